@@ -23,6 +23,8 @@ use tokio_util::sync::CancellationToken;
 
 /// Threads that write frame logs; they mostly wait for the disk.
 const COMMIT_THREADS: usize = 4;
+/// Recoveries that keep what they know while they wait, beside one for each that may work.
+const RECOVERIES_KEPT: u64 = 4;
 /// New sessions and cage jobs whose files are parsed at a time.
 const MAX_CONCURRENT_PARSING: u64 = 2;
 /// Sessions completed at a time: each reads all its frames and keeps a processor busy.
@@ -53,6 +55,8 @@ pub struct Service {
     pub(crate) designs: DesignPool,
     /// Recoveries that follow frames or are finished.
     pub(crate) recovering: Arc<Budget>,
+    /// Recoveries that keep what they know while they wait for frames or for their turn; each keeps a thread too.
+    pub(crate) recoveries_kept: Arc<Budget>,
     pub(crate) cage_maker: CageMaker,
     /// Uploaded files being parsed, which keeps a processor busy.
     pub(crate) reading: Arc<Budget>,
@@ -168,6 +172,7 @@ impl Service {
             unread,
             designs: DesignPool::new(&config, designer).map_err(StartError::Threads)?,
             recovering: config.budget(config.max_recoveries as u64),
+            recoveries_kept: config.budget(config.max_recoveries as u64 + RECOVERIES_KEPT),
             cage_maker: CageMaker::new(config.budget(config.max_preparing as u64), solvers.pool()),
             solvers,
             reading: config.budget(MAX_CONCURRENT_PARSING),

@@ -1,5 +1,6 @@
 //! What the options of a recovery say.
 
+use super::frames::MAX_FRAMES;
 use crate::coding::Goal;
 use crate::mismatch::Up;
 use crate::preparation::goal;
@@ -45,6 +46,11 @@ impl Choices {
             return refuse(
                 "frames: an animation has at least one frame; leave it out where it is not known".to_owned(),
             );
+        }
+        if let Some(frames) = options.frames.filter(|&frames| frames > MAX_FRAMES) {
+            return refuse(format!(
+                "frames: is {frames}, and a recovery has at most {MAX_FRAMES}; make one for each part of the sequence"
+            ));
         }
         let points = options.points.unwrap_or(DEFAULT_POINTS);
         if !POINTS.contains(&points) {

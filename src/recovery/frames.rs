@@ -16,6 +16,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
+/// Most frames of a recovery, an hour and more; each takes memory to its end.
+pub(super) const MAX_FRAMES: u32 = 100_000;
+/// Least bytes that a frame counts.
+const LEAST_BYTES: u64 = 4096;
+
 impl Service {
     /// Checks a frame and stores it, durably; the same frame again changes nothing. Runs to the end even if the client disconnects.
     ///
@@ -61,11 +66,14 @@ impl Service {
             if let Some(error) = closed(&job) {
                 return Err(error);
             }
-            let _reserved = service.reserve_frames(&tenant, part.bytes, 1)?;
+            // The end may have been declared while it was looked at.
+            expected(&job, frame, &part.name)?;
+            let counted = counted_bytes(&part);
+            let _reserved = service.reserve_frames(&tenant, counted, 1)?;
             let (store, id, kept) = (service.store.clone(), job.meta.id.clone(), part.clone());
             let stored = blocking(move || store.put_recovery_frame(&id, frame, &kept, &file.bytes)).await?;
             stored.map_err(|error| job.fail_if_damaged(&service.store, error))?;
-            job.bytes.fetch_add(part.bytes, Relaxed);
+            job.bytes.fetch_add(counted, Relaxed);
             let counter = metrics::counter!("cager_received_bytes_total", "tenant" => tenant.name.clone());
             counter.increment(part.bytes);
             job.progressed(|progress| {
@@ -111,6 +119,11 @@ impl Service {
     }
 }
 
+/// What a frame counts of a tenant's disk: a small one takes a block all the same, and memory.
+pub(super) fn counted_bytes(part: &StoredPart) -> u64 {
+    part.bytes.max(LEAST_BYTES)
+}
+
 /// Whether so many frames have been said already.
 fn may_end(job: &RecoveryJob, frames: u32) -> Result<bool, ApiError> {
     let refuse = |kind, detail: String| Err(ApiError::new(kind, detail));
@@ -144,6 +157,12 @@ fn expected(job: &RecoveryJob, frame: u32, name: &str) -> Result<(), ApiError> {
     if let Some(declared) = job.status().progress.declared.filter(|declared| frame >= *declared) {
         let detail = format!("frame {frame}: {name}: the recovery is being finished with {declared} frames");
         return Err(ApiError::new(problem::RECOVERY_COMPLETED, detail).frame(frame));
+    }
+    if frame >= MAX_FRAMES {
+        let detail = format!(
+            "frame {frame}: {name}: a recovery has at most {MAX_FRAMES} frames, which count from 0; make one for each part of the sequence"
+        );
+        return Err(ApiError::new(problem::INVALID_FRAME, detail).frame(frame).limit(u64::from(MAX_FRAMES)));
     }
     if let Some(frames) = job.meta.options.frames.filter(|frames| frame >= *frames) {
         let detail = format!(
@@ -179,9 +198,10 @@ fn check(job: &RecoveryJob, frame: u32, file: &NamedFile) -> Result<(), ApiError
     crate::origin::move_to(job.meta.origin, &mut model.points);
     let points = Choices::of(options, job.meta.parts.rig.is_some())?.recover.points;
     match observed(&model, frame as usize, points) {
-        Err(error) if !options.force => {
-            Err(refuse(format!("{}: {error}; or make the recovery with force to go on without such frames", file.name)))
-        }
+        Err(error) if !options.force => Err(refuse(format!(
+            "{}: {error}; or make the recovery with force (--force on the command line) to go on without such frames",
+            file.name
+        ))),
         _ => Ok(()),
     }
 }

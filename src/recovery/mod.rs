@@ -19,6 +19,7 @@ use crate::store::{RecoveryMeta, Store, StoreError, StoredPart};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Animations recovered from surfaces.
 pub(crate) struct Recovery;
@@ -42,6 +43,9 @@ impl Work for Recovery {
 
     fn load(store: &Store, job: &RecoveryJob) -> Result<(), StoreError> {
         let (frames, declared) = (store.recovery_frames(job.id())?, store.declared_recovery(job.id())?);
+        // Small frames count as much as when they came.
+        let more = frames.iter().map(|(_, part)| frames::counted_bytes(part) - part.bytes).sum();
+        job.bytes.fetch_add(more, Relaxed);
         job.progressed(|progress| {
             progress.declared = declared;
             progress.frames = frames.into_iter().collect();
@@ -60,7 +64,10 @@ impl Work for Recovery {
 
     fn enter(progress: &mut Progress, phase: &Phase<Finished>) {
         if phase.is_final() {
-            *progress = Progress { refined: progress.refined, ..Progress::default() };
+            progress.received = progress.frames.len() as u32;
+            progress.frames = BTreeMap::new();
+            // What followers have not heard yet; cages are in a file then.
+            progress.followed.iter_mut().for_each(|followed| followed.cage = Vec::new());
         }
     }
 }
@@ -70,6 +77,8 @@ impl Work for Recovery {
 pub(crate) struct Progress {
     /// Frames that are on disk.
     frames: BTreeMap<u32, StoredPart>,
+    /// How many there were when it was over, and kept its frames in mind no longer.
+    received: u32,
     /// How many are there from the first on without a gap.
     arrived: u32,
     /// How many there are in all, once it was said.

@@ -13,7 +13,7 @@ use crate::recover::{
     FirstLook, Person, RecoverError, RecoverJob, RecoverProgress, cage_around, manifold_of, recover, rig_of,
 };
 use crate::service::Service;
-use crate::store::{Kind, RecoveryParts, StoreError, Workshop};
+use crate::store::{RecoveryParts, StoreError, Workshop};
 use crate::sync::lock;
 use crate::tasks::blocking;
 use cager_core::cage::Cage;
@@ -24,6 +24,8 @@ use std::sync::Arc;
 enum Ended {
     Completed(Box<Finished>, Workshop),
     Failed(ApiError),
+    /// It ended the process too often; what was sent is kept.
+    GivenUp(ApiError),
     /// There is nothing to do for a while, the recovery was deleted, or the service is stopping.
     Paused,
 }
@@ -48,13 +50,7 @@ impl Service {
             };
             let (service, running) = (Arc::clone(&self), Arc::clone(&job));
             match blocking(move || service.recover(&running, place)).await.unwrap_or_else(Ended::Failed) {
-                // It does not count as an attempt.
-                Ended::Paused => {
-                    let (store, id) = (self.store.clone(), job.meta.id.clone());
-                    if let Ok(Err(error)) = blocking(move || store.uncount_attempt(Kind::Recovery, &id)).await {
-                        tracing::debug!(job = job.id(), %error, "the count of its beginnings stays");
-                    }
-                }
+                Ended::Paused => {}
                 Ended::Completed(finished, workshop) => {
                     let (id, files) = (job.meta.id.clone(), finished.files.clone());
                     let outcome = Outcome::Completed(finished);
@@ -75,7 +71,7 @@ impl Service {
                         .await;
                 }
                 // Errors that may be temporary are retried after a restart.
-                Ended::Failed(error) => return job.set_phase(Phase::Failed(error.problem)),
+                Ended::Failed(error) | Ended::GivenUp(error) => return job.set_phase(Phase::Failed(error.problem)),
             }
         }
     }
@@ -83,12 +79,26 @@ impl Service {
     /// Follows frames until there are none for a while, or to the end. Blocks.
     fn recover(self: Arc<Self>, job: &Arc<RecoveryJob>, place: Held) -> Ended {
         let source = StoredSurfaces::new(Arc::clone(&self), Arc::clone(job), place);
-        match self.recover_from(job, &source) {
+        match source.begin() {
+            Ok(true) => {}
+            Ok(false) => {
+                let detail = format!(
+                    "the service ended {MAX_ATTEMPTS} times while this recovery ran, without getting further, so it is given up; its frames are kept until it is deleted: restart the service with more memory, or make the recovery anew with a lighter template, or lighter frames"
+                );
+                tracing::warn!(job = job.id(), "a recovery that ended the service again and again is given up");
+                return Ended::GivenUp(ApiError::new(problem::RECOVERY_FAILED, detail));
+            }
+            Err(error) => return Ended::Failed(job.fail_if_damaged(&self.store, error)),
+        }
+        let ended = match self.recover_from(job, &source) {
             _ if source.is_stopped() => Ended::Paused,
             Ok(Some((finished, workshop))) => Ended::Completed(Box::new(finished), workshop),
             Ok(None) => Ended::Paused,
             Err(error) => Ended::Failed(lock(&source.failure).take().unwrap_or(error)),
-        }
+        };
+        // Here, since nothing new is begun when the service stops.
+        source.pause();
+        ended
     }
 
     fn recover_from(
@@ -98,12 +108,6 @@ impl Service {
     ) -> Result<Option<(Finished, Workshop)>, ApiError> {
         let (meta, pool) = (&job.meta, self.designs.threads());
         let damaged = |error: StoreError| job.fail_if_damaged(&self.store, error);
-        if self.store.count_attempt(Kind::Recovery, &meta.id).map_err(damaged)? > MAX_ATTEMPTS {
-            let detail = format!(
-                "the service ended {MAX_ATTEMPTS} times while this recovery ran, so it is given up; try a lighter template, or lighter frames"
-            );
-            return Err(ApiError::new(problem::INVALID_GEOMETRY, detail));
-        }
         let Choices { recover: options, person, goal } = Choices::of(&meta.options, meta.parts.rig.is_some())?;
         let RecoveryParts { template, cage, rig, manifold } = self.store.recovery_parts(meta).map_err(damaged)?;
         let mut model = read_part("template", &template.name, &template.bytes)?;
@@ -141,7 +145,7 @@ impl Service {
             options,
             scratch: workshop.path(),
         };
-        let recovered = match recover(recovering, &|told| job.told(told)) {
+        let recovered = match recover(recovering, &|told| job.told(source, told)) {
             Ok(recovered) => recovered,
             Err(RecoverError::Stopped) => return Ok(None),
             Err(error) => return Err(refused(&error)),
@@ -153,7 +157,10 @@ impl Service {
 
 impl RecoveryJob {
     /// Takes over what a run tells. A run begins with the first frame, and finds what the one before found.
-    fn told(&self, told: RecoverProgress<'_>) {
+    fn told(&self, source: &StoredSurfaces, told: RecoverProgress<'_>) {
+        if let RecoverProgress::Followed(FirstLook { frame, .. }) = told {
+            source.followed(frame as u32 + 1);
+        }
         self.progressed(|progress| match told {
             RecoverProgress::Followed(FirstLook { frame, cage, joints, score, outcome })
                 if frame == progress.followed.len() =>

@@ -1,7 +1,7 @@
 //! Recoveries as the service tells of them.
 
-use super::{Progress, RecoveryJob};
-use crate::jobs::Phase;
+use super::{Progress, Recovery, RecoveryJob};
+use crate::jobs::{Phase, Status};
 use crate::store::StoreError;
 use cager_proto::recovery_messages::{
     FollowedFrame, Recovery as View, RecoveryFrames, RecoveryProgress, RecoveryState,
@@ -19,24 +19,28 @@ pub(super) const CAGES: &str = "cages";
 impl RecoveryJob {
     /// The recovery as returned by the API.
     pub(crate) fn view(&self) -> View {
-        let status = self.status();
+        self.view_of(&self.status())
+    }
+
+    fn view_of(&self, status: &Status<Recovery>) -> View {
         let progress = &status.progress;
+        let vertices = progress.followed.first().map(|first| first.cage.len() as u32);
         let mut view = View {
             id: self.meta.id.clone(),
             name: self.meta.options.name.clone(),
             state: state_of(&status.phase, progress),
             created: self.meta.created_ms as f64 / 1e3,
             points: self.meta.points,
-            cage_vertices: progress.followed.first().map(|first| first.cage.len() as u32),
+            cage_vertices: vertices.filter(|&vertices| vertices > 0),
             origin: self.meta.origin,
             joints: self.meta.parts.rig.is_some(),
             frames: RecoveryFrames {
-                received: progress.frames.len() as u32,
+                received: progress.received.max(progress.frames.len() as u32),
                 followed: progress.followed.len() as u32,
                 refined: progress.refined,
                 lost: progress.followed.iter().filter(|frame| frame.outcome == "lost").count() as u32,
                 declared: progress.declared,
-                missing: missing(progress, None),
+                missing: if status.phase.is_final() { Vec::new() } else { missing(progress, None) },
             },
             container_bytes: None,
             warnings: Vec::new(),
@@ -58,10 +62,11 @@ impl RecoveryJob {
         view
     }
 
-    /// State and progress for server-sent events, with the frames from `told` on.
-    pub(crate) fn progress_from(&self, told: u32) -> RecoveryProgress {
-        let View { state, frames: RecoveryFrames { received, followed, refined, .. }, .. } = self.view();
+    /// State and progress for server-sent events, with the frames from `told` on, and whether nothing follows.
+    pub(crate) fn progress_from(&self, told: u32) -> (RecoveryProgress, bool) {
         let status = self.status();
+        let View { state, frames: RecoveryFrames { received, followed, refined, .. }, .. } = self.view_of(&status);
+        let is_last = status.phase.is_final() && status.progress.followed.len() <= told as usize + TOLD;
         let new = status.progress.followed.iter().enumerate().skip(told as usize).take(TOLD);
         let frames = new.map(|(frame, found)| FollowedFrame {
             frame: frame as u32,
@@ -69,7 +74,7 @@ impl RecoveryJob {
             joints: found.joints.clone(),
             outcome: found.outcome.to_owned(),
         });
-        RecoveryProgress { state, received, followed, refined, frames: frames.collect() }
+        (RecoveryProgress { state, received, followed, refined, frames: frames.collect() }, is_last)
     }
 
     /// Cages from frame `first` on, at most `most`, m × 12 bytes each, and the number of frames, once that is known: of the first pass, and of the

@@ -57,6 +57,18 @@ impl Store {
         self.set_attempts(kind, id, |before| before.saturating_sub(1)).map(|_| ())
     }
 
+    /// Sets the number of attempts to 0, after progress.
+    ///
+    /// # Errors
+    /// Not found where the job was deleted.
+    pub fn forget_attempts(&self, kind: Kind, id: &str) -> Result<(), StoreError> {
+        let path = self.folder(kind, id)?.join(ATTEMPTS);
+        match meta::read::<u32>(self.files(), &path, "attempts") {
+            Ok(None | Some(0)) => Ok(()),
+            _ => self.set_attempts(kind, id, |_| 0).map(|_| ()),
+        }
+    }
+
     fn set_attempts(&self, kind: Kind, id: &str, change: impl FnOnce(u32) -> u32) -> Result<u32, StoreError> {
         let path = self.folder(kind, id)?.join(ATTEMPTS);
         // An unreadable counter restarts at 0.

@@ -92,6 +92,7 @@ impl JobMeta for RecoveryMeta {
 const META: &str = "recovery.json";
 const TEMPLATE: &str = "template";
 const COMPLETE: &str = "complete.json";
+const REACHED: &str = "reached.json";
 const FRAME: &str = "frame-";
 /// Most bytes before the content of a frame's file: a name and a digest.
 const HEAD_BYTES: u64 = 4096;
@@ -224,6 +225,23 @@ impl Store {
         meta::read(self.files(), &self.folder(Kind::Recovery, id)?.join(COMPLETE), "completion")
     }
 
+    /// How many frames of a recovery were ever followed, as far as was noted.
+    pub fn reached_recovery(&self, id: &str) -> Result<u32, StoreError> {
+        let path = self.folder(Kind::Recovery, id)?.join(REACHED);
+        // An unreadable number restarts at 0.
+        Ok(meta::read(self.files(), &path, "progress").ok().flatten().unwrap_or(0))
+    }
+
+    /// Notes durably that more frames than ever before were followed, so that the attempts before count no longer.
+    ///
+    /// # Errors
+    /// Not found where it was deleted.
+    pub fn note_reached_recovery(&self, id: &str, frames: u32) -> Result<(), StoreError> {
+        let path = self.folder(Kind::Recovery, id)?.join(REACHED);
+        self.files().replace(&path, &meta::wrap(&path, "progress", &frames)?)?;
+        self.forget_attempts(Kind::Recovery, id)
+    }
+
     /// A new folder for what is being made.
     pub fn workshop(&self) -> Result<Workshop, StoreError> {
         let path = self.files().temporary("workshop");
@@ -265,7 +283,7 @@ impl Store {
         let folder = self.folder(Kind::Recovery, id);
         let frames = folder.and_then(|folder| frame_names(self.files(), &folder)).unwrap_or_default();
         self.forget_files(Kind::Recovery, id, frames);
-        self.forget_files(Kind::Recovery, id, [TEMPLATE, "cage", "rig", "manifold", COMPLETE, ATTEMPTS]);
+        self.forget_files(Kind::Recovery, id, [TEMPLATE, "cage", "rig", "manifold", COMPLETE, ATTEMPTS, REACHED]);
     }
 }
 

@@ -57,6 +57,8 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_preparing").set(service.solvers.in_flight() as f64);
     metrics::gauge!("cager_designing").set(service.cage_jobs.unfinished() as f64);
     metrics::gauge!("cager_recovering").set(service.recoveries.unfinished() as f64);
+    let kept = service.recovering.used() + service.recoveries_kept.used();
+    metrics::gauge!("cager_recoveries_in_memory").set(kept as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "designs").set(service.designs.bytes() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "downloads").set(service.download_memory.used() as f64);
@@ -116,6 +118,7 @@ fn describe() {
         "Cage designs that ended, by result: completed, failed, or known from an earlier one"
     );
     describe_gauge!("cager_recovering", "Recoveries that are not over");
+    describe_gauge!("cager_recoveries_in_memory", "Recoveries that work, or wait with all they know in memory");
     describe_counter!("cager_recoveries_total", "Recoveries that ended, by result: completed or failed");
     describe_counter!("cager_recovered_frames_total", "Frames of recoveries that were followed, by tenant");
     describe_histogram!("cager_design_seconds", Unit::Seconds, "Designing a cage");

@@ -29,14 +29,13 @@ pub(crate) async fn get(
     let (changes, deleted) = (job.changes(), job.deleted().clone());
     let look = move |heard: Option<&str>| {
         let told = heard.and_then(|id| id.split('.').next()?.parse().ok()).unwrap_or(0);
-        let progress = job.progress_from(told);
+        let (progress, last) = job.progress_from(told);
         let up_to = progress.frames.last().map_or(told, |frame| frame.frame + 1);
-        let is_final = progress.state.is_final();
         let state = serde_json::to_value(progress.state).unwrap_or_default();
         ProgressEvent {
             id: format!("{up_to}.{}.{}.{}", state.as_str().unwrap_or_default(), progress.received, progress.refined),
             data: serde_json::to_string(&progress).unwrap_or_default(),
-            last: is_final,
+            last,
         }
     };
     Ok(progress::stream(service, place, &headers, ProgressSource { changes, deleted, look: Box::new(look) }))

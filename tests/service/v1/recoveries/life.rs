@@ -1,6 +1,6 @@
 //! Recoveries are repeated, listed, deleted and counted as sessions are.
 
-use super::{FRAMES, create, created, post, scans, until};
+use super::{FRAMES, complete, create, created, post, recovery, scans, until};
 use crate::support::TestApp;
 use cager_proto::recovery_messages::{Recovery, RecoveryList};
 use serde_json::json;
@@ -56,4 +56,42 @@ async fn tenants_have_recoveries_and_quotas_of_their_own() {
     create(&bert, scans().form(&json!({})), None).await.problem(429, "too-many-sessions");
     post(&bert, &own.id, 0, scans().parts(0..FRAMES)).await.problem(507, "quota-exceeded");
     post(&anna, &job.id, 0, scans().parts(0..FRAMES)).await.expect(200);
+}
+
+#[tokio::test]
+async fn no_frame_is_acknowledged_beyond_the_end_that_was_declared_meanwhile() {
+    let app = TestApp::start();
+    for _ in 0..5 {
+        let job = created(&app, &json!({"points": 800})).await;
+        post(&app, &job.id, 0, scans().parts(0..1)).await.expect(200);
+        let (beyond, end) = tokio::join!(post(&app, &job.id, 1, scans().parts(1..2)), async {
+            tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+            complete(&app, &job.id, 1).await
+        });
+        assert!(beyond.status != 200 || end.status != 202, "both a frame and an end before it were taken");
+        let found = recovery(&app, &job.id).await.frames;
+        assert_eq!(found.received, if beyond.status == 200 { 2 } else { 1 });
+        app.delete(&format!("/v1/recoveries/{}", job.id)).await.expect(204);
+    }
+}
+
+#[tokio::test]
+async fn only_some_of_many_recoveries_that_wait_are_kept_in_memory() {
+    let app = TestApp::start();
+    let mut jobs = Vec::new();
+    for _ in 0..40 {
+        let job = created(&app, &json!({"points": 200})).await;
+        post(&app, &job.id, 0, scans().parts(0..1)).await.expect(200);
+        assert!(app.metric("cager_recoveries_in_memory").await <= 6.0);
+        jobs.push(job.id);
+    }
+    for id in &jobs {
+        until(&app, id, |recovery| recovery.frames.followed == 1).await;
+    }
+    assert!(app.metric("cager_recoveries_in_memory").await <= 6.0);
+    // Also one that is not kept goes on when its next frame comes.
+    for id in [&jobs[0], &jobs[39]] {
+        post(&app, id, 1, scans().parts(1..2)).await.expect(200);
+        until(&app, id, |recovery| recovery.frames.followed == 2).await;
+    }
 }

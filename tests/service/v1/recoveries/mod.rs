@@ -134,6 +134,19 @@ async fn completed(api: &Api, id: &str) -> Recovery {
     until(api, id, |recovery| recovery.state == RecoveryState::Completed).await
 }
 
+/// Waits until a recovery has failed.
+async fn failed(api: &Api, id: &str) -> Recovery {
+    let clock = Instant::now();
+    loop {
+        let found = recovery(api, id).await;
+        if found.state == RecoveryState::Failed {
+            return found;
+        }
+        assert!(!found.state.is_final() && clock.elapsed() < PATIENCE, "{found:?}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
 async fn container(api: &Api, id: &str) -> Vec<u8> {
     api.get(&format!("/v1/recoveries/{id}/capture.cager")).await.expect(200).body.to_vec()
 }

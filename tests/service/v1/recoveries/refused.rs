@@ -37,6 +37,7 @@ async fn templates_rigs_and_options_that_cannot_be_used_are_refused_at_once() {
         (json!({"max_error": 2.0}), "max_error"),
         (json!({"max_error": 0.1, "quality": "preview"}), "give one of them"),
         (json!({"frames": 0}), "frames"),
+        (json!({"frames": 100_001}), "at most 100000"),
         (json!({"pints": 3}), "pints"),
         (json!({"align": "maybe"}), "maybe"),
     ] {
@@ -74,6 +75,8 @@ async fn frames_without_a_surface_are_refused_by_number_and_name_and_those_befor
         assert!(name == "b" || problem.detail.contains(name), "{}", problem.detail);
         assert_eq!(recovery(&app, &job.id).await.frames.received, 1);
     }
+    let beyond = post(&app, &job.id, 100_000, scans().parts(3..4)).await.problem(422, "invalid-frame");
+    assert!(beyond.detail.contains("at most 100000 frames"), "{}", beyond.detail);
     let beyond = post(&app, &job.id, 3, scans().parts(3..4)).await.problem(422, "invalid-frame");
     assert!(beyond.detail.contains("beyond the 3 frames"), "{}", beyond.detail);
     post(&app, &job.id, 0, Form::new()).await.problem(400, "bad-request");

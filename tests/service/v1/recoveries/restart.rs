@@ -1,8 +1,7 @@
 //! Recoveries and restarts.
 
-use super::{FRAMES, complete, completed, container, created, post, recovery, scans, until};
+use super::{FRAMES, complete, completed, container, created, failed, post, recovery, scans, until};
 use crate::support::TestApp;
-use cager_proto::recovery_messages::RecoveryState;
 use serde_json::json;
 
 #[tokio::test]
@@ -37,6 +36,55 @@ async fn a_killed_service_keeps_every_frame_it_acknowledged_and_makes_the_same_f
 }
 
 #[tokio::test]
+async fn a_recovery_that_waits_for_a_frame_outlives_any_number_of_restarts() {
+    let scans = scans();
+    for kills in [false, true] {
+        let mut app = TestApp::start();
+        let job = created(&app, &json!({"points": 800})).await;
+        post(&app, &job.id, 0, scans.parts(0..2)).await.expect(200);
+        for _ in 0..6 {
+            until(&app, &job.id, |recovery| recovery.frames.followed == 2).await;
+            if kills {
+                app.kill();
+            } else {
+                app.terminate();
+                app.ended().await;
+            }
+            app = app.again();
+        }
+        let found = recovery(&app, &job.id).await;
+        assert_eq!((found.frames.received, found.problem), (2, None), "killed: {kills}");
+        post(&app, &job.id, 2, scans.parts(2..FRAMES)).await.expect(200);
+        complete(&app, &job.id, FRAMES).await.expect(202);
+        completed(&app, &job.id).await;
+        let made = container(&app, &job.id).await;
+        assert!(made == scans.recovered("--points 800"), "another file than that of the command line");
+    }
+}
+
+#[tokio::test]
+async fn a_recovery_that_ends_the_service_again_and_again_is_given_up_and_keeps_its_frames() {
+    let mut app = TestApp::start();
+    let job = created(&app, &json!({"points": 800})).await;
+    post(&app, &job.id, 0, scans().parts(0..2)).await.expect(200);
+    until(&app, &job.id, |recovery| recovery.frames.followed == 2).await;
+    app.kill();
+    // As many beginnings as are allowed, none of which came as far as the one before.
+    let folder = app.data().join("recoveries").join(&job.id);
+    let wrapped = |kind: &str, body: &str| {
+        let checksum = blake3::hash(body.as_bytes()).to_hex();
+        format!("{{\"format\":1,\"kind\":\"{kind}\",\"blake3\":\"{checksum}\",\"body\":{body}}}\n")
+    };
+    std::fs::write(folder.join("attempts.json"), wrapped("attempts", "5")).expect("a file");
+    let app = app.again();
+    let failed = failed(&app, &job.id).await;
+    assert!(failed.problem.is_some_and(|problem| problem.detail.contains("given up")));
+    assert_eq!((failed.frames.received, folder.join("frame-1").exists()), (2, true));
+    app.delete(&format!("/v1/recoveries/{}", job.id)).await.expect(204);
+    assert!(!folder.exists());
+}
+
+#[tokio::test]
 async fn a_damaged_frame_fails_the_recovery_and_goes_to_quarantine() {
     let mut app = TestApp::start();
     let job = created(&app, &json!({"points": 800})).await;
@@ -48,17 +96,7 @@ async fn a_damaged_frame_fails_the_recovery_and_goes_to_quarantine() {
     bytes[middle] ^= 1;
     std::fs::write(&path, bytes).expect("a frame");
     let app = app.again();
-    let failed = {
-        let clock = std::time::Instant::now();
-        loop {
-            let found = recovery(&app, &job.id).await;
-            if found.state == RecoveryState::Failed {
-                break found;
-            }
-            assert!(clock.elapsed() < super::PATIENCE, "{found:?}");
-            tokio::time::sleep(std::time::Duration::from_millis(20)).await;
-        }
-    };
+    let failed = failed(&app, &job.id).await;
     assert!(failed.problem.is_some_and(|problem| problem.detail.contains("quarantine")));
     assert!(!path.exists());
     post(&app, &job.id, 1, scans().parts(1..2)).await.problem(409, "recovery-failed");

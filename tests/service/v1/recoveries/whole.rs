@@ -66,6 +66,7 @@ async fn what_is_recovered_is_byte_for_byte_what_the_command_line_recovers() {
     assert_eq!(following.await.expect("a stream").len(), FRAMES as usize * stride);
     let told = progress(&events.await.expect("a stream"));
     let frames: Vec<&FollowedFrame> = told.iter().flat_map(|progress| &progress.frames).collect();
+    assert_eq!(frames.len(), FRAMES as usize, "{told:?}");
     assert!(frames.iter().enumerate().all(|(k, frame)| frame.frame == k as u32), "{frames:?}");
     assert!(frames.iter().all(|frame| frame.score.is_some_and(|score| score < 0.1)), "{frames:?}");
     assert_eq!(told.last().map(|progress| progress.state), Some(RecoveryState::Completed));
