@@ -60,8 +60,20 @@ impl Service {
     ) {
         let (store, id, kept) = (self.store.clone(), job.id().to_owned(), outcome.clone());
         let stored = blocking(move || write(&store, &kept).map(|()| store.bytes(kind_of::<W>(), &id).ok()));
-        match stored.await {
-            _ if job.is_going() => return,
+        let stored = stored.await;
+        let mut changes = job.changes();
+        // One that cannot be deleted is over all the same.
+        loop {
+            changes.mark_unchanged();
+            if !job.is_going() {
+                break;
+            }
+            tokio::select! {
+                () = job.deleted().cancelled() => return,
+                _ = changes.changed() => {}
+            }
+        }
+        match stored {
             Ok(Ok(Some(bytes))) => job.bytes.store(bytes, Relaxed),
             Ok(Ok(None)) => {}
             Ok(Err(error)) => {

@@ -93,7 +93,7 @@ impl Person<'_> {
             Ok(())
         })?;
         if numbers.is_empty() {
-            let first = "its file was there when it was looked at first".to_owned();
+            let first = "it held a surface when it was looked at first, and was changed since".to_owned();
             return Err(RecoverError::NoSurface { frames, first });
         }
         let mut back = tracker.back();

@@ -16,7 +16,7 @@ use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{Error, FrameReader, Target};
 use cager_geometry::mesh::{Point, TriMesh};
 use std::fs::File;
-use std::io;
+use std::io::{self, BufWriter, Write as _};
 
 /// Why results cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -86,8 +86,12 @@ pub(super) fn results(
         write("joints.csv", joints.csv(&numbers).as_bytes())?;
         write("joints.bvh", &joints.bvh(options.frame_rate.unwrap_or(JOINTS_RATE)))?;
     }
-    let single = cages.iter().flat_map(|cage| cage.as_flattened()).flat_map(|&x| (x as f32).to_le_bytes());
-    write(CAGES, &single.collect::<Vec<u8>>())?;
+    let mut out = BufWriter::new(File::create_new(workshop.path().join(CAGES))?);
+    for x in cages.iter().flat_map(|cage| cage.as_flattened()) {
+        out.write_all(&(*x as f32).to_le_bytes())?;
+    }
+    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_data()?;
+    files.push(described(workshop, CAGES)?);
     Ok(Finished {
         frames: cages.len() as u32,
         lost: report.lost.len() as u32,
@@ -138,11 +142,11 @@ impl<F: FrameReader> FrameReader for Stoppable<'_, F> {
 pub(super) fn refused(error: &RecoverError) -> ApiError {
     let detail = match error {
         RecoverError::Turned { path, degrees } => format!(
-            "{}: the template lies on this first surface better when it is turned by {degrees:.0} degrees; make the recovery anew with align auto, with up where another axis points up, or with force to go on as it is",
+            "{}: the template lies on this first surface better when it is turned by {degrees:.0} degrees; make the recovery anew with align auto, with up where another axis points up, or with force to go on as it is (--align, --up and --force on the command line)",
             path.display()
         ),
         RecoverError::OtherSize { path, scale } => format!(
-            "{}: this first surface is {scale:.3} times as large as the template; make the recovery anew with scale auto, or with force to go on as it is",
+            "{}: this first surface is {scale:.3} times as large as the template; make the recovery anew with scale auto, or with force to go on as it is (--scale auto and --force on the command line)",
             path.display()
         ),
         other => other.to_string(),

@@ -88,6 +88,7 @@ impl Service {
                 tracing::warn!(job = job.id(), "a recovery that ended the service again and again is given up");
                 return Ended::GivenUp(ApiError::new(problem::RECOVERY_FAILED, detail));
             }
+            Err(_) if source.is_stopped() => return Ended::Paused,
             Err(error) => return Ended::Failed(job.fail_if_damaged(&self.store, error)),
         }
         let ended = match self.recover_from(job, &source) {

@@ -1,6 +1,6 @@
 //! Recoveries as the service tells of them.
 
-use super::{Progress, Recovery, RecoveryJob};
+use super::{Finished, Progress, Recovery, RecoveryJob};
 use crate::jobs::{Phase, Status};
 use crate::store::StoreError;
 use cager_proto::recovery_messages::{
@@ -77,27 +77,29 @@ impl RecoveryJob {
         (RecoveryProgress { state, received, followed, refined, frames: frames.collect() }, is_last)
     }
 
-    /// Cages from frame `first` on, at most `most`, m × 12 bytes each, and the number of frames, once that is known: of the first pass, and of the
-    /// whole when the recovery is completed. Blocks.
+    /// Cages of the first pass from frame `first` on, at most `most`, m × 12 bytes each, and the number of frames, once that is known; nothing when the
+    /// recovery is over.
+    pub(crate) fn first_cages(&self, first: u32, most: u32) -> Option<(Vec<u8>, Option<u32>)> {
+        let status = self.status();
+        let progress = &status.progress;
+        if status.phase.is_final() {
+            return None;
+        }
+        let found = progress.followed.iter().skip(first as usize).take(most as usize);
+        let bytes = found.flat_map(|found| found.cage.as_flattened()).flat_map(|x| x.to_le_bytes());
+        Some((bytes.collect(), progress.declared))
+    }
+
+    /// Cages of a completed recovery from frame `first` on, at most `most`, m × 12 bytes each; none after the last. Blocks.
     ///
     /// # Errors
     /// The file of all cages cannot be read.
-    pub(crate) fn cages(
+    pub(crate) fn final_cages(
         &self,
         store: &crate::store::Store,
-        first: u32,
-        most: u32,
-    ) -> Result<(Vec<u8>, Option<u32>), StoreError> {
-        let finished = {
-            let status = self.status();
-            let progress = &status.progress;
-            let Phase::Completed(finished) = &status.phase else {
-                let found = progress.followed.iter().skip(first as usize).take(most as usize);
-                let bytes = found.flat_map(|found| found.cage.as_flattened()).flat_map(|x| x.to_le_bytes());
-                return Ok((bytes.collect(), progress.declared));
-            };
-            finished.clone()
-        };
+        finished: &Finished,
+        (first, most): (u32, u32),
+    ) -> Result<Vec<u8>, StoreError> {
         let path = store.recovery_file(&self.meta.id, CAGES)?;
         let stride = 12 * u64::from(finished.cage_vertices);
         let count = most.min(finished.frames.saturating_sub(first));
@@ -108,11 +110,11 @@ impl RecoveryJob {
             file.read_exact(&mut bytes)
         };
         read().map_err(|error| StoreError::of(&path, "read", error))?;
-        Ok((bytes, Some(finished.frames)))
+        Ok(bytes)
     }
 }
 
-fn state_of(phase: &Phase<super::Finished>, progress: &Progress) -> RecoveryState {
+fn state_of(phase: &Phase<Finished>, progress: &Progress) -> RecoveryState {
     match phase {
         Phase::Completed(_) => RecoveryState::Completed,
         Phase::Failed(_) => RecoveryState::Failed,

@@ -1,6 +1,6 @@
 //! Recovery by a service: the same files in, the same container out.
 
-use super::{RemoteError, mesh_file};
+use super::{RemoteError, clean_up, mesh_file};
 use cager_client::recovery_messages::{Recovery, RecoveryProgress, RecoveryState};
 use cager_client::{Client, NewRecovery};
 use cager_formats::AtomicFile;
@@ -55,7 +55,12 @@ async fn recover(
     job.new.idempotency_key = Some(key(&job.new, job.files));
     let begun = client.create_recovery(&job.new).await?;
     let id = begun.id.clone();
-    let ended = follow(&client, begun, job.files, progress).await?;
+    let followed = follow(&client, begun, job.files, progress).await;
+    if followed.as_ref().is_err_and(is_refusal) {
+        // The same again would be refused again.
+        clean_up(&client, async |client| client.delete_recovery(&id).await).await;
+    }
+    let ended = followed?;
     if ended.state == RecoveryState::Completed {
         for (name, out) in job.outputs {
             client.download_recovered(&id, name, out).await?;
@@ -65,6 +70,16 @@ async fn recover(
     match ended.problem {
         Some(problem) => Err(RemoteError::Recovery(problem.detail)),
         None => Ok(ended),
+    }
+}
+
+/// Whether the service refuses what was sent, so that what it has is of no use.
+fn is_refusal(error: &RemoteError) -> bool {
+    match error {
+        RemoteError::Client(error) => {
+            error.status().is_some_and(|status| (400..500).contains(&status) && ![408, 429].contains(&status))
+        }
+        _ => false,
     }
 }
 
@@ -104,8 +119,11 @@ fn key(new: &NewRecovery, files: &[PathBuf]) -> String {
     let mut digest = blake3::Hasher::new();
     // Whatever else is written, a digest takes it.
     let _ = write!(digest, "{:?}", new.options);
-    for part in [Some(&new.template), new.cage.as_ref()].into_iter().flatten().chain(new.person.iter().flatten()) {
-        digest.update(&(part.bytes.len() as u64).to_le_bytes()).update(&part.bytes);
+    let person = new.person.iter().flat_map(|[rig, manifold]| [("rig", rig), ("manifold", manifold)]);
+    let cage = new.cage.iter().map(|cage| ("cage", cage));
+    for (name, part) in [("template", &new.template)].into_iter().chain(cage).chain(person) {
+        let _ = write!(digest, "{name} {:?} {} ", part.name, part.bytes.len());
+        digest.update(&part.bytes);
     }
     for path in files {
         let found = std::fs::metadata(path).ok();

@@ -6,7 +6,7 @@ use crate::http::extract::{Query, RequestedJob};
 use crate::http::openapi;
 use crate::jobs::Phase;
 use crate::problem::{self, ApiError};
-use crate::recovery::{Recovery, RecoveryJob};
+use crate::recovery::{Finished, Recovery, RecoveryJob};
 use crate::service::Service;
 use crate::tasks::blocking;
 use axum::body::Body;
@@ -32,7 +32,8 @@ pub(crate) struct CagesQuery {
     first: u32,
     /// Number of frames; all that are there where it is left out.
     count: Option<u32>,
-    /// Keep the stream open for frames still to be followed, in order, to the last one.
+    /// Keep the stream open for frames still to be followed, in order, to the last one. It breaks off where the recovery is completed before all cages
+    /// of the first pass are sent, since the final ones are others.
     #[serde(default)]
     follow: bool,
 }
@@ -63,9 +64,8 @@ pub(crate) async fn get(
             format!("{there} of the {count} frames from {first} on are followed; request fewer, or use follow=true");
         return Err(ApiError::new(problem::FRAMES_MISSING, detail));
     }
-    if let Ok(finished) = job.finished()
-        && !follow
-    {
+    let finished = job.finished().ok();
+    if let Some(finished) = finished.as_ref().filter(|_| !follow) {
         let stride = 12 * u64::from(finished.cage_vertices);
         let begin = stride * u64::from(first);
         let bytes = begin..begin + stride * u64::from(count.unwrap_or(there));
@@ -76,7 +76,7 @@ pub(crate) async fn get(
         (None, true) => None,
         (None, false) => Some(first + there),
     };
-    let following = Following { service, job, next: first, end, _place: place };
+    let following = Following { service, job, finished, next: first, end, _place: place };
     let stream = futures_util::stream::unfold(Some(following), |following| async move {
         let mut following = following?;
         match following.piece().await {
@@ -93,6 +93,8 @@ pub(crate) async fn get(
 struct Following {
     service: Arc<Service>,
     job: Arc<RecoveryJob>,
+    /// What is completed already: its cages are the final ones. Others get those of the first pass, and never both.
+    finished: Option<Box<Finished>>,
     next: u32,
     /// The frame after the last one, where that is known.
     end: Option<u32>,
@@ -109,19 +111,14 @@ impl Following {
             if left == 0 || self.job.deleted().is_cancelled() {
                 return Ok(None);
             }
-            if matches!(self.job.status().phase, Phase::Failed(_)) {
-                return Err(io::Error::other("the recovery failed"));
-            }
-            let (job, store, next) = (Arc::clone(&self.job), self.service.store.clone(), self.next);
-            let read =
-                blocking(move || job.cages(&store, next, left).map_err(|error| job.fail_if_damaged(&store, error)));
-            let (cages, total) = read.await.map_err(io::Error::from)??;
+            let (cages, is_last) = self.read(left).await?;
             if !cages.is_empty() {
-                let stride = 12 * self.job.view().cage_vertices.unwrap_or(1);
+                let vertices = self.finished.as_ref().map(|finished| finished.cage_vertices);
+                let stride = 12 * vertices.or(self.job.view().cage_vertices).unwrap_or(1);
                 self.next += cages.len() as u32 / stride.max(1);
                 return Ok(Some(cages.into()));
             }
-            if total.is_some_and(|total| self.next >= total) {
+            if is_last {
                 return Ok(None);
             }
             tokio::select! {
@@ -129,6 +126,26 @@ impl Following {
                 () = self.job.deleted().cancelled() => return Ok(None),
                 () = self.service.stopping().cancelled() => return Err(io::Error::other("the service is stopping")),
             }
+        }
+    }
+
+    /// Cages that are there of the next frames, and whether there are none after the last.
+    async fn read(&self, most: u32) -> io::Result<(Vec<u8>, bool)> {
+        let (job, store, next) = (Arc::clone(&self.job), self.service.store.clone(), self.next);
+        if let Some(finished) = self.finished.clone() {
+            let read = blocking(move || {
+                let read = job.final_cages(&store, &finished, (next, most));
+                read.map_err(|error| job.fail_if_damaged(&store, error))
+            });
+            return Ok((read.await.map_err(io::Error::from)??, true));
+        }
+        if let Some((cages, total)) = blocking(move || job.first_cages(next, most)).await.map_err(io::Error::from)? {
+            return Ok((cages, total.is_some_and(|total| next >= total)));
+        }
+        match self.job.finished() {
+            Ok(finished) if next >= finished.frames => Ok((Vec::new(), true)),
+            Ok(_) => Err(io::Error::other("the recovery is completed, and its cages are other ones now")),
+            Err(_) => Err(io::Error::other("the recovery failed")),
         }
     }
 }

@@ -16,6 +16,7 @@ use axum::extract::{Request, State};
 use cager_proto::recovery_messages::{PostedFrame, PostedFrames};
 use serde::Deserialize;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 use tokio::time::timeout;
 
 /// The query of an upload.
@@ -45,9 +46,8 @@ pub(crate) async fn post(
     let FormHeader { patience, .. } = multipart::check_form_header(&service, &request, "frame, one for each", limit)?;
     let _place = service.stream(&tenant)?;
     let (pace, request) = Paced::new(request);
-    let receiver = Receiver { service, tenant, job: Arc::clone(&job), pace: pace.clone() };
-    let reading = receiver.read(request, query.first);
-    let frames = pace.finish(timeout(patience, reading).await.map_err(|_| too_slow())?)?;
+    let mut receiver = Receiver { service, tenant, job: Arc::clone(&job), pace: pace.clone(), patience };
+    let frames = pace.finish(receiver.read(request, query.first).await)?;
     Ok(Json(PostedFrames { frames, received: job.view().frames.received }))
 }
 
@@ -56,13 +56,23 @@ struct Receiver {
     tenant: Arc<Tenant>,
     job: Arc<RecoveryJob>,
     pace: Paced,
+    /// How long the client may still take to send; what the service does meanwhile is its own affair.
+    patience: Duration,
+}
+
+/// What a client sends, within the time that is left for it.
+async fn in_time<T>(patience: &mut Duration, sent: impl Future<Output = T>) -> Result<T, ApiError> {
+    let clock = Instant::now();
+    let sent = timeout(*patience, sent).await.map_err(|_| too_slow())?;
+    *patience = patience.saturating_sub(clock.elapsed());
+    Ok(sent)
 }
 
 impl Receiver {
-    async fn read(&self, request: Request, first: u32) -> Result<Vec<PostedFrame>, ApiError> {
-        let mut body = form(request).await?;
+    async fn read(&mut self, request: Request, first: u32) -> Result<Vec<PostedFrame>, ApiError> {
+        let mut body = in_time(&mut self.patience, form(request)).await??;
         let (mut frames, mut left) = (Vec::new(), self.service.config.max_frames_bytes);
-        while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
+        while let Some(field) = in_time(&mut self.patience, body.next_field()).await?.map_err(|e| broken(&e))? {
             let part = field.name().unwrap_or_default();
             if part != "frame" {
                 return Err(bad(format!("part {part:?} is unknown; send frame, once for each")));
@@ -78,7 +88,12 @@ impl Receiver {
         Ok(frames)
     }
 
-    async fn read_file(&self, mut field: Field<'_>, frame: u32, left: &mut u64) -> Result<(NamedFile, Held), ApiError> {
+    async fn read_file(
+        &mut self,
+        mut field: Field<'_>,
+        frame: u32,
+        left: &mut u64,
+    ) -> Result<(NamedFile, Held), ApiError> {
         let name = file_name(&field);
         if !name.contains('.') || name.chars().count() > NAME_CHARACTERS {
             let detail = format!(
@@ -89,7 +104,7 @@ impl Receiver {
         let mut room = self.service.upload_memory.nothing(&self.tenant.name);
         let limit = self.service.config.max_rest_bytes;
         let mut bytes = Vec::new();
-        while let Some(chunk) = self.pace.chunk(&mut field).await? {
+        while let Some(chunk) = in_time(&mut self.patience, self.pace.chunk(&mut field)).await?? {
             let together = (bytes.len() + chunk.len()) as u64;
             *left = left.checked_sub(chunk.len() as u64).ok_or_else(|| {
                 let limit = self.service.config.max_frames_bytes;

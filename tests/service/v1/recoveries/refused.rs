@@ -2,8 +2,10 @@
 
 use super::{create, created, post, recovery, scans};
 use crate::support::{TestApp, file, text};
+use cager_proto::recovery_messages::RecoveryList;
 use reqwest::multipart::Form;
 use serde_json::json;
+use std::process::{Command, Stdio};
 
 #[tokio::test]
 async fn templates_rigs_and_options_that_cannot_be_used_are_refused_at_once() {
@@ -82,4 +84,28 @@ async fn frames_without_a_surface_are_refused_by_number_and_name_and_those_befor
     post(&app, &job.id, 0, Form::new()).await.problem(400, "bad-request");
     let other = Form::new().part("mesh", file("a.ply", &good.1));
     post(&app, &job.id, 0, other).await.problem(400, "bad-request");
+}
+
+#[tokio::test]
+async fn the_command_line_leaves_nothing_on_a_service_that_refuses_a_frame() {
+    let app = TestApp::start();
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).expect("a file");
+    write("rest.obj", &scans().template);
+    write("scan_1.ply", &scans().frames[0].1);
+    write("scan_2.ply", b"nothing");
+    write("scan_3.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    for (pattern, said) in [("scan_*.ply", "scan_2.ply"), ("scan_3.obj", "--force")] {
+        let done = Command::new(env!("CARGO_BIN_EXE_cager"))
+            .args(["recover", "--template", "rest.obj", "--points", "800", "-o", "out.cager", "--frames", pattern])
+            .args(["--server", &format!("http://{}", app.address)])
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .output()
+            .expect("the program runs");
+        let told = String::from_utf8_lossy(&done.stderr);
+        assert!(!done.status.success() && told.contains(said), "{told}");
+        let list: RecoveryList = app.get("/v1/recoveries").await.is(200);
+        assert!(list.recoveries.is_empty(), "{list:?}");
+    }
 }
