@@ -35,6 +35,13 @@ fn what_is_written_is_read_back_exactly() {
 }
 
 #[test]
+fn a_mark_of_byte_order_and_labels_without_a_blank_are_read() {
+    let text = ARM.replace("Frames: 2", "Frames:2").replace("Frame Time: .01", "frame time:.01");
+    assert_eq!(read(&format!("\u{feff}{text}")).unwrap(), read(ARM).unwrap());
+    assert!(read(&ARM.replace("Frames: 2", "Frames2")).is_err());
+}
+
+#[test]
 fn what_is_wrong_is_named_with_its_line() {
     let cases = [
         ("HIERARCHY", "MESH", "does not begin with HIERARCHY"),

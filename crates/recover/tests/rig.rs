@@ -61,4 +61,7 @@ fn what_is_wrong_with_a_rig_file_is_named() {
         place(&ball, &PlacementOptions::default()).unwrap_err(),
         RigError::NoSurface { points: 4, faces: 1 }
     ));
+    let ball = TriMesh { vertices: vec![[0.0; 3]; 100], triangles: vec![[0, 1, 2]; 100] };
+    let upwards = PlacementOptions { forward: Some([0.0, -1.0, 0.0]), ..Default::default() };
+    assert!(matches!(place(&ball, &upwards).unwrap_err(), RigError::ForwardIsUp));
 }

@@ -65,7 +65,7 @@ fn wrong_count(line: usize, found: usize, channels: usize) -> Fault {
 
 fn label(text: &mut Words<'_>, expected: &[&[u8]]) -> Result<(), Fault> {
     for &expected in expected {
-        let Some(word) = text.next() else {
+        let Some(word) = text.next_label(expected) else {
             return Err(Fault::damaged(format!(
                 "ends after line {}, before its frames; copy or export the file again",
                 text.number()

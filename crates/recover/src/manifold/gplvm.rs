@@ -62,12 +62,25 @@ impl From<Gplvm> for Stored {
 }
 
 impl TryFrom<Stored> for Gplvm {
-    type Error = ManifoldError;
+    /// What is wrong with a file, for [`ManifoldError::Syntax`].
+    type Error = String;
 
-    fn try_from(stored: Stored) -> Result<Self, ManifoldError> {
+    fn try_from(stored: Stored) -> Result<Self, String> {
+        let PoseWeights { position, rotation } = stored.pose_weights;
+        let scales = [
+            ("alpha", stored.alpha),
+            ("gamma", stored.gamma),
+            ("beta", stored.beta),
+            ("scale", stored.scale),
+            ("pose_weights.position", position),
+            ("pose_weights.rotation", rotation),
+        ];
+        if let Some((name, value)) = scales.into_iter().find(|&(_, value)| !(value > 0.0 && value.is_finite())) {
+            return Err(format!("its {name} is {value}, not above zero"));
+        }
         let n = stored.latent.len();
         let dims = stored.latent.first().map_or(0, Vec::len);
-        let wrong = || ManifoldError::Syntax("its numbers do not fit together".to_owned());
+        let wrong = || "its numbers do not fit together".to_owned();
         let fits = dims > 0
             && stored.poses.len() == n
             && stored.mean.len() == QUAD_UNKNOWNS
@@ -110,6 +123,7 @@ impl Gplvm {
             mean: examples.mean.clone(),
             poses: (0..n).map(|i| (0..QUAD_UNKNOWNS).map(|j| y[(i, j)]).collect()).collect(),
         })
+        .map_err(ManifoldError::Syntax)
     }
 
     /// Latent numbers.
@@ -305,6 +319,28 @@ mod tests {
                 "{k}: {difference} {}",
                 gradient[k]
             );
+        }
+    }
+
+    #[test]
+    fn scales_of_a_file_that_are_not_above_zero_are_refused_by_name() {
+        let stored = |scale: f64, rotation: f64, alpha: f64| Stored {
+            latent: vec![vec![0.0], vec![1.0]],
+            alpha,
+            gamma: 1.0,
+            beta: 100.0,
+            scale,
+            pose_weights: PoseWeights { position: 10.0, rotation },
+            mean: vec![0.0; QUAD_UNKNOWNS],
+            poses: vec![vec![0.0; QUAD_UNKNOWNS], vec![1.0; QUAD_UNKNOWNS]],
+        };
+        assert!(Gplvm::try_from(stored(0.1, 1.5, 1.0)).is_ok());
+        for (file, expected) in [
+            (stored(0.0, 1.5, 1.0), "its scale is 0, not above zero"),
+            (stored(0.1, 0.0, 1.0), "its pose_weights.rotation is 0, not above zero"),
+            (stored(0.1, 1.5, -1.0), "its alpha is -1, not above zero"),
+        ] {
+            assert_eq!(Gplvm::try_from(file).unwrap_err(), expected);
         }
     }
 }

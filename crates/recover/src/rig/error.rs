@@ -24,6 +24,9 @@ pub enum RigError {
         "has a coordinate that is not finite, or axes that are not orthogonal unit vectors; place the rig anew with `cager rig`"
     )]
     BadNumbers,
+    /// The axes that a template is placed by are one and the same, or opposite.
+    #[error("a person cannot look along the axis that points up; choose another axis to look along, or another up")]
+    ForwardIsUp,
     /// The template has too few points or faces.
     #[error("has {points} points and {faces} faces; a rig is placed in a surface of a person")]
     NoSurface {

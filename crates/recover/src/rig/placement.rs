@@ -56,7 +56,7 @@ pub fn place(template: &TriMesh, options: &PlacementOptions) -> Result<PlacedRig
 fn axes(template: &TriMesh, options: &PlacementOptions) -> Result<DMat3, RigError> {
     let up = DVec3::from(options.up).try_normalize().ok_or(RigError::BadNumbers)?;
     if let Some(forward) = options.forward {
-        let forward = DVec3::from(forward).reject_from_normalized(up).try_normalize().ok_or(RigError::BadNumbers)?;
+        let forward = DVec3::from(forward).reject_from_normalized(up).try_normalize().ok_or(RigError::ForwardIsUp)?;
         return Ok(DMat3::from_cols(up.cross(forward), up, forward));
     }
     let extent = |a: DVec3| {
