@@ -1,13 +1,14 @@
 //! One frame: rounds of matching and Gauss–Newton, stage after stage.
 
 use super::equations::NormalEquations;
-use super::model::{CAGE_UNKNOWNS, PersonModel, Sampled};
+use super::limbs::limb_scores;
+use super::matching::{Match, Matching, NORMAL_LENGTH, Pairs};
+use super::model::{CAGE_UNKNOWNS, PersonModel};
 use super::observed::Observed;
 use super::options::{FitOptions, Method};
-use super::search::search;
 use super::stages::{Free, LatentStage, Linearized, QuadStage, Stage, VertexStage};
 use crate::manifold::Manifold;
-use crate::rig::{Placement, QUAD_UNKNOWNS, deform};
+use crate::rig::{Placement, QUAD_UNKNOWNS, QUADS, deform};
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
 use cager_registration::{Observation, OrientedPoints};
@@ -15,16 +16,12 @@ use faer::Mat;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Length of a normal in matches, as a fraction of the template's diagonal.
-const NORMAL_LENGTH: f64 = 0.02;
-/// Distances beyond this fraction of the height count no more in scores.
-const SCORE_CAP: f64 = 0.1;
-/// Cosine of normals below which a match does not count.
-const MIN_COSINE: f64 = 0.2;
 /// A stage ends where its step moves no vertex by more than this fraction of the height.
 const STILL: f64 = 2e-4;
-/// A sample keeps its observed point while it moves by no more than this fraction of the height.
-const KEPT: f64 = 3e-4;
+/// A limb whose mean distance is above this fraction of the height, or so many times that of the frame before, is tried elsewhere.
+const ASTRAY: [f64; 2] = [0.015, 1.3];
+/// More rounds for quads of limbs that were put elsewhere.
+const MENDING: usize = 4;
 /// Matches whose derivatives one task computes.
 const TASK: usize = 64;
 
@@ -41,6 +38,8 @@ pub struct FrameFit {
     pub vertices: Vec<Point>,
     /// Mean distance of matches, both ways, none beyond a tenth of the height, as a fraction of it.
     pub score: f64,
+    /// Of each quad, the mean distance of the template around it to what was observed, as the score.
+    pub parts: [f64; QUADS],
     /// Vertices of the cage of the manifold alone, and of the quads: what the stages before the last came to.
     pub stages: [Vec<Point>; 2],
 }
@@ -55,24 +54,15 @@ pub struct PersonFit<'a> {
     pub options: FitOptions,
 }
 
-/// Which sample belongs to which observed point.
-#[derive(Default)]
-struct Pairs {
-    /// Where the samples were when their observed points were found.
-    at: Vec<Point>,
-    /// Of each sample, its observed point.
-    forth: Vec<usize>,
-    /// Of each chosen observed point, its sample.
-    back: Vec<usize>,
-}
-
-/// A point of the template at the plane of an observed one.
-pub(super) struct Match {
-    pub(super) sample: usize,
-    pub(super) normal: DVec3,
-    pub(super) residual: f64,
-    pub(super) distance: f64,
-    pub(super) weight: f64,
+/// Rounds of Gauss–Newton.
+#[derive(Clone, Copy)]
+pub(super) struct Rounds {
+    /// How many, at the most.
+    pub(super) count: usize,
+    /// Every so manieth sample is matched.
+    pub(super) thin: usize,
+    /// Distance at which a match counts half, in units, in the first and in the last.
+    pub(super) reach: [f64; 2],
 }
 
 impl<'a> PersonFit<'a> {
@@ -82,32 +72,30 @@ impl<'a> PersonFit<'a> {
         if let Some(fit) = start {
             let mut stage = self.latent_stage(fit.placement, fit.latent.clone());
             stage.offset = self.offset(&stage, &fit.pose);
-            return self.finish(&observed, stage, self.options.rounds);
+            let found = self.finish(&observed, stage, self.options.rounds);
+            let (before, now) = (limb_scores(&fit.parts), limb_scores(&found.parts));
+            let astray = |&limb: &usize| now[limb] > ASTRAY[0].min(ASTRAY[1] * before[limb]);
+            let limbs: Vec<usize> = (0..now.len()).filter(astray).collect();
+            return self.mended(&observed, found, &limbs);
         }
-        let starts = search(self.model, self.manifold, self.options.candidates, &observed);
-        let fits = starts.into_iter().map(|(placement, latent)| self.fit_from(&observed, placement, latent));
-        // The examples of a manifold are never none, so there is a start.
-        fits.reduce(|best, fit| if fit.score < best.score { fit } else { best }).unwrap_or_else(|| {
-            self.finish(&observed, self.latent_stage(Placement::default(), vec![0.0; self.manifold.dims()]), [0; 3])
-        })
+        self.anew(&observed)
     }
 
-    /// Fits from a start of the search: once to find what the pose is off the manifold by, and once more from there.
-    fn fit_from(&self, observed: &Observed<'_>, placement: Placement, latent: Vec<f64>) -> FrameFit {
-        let options = &self.options;
-        let stage = self.latent_stage(placement, latent);
-        if options.method == Method::Paper {
-            return self.finish(observed, stage, options.first_rounds);
+    /// A fit with limbs put elsewhere, where it then lies better.
+    pub(super) fn mended(&self, observed: &Observed<'_>, fit: FrameFit, limbs: &[usize]) -> FrameFit {
+        if self.options.method == Method::Paper || limbs.is_empty() {
+            return fit;
         }
-        let [latents, quads, vertices] = options.first_rounds;
-        let first = self.finish(observed, stage, [latents, quads, 0]);
-        let mut stage = self.latent_stage(first.placement, first.latent.clone());
-        stage.offset = self.offset(&stage, &first.pose);
-        self.finish(observed, stage, [quads, quads, vertices])
+        let Some(pose) = self.relimbed(observed, &fit, limbs) else { return fit };
+        let mut stage = self.latent_stage(fit.placement, fit.latent.clone());
+        stage.offset = pose.iter().zip(stage.pose()).map(|(y, on)| y - on).collect();
+        let [_, quads, vertices] = self.options.rounds;
+        let again = self.finish(observed, stage, [0, quads + MENDING, vertices]);
+        if again.score < fit.score { again } else { fit }
     }
 
     /// The share of a pose's offset from the manifold that is carried on.
-    fn offset(&self, stage: &LatentStage<'_>, pose: &[f64]) -> Vec<f64> {
+    pub(super) fn offset(&self, stage: &LatentStage<'_>, pose: &[f64]) -> Vec<f64> {
         if self.options.method == Method::Paper {
             return stage.offset.clone();
         }
@@ -115,37 +103,38 @@ impl<'a> PersonFit<'a> {
     }
 
     /// All stages from a placement and latent numbers.
-    fn finish(&self, observed: &Observed<'_>, mut stage: LatentStage<'_>, rounds: [usize; 3]) -> FrameFit {
+    pub(super) fn finish(&self, observed: &Observed<'_>, mut stage: LatentStage<'_>, rounds: [usize; 3]) -> FrameFit {
         let (options, rig, height) = (&self.options, self.model.rig(), self.model.height());
         if options.method == Method::Paper {
             for free in [Free::Placement, Free::Latent, Free::Placement, Free::Latent, Free::Placement, Free::Latent] {
                 stage.free = free;
-                self.run(&mut stage, observed, rounds[0]);
+                self.run(&mut stage, observed, self.rounds(rounds[0]));
             }
         } else {
-            self.run(&mut stage, observed, rounds[0]);
+            self.run(&mut stage, observed, self.rounds(rounds[0]));
         }
         let target = stage.pose();
         let (placement, latent) = (stage.placement, stage.latent);
         let on_manifold = deform(rig, &target, &placement).vertices;
         let start = target.clone();
         let mut quads = QuadStage::new(rig, height, options, placement, [start, target]);
-        self.run(&mut quads, observed, rounds[1]);
+        self.run(&mut quads, observed, self.rounds(rounds[1]));
         let of_quads = quads.linearized().vertices;
-        let vertices = if options.method == Method::Robust {
+        let vertices = if options.method == Method::Robust && rounds[2] > 0 {
             let mut vertices = VertexStage::new(height, options, of_quads.clone());
-            self.run(&mut vertices, observed, rounds[2]);
+            self.run(&mut vertices, observed, self.rounds(rounds[2]));
             vertices.linearized().vertices
         } else {
             of_quads.clone()
         };
-        let score = self.score(observed, &vertices);
+        let score = self.matching(observed, 1).score(&vertices);
         FrameFit {
             placement: quads.placement,
             latent,
             pose: quads.pose,
             vertices,
-            score,
+            score: score.mean,
+            parts: score.parts,
             stages: [on_manifold, of_quads],
         }
     }
@@ -174,20 +163,31 @@ impl<'a> PersonFit<'a> {
         Observed { observation, tree, chosen }
     }
 
+    /// The template and an observation, every so manieth point of both.
+    pub(super) fn matching<'o>(&'o self, observed: &'o Observed<'o>, thin: usize) -> Matching<'o> {
+        let thin = if self.options.method == Method::Robust { thin } else { 1 };
+        Matching { model: self.model, options: &self.options, observed, thin }
+    }
+
+    fn rounds(&self, count: usize) -> Rounds {
+        Rounds { count, thin: 1, reach: self.options.reach }
+    }
+
     /// Rounds of Gauss–Newton.
-    pub(super) fn run(&self, stage: &mut dyn Stage, observed: &Observed<'_>, rounds: usize) {
+    pub(super) fn run(&self, stage: &mut dyn Stage, observed: &Observed<'_>, rounds: Rounds) {
+        let Rounds { count, thin, reach: [first, end] } = rounds;
+        let matching = self.matching(observed, thin);
         let mut last: Option<Vec<Point>> = None;
         let mut pairs = Pairs::default();
-        for round in 0..rounds {
+        for round in 0..count {
             let at = stage.linearized();
             let far = last.map(|last| farthest(&last, &at.vertices));
             if far.is_some_and(|far| far < STILL * self.model.height()) {
                 break;
             }
-            let share = round as f64 / (rounds.max(2) - 1) as f64;
-            let [first, end] = self.options.reach;
+            let share = round as f64 / (count.max(2) - 1) as f64;
             let reach = first * (end / first).powf(share) * self.options.deviation * self.model.height();
-            let matches = self.matches(observed, &at.vertices, reach, &mut pairs);
+            let matches = matching.matches(&at.vertices, reach, &mut pairs);
             let derivatives = self.derivatives(&at, &matches);
             let residuals: Vec<f64> = matches.iter().map(|m| m.residual * m.weight.sqrt()).collect();
             let mut equations = NormalEquations::new(&derivatives, &residuals);
@@ -212,64 +212,6 @@ impl<'a> PersonFit<'a> {
             }
         });
         at.through(rows)
-    }
-
-    /// Matches of the samples with the observation and, but for the paper's method, back. Samples that hardly moved since `pairs` were found keep theirs.
-    fn matches(&self, observed: &Observed<'_>, vertices: &[Point], reach: f64, pairs: &mut Pairs) -> Vec<Match> {
-        let sampled = self.model.sampled(vertices);
-        let robust = self.options.method == Method::Robust;
-        let unit = self.options.deviation * self.model.height();
-        let Observation { points, normals } = observed.observation;
-        self.find(pairs, observed, &sampled);
-        let matched = |sample: usize, point: usize, count: usize| {
-            let (normal, offset) =
-                (DVec3::from(normals[point]), DVec3::from(sampled.points[sample]) - DVec3::from(points[point]));
-            let cosine = normal.dot(sampled.normals[sample].into());
-            let weight = match robust {
-                true if cosine < MIN_COSINE => 0.0,
-                true => cosine / (1.0 + offset.length_squared() / (reach * reach)),
-                false => 1.0,
-            };
-            let weight = weight / (count as f64 * unit * unit);
-            Match { sample, normal, residual: normal.dot(offset), distance: offset.length(), weight }
-        };
-        let count = pairs.forth.len();
-        let forth = pairs.forth.iter().enumerate().map(|(s, &p)| matched(s, p, count));
-        let back = observed.chosen.iter().zip(&pairs.back).map(|(&p, &s)| matched(s, p, pairs.back.len()));
-        forth.chain(back).collect()
-    }
-
-    /// Brings pairs up to date.
-    fn find(&self, pairs: &mut Pairs, observed: &Observed<'_>, sampled: &Sampled) {
-        let still2 = (KEPT * self.model.height()).powi(2);
-        let Pairs { at, forth, back } = pairs;
-        let count = sampled.points.len();
-        let moved = |s: usize, at: &[Point]| {
-            at.get(s).is_none_or(|&p| DVec3::from(p).distance_squared(sampled.points[s].into()) > still2)
-        };
-        let anew: Vec<bool> = (0..count).map(|s| moved(s, at)).collect();
-        forth.resize(count, 0);
-        at.resize(count, [0.0; 3]);
-        forth.par_iter_mut().zip(at.par_iter_mut()).enumerate().filter(|&(s, _)| anew[s]).for_each(
-            |(s, (pair, at))| {
-                *pair = observed.tree.nearest(sampled.points[s], sampled.normals[s]).0;
-                *at = sampled.points[s];
-            },
-        );
-        let some = anew.iter().filter(|&&anew| anew).count();
-        if self.options.method == Method::Robust && (back.is_empty() || some * 20 > count) {
-            let tree = OrientedPoints::new(&sampled.points, &sampled.normals, NORMAL_LENGTH * self.model.diagonal());
-            let Observation { points, normals } = observed.observation;
-            *back = observed.chosen.par_iter().map(|&p| tree.nearest(points[p], normals[p]).0).collect();
-        }
-    }
-
-    /// See [`FrameFit::score`].
-    pub(super) fn score(&self, observed: &Observed<'_>, vertices: &[Point]) -> f64 {
-        let cap = SCORE_CAP * self.model.height();
-        let matches = self.matches(observed, vertices, cap, &mut Pairs::default());
-        let capped = |found: &Match| if found.weight > 0.0 { found.distance.min(cap) } else { cap };
-        matches.iter().map(capped).sum::<f64>() / (matches.len() as f64 * self.model.height())
     }
 }
 

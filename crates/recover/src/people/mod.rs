@@ -4,8 +4,11 @@
 //! What is fitted are distances of points of the template to the planes of the observed points that they are matched with, both ways, in the unit
 //! `0.005 · height`, less the farther apart and not at all where the surfaces face apart.
 
+mod anew;
 mod equations;
 mod fit;
+mod limbs;
+mod matching;
 mod model;
 mod observed;
 mod options;

@@ -1,7 +1,7 @@
 //! A template in the cage of its rig: coordinates of all vertices and of samples of the surface, and derivatives by the cage.
 
 use super::options::SystemKind;
-use crate::rig::{CAGE_VERTICES, Rig};
+use crate::rig::{CAGE_VERTICES, QUADS, Rig, owner};
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinatesError, DependentNormals, Derivative};
 use cager_geometry::linalg::{tall_product, zeros};
@@ -23,6 +23,8 @@ pub struct PersonModel {
     phi: Mat<f64>,
     /// Those of the samples, then of the two edges at each that span its tangent plane, one column each.
     samples: Mat<f64>,
+    /// Of each sample, the quad that it follows most.
+    parts: Vec<usize>,
     height: f64,
     diagonal: f64,
 }
@@ -91,7 +93,9 @@ impl PersonModel {
                 at_samples[(j, 2 * count + s)] = pc - pa;
             }
         }
+        let parts = (0..count).map(|s| part(&at_samples.col_as_slice(s)[..CAGE_VERTICES])).collect();
         Ok(Self {
+            parts,
             normals: system.values(&cage).dependent_normals,
             cage,
             rig: rig.clone(),
@@ -133,16 +137,26 @@ impl PersonModel {
         self.samples.ncols() / 3
     }
 
-    /// The samples under a cage.
-    pub(super) fn sampled(&self, vertices: &[Point]) -> Sampled {
-        let count = self.sample_count();
-        let positions = tall_product(self.samples.transpose(), self.values(vertices).as_ref());
-        let row = |i: usize| [0, 1, 2].map(|k| positions[(i, k)]);
-        let unit = |n: Point| n.map(|x| x / norm(n).max(f64::MIN_POSITIVE));
-        Sampled {
-            points: (0..count).map(row).collect(),
-            normals: (0..count).map(|i| unit(cross(row(count + i), row(2 * count + i)))).collect(),
+    /// The quad that a sample follows most.
+    pub(super) fn part(&self, sample: usize) -> usize {
+        self.parts[sample]
+    }
+
+    /// Every so manieth sample under a cage.
+    pub(super) fn sampled(&self, vertices: &[Point], thin: usize) -> Sampled {
+        if thin == 1 {
+            return positioned(&tall_product(self.samples.transpose(), self.values(vertices).as_ref()));
         }
+        self.sampled_at(vertices, &(0..self.sample_count()).step_by(thin).collect::<Vec<_>>())
+    }
+
+    /// Some samples under a cage.
+    pub(super) fn sampled_at(&self, vertices: &[Point], samples: &[usize]) -> Sampled {
+        let (all, count) = (self.sample_count(), samples.len().max(1));
+        let some = Mat::from_fn(self.samples.nrows(), 3 * samples.len(), |j, i| {
+            self.samples[(j, i / count * all + samples[i % count])]
+        });
+        positioned(&tall_product(some.transpose(), self.values(vertices).as_ref()))
     }
 
     /// Vertices of a cage, and the normals of its faces where the coordinates have some.
@@ -187,5 +201,23 @@ impl SampleDerivative<'_> {
             by[*a] -= by_b + by_c;
         }
         out.chunks_exact_mut(3).zip(&by).for_each(|(out, by)| out.copy_from_slice(&by.to_array()));
+    }
+}
+
+/// The quad whose vertices a point with these coordinates follows most.
+fn part(coordinates: &[f64]) -> usize {
+    let mut sums = [0.0; QUADS];
+    coordinates.iter().enumerate().for_each(|(v, weight)| sums[owner(v)] += weight);
+    (0..QUADS).max_by(|&a, &b| sums[a].total_cmp(&sums[b])).unwrap_or(0)
+}
+
+/// Samples, from their positions and then the edges at each that span its tangent plane.
+fn positioned(rows: &Mat<f64>) -> Sampled {
+    let count = rows.nrows() / 3;
+    let row = |i: usize| [0, 1, 2].map(|k| rows[(i, k)]);
+    let unit = |n: Point| n.map(|x| x / norm(n).max(f64::MIN_POSITIVE));
+    Sampled {
+        points: (0..count).map(row).collect(),
+        normals: (0..count).map(|i| unit(cross(row(count + i), row(2 * count + i)))).collect(),
     }
 }

@@ -63,8 +63,6 @@ pub struct FitOptions {
     pub rounds: [usize; 3],
     /// Rounds where there is no frame before.
     pub first_rounds: [usize; 3],
-    /// Places of the search that are tried in earnest.
-    pub candidates: usize,
 }
 
 impl Default for FitOptions {
@@ -83,7 +81,6 @@ impl Default for FitOptions {
             carried: 0.7,
             rounds: [6, 7, 4],
             first_rounds: [25, 15, 6],
-            candidates: 8,
         }
     }
 }

@@ -5,7 +5,6 @@ use super::observed::Observed;
 use crate::manifold::Manifold;
 use crate::rig::{Placement, deform};
 use cager_geometry::mesh::Point;
-use cager_geometry::vector::mean;
 use cager_registration::{Observation, OrientedPoints};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -16,31 +15,31 @@ const HEADINGS: usize = 8;
 /// Examples that are tried at the most.
 const EXAMPLES: usize = 96;
 /// Every so manieth sample and chosen point is looked at.
-const THIN: usize = 5;
+const THIN: usize = 20;
 
 /// Placements and latent numbers of the best starts, best first.
 pub(super) fn search(
     model: &PersonModel,
     manifold: &Manifold,
-    candidates: usize,
+    count: usize,
     observed: &Observed<'_>,
 ) -> Vec<(Placement, Vec<f64>)> {
     let tried = manifold.examples().min(EXAMPLES);
     let examples: Vec<usize> = (0..tried).map(|k| k * manifold.examples() / tried).collect();
     let up = DVec3::from(model.rig().up);
     let Observation { points, normals } = observed.observation;
-    let center = DVec3::from(mean(points));
+    let some: Vec<DVec3> = observed.chosen.iter().map(|&p| points[p].into()).collect();
     let seen: Vec<usize> = observed.chosen.iter().copied().step_by(THIN).collect();
     let cap = 0.1 * model.height();
+    let center = middle(&some);
     let mut starts: Vec<(f64, Placement, usize, usize)> = examples
         .par_iter()
         .flat_map_iter(|&example| {
             let vertices =
                 deform(model.rig(), &manifold.pose(manifold.latent(example)), &Placement::default()).vertices;
-            let sampled = model.sampled(&vertices);
-            let own = DVec3::from(mean(&sampled.points));
-            let thin = |all: &[Point]| -> Vec<DVec3> { all.iter().step_by(THIN).map(|&p| p.into()).collect() };
-            let (at, facing) = (thin(&sampled.points), thin(&sampled.normals));
+            let sampled = model.sampled(&vertices, THIN);
+            let vectors = |all: &[Point]| -> Vec<DVec3> { all.iter().map(|&p| p.into()).collect() };
+            let (at, facing) = (vectors(&sampled.points), vectors(&sampled.normals));
             let tree = OrientedPoints::new(
                 &at.iter().map(DVec3::to_array).collect::<Vec<_>>(),
                 &facing.iter().map(DVec3::to_array).collect::<Vec<_>>(),
@@ -49,7 +48,8 @@ pub(super) fn search(
             (0..HEADINGS)
                 .map(|heading| {
                     let rotation = DMat3::from_axis_angle(up, TAU * heading as f64 / HEADINGS as f64);
-                    let placement = Placement { rotation, translation: center - rotation * own };
+                    let turned: Vec<DVec3> = at.iter().map(|&p| rotation * p).collect();
+                    let placement = Placement { rotation, translation: center - middle(&turned) };
                     let forth = at.iter().zip(&facing).map(|(&p, &n)| {
                         let p = placement.at(p);
                         let found = observed.tree.nearest(p.to_array(), (rotation * n).to_array()).0;
@@ -70,13 +70,22 @@ pub(super) fn search(
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     // Several of each heading, since the nearest of all may face the wrong way.
     let mut taken = [0; HEADINGS];
-    let each = candidates.div_ceil(2).max(1);
+    let each = count.div_ceil(HEADINGS / 2).max(1);
     let mut chosen = Vec::new();
     for (_, placement, heading, example) in starts {
-        if taken[heading] < each && chosen.len() < candidates.max(1) {
+        if taken[heading] < each && chosen.len() < count.max(1) {
             taken[heading] += 1;
             chosen.push((placement, manifold.latent(example).to_vec()));
         }
     }
     chosen
+}
+
+/// Median along each axis, which points far away do not move.
+fn middle(points: &[DVec3]) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|k| {
+        let mut along: Vec<f64> = points.iter().map(|p| p[k]).collect();
+        let half = along.len() / 2;
+        if along.is_empty() { 0.0 } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
+    }))
 }

@@ -1,6 +1,6 @@
 //! Derivatives of every stage against central differences, on a person made of boxes.
 
-use super::fit::Match;
+use super::matching::Match;
 use super::stages::{Free, LatentStage, QuadStage, Stage, VertexStage};
 use super::{FitOptions, PersonFit, PersonModel, SystemKind};
 use crate::manifold::{Examples, Kind, Manifold};
@@ -71,7 +71,7 @@ fn compare<S: Stage>(fit: &PersonFit<'_>, stage: impl Fn() -> S, what: &str) {
             let mut change = vec![0.0; unknowns];
             change[i] = by;
             stage.step(&change);
-            let points = fit.model.sampled(&stage.linearized().vertices).points;
+            let points = fit.model.sampled(&stage.linearized().vertices, 1).points;
             matches.iter().map(|m| dot(points[m.sample], m.normal.to_array())).collect::<Vec<f64>>()
         };
         for (k, (up, down)) in moved(step).iter().zip(moved(-step)).enumerate() {
@@ -202,7 +202,7 @@ fn known(fit: &PersonFit<'_>, stage: &mut dyn Stage, truth: &[Point], rounds: us
     let weight = 1e6 / truth.len() as f64;
     for _ in 0..rounds {
         let at = stage.linearized();
-        let sampled = fit.model.sampled(&at.vertices);
+        let sampled = fit.model.sampled(&at.vertices, 1);
         let mut matches = Vec::new();
         for (sample, (p, q)) in sampled.points.iter().zip(truth).enumerate() {
             for (k, normal) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
