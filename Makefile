@@ -4,6 +4,7 @@ CARGO ?= cargo
 PYTHON ?= python3
 PEERS := benches/.venv/bin/python
 CODECS := target/codecs/bin/python
+REGISTRATION := target/registration/bin/python
 SCHEMATHESIS := target/schemathesis/bin/python
 DENY := target/deny/bin/cargo-deny
 
@@ -14,7 +15,7 @@ LINT := target/lint-deploy
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -150,6 +151,15 @@ paper: ## run the paper's comparisons on the captures in CAGER_CAPTURES and writ
 cages: ## make and design cages for the captures in CAGER_CAPTURES and write their tables in docs/PAPER.md; cages in out/cages/
 	$(CARGO) build --release --locked --bin cager
 	$(PYTHON) benches/cages.py
+
+recovery: $(REGISTRATION) ## recover the captures in CAGER_CAPTURES from surfaces without correspondence, beside other programs: docs/RECOVERY.md
+	$(CARGO) build --release --locked --bin cager
+	$(REGISTRATION) benches/recovery.py
+
+$(REGISTRATION): benches/peers/registration.txt
+	$(PYTHON) -m venv target/registration
+	target/registration/bin/pip install --quiet --requirement benches/peers/registration.txt
+	@touch $@
 
 openapi: ## write docs/openapi.json anew from the routes
 	CAGER_UPDATE_OPENAPI=1 $(CARGO) test --locked --quiet --test http openapi

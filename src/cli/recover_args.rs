@@ -23,7 +23,7 @@ pub(crate) struct RecoverArgs {
     #[arg(long, value_name = "FRAMES")]
     pub(super) frames: PathBuf,
 
-    /// Closed cage around the template [default: one of 350 vertices is made].
+    /// Closed cage around the template [default: one of about 350 vertices is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "rig")]
     pub(super) cage: Option<PathBuf>,
 

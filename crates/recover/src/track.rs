@@ -50,6 +50,8 @@ const ALIKE: f64 = 0.02;
 const SEARCHED_FOR: usize = 3;
 /// A frame that scores above so many times the median of all is lost.
 const LOST_FROM: f64 = 1.6;
+/// Not so one that scores below this share of the diagonal: where surfaces are exact and move little, the usual score is next to nothing.
+const LIES_WELL: f64 = 1e-3;
 /// Frames before that it takes to say so: a template that is the first frame lies there better than it can elsewhere.
 const MIN_JUDGED: usize = 3;
 
@@ -84,7 +86,7 @@ impl<'t> Tracker<'t> {
                 (best, outcome) = (again, Outcome::SearchedWider);
             }
         }
-        if self.scores.len() >= MIN_JUDGED && best.score > LOST_FROM * usual {
+        if self.scores.len() >= MIN_JUDGED && is_lost(best.score, usual) {
             outcome = Outcome::Lost;
         }
         self.scores.push(best.score);
@@ -115,6 +117,11 @@ fn judging(scores: &[f64]) -> &[f64] {
 /// How far two cages are apart where they are farthest.
 fn farthest_apart([a, b]: [&Vec<Point>; 2]) -> f64 {
     a.iter().zip(b).map(|(&a, &b)| norm(sub(a, b))).fold(0.0, f64::max)
+}
+
+/// Whether a frame lies badly, where this score is usual.
+fn is_lost(score: f64, usual: f64) -> bool {
+    score > (LOST_FROM * usual).max(LIES_WELL)
 }
 
 /// The median of some scores; infinite without any.
@@ -194,7 +201,7 @@ impl<'t> SecondPass<'t> {
 
     /// Whether a frame is lost, in the end.
     pub fn judge(&self, frame: &mut TrackedFrame) {
-        let lost = self.scores.len() > MIN_JUDGED && frame.score > LOST_FROM * self.usual;
+        let lost = self.scores.len() > MIN_JUDGED && is_lost(frame.score, self.usual);
         match (lost, frame.outcome) {
             (_, Outcome::NoSurface) => {}
             (true, _) => frame.outcome = Outcome::Lost,
