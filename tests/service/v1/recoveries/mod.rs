@@ -28,6 +28,7 @@ const FRAMES: u32 = 4;
 /// The built-in figure, and clouds of points drawn anew of it in every frame.
 struct Scans {
     template: Vec<u8>,
+    cage: Vec<u8>,
     /// With names whose numbers do not begin with 0.
     frames: Vec<(String, Vec<u8>)>,
 }
@@ -42,8 +43,10 @@ fn scans() -> &'static Scans {
             Model { points: numbers.as_chunks().0.to_vec(), ..capture.rest.clone() }
         };
         let frames = (0..FRAMES).map(|frame| (format!("scan_{}.ply", 5 + frame), cloud(&posed(frame as usize), frame)));
-        let template = model_bytes(Path::new("rest.obj"), &posed(0)).expect("a template");
-        Scans { template, frames: frames.collect() }
+        let obj = |model: &Model| model_bytes(Path::new("model.obj"), model).expect("a model");
+        let mut cage = Model { points: capture.deformed_cage(0), ..Model::default() };
+        capture.cage.triangles.iter().for_each(|triangle| cage.faces.push(triangle));
+        Scans { template: obj(&posed(0)), cage: obj(&cage), frames: frames.collect() }
     })
 }
 
@@ -65,10 +68,16 @@ impl Scans {
         Form::new().part("template", file("rest.obj", &self.template)).part("options", text(options))
     }
 
+    /// With a cage, so that none is made at every beginning.
+    fn caged_form(&self, options: &Value) -> Form {
+        self.form(options).part("cage", file("cage.obj", &self.cage))
+    }
+
     /// What the command line makes of the first frames, with these arguments.
     fn recovered(&self, more: &str) -> Vec<u8> {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("rest.obj"), &self.template).expect("a file");
+        std::fs::write(folder.path().join("cage.obj"), &self.cage).expect("a file");
         for (name, bytes) in &self.frames {
             std::fs::write(folder.path().join(name), bytes).expect("a file");
         }

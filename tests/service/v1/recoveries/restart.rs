@@ -1,7 +1,8 @@
 //! Recoveries and restarts.
 
-use super::{FRAMES, complete, completed, container, created, failed, post, recovery, scans, until};
+use super::{FRAMES, complete, completed, container, create, created, failed, post, recovery, scans, until};
 use crate::support::TestApp;
+use cager_proto::recovery_messages::Recovery;
 use serde_json::json;
 
 #[tokio::test]
@@ -40,7 +41,7 @@ async fn a_recovery_that_waits_for_a_frame_outlives_any_number_of_restarts() {
     let scans = scans();
     for kills in [false, true] {
         let mut app = TestApp::start();
-        let job = created(&app, &json!({"points": 800})).await;
+        let job: Recovery = create(&app, scans.caged_form(&json!({"points": 800})), None).await.is(202);
         post(&app, &job.id, 0, scans.parts(0..2)).await.expect(200);
         for _ in 0..6 {
             until(&app, &job.id, |recovery| recovery.frames.followed == 2).await;
@@ -58,7 +59,7 @@ async fn a_recovery_that_waits_for_a_frame_outlives_any_number_of_restarts() {
         complete(&app, &job.id, FRAMES).await.expect(202);
         completed(&app, &job.id).await;
         let made = container(&app, &job.id).await;
-        assert!(made == scans.recovered("--points 800"), "another file than that of the command line");
+        assert!(made == scans.recovered("--points 800 --cage cage.obj"), "another file than that of the command line");
     }
 }
 
