@@ -129,7 +129,7 @@ impl Following {
         }
     }
 
-    /// Cages that are there of the next frames, and whether there are none after the last.
+    /// Cages found so far from a frame on, and whether no more will follow.
     async fn read(&self, most: u32) -> io::Result<(Vec<u8>, bool)> {
         let (job, store, next) = (Arc::clone(&self.job), self.service.store.clone(), self.next);
         if let Some(finished) = self.finished.clone() {

@@ -48,7 +48,7 @@ impl<'a> PersonFit<'a> {
         let [_, quads, vertices] = self.options.first_rounds;
         let finished = some.into_iter().map(|start| {
             let fit = self.finish(observed, start.stage, [quads, quads, vertices]);
-            self.mended(observed, fit, &[0, 1, 2, 3])
+            self.refit_with_other_limbs(observed, fit, &[0, 1, 2, 3])
         });
         // The examples of a manifold are never none, so there is a start.
         finished.reduce(|best, fit| if fit.score < best.score { fit } else { best }).unwrap_or_else(|| {

@@ -76,17 +76,17 @@ impl<'a> PersonFit<'a> {
             let (before, now) = (limb_scores(&fit.parts), limb_scores(&found.parts));
             let astray = |&limb: &usize| now[limb] > ASTRAY[0].min(ASTRAY[1] * before[limb]);
             let limbs: Vec<usize> = (0..now.len()).filter(astray).collect();
-            return self.mended(&observed, found, &limbs);
+            return self.refit_with_other_limbs(&observed, found, &limbs);
         }
         self.anew(&observed)
     }
 
     /// A fit with limbs put elsewhere, where it then lies better.
-    pub(super) fn mended(&self, observed: &Observed<'_>, fit: FrameFit, limbs: &[usize]) -> FrameFit {
+    pub(super) fn refit_with_other_limbs(&self, observed: &Observed<'_>, fit: FrameFit, limbs: &[usize]) -> FrameFit {
         if self.options.method == Method::Paper || limbs.is_empty() {
             return fit;
         }
-        let Some(pose) = self.relimbed(observed, &fit, limbs) else { return fit };
+        let Some(pose) = self.pose_with_other_limbs(observed, &fit, limbs) else { return fit };
         let mut stage = self.latent_stage(fit.placement, fit.latent.clone());
         stage.offset = pose.iter().zip(stage.pose()).map(|(y, on)| y - on).collect();
         let [_, quads, vertices] = self.options.rounds;

@@ -29,7 +29,12 @@ pub(super) fn limb_scores(parts: &[f64; QUADS]) -> [f64; 4] {
 
 impl PersonFit<'_> {
     /// The pose of a fit with some limbs put where they explain more of what was observed; none where they are well where they are.
-    pub(super) fn relimbed(&self, observed: &Observed<'_>, fit: &FrameFit, limbs: &[usize]) -> Option<Vec<f64>> {
+    pub(super) fn pose_with_other_limbs(
+        &self,
+        observed: &Observed<'_>,
+        fit: &FrameFit,
+        limbs: &[usize],
+    ) -> Option<Vec<f64>> {
         let count = self.manifold.examples().min(EXAMPLES);
         let examples: Vec<Vec<f64>> = (0..count)
             .map(|k| self.manifold.pose(self.manifold.latent(k * self.manifold.examples() / count)))
