@@ -15,7 +15,7 @@ LINT := target/lint-deploy
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -155,6 +155,12 @@ cages: ## make and design cages for the captures in CAGER_CAPTURES and write the
 recovery: $(REGISTRATION) ## recover the captures in CAGER_CAPTURES from surfaces without correspondence, beside other programs: docs/RECOVERY.md
 	$(CARGO) build --release --locked --bin cager
 	$(REGISTRATION) benches/recovery.py
+
+transfers: $(REGISTRATION) ## move the captures in CAGER_CAPTURES onto other models, beside other programs and the paper's way: docs/EXPLORATION.md
+	@if [ -z "$(CAGER_BLENDER_PYTHON)" ] && command -v python3.11 >/dev/null; then $(MAKE) --no-print-directory $(BLENDER); fi
+	$(if $(CAGER),,$(CARGO) build --release --locked --bin cager)
+	$(REGISTRATION) benches/transfers.py
+	$(REGISTRATION) benches/exploration_pictures.py
 
 $(REGISTRATION): benches/peers/registration.txt
 	$(PYTHON) -m venv target/registration

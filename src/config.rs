@@ -129,6 +129,16 @@ settings! {
     max_design_seconds: u64 = 120, Kind::Number { least: 1, most: DAY };
     /// Recoveries that follow frames at the same time.
     max_recoveries: usize = 1, Kind::Number { least: 1, most: 4096 };
+    /// Recoveries of a tenant whose frames wait for their turn; then no new one is taken.
+    max_recovery_queue: usize = 64, Kind::Number { least: 0, most: 1_000_000 };
+    /// Transfers that run at the same time.
+    max_transfers: usize = 1, Kind::Number { least: 1, most: 4096 };
+    /// Transfers of a tenant waiting for their turn.
+    max_transfer_queue: usize = 16, Kind::Number { least: 0, most: 1_000_000 };
+    /// Memory of shape spaces, in bytes.
+    shape_bytes: u64 = GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    /// Seconds without a request after which a shape space is forgotten.
+    shape_idle_s: u64 = 900, Kind::Number { least: 1, most: DAY };
     /// Memory that the frames of one design may take, in bytes: so many of those that were sent are looked at.
     max_design_bytes: u64 = 512 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
     /// Bytes of the frames that a cage is designed from.

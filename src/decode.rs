@@ -270,6 +270,44 @@ fn bind(
     Ok(BoundModel { rest, decoder, outside: found.outside.len() })
 }
 
+/// Frames of a container, decoded as they are asked for.
+pub(crate) struct Positions {
+    container: Container,
+    model: BoundModel,
+    path: PathBuf,
+}
+
+impl Positions {
+    /// Of a container.
+    ///
+    /// # Errors
+    /// As [`decode`].
+    pub(crate) fn open(path: &Path) -> Result<Self, DecodeError> {
+        let mut container = open(path)?;
+        container.limit_coordinates(free_bytes());
+        let memory = Memory::half_of_free();
+        let batches = container.frames().div_ceil(BATCH);
+        let model = bind(&mut container, path, None, None, |points, columns| memory.keeps(points, columns, batches))?;
+        Ok(Self { container, model, path: path.to_owned() })
+    }
+
+    /// Positions of these frames, from which the container's origin is subtracted.
+    ///
+    /// # Errors
+    /// Damage, or a frame that is not there.
+    pub(crate) fn read(&mut self, frames: &[usize]) -> Result<Vec<Vec<f32>>, DecodeError> {
+        let fail = |cause| DecodeError::container(&self.path, cause);
+        let (mut cages, mut positions) = (vec![Vec::new(); frames.len()], vec![Vec::new(); frames.len()]);
+        for (&frame, cage) in frames.iter().zip(&mut cages) {
+            self.container.read_frame(frame, cage).map_err(fail)?;
+        }
+        let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
+        self.model.decoder.decode(&views, &mut positions);
+        self.container.add_residual(frames, &mut positions).map_err(fail)?;
+        Ok(positions)
+    }
+}
+
 /// Frame rate and frame numbers of the output; `timing` overrides the container's, whose frames are counted from 0 where their numbers are damaged and
 /// may be lost.
 ///

@@ -50,6 +50,7 @@ kinds! {
     CAGE_FAILED CONFLICT "cage-failed" "No cage could be designed";
     RECOVERY_COMPLETED CONFLICT "recovery-completed" "The recovery takes no frames any more";
     RECOVERY_FAILED CONFLICT "recovery-failed" "The recovery failed and cannot be used";
+    TRANSFER_FAILED CONFLICT "transfer-failed" "The motion could not be moved";
     KEY_IN_USE CONFLICT "idempotency-key-in-use" "A request with this idempotency key is still being worked on";
     SESSION_DELETED GONE "session-deleted" "The session was deleted";
     TOO_LARGE PAYLOAD_TOO_LARGE "too-large" "The body is larger than allowed";
@@ -61,6 +62,7 @@ kinds! {
     KEY_REUSED UNPROCESSABLE_ENTITY "idempotency-key-reused" "The idempotency key was used for another request";
     TOO_MANY_SESSIONS TOO_MANY_REQUESTS "too-many-sessions" "The tenant has as many sessions as it may";
     TOO_MANY_STREAMS TOO_MANY_REQUESTS "too-many-streams" "The tenant has as many streams open as it may";
+    TOO_MANY_JOBS TOO_MANY_REQUESTS "too-many-jobs" "The tenant has as many jobs waiting as it may";
     SHARE_TAKEN TOO_MANY_REQUESTS "share-taken" "The tenant holds its share of what all tenants use";
     INTERNAL INTERNAL_SERVER_ERROR "internal" "The service failed";
     BUSY SERVICE_UNAVAILABLE "busy" "The service has too much to do";

@@ -11,8 +11,10 @@ use crate::problem::{self, ApiError};
 use crate::recovery::Recovery;
 use crate::session::commit::Committer;
 use crate::session::registry::Registry;
+use crate::shape_spaces::ShapeSpaces;
 use crate::store::{ContentKey, Disk, Store, StoreError};
 use crate::tasks::blocking;
+use crate::transfers::Transfer;
 use crate::unreadable::UnreadableFiles;
 use crate::webhooks::{Webhooks, WebhooksError};
 use std::collections::BTreeSet;
@@ -51,12 +53,16 @@ pub struct Service {
     pub(crate) registry: Arc<Registry>,
     pub(crate) cage_jobs: Jobs<CageDesign>,
     pub(crate) recoveries: Jobs<Recovery>,
+    pub(crate) transfers: Jobs<Transfer>,
+    pub(crate) shape_spaces: ShapeSpaces,
     pub(crate) unread: UnreadableFiles,
     pub(crate) designs: DesignPool,
     /// Recoveries that follow frames or are finished.
     pub(crate) recovering: Arc<Budget>,
     /// Recoveries that keep what they know while they wait for frames or for their turn; each keeps a thread too.
     pub(crate) recoveries_kept: Arc<Budget>,
+    /// Transfers that run.
+    pub(crate) transferring: Arc<Budget>,
     pub(crate) cage_maker: CageMaker,
     /// Uploaded files being parsed, which keeps a processor busy.
     pub(crate) reading: Arc<Budget>,
@@ -169,6 +175,9 @@ impl Service {
             registry: Arc::default(),
             cage_jobs: Jobs::default(),
             recoveries: Jobs::default(),
+            transfers: Jobs::default(),
+            shape_spaces: ShapeSpaces::new(config.budget(config.shape_bytes), config.shape_idle_s),
+            transferring: config.budget(config.max_transfers as u64),
             unread,
             designs: DesignPool::new(&config, designer).map_err(StartError::Threads)?,
             recovering: config.budget(config.max_recoveries as u64),
@@ -205,12 +214,17 @@ impl Service {
         for meta in opened.recoveries {
             service.resume_and_track_job::<Recovery>(meta);
         }
+        let transfers = opened.transfers.len();
+        for meta in opened.transfers {
+            service.resume_and_track_job::<Transfer>(meta);
+        }
         service.orphans().iter().for_each(|key| service.forget_orphan(key));
         service.resumed.store(true, Ordering::Release);
         tracing::info!(
             sessions = count,
             cage_jobs,
             recoveries,
+            transfers,
             quarantined = opened.quarantined.len(),
             unread = service.unread.summary(),
             "sessions resumed"

@@ -8,6 +8,7 @@ use crate::service::Service;
 use crate::store::{FolderMeta as _, JobMeta as _, Kind, SessionMeta, StoreError};
 use crate::sync::lock;
 use crate::tasks::blocking;
+use crate::transfers::Transfer;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
@@ -81,11 +82,11 @@ impl UnreadableFiles {
 
     /// A summary for operators; `None` if everything could be read.
     pub(crate) fn summary(&self) -> Option<String> {
-        let [sessions, designs, recoveries] =
-            [Kind::Session, Kind::CageJob, Kind::Recovery].map(|kind| self.count(kind));
-        (sessions + designs + recoveries > 0).then(|| {
+        let counts = Kind::ALL.map(|(kind, _)| self.count(kind));
+        let [sessions, designs, recoveries, transfers] = counts;
+        counts.iter().any(|count| *count > 0).then(|| {
             format!(
-                "{sessions} sessions, {designs} cage designs and {recoveries} recoveries cannot be read and are left where they are; the log has their paths, and they are served when they can be read"
+                "{sessions} sessions, {designs} cage designs, {recoveries} recoveries and {transfers} transfers cannot be read and are left where they are; the log has their paths, and they are served when they can be read"
             )
         })
     }
@@ -184,6 +185,7 @@ impl Service {
                 }
                 Kind::CageJob => service.reload_job::<CageDesign>(&id),
                 Kind::Recovery => service.reload_job::<Recovery>(&id),
+                Kind::Transfer => service.reload_job::<Transfer>(&id),
             };
             if matches!(found, Ok(None)) {
                 service.unread.forget(kind, &id);

@@ -1,5 +1,6 @@
 //! The JSON bodies of cage design: what is asked for at `POST /v1/cages`, and what becomes of it.
 
+pub use crate::messages::JobState as CageState;
 use crate::messages::Problem;
 use serde::{Deserialize, Serialize};
 
@@ -51,28 +52,6 @@ pub enum CageStyle {
     Free,
     /// Editing by hand.
     Editable,
-}
-
-/// What the design of a cage is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-#[serde(rename_all = "lowercase")]
-pub enum CageState {
-    /// It waits for its turn.
-    Queued,
-    /// The cage is being designed.
-    Running,
-    /// The cage is there; nothing changes any more.
-    Completed,
-    /// There is no cage; `problem` says why.
-    Failed,
-}
-
-impl CageState {
-    /// Whether nothing changes any more.
-    pub fn is_final(self) -> bool {
-        matches!(self, Self::Completed | Self::Failed)
-    }
 }
 
 /// Mean L2 errors of a cage as fractions of the rest pose's diagonal.

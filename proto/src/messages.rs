@@ -20,6 +20,28 @@ pub enum SessionState {
     Failed,
 }
 
+/// What a job is doing that is created as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum JobState {
+    /// It waits for its turn.
+    Queued,
+    /// It is being worked on.
+    Running,
+    /// The result is there; nothing changes any more.
+    Completed,
+    /// There is no result; `problem` says why.
+    Failed,
+}
+
+impl JobState {
+    /// Whether nothing changes any more.
+    pub fn is_final(self) -> bool {
+        matches!(self, Self::Completed | Self::Failed)
+    }
+}
+
 /// Choices for a session, the JSON part `options` of its creation. What is left out has its default.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

@@ -1,22 +1,21 @@
 //! Creating, resuming and deleting cage jobs.
 
-use super::{CageJob, Finished, options, samples};
+use super::{CageDesign, CageJob, Finished, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
 use crate::far_frames::Reach;
-use crate::idempotency::{extension, made_before, once, request};
-use crate::jobs::{Outcome, Phase};
+use crate::idempotency::{extension, request};
+use crate::jobs::{Outcome, Phase, new_job};
 use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::registry::Reserved;
 use crate::store::{CageJobMeta, ContentKey, Idempotency, Spool, Store, StoredPart};
-use crate::tasks::{blocking, to_the_end};
+use crate::tasks::blocking;
 use cager_geometry::mesh::diagonal;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A request to design a cage.
 pub(crate) struct NewCageJob {
@@ -55,32 +54,21 @@ impl Service {
             (new, request, rest)
         })
         .await?;
-        let frames = new.frames.digest();
+        let (frames, options) = (new.frames.digest(), new.options.clone());
         let may_be = |job: &CageJob| {
             let meta = &job.meta;
             let digests = [&meta.rest, &meta.frames].map(|part| part.blake3.as_str());
-            meta.options == new.options && digests == [rest.to_hex().as_str(), frames.to_hex().as_str()]
+            meta.options == options && digests == [rest.to_hex().as_str(), frames.to_hex().as_str()]
         };
-        if let Some(made) = made_before(&self.cage_jobs, &tenant.name, request.as_ref(), may_be)? {
-            return Ok(made);
-        }
-        let (new, checked) = {
-            let place = self.reading.take(&tenant.name, 1).await;
-            let (config, name) = (self.config.clone(), tenant.name.clone());
-            let (new, checked) = blocking(move || {
-                let _place = place;
-                let checked = check(&new, &name, config.max_design_seconds, config.max_design_bytes);
-                (new, checked)
-            })
-            .await?;
-            (new, checked?)
+        let (config, name) = (self.config.clone(), tenant.name.clone());
+        let check = move || {
+            let checked = check(&new, &name, config.max_design_seconds, config.max_design_bytes);
+            checked.map(|checked| (new, checked))
         };
-        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
-        to_the_end(async move {
-            let make = |request| service.create_new_cage_job(&tenant, new, checked, request);
-            once(&service.cage_jobs, &tenant.name, request, make).await
-        })
-        .await
+        let make = async |service: Arc<Self>, tenant: Arc<Tenant>, (new, checked), request| {
+            service.create_new_cage_job(&tenant, new, checked, request).await
+        };
+        self.create_job(tenant, request, may_be, check, make).await
     }
 
     async fn create_new_cage_job(
@@ -96,10 +84,11 @@ impl Service {
             bytes,
             blake3: digest.to_hex().to_string(),
         };
+        let (id, created_ms) = new_job();
         let meta = CageJobMeta {
-            id: uuid::Uuid::now_v7().simple().to_string(),
+            id,
             tenant: tenant.name.clone(),
-            created_ms: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64,
+            created_ms,
             key: checked.key,
             options,
             points: checked.points,
@@ -113,20 +102,13 @@ impl Service {
         {
             return Ok(job);
         }
-        let most = self.config.max_design_queue;
-        if self.cage_jobs.waiting_of(&tenant.name) >= most {
-            self.rejected("design_queue");
-            let detail = format!("{most} of your cage designs wait for their turn; try again later, or delete one");
-            return Err(ApiError::new(problem::BUSY, detail).limit(most as u64).retry_after(10));
-        }
+        self.check_job_queue::<CageDesign>(&tenant.name)?;
         self.reserve_more(tenant, &mut reserved, meta.rest.bytes)?;
         let bytes = meta.rest.bytes + meta.frames.bytes;
         let (store, kept) = (self.store.clone(), meta.clone());
         blocking(move || store.create_cage_job(&kept, &rest, frames)).await??;
-        let job = Arc::new(CageJob::new(meta, Phase::Waiting, bytes));
-        self.cage_jobs.insert(Arc::clone(&job));
+        let job = self.begin_job(meta, bytes);
         drop(reserved);
-        tokio::spawn(Arc::clone(self).run_cage_job(Arc::clone(&job)));
         Ok(job)
     }
 
@@ -187,7 +169,7 @@ pub(crate) fn check_options(options: &CageOptions, config: &ServeConfig) -> Resu
 fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Result<Checked, ApiError> {
     let design = options::design_options(&new.options, max_seconds)?;
     let rest = read_part("rest", &new.rest_name, &new.rest)?;
-    check_extent(&rest)?;
+    check_extent("rest", &rest)?;
     let points = rest.points.len();
     let reach = Reach::around(&rest.points, diagonal(&rest.points));
     drop(rest);

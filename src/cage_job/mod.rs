@@ -5,11 +5,12 @@ pub(crate) mod create;
 mod duplicates;
 mod options;
 mod run;
-mod samples;
+pub(crate) mod samples;
 
 pub use run::Designer;
 pub(crate) use run::{DesignPool, local_designer};
 
+use crate::config::ServeConfig;
 use crate::jobs::{Job, Jobs, Phase, Work};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -37,9 +38,15 @@ impl Work for CageDesign {
     const LIST: &'static str = "/v1/cages";
     const ENDED: &'static str = "cager_designs_total";
     const FAILED: problem::Kind = problem::CAGE_FAILED;
+    const UNFINISHED: &'static str = "wait until the cage is designed";
+    const QUEUE: &'static str = "design_queue";
 
     fn jobs(service: &Service) -> &Jobs<Self> {
         &service.cage_jobs
+    }
+
+    fn most_waiting(config: &ServeConfig) -> usize {
+        config.max_design_queue
     }
 
     fn begin(service: Arc<Service>, job: Arc<CageJob>) {

@@ -1,12 +1,10 @@
 //! Validation of the options of a cage design.
 
-use crate::preparation::{VERTICES, vertices_detail};
+use crate::preparation::{NAME_CHARACTERS, VERTICES, vertices_detail};
 use crate::problem::{self, ApiError};
 use cager_cages::{DesignOptions, Goal, Style};
 use cager_proto::cage_messages::{CageOptions, CageStyle};
 use std::time::Duration;
-
-const NAME_CHARACTERS: usize = 200;
 
 /// Validates the options of a design and converts them.
 ///

@@ -60,6 +60,20 @@ impl DesignPool {
         &self.pool
     }
 
+    /// Designs a cage on its threads.
+    ///
+    /// # Errors
+    /// See [`DesignError`].
+    pub(crate) fn design(
+        &self,
+        rest: &Model,
+        frames: &[Vec<f64>],
+        options: &DesignOptions,
+        watch: &mut (dyn FnMut(Progress<'_>) -> ControlFlow<()> + Send),
+    ) -> Result<Design, DesignError> {
+        self.pool.install(|| (self.designer)(rest, frames, options, &mut |told: Progress<'_>| watch(told)))
+    }
+
     /// Memory of the frames of running designs, in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes.load(Relaxed)
@@ -179,7 +193,7 @@ impl Service {
             let over = Instant::now() > latest || job.deleted().is_cancelled() || self.stopping().is_cancelled();
             if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let designed = self.designs.pool.install(|| (self.designs.designer)(&rest, &frames, &options, &mut watch));
+        let designed = self.designs.design(&rest, &frames, &options, &mut watch);
         drop((frames, taken));
         let designed = designed.map_err(|error| refused(&error))?;
         let best = Best::new(&designed.cage);

@@ -20,7 +20,7 @@ pub(super) fn sampled(frames: usize, points: usize, max_bytes: u64) -> usize {
 ///
 /// # Errors
 /// A length or a number of points that does not match.
-pub(super) fn open<'a>(
+pub(crate) fn open<'a>(
     name: &str,
     mut source: impl Read + Seek + Send + 'a,
     bytes: u64,

@@ -3,6 +3,8 @@
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
 use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
+use super::explore::ExploreArgs;
+use super::motion_args::TransferMotionArgs;
 use super::names;
 use super::outputs::OutputArgs;
 use super::recover_args::RecoverArgs;
@@ -57,6 +59,8 @@ pub(crate) enum Command {
     Encode(Box<EncodeArgs>),
     Decode(DecodeArgs),
     Recover(Box<RecoverArgs>),
+    Transfer(Box<TransferMotionArgs>),
+    Explore(ExploreArgs),
     Rig(RigArgs),
     Manifold(ManifoldArgs),
     Edit(EditArgs),
@@ -274,6 +278,8 @@ pub(crate) struct DecodeArgs {
 /// Show what a .cager file holds: sizes, spectrum, errors.
 ///
 /// Every checksum is compared on the way. Example: cager inspect walk.cager
+///
+/// Of a list that recover wrote, each file is shown.
 #[derive(Args, Debug)]
 pub(crate) struct InspectArgs {
     /// File to read.

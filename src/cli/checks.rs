@@ -119,7 +119,7 @@ pub(super) fn capture_files<'a>(
     files
 }
 
-/// Compares some frames of a capture with its rest pose, and has the others compared as they are read.
+/// Compares some frames of a capture with its rest pose, and has the others compared as they are read; `turns` where the command has --up and --weld.
 pub(super) fn check_capture(
     files: &mut CaptureFiles,
     rest: (&Path, &Model),
@@ -131,7 +131,7 @@ pub(super) fn check_capture(
         warn(&reader.notes());
         sample_frames(reader.as_mut(), mismatch::FRAMES, false)
     });
-    let frames = frames.map_err(|error| explained(error, files, rest))?;
+    let frames = frames.map_err(|error| explained(error, files, rest, turns))?;
     warn(single_far_away(files, rest.1, &frames).as_slice());
     let found = mismatches(rest.1, &frames);
     if found.is_empty() {
@@ -214,11 +214,11 @@ fn refuse_or_warn(what: String, advice: &str, force: bool) -> Result<()> {
 }
 
 /// Explains a wrong number of points where welding seams would make it right.
-fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Model)) -> anyhow::Error {
+fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Model), welds: bool) -> anyhow::Error {
     use cager_formats::Error::{PointCount, SeveralSequences};
     match error {
         EncodeError::Formats(PointCount { path: ref capture, expected, found, .. })
-            if weld(rest).is_some_and(|welded| welded.model.points.len() as u64 == found) =>
+            if welds && weld(rest).is_some_and(|welded| welded.model.points.len() as u64 == found) =>
         {
             anyhow::anyhow!(
                 "{}: has {found} points where {} has {expected}, {} of them doubles along seams that flat shading or UVs split; pass --weld",

@@ -2,26 +2,43 @@
 
 use super::args::InspectArgs;
 use super::encode_summary::errors;
+use super::stretches::{Stretch, StretchList};
 use super::{grouped, human_bytes, plain, print, warn};
 use crate::decode::{self, Container, DecodeError};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use cager_formats::missing_frames;
 use cager_proto::report::Report;
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::Path;
 
 pub(super) fn run(args: &InspectArgs) -> Result<()> {
-    let mut container = decode::open(&args.input)?;
-    let fail = |cause| DecodeError::container(&args.input, cause);
-    container.verify().map_err(fail)?;
-    let report = container.report().map_err(fail)?;
-    let sections = sections(&container);
-    if args.json {
-        let told = Inspected { report, sections };
-        return print(&format!("{}\n", serde_json::to_string_pretty(&told)?));
+    let Some(list) = StretchList::read(&args.input)? else {
+        let found = Inspected::of(&args.input)?;
+        if args.json {
+            return print(&format!("{}\n", serde_json::to_string_pretty(&found)?));
+        }
+        return found.tell(&args.input);
+    };
+    let mut all = Vec::new();
+    for Stretch { file, first_frame, frames, .. } in &list.stretches {
+        let path = args.input.with_file_name(file);
+        let found = Inspected::of(&path)?;
+        let (first, count) = (found.report.frame_numbers.first().copied().unwrap_or(0.0), found.report.frames);
+        if (first, count) != (*first_frame, *frames) {
+            bail!(
+                "{}: has {frames} frames of {} from {first_frame} on, but that has {count} from {first} on; recover them again",
+                args.input.display(),
+                path.display()
+            );
+        }
+        all.push((path, found));
     }
-    warn(&report.warnings);
-    print(&as_text(&args.input.display().to_string(), &report, &sections)?)
+    if args.json {
+        let all: Vec<&Inspected> = all.iter().map(|(_, found)| found).collect();
+        return print(&format!("{}\n", serde_json::to_string_pretty(&all)?));
+    }
+    all.iter().try_for_each(|(path, found)| found.tell(path))
 }
 
 /// What `--json` prints.
@@ -30,6 +47,21 @@ struct Inspected {
     #[serde(flatten)]
     report: Report,
     sections: Vec<Section>,
+}
+
+impl Inspected {
+    fn of(path: &Path) -> Result<Self> {
+        let mut container = decode::open(path)?;
+        let fail = |cause| DecodeError::container(path, cause);
+        container.verify().map_err(fail)?;
+        let report = container.report().map_err(fail)?;
+        Ok(Self { report, sections: sections(&container) })
+    }
+
+    fn tell(&self, path: &Path) -> Result<()> {
+        warn(&self.report.warnings);
+        print(&as_text(&path.display().to_string(), &self.report, &self.sections)?)
+    }
 }
 
 /// Sections of one kind added up.

@@ -16,22 +16,30 @@ mod edit;
 mod encode;
 mod encode_remote;
 mod encode_summary;
+mod explore;
 mod global_args;
 mod health;
 mod inspect;
 mod interrupt;
 mod local_service;
 mod manual;
+mod motion_args;
 mod names;
 mod outputs;
+mod poses;
 mod progress;
 mod recover;
 mod recover_args;
 mod recover_remote;
+mod recover_stretch;
 mod rig;
 pub(crate) mod serve;
 mod solver_options;
+mod stretches;
+mod transfer;
 mod transfer_args;
+mod transfer_source;
+mod vertex_pairs;
 
 use args::{Cli, Command};
 use cager_geometry::mesh::Model;
@@ -55,6 +63,8 @@ pub fn run() -> ExitCode {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Transfer(args) => transfer::run(&args),
+        Command::Explore(args) => explore::run(&args),
         Command::Rig(args) => rig::run(&args),
         Command::Manifold(args) => rig::learn(&args),
         Command::Edit(args) => edit::run(&args),

@@ -106,6 +106,15 @@ impl Outputs {
     }
 }
 
+/// The folder that an output is to lie in, where there is room for what is on its way.
+pub(super) fn folder_of(output: &Target) -> &Path {
+    let folder = match output {
+        Target::StandardOutput => None,
+        output => output.path().parent().filter(|folder| !folder.as_os_str().is_empty()),
+    };
+    folder.unwrap_or(Path::new("."))
+}
+
 fn refuse_terminal(path: &Path, example: &str) -> Result<()> {
     if path.as_os_str() == "-" && std::io::stdout().is_terminal() {
         bail!("-: standard output is a terminal; redirect it, as in -o - > {example}");

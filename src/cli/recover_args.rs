@@ -3,7 +3,9 @@
 use super::args::CodingArgs;
 use super::checks::TimingArgs;
 use super::outputs::OutputArgs;
+use super::stretches::KeyTemplate;
 use crate::mismatch::Up;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -14,18 +16,19 @@ use std::path::PathBuf;
 /// Example: cager recover --template scan_0001.ply --frames 'scan_*.ply' -o dance.cager
 #[derive(Args)]
 pub(crate) struct RecoverArgs {
-    /// Mesh that is to move: .obj .ply .off .stl .glb, with faces; one of the frames will do.
-    #[arg(long, value_name = "TEMPLATE")]
-    pub(super) template: PathBuf,
+    /// Mesh that is to move: .obj .ply .off .stl .glb, with faces; one of the frames will do. Where the topology changes for good, go on with another one from
+    /// that frame: --template first.obj --template 120:second.obj. Then out-1.cager, out-2.cager and a list of them, out.stretches.json, are written.
+    #[arg(long, value_name = "[FRAME:]TEMPLATE", required = true, value_parser = OsStringValueParser::new().map(KeyTemplate::from))]
+    pub(super) template: Vec<KeyTemplate>,
 
     /// Surfaces, in the order of their numbers: a folder, quoted glob or numbered name (scan.%04d.ply) of mesh files or of point clouds with or without
     /// normals.
     #[arg(long, value_name = "FRAMES")]
     pub(super) frames: PathBuf,
 
-    /// Closed cage around the template [default: one of about 350 vertices is made].
+    /// Closed cage around the template, or one for each template in their order [default: one of about 350 vertices is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "rig")]
-    pub(super) cage: Option<PathBuf>,
+    pub(super) cage: Vec<PathBuf>,
 
     /// Follow a person by this rig, as `cager rig` writes it for the template: for noisy, partial or fast surfaces.
     #[arg(long, value_name = "RIG.json", requires = "manifold")]
@@ -43,6 +46,10 @@ pub(crate) struct RecoverArgs {
     #[arg(long, value_name = "JOINTS", requires = "rig")]
     pub(super) joints: Option<PathBuf>,
 
+    /// With --rig, draw how high ankles and toes are over time: .svg.
+    #[arg(long, value_name = "GAIT.svg", requires = "rig", conflicts_with = "server")]
+    pub(super) gait: Option<PathBuf>,
+
     /// File to write, or - for standard output; it appears whole or not at all.
     #[arg(short, long, value_name = "OUT.cager")]
     pub(super) output: PathBuf,
@@ -53,6 +60,10 @@ pub(crate) struct RecoverArgs {
     /// Let points of the template leave the cage to meet the surfaces, smoothly; give an error (--max-error) to store where they are.
     #[arg(long)]
     pub(super) offsets: bool,
+
+    /// Give the template the colours of the surfaces, each point the mean of what is seen at it.
+    #[arg(long, conflicts_with = "server")]
+    pub(super) colors: bool,
 
     /// auto: turn and move the template onto the first surface before it is followed.
     #[arg(long, value_enum, value_name = "ALIGN", default_value = "none")]

@@ -12,6 +12,7 @@ use cager_client::messages::SessionOptions;
 use cager_client::recovery_messages::{Placing, RecoveryOptions, RecoveryState};
 use cager_formats::{AtomicFile, MeshSequence, Target, commit_together};
 use cager_geometry::mesh::Model;
+use std::path::PathBuf;
 
 /// Has a service recover what the arguments say.
 pub(super) fn run(
@@ -28,10 +29,11 @@ pub(super) fn run(
     let mut joints = joints
         .map(|(target, kind)| Ok::<_, anyhow::Error>((kind.result(), AtomicFile::create(target)?)))
         .transpose()?;
-    let file = |path: &Option<_>| path.as_deref().map(mesh_file).transpose();
-    let person = file(&args.rig)?.zip(file(&args.manifold)?).map(|(rig, manifold)| [rig, manifold]);
+    let file = |path: Option<&PathBuf>| path.map(|path| mesh_file(path)).transpose();
+    let person = file(args.rig.as_ref())?.zip(file(args.manifold.as_ref())?).map(|(rig, manifold)| [rig, manifold]);
     let options = options(args, template, files.files.len(), person.is_some())?;
-    let new = NewRecovery { cage: file(&args.cage)?, person, options, ..NewRecovery::new(mesh_file(&args.template)?) };
+    let template_file = mesh_file(&args.template[0].path)?;
+    let new = NewRecovery { cage: file(args.cage.first())?, person, options, ..NewRecovery::new(template_file) };
     let mut outputs = vec![("capture.cager", &mut container)];
     outputs.extend(report.as_mut().map(|file| ("report", file)));
     outputs.extend(joints.as_mut().map(|(name, file)| (*name, file)));

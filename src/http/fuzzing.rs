@@ -107,7 +107,7 @@ pub async fn new_cage(
     let mut request = Request::new(body);
     request.headers_mut().insert(header::CONTENT_TYPE, content_type);
     let tenant = service.access.tenant("local");
-    let new = cage_jobs::parts::read(service, &tenant, request, None).await?;
+    let new = cage_jobs::create::read(service, &tenant, request, None).await?;
     Ok((new.rest.len(), new.frames.bytes()))
 }
 

@@ -18,6 +18,8 @@ mod frames;
 pub mod fuzzing;
 mod guarded;
 mod health;
+mod job_frames;
+mod jobs;
 pub mod listen;
 mod metered;
 mod multipart;
@@ -33,6 +35,9 @@ mod respond;
 mod router;
 mod sent;
 mod sessions;
+mod shape_spaces;
+mod spooled;
+mod transfers;
 
 pub use admin::admin;
 pub(crate) use page::file as page_file;

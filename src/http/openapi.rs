@@ -11,6 +11,8 @@ use cager_proto::messages::{
     CageSource, FrameErrors, FrameResult, Problem, RestCage, Session, SessionList, SessionOptions,
 };
 use cager_proto::recovery_messages::{Recovery, RecoveryList, RecoveryOptions, RecoveryProgress};
+use cager_proto::shape_messages::{ShapeSpace, ShapeSpaceList, ShapeSpaceOptions};
+use cager_proto::transfer_messages::{Transfer, TransferList, TransferOptions, TransferProgress};
 use http::header;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -33,21 +35,12 @@ pub(crate) struct Id {
     id: String,
 }
 
-/// The path parameter of a cage design.
+/// The path parameter of a job, or of a shape space.
 #[derive(IntoParams)]
 #[into_params(parameter_in = Path)]
 #[allow(dead_code, reason = "it only describes")]
-pub(crate) struct CageId {
-    /// Id of the cage design.
-    id: String,
-}
-
-/// The path parameter of a recovery.
-#[derive(IntoParams)]
-#[into_params(parameter_in = Path)]
-#[allow(dead_code, reason = "it only describes")]
-pub(crate) struct RecoveryId {
-    /// Id of the recovery.
+pub(crate) struct JobId {
+    /// Its id.
     id: String,
 }
 
@@ -79,6 +72,49 @@ pub(crate) struct SurfacesForm {
     /// Meshes or point clouds, each a part of its own, files whose names end in .obj, .ply, .off, .stl or .glb.
     #[schema(value_type = Vec<String>, format = Binary)]
     frame: Vec<Vec<u8>>,
+}
+
+/// The parts of a request for a transfer.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct NewTransferForm {
+    /// Source in its rest pose, with faces, a file whose name ends in .obj, .ply, .off, .stl or .glb.
+    #[schema(value_type = String, format = Binary, required = false)]
+    source_rest: Vec<u8>,
+    /// Its frames, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2 or .mdd; else raw little-endian f32,
+    /// frame after frame, whose number `options.frames` says.
+    #[schema(value_type = String, format = Binary, required = false)]
+    source_frames: Vec<u8>,
+    /// Source with its frames, a container, in place of these two.
+    #[schema(value_type = String, format = Binary, required = false)]
+    source: Vec<u8>,
+    /// Model that is to move, in its rest pose; a point cloud will do.
+    #[schema(value_type = String, format = Binary)]
+    target: Vec<u8>,
+    /// Closed cage: around the source, or with the methods `public` and `rigid` around both, in the target's space; one is made where it is left out.
+    #[schema(value_type = String, format = Binary, required = false)]
+    cage: Vec<u8>,
+    /// Choices.
+    #[schema(required = false)]
+    options: TransferOptions,
+}
+
+/// The parts of a request for a shape space.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct NewShapeSpaceForm {
+    /// Poses, each a part of its own, files whose names end in .obj, .ply, .off, .stl or .glb.
+    #[schema(value_type = Vec<String>, format = Binary, required = false)]
+    pose: Vec<Vec<u8>>,
+    /// A container, of whose frames `options.frames` are the poses, in place of these.
+    #[schema(value_type = String, format = Binary, required = false)]
+    source: Vec<u8>,
+    /// Closed cage around the first pose, or around the container's model in place of its own; one is made where it is left out.
+    #[schema(value_type = String, format = Binary, required = false)]
+    cage: Vec<u8>,
+    /// Choices.
+    #[schema(required = false)]
+    options: ShapeSpaceOptions,
 }
 
 /// The parts of a request for a cage design.
@@ -136,7 +172,7 @@ pub(crate) struct NewSessionForm {
         description = "Turns animated mesh captures into cages: make a session from a rest pose and its cage, post frames, follow or download the cages.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
     ),
-    components(schemas(CageJob, CageJobList, CageOptions, CageProgress, CageSource, Event, FrameErrors, FrameResult, Problem, Recovery, RecoveryList, RecoveryOptions, RecoveryProgress, RestCage, RowsQuery, Session, SessionList, SessionOptions)),
+    components(schemas(CageJob, CageJobList, CageOptions, CageProgress, CageSource, Event, FrameErrors, FrameResult, Problem, Recovery, RecoveryList, RecoveryOptions, RecoveryProgress, RestCage, RowsQuery, Session, SessionList, SessionOptions, ShapeSpace, ShapeSpaceList, ShapeSpaceOptions, Transfer, TransferList, TransferOptions, TransferProgress)),
     security(("token" = [])),
     tags(
         (name = "sessions", description = "Sessions and their progress"),
@@ -144,6 +180,8 @@ pub(crate) struct NewSessionForm {
         (name = "results", description = "What comes out"),
         (name = "cages", description = "Cages designed from a motion"),
         (name = "recoveries", description = "Animations recovered from surfaces without correspondence"),
+        (name = "transfers", description = "Motions moved onto other models"),
+        (name = "shapespaces", description = "Shapes between poses"),
         (name = "operation", description = "For operators"),
     ),
     modifiers(&Token),
@@ -210,7 +248,8 @@ pub(crate) fn finished(mut document: utoipa::openapi::OpenApi) -> Value {
     let mut document = serde_json::to_value(&document).unwrap_or_default();
     fix_u32_ranges(&mut document);
     let schemas = &mut document["components"]["schemas"];
-    for form in ["NewSessionForm", "NewCageForm", "NewRecoveryForm", "OtherModelForm", "SurfacesForm"] {
+    let forms = ["NewSessionForm", "NewCageForm", "NewRecoveryForm", "OtherModelForm", "SurfacesForm"];
+    for form in forms.into_iter().chain(["NewTransferForm", "NewShapeSpaceForm"]) {
         schemas[form]["additionalProperties"] = false.into();
     }
     document
@@ -289,6 +328,14 @@ fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
             "SurfacesForm" => &[("frame", "ply")],
             "NewRecoveryForm" => &[("template", "obj"), ("cage", "obj"), ("rig", "json"), ("manifold", "json")],
             "NewCageForm" => &[("rest", "obj"), ("frames", "npy")],
+            "NewTransferForm" => &[
+                ("source_rest", "obj"),
+                ("source_frames", "npy"),
+                ("source", "cager"),
+                ("target", "obj"),
+                ("cage", "obj"),
+            ],
+            "NewShapeSpaceForm" => &[("pose", "obj"), ("source", "cager"), ("cage", "obj")],
             _ => &[("rest", "obj"), ("cage", "obj")],
         };
         for (part, ending) in files {

@@ -6,6 +6,7 @@ use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use http::{HeaderMap, header};
+use serde::Serialize;
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,6 +37,14 @@ pub(super) struct ProgressEvent {
     pub(super) data: String,
     /// Whether the state is final.
     pub(super) last: bool,
+}
+
+impl ProgressEvent {
+    /// An event whose id is that of its data.
+    pub(super) fn of(data: &impl Serialize, last: bool) -> Self {
+        let data = serde_json::to_string(data).unwrap_or_default();
+        Self { id: blake3::hash(data.as_bytes()).to_hex()[..16].to_owned(), data, last }
+    }
 }
 
 /// Streams an event `progress` after each change, until the state is final, the object is deleted, or the service stops.

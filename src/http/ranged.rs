@@ -6,6 +6,7 @@ use crate::sync::lock;
 use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
+use futures_util::StreamExt as _;
 use http::{HeaderMap, HeaderValue, StatusCode, header};
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -122,7 +123,7 @@ impl Immutable {
         let read = Arc::clone(&self.read);
         let nothing = self.room.nothing();
         let room = std::mem::replace(&mut self.room, nothing);
-        Body::from_stream(futures_util::stream::unfold((range, room), move |(left, room)| {
+        let pieces = futures_util::stream::unfold((range, room), move |(left, room)| {
             let read = Arc::clone(&read);
             async move {
                 if left.is_empty() {
@@ -133,7 +134,9 @@ impl Immutable {
                 let bytes = tokio::task::spawn_blocking(move || read(piece)).await;
                 Some((bytes.map_err(io::Error::other).and_then(|bytes| bytes), (next, room)))
             }
-        }))
+        });
+        // What compresses a body asks for more after its end.
+        Body::from_stream(pieces.fuse())
     }
 }
 

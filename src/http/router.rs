@@ -6,7 +6,7 @@ use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
     cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
-    page, recoveries, sent, sessions,
+    page, recoveries, sent, sessions, shape_spaces, transfers,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
@@ -55,6 +55,15 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(recoveries::results::report))
         .routes(routes!(recoveries::results::joints_csv))
         .routes(routes!(recoveries::results::joints_bvh))
+        .routes(routes!(transfers::jobs::list))
+        .routes(routes!(transfers::jobs::get, transfers::jobs::delete))
+        .routes(routes!(transfers::jobs::events))
+        .routes(routes!(transfers::results::frames))
+        .routes(routes!(transfers::results::container))
+        .routes(routes!(transfers::results::report))
+        .routes(routes!(shape_spaces::list))
+        .routes(routes!(shape_spaces::get, shape_spaces::delete))
+        .routes(routes!(shape_spaces::pose))
 }
 
 /// Routes that take as long as their work.
@@ -71,6 +80,8 @@ fn streaming() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(cage_jobs::create::create))
         .routes(routes!(recoveries::create::create))
         .routes(routes!(recoveries::frames::post))
+        .routes(routes!(transfers::create::create))
+        .routes(routes!(shape_spaces::create))
 }
 
 /// Routes without authentication and limits, for probes.

@@ -3,11 +3,21 @@
 use super::{Job, Outcome, Phase, Work, kind_of};
 use crate::problem::ApiError;
 use crate::service::Service;
-use crate::store::{FolderMeta as _, JobMeta as _, Store, StoreError};
+use crate::store::{FolderMeta as _, JobMeta as _, Store, StoreError, Workshop};
 use crate::tasks::{blocking, to_the_end};
 use crate::unreadable;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
+
+/// How work on a job ended whose results are files.
+pub(crate) enum Ended<F> {
+    Completed(Box<F>, Workshop),
+    Failed(ApiError),
+    /// It ended the process too often; what was sent is kept.
+    GivenUp(ApiError),
+    /// There is nothing to do for a while, the job was deleted, or the service is stopping.
+    Paused,
+}
 
 impl Service {
     /// Resumes a job found on disk; one without outcome is begun again. If its outcome cannot be read, it is registered as failed so that it
@@ -49,6 +59,35 @@ impl Service {
             W::begin(Arc::clone(self), job);
         }
         error.map_or(Ok(()), Err)
+    }
+
+    /// Keeps how work on a job ended. Whether the job is over.
+    pub(crate) async fn end_job<W: Work>(&self, job: &Arc<Job<W>>, ended: Ended<W::Finished>) -> bool {
+        let (id, kind) = (job.id().to_owned(), kind_of::<W>());
+        let (outcome, workshop) = match ended {
+            Ended::Paused => return false,
+            Ended::Completed(finished, workshop) => (Outcome::Completed(finished), Some(workshop)),
+            Ended::Failed(error) if error.status().is_client_error() => {
+                tracing::info!(job = job.id(), detail = %error.problem.detail, "a job cannot be done");
+                (Outcome::Failed(error.problem), None)
+            }
+            // Errors that may be temporary are retried after a restart.
+            Ended::Failed(error) | Ended::GivenUp(error) => {
+                job.set_phase(Phase::Failed(error.problem));
+                return true;
+            }
+        };
+        let write = move |store: &Store, outcome: &Outcome<W::Finished>| {
+            let results = match (outcome, &workshop) {
+                (Outcome::Completed(finished), Some(workshop)) => Some((workshop, W::files(finished))),
+                _ => None,
+            };
+            store.finish_job(kind, &id, outcome, results)?;
+            W::forget_input(store, &id);
+            Ok(())
+        };
+        self.finish_job(job, outcome, write).await;
+        true
     }
 
     /// Stores the outcome of a job by `write`, then notifies its followers.

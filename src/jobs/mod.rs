@@ -1,14 +1,20 @@
 //! Long jobs, whatever they do: created durably, worked on in the background, followed, completed or failed once, kept over restarts, deleted.
 //! What the work is lies with each kind of job ([`Work`]); nothing here knows HTTP.
 
+mod create;
 mod life;
 mod registry;
+mod results;
 
+pub(crate) use create::new_job;
+pub(crate) use life::Ended;
 pub(crate) use registry::Jobs;
+pub(crate) use results::{Piece, ResultsError, Stoppable};
 
+use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{FolderMeta as _, JobMeta, Kind, Store, StoreError};
+use crate::store::{FolderMeta as _, JobMeta, Kind, Store, StoreError, StoredPart};
 use crate::sync::lock;
 use cager_proto::messages::Problem;
 use serde::de::DeserializeOwned;
@@ -37,8 +43,25 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
     const ENDED: &'static str;
     /// The problem of one that failed.
     const FAILED: problem::Kind;
+    /// What has to happen before there are results.
+    const UNFINISHED: &'static str;
+    /// The reason that is counted where too many wait.
+    const QUEUE: &'static str;
 
     fn jobs(service: &Service) -> &Jobs<Self>;
+
+    /// How many of a tenant's may wait for their turn.
+    fn most_waiting(config: &ServeConfig) -> usize;
+
+    /// Whether one waits for its turn.
+    fn waits(status: &Status<Self>) -> bool {
+        matches!(status.phase, Phase::Waiting)
+    }
+
+    /// Files of the results.
+    fn files(_finished: &Self::Finished) -> &[StoredPart] {
+        &[]
+    }
 
     /// Reads what is on disk of a job that is not over. Blocks.
     ///
@@ -139,6 +162,18 @@ impl<W: Work> Job<W> {
     /// State and progress, locked.
     pub(crate) fn status(&self) -> MutexGuard<'_, Status<W>> {
         lock(&self.status)
+    }
+
+    /// The results of a completed job.
+    ///
+    /// # Errors
+    /// It is not completed.
+    pub(crate) fn finished(&self) -> Result<Box<W::Finished>, ApiError> {
+        match self.phase() {
+            Phase::Completed(finished) => Ok(finished),
+            Phase::Failed(problem) => Err(ApiError::new(W::FAILED, problem.detail)),
+            Phase::Waiting | Phase::Running => Err(ApiError::new(problem::NOT_COMPLETED, W::UNFINISHED).retry_after(2)),
+        }
     }
 
     pub(crate) fn phase(&self) -> Phase<W::Finished> {

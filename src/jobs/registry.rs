@@ -1,6 +1,6 @@
 //! All jobs of a kind by id and tenant, and the idempotency keys that created them.
 
-use super::{Job, Phase, Work};
+use super::{Job, Work};
 use crate::idempotency::{Keyed, Requests};
 use crate::problem::{self, ApiError};
 use crate::store::JobMeta as _;
@@ -85,8 +85,8 @@ impl<W: Work> Jobs<W> {
     }
 
     /// Number of a tenant's jobs that wait.
-    pub(crate) fn waiting_of(&self, tenant: &str) -> usize {
-        self.of(tenant).iter().filter(|job| matches!(job.status().phase, Phase::Waiting)).count()
+    pub(super) fn waiting_of(&self, tenant: &str) -> usize {
+        self.of(tenant).iter().filter(|job| W::waits(&job.status())).count()
     }
 }
 

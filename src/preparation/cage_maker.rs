@@ -131,7 +131,7 @@ fn make(
     vertices: Option<u32>,
     watch: &mut (dyn FnMut() -> ControlFlow<()> + Send),
 ) -> Result<TriMesh, ApiError> {
-    check_extent(rest)?;
+    check_extent("rest", rest)?;
     // With more vertices than half the points, the data could not determine the cage.
     let usual = DEFAULT_VERTICES.min(rest.points.len() / 2).max(*VERTICES.start() as usize);
     let vertices = vertices.map_or(usual, |vertices| vertices as usize);
@@ -146,7 +146,7 @@ fn make(
 ///
 /// # Errors
 /// `INVALID_GEOMETRY`.
-pub(crate) fn check_extent(rest: &Model) -> Result<(), ApiError> {
+pub(crate) fn check_extent(part: &str, rest: &Model) -> Result<(), ApiError> {
     let error = if rest.points.is_empty() {
         EncloseError::Empty
     } else {
@@ -156,7 +156,7 @@ pub(crate) fn check_extent(rest: &Model) -> Result<(), ApiError> {
         }
         EncloseError::NoExtent
     };
-    Err(ApiError::new(problem::INVALID_GEOMETRY, format!("rest: {error}")))
+    Err(ApiError::new(problem::INVALID_GEOMETRY, format!("{part}: {error}")))
 }
 
 /// A mesh as the bytes of an OBJ file.

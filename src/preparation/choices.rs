@@ -21,7 +21,8 @@ pub(crate) struct Choices {
     pub(super) frames: u32,
 }
 
-const NAME_CHARACTERS: usize = 200;
+/// Most characters of a name that a user gives.
+pub(crate) const NAME_CHARACTERS: usize = 200;
 
 impl Choices {
     /// Validates what does not depend on the cage.

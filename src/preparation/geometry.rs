@@ -2,6 +2,7 @@
 
 use super::Choices;
 use crate::coding::RestMeshes;
+use crate::origin::move_to;
 use crate::problem::{self, ApiError};
 use crate::store::{Content, NamedFile};
 use cager_cages::diagnosis::weld;
@@ -10,7 +11,7 @@ use cager_core::cage::{Cage, CageError};
 use cager_core::regularize::Regularizer;
 use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
 use cager_geometry::linalg::SparseMatrix;
-use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use std::path::Path;
 
 /// Rest pose and cage of a session, on a grid where its frames are coded.
@@ -80,6 +81,23 @@ pub(crate) fn read_cage(file: &NamedFile, choices: &Choices) -> Result<Cage, Api
         let error = error.renumbered(|triangle| polygon_of[triangle] as usize);
         geometry(format!("{name}: {error}{or}"))
     })
+}
+
+/// A cage that was sent with a job.
+///
+/// # Errors
+/// It cannot be read or used.
+pub(crate) fn cage_of(file: &NamedFile, origin: Option<Point>) -> Result<Cage, ApiError> {
+    let refuse = |what: String| ApiError::new(problem::INVALID_GEOMETRY, format!("cage: {}: {what}", file.name));
+    let mut model = read_part("cage", &file.name, &file.bytes)?;
+    if model.faces.is_empty() {
+        return Err(refuse("has no faces, and a cage is a closed mesh; export the cage with its faces".to_owned()));
+    }
+    model = weld(&model).map_or(model, |welded| welded.model);
+    move_to(origin, &mut model.points);
+    let polygon_of = model.faces.polygon_of_triangle();
+    let cage = Cage::new(TriMesh::from(&model));
+    cage.map_err(|error| refuse(error.renumbered(|triangle| polygon_of[triangle] as usize).to_string()))
 }
 
 /// Parses a mesh file; `part` names it in errors.

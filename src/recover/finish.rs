@@ -1,6 +1,7 @@
 //! Frames whose cages are known: vertices that leave their cage, distances, positions written.
 
 use super::RecoverError;
+use super::colors::Painter;
 use super::distances::distances;
 use super::positions::RecoveredFrames;
 use super::report::{FrameReport, How};
@@ -19,6 +20,13 @@ pub(super) struct Finisher<'a> {
     offsets: Option<OffsetSolver>,
     samples: Vec<SurfacePoint>,
     written: RecoveredFrames,
+    painter: Painter,
+}
+
+/// Frames that can be read, and colours of the template where surfaces had some.
+pub(super) struct Written {
+    pub(super) frames: RecoveredFrames,
+    pub(super) colors: Option<Vec<[u8; 3]>>,
 }
 
 /// Points of the template that are measured to the surfaces.
@@ -34,7 +42,9 @@ impl<'a> Finisher<'a> {
         written: RecoveredFrames,
     ) -> Self {
         let samples = sample_surface(&rest.vertices, &rest.triangles, MEASURED, 1);
-        Self { rest, source, diagonal, offsets: offsets.then(|| OffsetSolver::new(rest, diagonal)), samples, written }
+        let offsets = offsets.then(|| OffsetSolver::new(rest, diagonal));
+        let painter = Painter::new(rest.vertices.len(), diagonal);
+        Self { rest, source, diagonal, offsets, samples, written, painter }
     }
 
     /// Writes a frame from where its cage has the template's points.
@@ -49,6 +59,9 @@ impl<'a> Finisher<'a> {
             positions = offsets.offset(&positions, &seen.target);
         }
         self.written.write(frame, &positions)?;
+        if let Some(colored) = seen.and_then(|seen| seen.colored.as_ref()) {
+            self.painter.add(&positions, colored);
+        }
         let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
         let points: Vec<Point> = self.samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
         let distances = seen.map_or((None, None), |seen| distances(&mesh, &points, seen, self.diagonal));
@@ -57,8 +70,8 @@ impl<'a> Finisher<'a> {
     }
 
     /// All frames, ready to be read.
-    pub(super) fn into_frames(mut self) -> Result<RecoveredFrames, RecoverError> {
+    pub(super) fn into_frames(mut self) -> Result<Written, RecoverError> {
         self.written.rewind()?;
-        Ok(self.written)
+        Ok(Written { frames: self.written, colors: self.painter.colors(&self.rest.vertices) })
     }
 }

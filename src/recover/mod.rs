@@ -1,9 +1,11 @@
 //! One animation of a template from surfaces that have no correspondence: files in, frames out that can be encoded as any capture.
 
 mod any_subject;
+mod colors;
 mod distances;
 mod encoding;
 mod finish;
+mod gait;
 mod people;
 mod placement;
 mod positions;
@@ -13,6 +15,8 @@ mod surfaces;
 
 pub use distances::Distances;
 pub(crate) use encoding::Encoding;
+pub use gait::GaitCurve;
+pub(crate) use gait::gait_svg;
 pub(crate) use people::{JOINTS_RATE, manifold_of, rig_of};
 pub use people::{Joints, Person};
 pub use placement::Placement;
@@ -31,7 +35,7 @@ use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_recover::joints::JointsError;
 use cager_recover::people::ModelError;
 use cager_registration::{ObservationError, RegistrationError, outward};
-use finish::Finisher;
+use finish::{Finisher, Written};
 use report::Seconds;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -115,6 +119,8 @@ pub struct RecoverOptions {
     pub force: bool,
     /// Points of each surface that are looked at.
     pub points: usize,
+    /// Give the template the colours of the surfaces, where these have some.
+    pub colors: bool,
 }
 
 /// Everything a recovery needs.
@@ -197,7 +203,7 @@ struct Finished {
     reports: Vec<FrameReport>,
     cages: Vec<Vec<Point>>,
     joints: Option<Joints>,
-    frames: RecoveredFrames,
+    written: Written,
 }
 
 /// Follows a template through surfaces.
@@ -208,8 +214,8 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
     let clock = Instant::now();
     let RecoverJob { mut template, cage, person, source, pool, frame_rate, origin, options, scratch } = job;
     let diagonal = |model: &Model| cager_geometry::mesh::diagonal(&model.points);
-    let RecoverOptions { points, force, .. } = options;
-    let mut surfaces = Surfaces { source, pool, points, diagonal: diagonal(&template), origin, force };
+    let RecoverOptions { points, force, colors, .. } = options;
+    let mut surfaces = Surfaces { source, pool, points, diagonal: diagonal(&template), origin, force, colors };
     let (first, seen) = surfaces.first()?;
     let mut cage = cage.mesh().clone();
     let placement = surfaces.on_pool(|| Placement::find(&mut template, &mut cage, &seen.observation, &options))?;
@@ -224,7 +230,7 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
     };
     let mut seconds = Seconds::default();
     let mut warnings = Vec::new();
-    let Finished { reports, cages, joints, frames } = if let Some(person) = person {
+    let Finished { reports, cages, joints, written } = if let Some(person) = person {
         seconds.prepare = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let found = person.follow(&rest, &surfaces, &finisher, watch)?;
@@ -254,8 +260,18 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
         seconds.refine = clock.elapsed().as_secs_f64();
         found
     };
-    let report = RecoveryReport::new((&rest, &cage), surfaces.diagonal, placement, reports, seconds);
+    let mut report = RecoveryReport::new((&rest, &cage), surfaces.diagonal, placement, reports, seconds);
+    match &joints {
+        Some(joints) => report.gait = joints.gait(),
+        None => report.find_change(),
+    }
     warnings.extend(report.warnings());
     warnings.extend(placement.and_then(|placement| placement.warning()));
+    let Written { frames, colors: found } = written;
+    match found {
+        Some(found) => template.colors = found,
+        None if colors => warnings.push("no frame has colours, so the template keeps its own".to_owned()),
+        None => {}
+    }
     Ok(Recovered { rest: template, cage, frames, cages, report, joints, warnings })
 }

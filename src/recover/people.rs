@@ -1,6 +1,7 @@
 //! People: a template followed by its rig and the manifold of usual poses.
 
 use super::finish::Finisher;
+use super::gait::{GaitCurve, gait};
 use super::report::How;
 use super::surfaces::Surfaces;
 use super::{Finished, RecoverError, RecoverProgress, Watch};
@@ -28,12 +29,19 @@ pub(crate) const JOINTS_RATE: f64 = 30.0;
 pub struct Joints {
     caged: CagedJoints,
     frames: Vec<Vec<Point>>,
+    /// The rig's up axis.
+    up: Point,
 }
 
 impl Joints {
     /// A table, `frame,joint,x,y,z`, by the numbers of the frames.
     pub fn csv(&self, numbers: &[f64]) -> String {
         self.caged.csv(numbers, &self.frames)
+    }
+
+    /// How high feet are.
+    pub(super) fn gait(&self) -> Vec<GaitCurve> {
+        gait(&self.frames, self.up)
     }
 
     /// A BVH file of so many frames per second.
@@ -117,7 +125,7 @@ impl Person<'_> {
             watch(RecoverProgress::Refined(reports.len()));
             Ok(())
         })?;
-        let joints = Some(Joints { caged, frames: joints });
-        Ok(Finished { reports, cages, joints, frames: finisher.into_frames()? })
+        let joints = Some(Joints { caged, frames: joints, up: self.rig.up });
+        Ok(Finished { reports, cages, joints, written: finisher.into_frames()? })
     }
 }

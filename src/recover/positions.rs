@@ -18,7 +18,7 @@ pub struct RecoveredFrames {
 
 impl RecoveredFrames {
     /// An empty file in a folder.
-    pub(super) fn create(
+    pub(crate) fn create(
         folder: &Path,
         points: usize,
         numbers: Vec<f64>,
@@ -35,7 +35,7 @@ impl RecoveredFrames {
     }
 
     /// Stores a frame.
-    pub(super) fn write(&mut self, frame: usize, positions: &[Point]) -> Result<(), Error> {
+    pub(crate) fn write(&mut self, frame: usize, positions: &[Point]) -> Result<(), Error> {
         let bytes: Vec<u8> = positions.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
         let at = SeekFrom::Start(frame as u64 * self.frame_bytes());
         let file = self.file.get_mut();

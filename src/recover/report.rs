@@ -1,10 +1,12 @@
 //! What is told of a recovery.
 
 use super::distances::Distances;
+use super::gait::GaitCurve;
 use super::placement::Placement;
 use super::{FirstLook, RecoverProgress};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Point, TriMesh};
+use cager_recover::change::changed_for_good;
 use cager_recover::track::{Outcome, TrackedFrame};
 use cager_registration::ObservationNotes;
 use serde::Serialize;
@@ -23,12 +25,17 @@ pub struct RecoveryReport {
     pub placement: Option<Placement>,
     /// Frames in which part of the template may be somewhere else, by their numbers.
     pub lost: Vec<f64>,
+    /// The number of the frame from which on the template lies worse all at once and to the end: the topology seems to have changed for good.
+    pub changed_from: Option<f64>,
     /// From the template to the surfaces, on average over the frames that are not lost.
     pub to_surface: Option<f64>,
     /// And back.
     pub from_surface: Option<f64>,
     /// Every frame.
     pub frames: Vec<FrameReport>,
+    /// How high ankles and toes of a person are in them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub gait: Vec<GaitCurve>,
     /// How long it took.
     pub seconds: Seconds,
 }
@@ -151,11 +158,19 @@ impl RecoveryReport {
             diagonal,
             placement,
             lost: frames.iter().filter(|frame| frame.outcome == "lost").map(|frame| frame.number).collect(),
+            changed_from: None,
             to_surface: mean(|frame| frame.to_surface),
             from_surface: mean(|frame| frame.from_surface),
             frames,
+            gait: Vec::new(),
             seconds,
         }
+    }
+
+    /// Looks for a change of topology.
+    pub(super) fn find_change(&mut self) {
+        let scores: Vec<f64> = self.frames.iter().map(|frame| frame.score.unwrap_or(f64::INFINITY)).collect();
+        self.changed_from = changed_for_good(&scores).map(|frame| self.frames[frame].number);
     }
 
     /// As a file.
@@ -188,6 +203,9 @@ impl RecoveryReport {
         tell(&of(|frame| frame.outcome == "no_surface"), "no surface, so the template stays as it was, in frames");
         tell(&of(|frame| frame.turned), "the surface faced inwards, and was turned, in frames");
         tell(&of(|frame| frame.estimated_normals), "there are no normals, so they were estimated, in frames");
+        warnings.extend(self.changed_from.map(|number| format!(
+            "the template lies worse from frame {number} to the end: where the topology changed for good there, go on with another template (--template {number}:OTHER)"
+        )));
         warnings
     }
 }

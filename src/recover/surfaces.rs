@@ -5,7 +5,7 @@ use super::source::{Arrival, SurfaceSource};
 use crate::origin::move_to;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::spatial::Surface;
-use cager_registration::{Observation, ObservationError, ObservationNotes, ObservationOptions, Target};
+use cager_registration::{NearestPoints, Observation, ObservationError, ObservationNotes, ObservationOptions, Target};
 use std::sync::mpsc::sync_channel;
 
 /// The surfaces of a recovery, as they are read.
@@ -22,6 +22,8 @@ pub(super) struct Surfaces<'a> {
     pub(super) origin: Option<Point>,
     /// Whether frames without a surface are passed over.
     pub(super) force: bool,
+    /// Whether colours are kept.
+    pub(super) colors: bool,
 }
 
 /// A surface as it was read.
@@ -30,6 +32,20 @@ pub(super) struct Seen {
     pub(super) notes: ObservationNotes,
     /// Its triangles, to measure distances to; none of a cloud.
     pub(super) surface: Option<Surface>,
+    pub(super) colored: Option<Colored>,
+}
+
+/// Points of a surface with their colours.
+pub(super) struct Colored {
+    pub(super) tree: NearestPoints<3>,
+    pub(super) colors: Vec<[u8; 3]>,
+}
+
+impl Colored {
+    fn of(model: &Model) -> Option<Self> {
+        let tree = || NearestPoints::new(model.points.iter().copied());
+        (!model.colors.is_empty()).then(|| Self { tree: tree(), colors: model.colors.clone() })
+    }
 }
 
 /// A surface that can be followed and measured.
@@ -37,6 +53,7 @@ pub(super) struct Followed {
     pub(super) target: Target,
     pub(super) notes: ObservationNotes,
     pub(super) surface: Option<Surface>,
+    pub(super) colored: Option<Colored>,
 }
 
 /// What is looked at of a frame. The points that are drawn of it depend on its number alone.
@@ -73,14 +90,15 @@ impl Surfaces<'_> {
         let path = || self.source.file(frame);
         let (observation, notes) = found.map_err(|cause| RecoverError::Surface { path: path(), frame, cause })?;
         let surface = (!model.faces.is_empty()).then(|| Surface::from(&TriMesh::from(&model)));
-        Ok(Seen { observation, notes, surface })
+        let colored = self.colors.then(|| Colored::of(&model)).flatten();
+        Ok(Seen { observation, notes, surface, colored })
     }
 
     /// Reads a frame for a template; nothing of one that has no surface, where that is allowed.
     fn follow(&self, frame: usize) -> Result<Option<Followed>, RecoverError> {
         match self.read(frame) {
-            Ok(Seen { observation, notes, surface }) => {
-                Ok(Some(Followed { target: Target::new(&observation, self.diagonal), notes, surface }))
+            Ok(Seen { observation, notes, surface, colored }) => {
+                Ok(Some(Followed { target: Target::new(&observation, self.diagonal), notes, surface, colored }))
             }
             Err(RecoverError::Surface { .. }) if self.force => Ok(None),
             Err(error) => Err(error),

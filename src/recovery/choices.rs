@@ -3,7 +3,7 @@
 use super::frames::MAX_FRAMES;
 use crate::coding::Goal;
 use crate::mismatch::Up;
-use crate::preparation::goal;
+use crate::preparation::{NAME_CHARACTERS, goal};
 use crate::problem::{self, ApiError};
 use crate::recover::RecoverOptions;
 use cager_proto::messages::SessionOptions;
@@ -11,7 +11,6 @@ use cager_proto::recovery_messages::{Placing, RecoveryOptions};
 use cager_recover::people::{FitOptions, Method};
 use std::ops::RangeInclusive;
 
-const NAME_CHARACTERS: usize = 200;
 const POINTS: RangeInclusive<u32> = 100..=1_000_000;
 const DEFAULT_POINTS: u32 = 15_000;
 /// Numbers of frames lie below.
@@ -78,7 +77,7 @@ impl Choices {
         let quality = options.quality.clone();
         let coded = SessionOptions { max_error, mean_error, target_size, quality, frames, ..SessionOptions::default() };
         Ok(Self {
-            recover: RecoverOptions { align, scale, up, offsets, force, points: points as usize },
+            recover: RecoverOptions { align, scale, up, offsets, force, points: points as usize, colors: false },
             person: FitOptions { method, ..FitOptions::default() },
             goal: goal(&coded)?,
         })

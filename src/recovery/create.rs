@@ -4,21 +4,20 @@ use super::choices::Choices;
 use super::{Recovery, RecoveryJob};
 use crate::admission::Held;
 use crate::auth::Tenant;
-use crate::idempotency::{extension, made_before, once, request};
-use crate::jobs::{Phase, Work as _};
+use crate::idempotency::{extension, request};
+use crate::jobs::new_job;
 use crate::origin::own_origin;
-use crate::preparation::{check_extent, read_part};
+use crate::preparation::{cage_of, check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::recover::{manifold_of, rig_of};
 use crate::service::Service;
 use crate::store::{Idempotency, NamedFile, RecoveryMeta, RecoveryParts, StoredPart};
-use crate::tasks::{blocking, to_the_end};
+use crate::tasks::blocking;
 use cager_core::cage::Cage;
 use cager_geometry::mesh::Point;
 use cager_proto::recovery_messages::RecoveryOptions;
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A request to recover an animation.
 pub(crate) struct NewRecovery {
@@ -50,24 +49,12 @@ impl Service {
             (new, request)
         })
         .await?;
+        let check = move || check(&new).map(|checked| (new, checked));
+        let make = async |service: Arc<Self>, tenant: Arc<Tenant>, (new, checked), request| {
+            service.create_new_recovery(&tenant, new, checked, request).await
+        };
         // Fingerprints of recoveries have been the same in all versions.
-        if let Some(made) = made_before(&self.recoveries, &tenant.name, request.as_ref(), |_| false)? {
-            return Ok(made);
-        }
-        let place = self.reading.take(&tenant.name, 1).await;
-        let (new, checked) = blocking(move || {
-            let _place = place;
-            let checked = check(&new);
-            (new, checked)
-        })
-        .await?;
-        let checked = checked?;
-        let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
-        to_the_end(async move {
-            let make = |request| service.create_new_recovery(&tenant, new, checked, request);
-            once(&service.recoveries, &tenant.name, request, make).await
-        })
-        .await
+        self.create_job::<Recovery, _, _>(tenant, request, |_| false, check, make).await
     }
 
     async fn create_new_recovery(
@@ -77,6 +64,7 @@ impl Service {
         checked: Checked,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<RecoveryJob>, ApiError> {
+        self.check_job_queue::<Recovery>(&tenant.name)?;
         let NewRecovery { parts, options, room, .. } = new;
         let bytes = parts.named().map(|(_, part)| part.bytes.len() as u64).sum();
         let _reserved = self.reserve(tenant, bytes)?;
@@ -84,22 +72,12 @@ impl Service {
         let meta = blocking(move || {
             let _room = room;
             let Ok(stored) = parts.map(|_, part| Ok::<_, Infallible>(StoredPart::of(&part.name, &part.bytes)));
-            let meta = RecoveryMeta {
-                id: uuid::Uuid::now_v7().simple().to_string(),
-                tenant,
-                created_ms: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64,
-                options,
-                points: checked.points,
-                origin: checked.origin,
-                parts: stored,
-                idempotency,
-            };
+            let (id, created_ms) = new_job();
+            let Checked { points, origin } = checked;
+            let meta = RecoveryMeta { id, tenant, created_ms, options, points, origin, parts: stored, idempotency };
             store.create_recovery(&meta, &parts).map(|()| meta)
         });
-        let job = Arc::new(RecoveryJob::new(meta.await??, Phase::Waiting, bytes));
-        self.recoveries.insert(Arc::clone(&job));
-        Recovery::begin(Arc::clone(self), Arc::clone(&job));
-        Ok(job)
+        Ok(self.begin_job(meta.await??, bytes))
     }
 }
 
@@ -119,7 +97,7 @@ fn check(new: &NewRecovery) -> Result<Checked, ApiError> {
     if template.faces.is_empty() {
         return refuse(format!("template: {}: has no faces, and a template is a mesh; give one with faces", file.name));
     }
-    check_extent(&template)?;
+    check_extent("template", &template)?;
     let origin = own_origin(&template.points);
     match (rig, manifold) {
         (Some(_), Some(_)) if cage.is_some() => {
@@ -148,7 +126,7 @@ fn check(new: &NewRecovery) -> Result<Checked, ApiError> {
         (None, Some(_)) => return refuse("manifold: is of a rig; send the rig too, from `cager rig`".to_owned()),
     }
     if let Some(cage) = cage {
-        super::finish::cage_of(cage, origin)?;
+        cage_of(cage, origin)?;
     }
     Ok(Checked { points: template.points.len() as u32, origin })
 }

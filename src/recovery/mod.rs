@@ -12,7 +12,8 @@ mod view;
 
 pub(crate) use create::NewRecovery;
 
-use crate::jobs::{Job, Jobs, Phase, Work};
+use crate::config::ServeConfig;
+use crate::jobs::{Job, Jobs, Phase, Status, Work};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{RecoveryMeta, Store, StoreError, StoredPart};
@@ -36,9 +37,23 @@ impl Work for Recovery {
     const LIST: &'static str = "/v1/recoveries";
     const ENDED: &'static str = "cager_recoveries_total";
     const FAILED: problem::Kind = problem::RECOVERY_FAILED;
+    const UNFINISHED: &'static str = "results are written when the recovery is completed; post {\"frames\": F} to complete, and wait until its state is completed";
+    const QUEUE: &'static str = "recovery_queue";
 
     fn jobs(service: &Service) -> &Jobs<Self> {
         &service.recoveries
+    }
+
+    fn most_waiting(config: &ServeConfig) -> usize {
+        config.max_recovery_queue
+    }
+
+    fn waits(status: &Status<Self>) -> bool {
+        !status.phase.is_final() && status.progress.has_work()
+    }
+
+    fn files(finished: &Finished) -> &[StoredPart] {
+        &finished.files
     }
 
     fn load(store: &Store, job: &RecoveryJob) -> Result<(), StoreError> {
@@ -121,23 +136,6 @@ pub(crate) struct Finished {
     pub(crate) warnings: Vec<String>,
     /// The results.
     pub(crate) files: Vec<StoredPart>,
-}
-
-impl RecoveryJob {
-    /// The results of a completed recovery.
-    ///
-    /// # Errors
-    /// It is not completed.
-    pub(crate) fn finished(&self) -> Result<Box<Finished>, ApiError> {
-        match self.phase() {
-            Phase::Completed(finished) => Ok(finished),
-            Phase::Failed(problem) => Err(ApiError::new(problem::RECOVERY_FAILED, problem.detail)),
-            Phase::Waiting | Phase::Running => {
-                let detail = "results are written when the recovery is completed; post {\"frames\": F} to complete, and wait until its state is completed";
-                Err(ApiError::new(problem::NOT_COMPLETED, detail).retry_after(2))
-            }
-        }
-    }
 }
 
 /// A recovery that takes no frames any more, or is gone.

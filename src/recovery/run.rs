@@ -1,13 +1,13 @@
 //! Following frames: a limited number of recoveries at a time, tenants in turn, on the threads of the lowest priority.
 
 use super::choices::Choices;
-use super::finish::{cage_of, refused, refused_encoding, results};
+use super::finish::{refused, results};
 use super::source::StoredSurfaces;
-use super::{Finished, FollowedCage, Recovery, RecoveryJob};
+use super::{Finished, FollowedCage, RecoveryJob};
 use crate::admission::Held;
-use crate::jobs::{MAX_ATTEMPTS, Outcome, Phase};
+use crate::jobs::{Ended, MAX_ATTEMPTS, Phase};
 use crate::origin::move_to;
-use crate::preparation::read_part;
+use crate::preparation::{cage_of, read_part};
 use crate::problem::{self, ApiError};
 use crate::recover::{
     FirstLook, Person, RecoverError, RecoverJob, RecoverProgress, cage_around, manifold_of, recover, rig_of,
@@ -19,16 +19,6 @@ use crate::tasks::blocking;
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use std::sync::Arc;
-
-/// How a run ended.
-enum Ended {
-    Completed(Box<Finished>, Workshop),
-    Failed(ApiError),
-    /// It ended the process too often; what was sent is kept.
-    GivenUp(ApiError),
-    /// There is nothing to do for a while, the recovery was deleted, or the service is stopping.
-    Paused,
-}
 
 impl Service {
     /// Follows frames whenever there are any, to the end.
@@ -49,35 +39,15 @@ impl Service {
                 () = self.stopping().cancelled() => return,
             };
             let (service, running) = (Arc::clone(&self), Arc::clone(&job));
-            match blocking(move || service.recover(&running, place)).await.unwrap_or_else(Ended::Failed) {
-                Ended::Paused => {}
-                Ended::Completed(finished, workshop) => {
-                    let (id, files) = (job.meta.id.clone(), finished.files.clone());
-                    let outcome = Outcome::Completed(finished);
-                    return self
-                        .finish_job::<Recovery>(&job, outcome, move |store, outcome| {
-                            store.finish_recovery(&id, outcome, Some((&workshop, &files)))
-                        })
-                        .await;
-                }
-                Ended::Failed(error) if error.status().is_client_error() => {
-                    tracing::info!(job = job.id(), detail = %error.problem.detail, "nothing can be recovered");
-                    let id = job.meta.id.clone();
-                    let outcome = Outcome::Failed(error.problem);
-                    return self
-                        .finish_job::<Recovery>(&job, outcome, move |store, outcome| {
-                            store.finish_recovery(&id, outcome, None)
-                        })
-                        .await;
-                }
-                // Errors that may be temporary are retried after a restart.
-                Ended::Failed(error) | Ended::GivenUp(error) => return job.set_phase(Phase::Failed(error.problem)),
+            let ended = blocking(move || service.recover(&running, place)).await.unwrap_or_else(Ended::Failed);
+            if self.end_job(&job, ended).await {
+                return;
             }
         }
     }
 
     /// Follows frames until there are none for a while, or to the end. Blocks.
-    fn recover(self: Arc<Self>, job: &Arc<RecoveryJob>, place: Held) -> Ended {
+    fn recover(self: Arc<Self>, job: &Arc<RecoveryJob>, place: Held) -> Ended<Finished> {
         let source = StoredSurfaces::new(Arc::clone(&self), Arc::clone(job), place);
         match source.begin() {
             Ok(true) => {}
@@ -152,7 +122,7 @@ impl Service {
             Err(error) => return Err(refused(&error)),
         };
         let encoded = results(job, recovered, (system, goal), pool, &workshop, source);
-        encoded.map(|finished| Some((finished, workshop))).map_err(|error| refused_encoding(&error))
+        encoded.map(|finished| Some((finished, workshop))).map_err(|error| ApiError::from(&error))
     }
 }
 

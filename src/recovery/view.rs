@@ -1,13 +1,13 @@
 //! Recoveries as the service tells of them.
 
 use super::{Finished, Progress, Recovery, RecoveryJob};
-use crate::jobs::{Phase, Status};
-use crate::store::StoreError;
+use crate::jobs::{Phase, Piece, Status};
+use crate::store::{Kind, Store, StoreError};
 use cager_proto::recovery_messages::{
     FollowedFrame, Recovery as View, RecoveryFrames, RecoveryProgress, RecoveryState,
 };
 use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom};
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 
 /// Missing ranges in a view, at most.
 const RANGES: usize = 100;
@@ -77,17 +77,27 @@ impl RecoveryJob {
         (RecoveryProgress { state, received, followed, refined, frames: frames.collect() }, is_last)
     }
 
-    /// Cages of the first pass from frame `first` on, at most `most`, m × 12 bytes each, and the number of frames, once that is known; nothing when the
-    /// recovery is over.
-    pub(crate) fn first_cages(&self, first: u32, most: u32) -> Option<(Vec<u8>, Option<u32>)> {
+    /// Cages of the first pass from frame `first` on, at most `most`, m × 12 bytes each.
+    ///
+    /// # Errors
+    /// It is over, so that its cages are others, or none.
+    pub(crate) fn first_cages(&self, first: u32, most: u32) -> io::Result<Piece> {
         let status = self.status();
-        let progress = &status.progress;
-        if status.phase.is_final() {
-            return None;
+        match &status.phase {
+            Phase::Completed(finished) if first >= finished.frames => {
+                return Ok(Piece { is_last: true, ..Piece::default() });
+            }
+            Phase::Completed(_) => {
+                return Err(io::Error::other("the recovery is completed, and its cages are other ones now"));
+            }
+            Phase::Failed(_) => return Err(io::Error::other("the recovery failed")),
+            Phase::Waiting | Phase::Running => {}
         }
+        let progress = &status.progress;
         let found = progress.followed.iter().skip(first as usize).take(most as usize);
-        let bytes = found.flat_map(|found| found.cage.as_flattened()).flat_map(|x| x.to_le_bytes());
-        Some((bytes.collect(), progress.declared))
+        let frames = found.len() as u32;
+        let bytes = found.flat_map(|found| found.cage.as_flattened()).flat_map(|x| x.to_le_bytes()).collect();
+        Ok(Piece { bytes, frames, is_last: progress.declared.is_some_and(|declared| first >= declared) })
     }
 
     /// Cages of a completed recovery from frame `first` on, at most `most`, m × 12 bytes each; none after the last. Blocks.
@@ -96,21 +106,22 @@ impl RecoveryJob {
     /// The file of all cages cannot be read.
     pub(crate) fn final_cages(
         &self,
-        store: &crate::store::Store,
+        store: &Store,
         finished: &Finished,
         (first, most): (u32, u32),
-    ) -> Result<Vec<u8>, StoreError> {
-        let path = store.recovery_file(&self.meta.id, CAGES)?;
+    ) -> io::Result<Piece> {
         let stride = 12 * u64::from(finished.cage_vertices);
-        let count = most.min(finished.frames.saturating_sub(first));
-        let mut bytes = vec![0; (stride * u64::from(count)) as usize];
+        let frames = most.min(finished.frames.saturating_sub(first));
+        let mut bytes = vec![0; (stride * u64::from(frames)) as usize];
         let mut read = || {
-            let mut file = File::open(&path)?;
-            file.seek(SeekFrom::Start(stride * u64::from(first)))?;
-            file.read_exact(&mut bytes)
+            let path = store.job_file(Kind::Recovery, &self.meta.id, CAGES)?;
+            let failed = |error| StoreError::of(&path, "read", error);
+            let mut file = File::open(&path).map_err(failed)?;
+            file.seek(SeekFrom::Start(stride * u64::from(first))).map_err(failed)?;
+            file.read_exact(&mut bytes).map_err(failed)
         };
-        read().map_err(|error| StoreError::of(&path, "read", error))?;
-        Ok(bytes)
+        read().map_err(|error| self.fail_if_damaged(store, error))?;
+        Ok(Piece { bytes, frames, is_last: true })
     }
 }
 

@@ -13,6 +13,7 @@ pub(crate) mod registry;
 mod resume;
 pub(crate) mod retention;
 pub(crate) mod solve;
+mod source;
 pub(crate) mod upload;
 mod view;
 

@@ -9,6 +9,7 @@ use crate::recovery::Recovery;
 use crate::service::Service;
 use crate::store::JobMeta as _;
 use crate::tasks::blocking;
+use crate::transfers::Transfer;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -28,7 +29,8 @@ impl Service {
         fn taken<W: Work>(jobs: &Jobs<W>) -> impl Iterator<Item = (String, u64)> {
             jobs.all().into_iter().map(|job| (job.meta.tenant().to_owned(), job.bytes.load(Relaxed)))
         }
-        for (tenant, bytes) in taken(&self.cage_jobs).chain(taken(&self.recoveries)) {
+        let jobs = taken(&self.cage_jobs).chain(taken(&self.recoveries)).chain(taken(&self.transfers));
+        for (tenant, bytes) in jobs {
             usage.entry(tenant).or_default().1 += bytes;
         }
         usage.into_iter().map(|(tenant, (sessions, bytes))| (tenant, sessions, bytes)).collect()
@@ -44,7 +46,7 @@ impl Service {
             if count >= tenant.limits.max_sessions {
                 self.rejected("tenant_sessions");
                 let detail = format!(
-                    "you have {count} sessions, cage designs and recoveries; delete one that is not needed any more"
+                    "you have {count} sessions, cage designs, recoveries and transfers; delete one that is not needed any more"
                 );
                 return Err(ApiError::new(problem::TOO_MANY_SESSIONS, detail).limit(tenant.limits.max_sessions));
             }
@@ -75,7 +77,8 @@ impl Service {
     }
 
     fn with_jobs(&self, tenant: &Tenant, (count, used): (u64, u64)) -> (u64, u64) {
-        let jobs = [self.cage_jobs.usage_of(&tenant.name), self.recoveries.usage_of(&tenant.name)];
+        let name = &tenant.name;
+        let jobs = [self.cage_jobs.usage_of(name), self.recoveries.usage_of(name), self.transfers.usage_of(name)];
         jobs.into_iter().fold((count, used), |(count, used), (jobs, theirs)| (count + jobs, used + theirs))
     }
 
@@ -94,7 +97,7 @@ impl Service {
         }
         self.rejected("tenant_bytes");
         let detail = format!(
-            "your sessions, cage designs and recoveries take {used} of {} bytes, and this needs {bytes} more; delete those that are not needed any more",
+            "your sessions, cage designs, recoveries and transfers take {used} of {} bytes, and this needs {bytes} more; delete those that are not needed any more",
             tenant.limits.max_bytes
         );
         Err(ApiError::new(problem::QUOTA_EXCEEDED, detail).limit(tenant.limits.max_bytes))
@@ -124,6 +127,8 @@ impl Service {
         };
         self.delete_jobs::<CageDesign>(&expired).await;
         self.delete_jobs::<Recovery>(&expired).await;
+        self.delete_jobs::<Transfer>(&expired).await;
+        self.shape_spaces.forget_idle();
         for session in self.registry.all() {
             if expired(&session.meta.tenant, session.meta.created_ms) {
                 tracing::info!(session = %session.meta.id, "deleted, because its time is over");

@@ -1,7 +1,7 @@
 //! Cage jobs: the input of a cage design, and the designed cage.
 
-use super::jobs::{ATTEMPTS, JobMeta, OUTCOME, outcome_of};
-use super::scan::{FolderMeta, Kind};
+use super::jobs::{ATTEMPTS, OUTCOME, job_meta, outcome_of};
+use super::scan::Kind;
 use super::{ContentKey, Idempotency, Spool, Store, StoreError, StoredFile, StoredPart, meta};
 use cager_proto::cage_messages::CageOptions;
 use serde::{Deserialize, Serialize};
@@ -31,32 +31,7 @@ pub struct CageJobMeta {
     pub idempotency: Option<Idempotency>,
 }
 
-impl FolderMeta for CageJobMeta {
-    const KIND: Kind = Kind::CageJob;
-    const FILE: &str = META;
-
-    fn id(&self) -> &str {
-        &self.id
-    }
-}
-
-impl JobMeta for CageJobMeta {
-    fn tenant(&self) -> &str {
-        &self.tenant
-    }
-
-    fn created_ms(&self) -> u64 {
-        self.created_ms
-    }
-
-    fn idempotency(&self) -> Option<&Idempotency> {
-        self.idempotency.as_ref()
-    }
-
-    fn sent_bytes(&self) -> u64 {
-        self.rest.bytes + self.frames.bytes
-    }
-}
+job_meta!(CageJobMeta, Kind::CageJob, META, |meta| meta.rest.bytes + meta.frames.bytes);
 
 const META: &str = "job.json";
 const REST: &str = "rest";
@@ -68,13 +43,7 @@ const CAGE_BYTES: u64 = 64 << 20;
 impl Store {
     /// Creates a job with its input, atomically; durable on `Ok`.
     pub fn create_cage_job(&self, meta: &CageJobMeta, rest: &[u8], frames: Spool) -> Result<(), StoreError> {
-        let (files, place) = (self.files(), self.folder(Kind::CageJob, &meta.id)?);
-        let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
-        files.publish_folder(&place, |staging| {
-            files.write_new(&staging.join(META), &bytes)?;
-            files.write_new(&staging.join(REST), rest)?;
-            frames.move_to(&staging.join(FRAMES))
-        })
+        self.create_job(meta, [(REST, rest)], Some((FRAMES, frames)))
     }
 
     /// Creates a finished job without input, atomically; durable on `Ok`.
@@ -99,7 +68,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`].
     pub fn cage_job_rest(&self, meta: &CageJobMeta) -> Result<Vec<u8>, StoreError> {
-        self.cage_job_part(&meta.id, REST, meta.rest.bytes, &meta.rest.blake3)
+        self.job_part(Kind::CageJob, &meta.id, REST, &meta.rest)
     }
 
     /// The frames of a job that is not finished. Their digest is not verified, since only a sample is read; each frame read is validated.
@@ -107,14 +76,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`] where the length differs.
     pub fn cage_job_frames(&self, meta: &CageJobMeta) -> Result<StoredFile, StoreError> {
-        let path = self.folder(Kind::CageJob, &meta.id)?.join(FRAMES);
-        let file = StoredFile::open(self.files().open_expected(&path)?);
-        let file = file.map_err(|e| StoreError::of(&path, "open", e))?;
-        if file.bytes() != meta.frames.bytes {
-            let what = format!("it has {} bytes where {} were stored", file.bytes(), meta.frames.bytes);
-            return Err(StoreError::damaged(&path, what));
-        }
-        Ok(file)
+        self.open_job_part(Kind::CageJob, &meta.id, FRAMES, &meta.frames)
     }
 
     /// Stores the outcome of a job and its cage, if any, and removes its input; durable on `Ok`.
@@ -136,15 +98,11 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`].
     pub fn cage_job_cage(&self, id: &str, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {
-        self.cage_job_part(id, CAGE, bytes.min(CAGE_BYTES), digest)
+        self.files().read_verified(&self.job_file(Kind::CageJob, id, CAGE)?, bytes.min(CAGE_BYTES), digest)
     }
 
     /// Removes the input of a finished job, best effort: files that remain are removed at the next start.
     pub fn forget_cage_job_input(&self, id: &str) {
         self.forget_files(Kind::CageJob, id, [REST, FRAMES, ATTEMPTS]);
-    }
-
-    fn cage_job_part(&self, id: &str, name: &str, bytes: u64, digest: &str) -> Result<Vec<u8>, StoreError> {
-        self.files().read_verified(&self.folder(Kind::CageJob, id)?.join(name), bytes, digest)
     }
 }

@@ -17,6 +17,7 @@ pub(crate) struct Files {
     pub(crate) sessions: PathBuf,
     pub(crate) cages: PathBuf,
     pub(crate) recoveries: PathBuf,
+    pub(crate) transfers: PathBuf,
     pub(crate) contents: PathBuf,
     pub(crate) prepared: PathBuf,
     pub(crate) trash: PathBuf,
@@ -30,11 +31,25 @@ pub(crate) struct Files {
 impl Files {
     pub(crate) fn new(root: &Path, disk: Arc<dyn Disk>) -> Self {
         let run = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
-        let [sessions, cages, recoveries, contents, prepared, trash, quarantine, tmp] =
-            ["sessions", "cages", "recoveries", "contents", "prepared", "trash", "quarantine", "tmp"]
+        let [sessions, cages, recoveries, transfers, contents, prepared, trash, quarantine, tmp] =
+            ["sessions", "cages", "recoveries", "transfers", "contents", "prepared", "trash", "quarantine", "tmp"]
                 .map(|name| root.join(name));
         let (root, next) = (root.to_owned(), AtomicU64::new(0));
-        Self { disk, root, sessions, cages, recoveries, contents, prepared, trash, quarantine, tmp, run, next }
+        Self {
+            disk,
+            root,
+            sessions,
+            cages,
+            recoveries,
+            transfers,
+            contents,
+            prepared,
+            trash,
+            quarantine,
+            tmp,
+            run,
+            next,
+        }
     }
 
     fn unique(&self, name: &str) -> String {

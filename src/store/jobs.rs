@@ -2,12 +2,13 @@
 
 use super::files::Files;
 use super::scan::{self, FolderMeta, FolderScan, Kind};
-use super::{Idempotency, Quarantined, Store, StoreError, Unreadable, meta};
+use super::{Idempotency, Quarantined, Spool, Store, StoreError, StoredFile, StoredPart, Unreadable, meta};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::path::PathBuf;
 
 /// Metadata of a job, fixed at its creation.
-pub(crate) trait JobMeta: FolderMeta + Clone + Send + Sync + 'static {
+pub(crate) trait JobMeta: FolderMeta + Serialize + Clone + Send + Sync + 'static {
     /// Tenant that owns it.
     fn tenant(&self) -> &str;
     /// Creation time, milliseconds since 1970.
@@ -18,6 +19,40 @@ pub(crate) trait JobMeta: FolderMeta + Clone + Send + Sync + 'static {
     fn sent_bytes(&self) -> u64;
 }
 
+/// Implements [`JobMeta`] for metadata with `id`, `tenant`, `created_ms` and `idempotency`: its kind, its file, and the bytes that were sent.
+macro_rules! job_meta {
+    ($meta:ident, $kind:expr, $file:expr, |$of:ident| $sent:expr) => {
+        impl $crate::store::FolderMeta for $meta {
+            const KIND: $crate::store::Kind = $kind;
+            const FILE: &str = $file;
+
+            fn id(&self) -> &str {
+                &self.id
+            }
+        }
+
+        impl $crate::store::JobMeta for $meta {
+            fn tenant(&self) -> &str {
+                &self.tenant
+            }
+
+            fn created_ms(&self) -> u64 {
+                self.created_ms
+            }
+
+            fn idempotency(&self) -> Option<&Idempotency> {
+                self.idempotency.as_ref()
+            }
+
+            fn sent_bytes(&self) -> u64 {
+                let $of = self;
+                $sent
+            }
+        }
+    };
+}
+pub(super) use job_meta;
+
 pub(super) const OUTCOME: &str = "outcome.json";
 pub(super) const ATTEMPTS: &str = "attempts.json";
 
@@ -26,6 +61,7 @@ pub(super) fn outcome_of(kind: Kind) -> &'static str {
     match kind {
         Kind::CageJob => "cage outcome",
         Kind::Recovery => "recovery outcome",
+        Kind::Transfer => "transfer outcome",
         Kind::Session => "outcome",
     }
 }
@@ -44,6 +80,58 @@ pub(super) fn find<M: JobMeta>(
 }
 
 impl Store {
+    /// Creates a job with its input, atomically; durable on `Ok`.
+    pub(super) fn create_job<'a, M: JobMeta>(
+        &self,
+        meta: &M,
+        parts: impl IntoIterator<Item = (&'a str, &'a [u8])>,
+        spooled: Option<(&str, Spool)>,
+    ) -> Result<(), StoreError> {
+        let (files, place) = (self.files(), self.folder(M::KIND, meta.id())?);
+        let bytes = meta::wrap(&place.join(M::FILE), M::KIND.name(), meta)?;
+        files.publish_folder(&place, |staging| {
+            files.write_new(&staging.join(M::FILE), &bytes)?;
+            for (name, bytes) in parts {
+                files.write_new(&staging.join(name), bytes)?;
+            }
+            spooled.map_or(Ok(()), |(name, spool)| spool.move_to(&staging.join(name)))
+        })
+    }
+
+    /// Path of a file of a job, for reading.
+    pub fn job_file(&self, kind: Kind, id: &str, name: &str) -> Result<PathBuf, StoreError> {
+        Ok(self.folder(kind, id)?.join(name))
+    }
+
+    /// The content of a file of a job.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`].
+    pub(super) fn job_part(&self, kind: Kind, id: &str, name: &str, part: &StoredPart) -> Result<Vec<u8>, StoreError> {
+        self.files().read_verified(&self.job_file(kind, id, name)?, part.bytes, &part.blake3)
+    }
+
+    /// A large file of a job, open for reading. Its digest is not verified.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] where the length differs.
+    pub(super) fn open_job_part(
+        &self,
+        kind: Kind,
+        id: &str,
+        name: &str,
+        part: &StoredPart,
+    ) -> Result<StoredFile, StoreError> {
+        let path = self.job_file(kind, id, name)?;
+        let file = StoredFile::open(self.files().open_expected(&path)?);
+        let file = file.map_err(|e| StoreError::of(&path, "open", e))?;
+        if file.bytes() != part.bytes {
+            let what = format!("it has {} bytes where {} were stored", file.bytes(), part.bytes);
+            return Err(StoreError::damaged(&path, what));
+        }
+        Ok(file)
+    }
+
     /// Durably increments the number of attempts and returns it, so that a job that crashes the process is not retried at every start.
     pub fn count_attempt(&self, kind: Kind, id: &str) -> Result<u32, StoreError> {
         self.set_attempts(kind, id, |before| before + 1)

@@ -9,6 +9,8 @@
 //! cages/<id>/      job.json  rest  frames  attempts.json  cage.obj  outcome.json
 //! recoveries/<id>/ recovery.json  template  cage  rig  manifold  frame-<k>  attempts.json  complete.json
 //!                  capture.cager  cages  report.json  joints.csv  joints.bvh  outcome.json
+//! transfers/<id>/  transfer.json  target  source  source_rest  source_frames  cage  attempts.json
+//!                  capture.cager  report.json  outcome.json
 //! contents/<key>/  content.json  rest  cage  matrix
 //! prepared/<key>.solver
 //! tmp/             being written; emptied at start       trash/       being removed; emptied at start
@@ -16,7 +18,7 @@
 //! ```
 //!
 //! Files and folders are written in `tmp/`, synced and renamed into place; folders are moved to `trash/` before they are removed. So
-//! everything in `sessions`, `cages`, `recoveries`, `contents` and `prepared` is complete. Only the frame log grows in place, whose recovery [`log`]
+//! everything in `sessions`, `cages`, `recoveries`, `transfers`, `contents` and `prepared` is complete. Only the frame log grows in place, whose recovery [`log`]
 //! describes, and frames that wait to be coded, whose digests it has.
 
 use crate::store::files::Files;
@@ -45,6 +47,8 @@ mod scan;
 mod sessions;
 mod solver_file;
 mod spool;
+mod transfers;
+mod workshop;
 
 #[cfg(test)]
 mod tests;
@@ -56,11 +60,13 @@ pub use error::StoreError;
 pub(crate) use jobs::JobMeta;
 pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
 pub use names::{ContentKey, is_session_id};
-pub use recoveries::{RecoveryMeta, RecoveryParts, Workshop};
+pub use recoveries::{RecoveryMeta, RecoveryParts};
 pub(crate) use scan::FolderMeta;
 pub use scan::{Kind, Unreadable};
 pub use sessions::{Completion, Container, Idempotency, SessionBytes, SessionMeta};
 pub use spool::{Spool, StoredFile};
+pub use transfers::{SOURCE, SOURCE_FRAMES, TransferMeta};
+pub use workshop::Workshop;
 
 /// The data folder. Clones share it.
 #[derive(Clone, Debug)]
@@ -96,6 +102,8 @@ pub struct Opened {
     pub cage_jobs: Vec<CageJobMeta>,
     /// Its recoveries, oldest first.
     pub recoveries: Vec<RecoveryMeta>,
+    /// Its transfers, oldest first.
+    pub transfers: Vec<TransferMeta>,
     /// Sessions and jobs that were damaged and moved to quarantine.
     pub quarantined: Vec<Quarantined>,
     /// Sessions and jobs that could not be read and were left in place.
@@ -125,17 +133,14 @@ impl Store {
         let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
         let lock = lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })?;
         let files = Files::new(root, disk);
-        let kept = [&files.trash, &files.sessions, &files.cages, &files.recoveries, &files.contents, &files.prepared];
-        for folder in kept.into_iter().chain([&files.quarantine, &files.tmp]) {
+        let own = [&files.sessions, &files.cages, &files.recoveries, &files.transfers, &files.contents];
+        let kept = [&files.trash, &files.prepared].into_iter().chain(own);
+        for folder in kept.clone().chain([&files.quarantine, &files.tmp]) {
             make_folder(&*files.disk, folder)?;
         }
         // They may be so on purpose: whoever made them decides.
         let is_open = |folder: &Path| disk::is_open_to_all(folder).unwrap_or(false);
-        if is_open(root)
-            && [&files.sessions, &files.contents, &files.cages, &files.recoveries]
-                .into_iter()
-                .any(|folder| is_open(folder))
-        {
+        if is_open(root) && own.into_iter().any(|folder| is_open(folder)) {
             let folder = root.display();
             tracing::warn!(
                 "every user of this machine may look into the data folder {folder}; close it: chmod -R o= {folder}"
@@ -155,9 +160,11 @@ impl Store {
         sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
         let cage_jobs = jobs::find(&files, &mut quarantined, &mut unread)?;
         let recoveries = jobs::find(&files, &mut quarantined, &mut unread)?;
+        let transfers = jobs::find(&files, &mut quarantined, &mut unread)?;
         quarantined.sort_by(|a, b| a.name.cmp(&b.name));
         let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default() };
-        Ok(Opened { store: Self { inner: Arc::new(inner) }, sessions, cage_jobs, recoveries, quarantined, unread })
+        let store = Self { inner: Arc::new(inner) };
+        Ok(Opened { store, sessions, cage_jobs, recoveries, transfers, quarantined, unread })
     }
 
     fn files(&self) -> &Files {

@@ -1,12 +1,12 @@
 //! Recoveries: what was sent, frame by frame, and what was made of it.
 
 use super::files::Files;
-use super::jobs::{ATTEMPTS, JobMeta};
-use super::scan::{FolderMeta, Kind};
+use super::jobs::{ATTEMPTS, job_meta};
+use super::scan::Kind;
 use super::{Idempotency, NamedFile, Store, StoreError, StoredPart, meta};
 use cager_proto::recovery_messages::RecoveryOptions;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Metadata of a recovery, fixed at its creation.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -62,34 +62,8 @@ impl<T> RecoveryParts<T> {
     }
 }
 
-impl FolderMeta for RecoveryMeta {
-    const KIND: Kind = Kind::Recovery;
-    const FILE: &str = META;
+job_meta!(RecoveryMeta, Kind::Recovery, "recovery.json", |meta| meta.parts.named().map(|(_, part)| part.bytes).sum());
 
-    fn id(&self) -> &str {
-        &self.id
-    }
-}
-
-impl JobMeta for RecoveryMeta {
-    fn tenant(&self) -> &str {
-        &self.tenant
-    }
-
-    fn created_ms(&self) -> u64 {
-        self.created_ms
-    }
-
-    fn idempotency(&self) -> Option<&Idempotency> {
-        self.idempotency.as_ref()
-    }
-
-    fn sent_bytes(&self) -> u64 {
-        self.parts.named().map(|(_, part)| part.bytes).sum()
-    }
-}
-
-const META: &str = "recovery.json";
 const TEMPLATE: &str = "template";
 const COMPLETE: &str = "complete.json";
 const REACHED: &str = "reached.json";
@@ -97,42 +71,10 @@ const FRAME: &str = "frame-";
 /// Most bytes before the content of a frame's file: a name and a digest.
 const HEAD_BYTES: u64 = 4096;
 
-/// A folder for what is being made; removed when it is dropped.
-#[derive(Debug)]
-pub struct Workshop {
-    store: Store,
-    path: PathBuf,
-}
-
-impl Workshop {
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Writes a file into it.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
-        self.store.files().write_new(&self.path.join(name), bytes)
-    }
-}
-
-impl Drop for Workshop {
-    fn drop(&mut self) {
-        self.store.files().discard(&self.path);
-    }
-}
-
 impl Store {
     /// Creates a recovery, atomically; durable on `Ok`.
     pub fn create_recovery(&self, meta: &RecoveryMeta, parts: &RecoveryParts<NamedFile>) -> Result<(), StoreError> {
-        let (files, place) = (self.files(), self.folder(Kind::Recovery, &meta.id)?);
-        let bytes = meta::wrap(&place.join(META), "recovery", meta)?;
-        files.publish_folder(&place, |staging| {
-            for (name, part) in parts.named() {
-                files.write_new(&staging.join(name), &part.bytes)?;
-            }
-            files.write_new(&staging.join(META), &bytes)
-        })
+        self.create_job(meta, parts.named().map(|(name, part)| (name, &part.bytes[..])), None)
     }
 
     /// The files of a recovery that is not over.
@@ -140,9 +82,8 @@ impl Store {
     /// # Errors
     /// [`StoreError::Damaged`].
     pub fn recovery_parts(&self, meta: &RecoveryMeta) -> Result<RecoveryParts<NamedFile>, StoreError> {
-        let folder = self.folder(Kind::Recovery, &meta.id)?;
         meta.parts.map(|name, part| {
-            let bytes = self.files().read_verified(&folder.join(name), part.bytes, &part.blake3)?;
+            let bytes = self.job_part(Kind::Recovery, &meta.id, name, part)?;
             Ok(NamedFile { name: part.name.clone(), bytes })
         })
     }
@@ -240,42 +181,6 @@ impl Store {
         let path = self.folder(Kind::Recovery, id)?.join(REACHED);
         self.files().replace(&path, &meta::wrap(&path, "progress", &frames)?)?;
         self.forget_attempts(Kind::Recovery, id)
-    }
-
-    /// A new folder for what is being made.
-    pub fn workshop(&self) -> Result<Workshop, StoreError> {
-        let path = self.files().temporary("workshop");
-        self.files().disk.create_dir(&path).map_err(|e| StoreError::of(&path, "create", e))?;
-        Ok(Workshop { store: self.clone(), path })
-    }
-
-    /// Takes results out of a workshop, stores the outcome and removes the input; durable on `Ok`.
-    ///
-    /// # Errors
-    /// Not found where the recovery was deleted.
-    pub(crate) fn finish_recovery<T: Serialize>(
-        &self,
-        id: &str,
-        outcome: &T,
-        results: Option<(&Workshop, &[StoredPart])>,
-    ) -> Result<(), StoreError> {
-        let (files, folder) = (self.files(), self.folder(Kind::Recovery, id)?);
-        if let Some((workshop, parts)) = results {
-            for part in parts {
-                let place = folder.join(&part.name);
-                let moved = files.disk.rename(&workshop.path.join(&part.name), &place);
-                moved.map_err(|e| StoreError::of(&place, "put in place", e))?;
-            }
-        }
-        files.sync_dir(&folder)?;
-        self.set_job_outcome(Kind::Recovery, id, outcome)?;
-        self.forget_recovery_input(id);
-        Ok(())
-    }
-
-    /// Path of a result, for reading.
-    pub fn recovery_file(&self, id: &str, name: &str) -> Result<PathBuf, StoreError> {
-        Ok(self.folder(Kind::Recovery, id)?.join(name))
     }
 
     /// Removes the input of a recovery that is over, best effort: files that remain are removed at the next start.

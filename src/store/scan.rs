@@ -15,15 +15,26 @@ pub enum Kind {
     CageJob,
     /// A recovery.
     Recovery,
+    /// A transfer.
+    Transfer,
 }
 
 impl Kind {
+    /// All of them, and what they are called in lists and metrics.
+    pub(crate) const ALL: [(Self, &str); 4] = [
+        (Self::Session, "sessions"),
+        (Self::CageJob, "cages"),
+        (Self::Recovery, "recoveries"),
+        (Self::Transfer, "transfers"),
+    ];
+
     /// Its name in messages and metadata.
     pub fn name(self) -> &'static str {
         match self {
             Self::Session => "session",
             Self::CageJob => "cage job",
             Self::Recovery => "recovery",
+            Self::Transfer => "transfer",
         }
     }
 
@@ -33,6 +44,7 @@ impl Kind {
             Self::Session => &files.sessions,
             Self::CageJob => &files.cages,
             Self::Recovery => &files.recoveries,
+            Self::Transfer => &files.transfers,
         }
     }
 }

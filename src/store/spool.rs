@@ -59,6 +59,11 @@ impl Spool {
         self.digest.finalize()
     }
 
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// A reader of the bytes written so far.
     pub fn stored(&self) -> StoredFile {
         StoredFile { file: Arc::clone(&self.file), bytes: self.bytes, at: 0 }

@@ -59,12 +59,15 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_recovering").set(service.recoveries.unfinished() as f64);
     let kept = service.recovering.used() + service.recoveries_kept.used();
     metrics::gauge!("cager_recoveries_in_memory").set(kept as f64);
+    metrics::gauge!("cager_transferring").set(service.transfers.unfinished() as f64);
+    metrics::gauge!("cager_shapespaces").set(service.shape_spaces.count() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "shapespaces").set(service.shape_spaces.bytes() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "designs").set(service.designs.bytes() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "downloads").set(service.download_memory.used() as f64);
     metrics::gauge!("cager_disk_bytes", "use" => "spool").set(service.spool_space.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
-    for (kind, what) in [(Kind::Session, "sessions"), (Kind::CageJob, "cages"), (Kind::Recovery, "recoveries")] {
+    for (kind, what) in Kind::ALL {
         metrics::gauge!("cager_unread", "what" => what).set(service.unread.count(kind) as f64);
     }
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
@@ -121,8 +124,17 @@ fn describe() {
     describe_gauge!("cager_recoveries_in_memory", "Recoveries that work, or wait with all they know in memory");
     describe_counter!("cager_recoveries_total", "Recoveries that ended, by result: completed or failed");
     describe_counter!("cager_recovered_frames_total", "Frames of recoveries that were followed, by tenant");
+    describe_gauge!("cager_transferring", "Transfers that run or wait");
+    describe_counter!("cager_transfers_total", "Transfers that ended, by result: completed or failed");
+    describe_counter!("cager_transferred_frames_total", "Frames that transfers moved, by tenant");
+    describe_gauge!("cager_shapespaces", "Shape spaces in memory");
+    describe_histogram!("cager_shape_seconds", Unit::Seconds, "Finding a shape between poses");
     describe_histogram!("cager_design_seconds", Unit::Seconds, "Designing a cage");
-    describe_gauge!("cager_memory_bytes", Unit::Bytes, "Memory of frames, uploads, downloads and designs in progress");
+    describe_gauge!(
+        "cager_memory_bytes",
+        Unit::Bytes,
+        "Memory of frames, uploads, downloads and designs in progress, and of shape spaces"
+    );
     describe_gauge!("cager_disk_free_bytes", Unit::Bytes, "Free space of the data folder's file system");
     describe_gauge!("cager_uptime_seconds", Unit::Seconds, "Time since the service started");
     describe_gauge!("cager_sessions", "Sessions, by tenant");

@@ -10,6 +10,7 @@ mod decode;
 mod defaults;
 mod demo;
 mod encode;
+mod explore;
 #[cfg(unix)]
 mod full_disk;
 mod golden;
@@ -36,4 +37,5 @@ mod refused;
 mod support;
 mod times;
 mod transfer;
+mod transfer_motion;
 mod usage;

@@ -2,6 +2,7 @@
 
 use crate::real_data::data;
 use crate::recover::ply;
+use crate::refused::refused;
 use crate::support::{Dir, measure, read_frames};
 use cager_formats::{open_frames, read_model};
 use cager_geometry::mesh::{Model, Point, TriMesh};
@@ -41,6 +42,41 @@ fn recovered(folder: &Path, frames: usize, step: usize) -> (Vec<f64>, f64) {
     let mean = points.iter().map(|p| p.iter().map(|x| x * x).sum::<f64>()).sum::<f64>() / points.len() as f64;
     let jitter = mean.sqrt() / cager_geometry::mesh::diagonal(&template.points);
     (errors, jitter)
+}
+
+#[test]
+#[ignore = "needs the captures: make captures"]
+fn a_walk_that_is_followed_by_a_rig_has_its_gait_in_report_and_picture() {
+    let (folder, dir) = (data().join("makehuman-cmu-walk"), Dir::new());
+    let rest = read_model(&folder.join("rest.obj")).expect("a rest pose");
+    let mut reader = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
+    let mut frame = Vec::new();
+    for t in 0..12 {
+        reader.read_next(&mut frame).expect("a frame");
+        let mesh = TriMesh { vertices: frame.as_chunks().0.to_vec(), ..TriMesh::from(&rest) };
+        let options = ObservationOptions { points: 4000, seed: t };
+        let (seen, _) = Observation::of_mesh(&mesh.vertices, &mesh.triangles, &options).expect("a surface");
+        dir.write(&format!("scan_{t:04}.ply"), ply(&seen, true));
+    }
+    dir.model("rest.obj", &rest);
+    dir.cager("rig rest.obj -o rig.json").succeeds();
+    let clip = data().join("bvh/02_02.bvh");
+    dir.cager("manifold --rig rig.json --dims 5 --poses 40 -o poses.json").arg(clip).succeeds();
+    let line = "recover --template rest.obj --frames scan_*.ply --rig rig.json --manifold poses.json --points 3000 -o out.cager";
+    refused(&dir, &format!("{line} --gait gait.png"), &["gait.png", ".svg"]);
+    dir.cager(&format!("{line} --report report.json --gait gait.svg --fps 30")).succeeds();
+    let report = dir.json("report.json");
+    let curves = report["gait"].as_array().expect("curves");
+    let heights =
+        |k: usize| curves[k]["heights"].as_array().expect("heights").iter().filter_map(serde_json::Value::as_f64);
+    assert_eq!((curves.len(), curves[1]["joint"].as_str(), heights(1).count()), (4, Some("right ankle"), 12));
+    let lowest = (0..4).flat_map(heights).fold(f64::INFINITY, f64::min);
+    assert!(lowest == 0.0 && heights(0).chain(heights(1)).all(|height| height > 0.0), "{report}");
+    let svg = String::from_utf8(dir.read("gait.svg")).expect("text");
+    assert_eq!(
+        (svg.matches("<polyline").count(), svg.contains(">seconds</text>"), svg.contains("NaN")),
+        (4, true, false)
+    );
 }
 
 fn mean(errors: &[f64]) -> f64 {

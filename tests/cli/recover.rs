@@ -4,7 +4,8 @@ use crate::refused::refused;
 use crate::support::{Dir, mean, measure, polygons, read_frames};
 use cager_demo::{Capture, Options};
 use cager_geometry::mesh::{Model, Point, TriMesh};
-use cager_geometry::vector::{add, centroid};
+use cager_geometry::vector::{add, centroid, mean as average};
+use cager_proto::container::ContainerReader;
 use cager_registration::{Observation, ObservationOptions};
 use std::fmt::Write;
 
@@ -16,9 +17,13 @@ struct Dance {
 
 impl Dance {
     fn new() -> Self {
+        Self::of(8)
+    }
+
+    fn of(frames: usize) -> Self {
         let capture = Capture::new(&Options { points: 1500, frames: 40, cage_vertices: 120 });
         let mut frame = Vec::new();
-        let frames = (0..8).map(|t| {
+        let frames = (0..frames).map(|t| {
             capture.frame(t, &mut frame);
             frame.clone()
         });
@@ -34,10 +39,15 @@ impl Dance {
 
     /// Points drawn anew of a frame, with normals.
     fn seen(&self, frame: usize, points: usize) -> Observation {
-        let mesh = TriMesh::from(&self.posed(frame));
-        let options = ObservationOptions { points, seed: 77 + frame as u64 };
-        Observation::of_mesh(&mesh.vertices, &mesh.triangles, &options).expect("a surface").0
+        drawn(&self.posed(frame), frame, points)
     }
+}
+
+/// Points drawn on a model by the number of its frame, with normals.
+fn drawn(model: &Model, frame: usize, points: usize) -> Observation {
+    let mesh = TriMesh::from(model);
+    let options = ObservationOptions { points, seed: 77 + frame as u64 };
+    Observation::of_mesh(&mesh.vertices, &mesh.triangles, &options).expect("a surface").0
 }
 
 pub(crate) fn ply(seen: &Observation, normals: bool) -> String {
@@ -108,6 +118,28 @@ fn a_figure_is_recovered_from_clouds_drawn_anew_in_every_frame() {
     let first = dir.read("out.cager");
     dir.cager(&format!("{RECOVER} --overwrite --threads 1 --fps 25")).succeeds();
     assert!(dir.read("out.cager") == first, "another number of threads gives another file");
+}
+
+#[test]
+fn colours_of_the_surfaces_are_those_of_the_template_where_asked() {
+    let (dir, dance) = (Dir::new(), Dance::of(4));
+    dir.model("rest.obj", &dance.rest);
+    let color = |p: &Point| if p[1] > 0.0 { [250, 20, 30] } else { [10, 20, 240] };
+    let colors: Vec<[u8; 3]> = dance.rest.points.iter().map(color).collect();
+    for frame in 0..4 {
+        dir.model(&format!("scan_{frame}.obj"), &Model { colors: colors.clone(), ..dance.posed(frame) });
+    }
+    let plain = RECOVER.replace(".ply", ".obj");
+    dir.cager(&plain).succeeds();
+    let found = |dir: &Dir| {
+        let file = std::fs::File::open(dir.path("out.cager")).expect("a container");
+        ContainerReader::open(std::io::BufReader::new(file)).expect("a container").colors().expect("colours")
+    };
+    assert!(found(&dir).is_empty());
+    assert_eq!(dir.cager(&format!("{plain} --colors --overwrite")).succeeds().stderr, "");
+    let found = found(&dir);
+    let same = found.iter().zip(&colors).filter(|(a, b)| a.iter().zip(*b).all(|(a, b)| a.abs_diff(*b) < 40)).count();
+    assert!(found.len() == colors.len() && same * 100 > 95 * found.len(), "{same} of {}", found.len());
 }
 
 #[test]
@@ -203,4 +235,67 @@ fn what_is_no_template_and_what_holds_no_frames_is_refused() {
     dir.write("scan_0.ply", ply(&dance.seen(0, 4000), true));
     refused(&dir, &RECOVER.replace("rest.obj", "cloud.obj"), &["cloud.obj", "no faces"]);
     refused(&dir, &RECOVER.replace("scan_*", "other_*"), &["other_*.ply", "no mesh files"]);
+}
+
+/// A model and a small copy of it at a point, which moves with that: another topology.
+fn with_puppet(model: &Model, hand: usize) -> Model {
+    let Model { points, faces, .. } = model;
+    let (middle, at) = (average(points), points[hand]);
+    let small = |p: &Point| [0, 1, 2].map(|k| at[k] + 0.3 * (p[k] - middle[k]));
+    let count = points.len() as u32;
+    let both =
+        faces.iter().map(<[u32]>::to_vec).chain(faces.iter().map(|face| face.iter().map(|v| v + count).collect()));
+    Model {
+        faces: polygons(both),
+        points: points.iter().copied().chain(points.iter().map(small)).collect(),
+        ..Model::default()
+    }
+}
+
+#[test]
+fn where_the_topology_changes_a_second_template_goes_on_and_a_report_says_where_that_is() {
+    let (dir, dance) = (Dir::new(), Dance::of(14));
+    let side = |v: &usize| dance.rest.points[*v][0];
+    let hand = (0..dance.rest.points.len()).max_by(|a, b| side(a).total_cmp(&side(b))).expect("points");
+    let posed = |frame| if frame < 7 { dance.posed(frame) } else { with_puppet(&dance.posed(frame), hand) };
+    for frame in 0..14 {
+        dir.write(&format!("scan_{}.ply", 5 + frame), ply(&drawn(&posed(frame), frame, 6000), true));
+    }
+    dir.model("rest.obj", &dance.rest);
+    dir.model("second.obj", &posed(7));
+    let said = dir.cager(&format!("{RECOVER} --report report.json")).succeeds();
+    assert!(said.stderr.contains("from frame 12 to the end") && said.stderr.contains("12:OTHER"), "{}", said.stderr);
+    assert_eq!(dir.json("report.json")["changed_from"].as_f64(), Some(12.0));
+
+    let two = "recover --template rest.obj --template 12:second.obj --frames scan_*.ply -o two.cager";
+    let said = dir.cager(&format!("{two} --report two.json --fps 25")).succeeds();
+    assert_eq!(said.stderr, "");
+    assert!(said.stdout.contains("two-1.cager: 7 frames") && said.stdout.contains("two-2.cager: 7"), "{}", said.stdout);
+    for (k, frames) in [(1, 0..7), (2, 7..14)] {
+        dir.cager(&format!("decode two-{k}.cager -o two-{k}.npy")).succeeds();
+        let truth: Vec<Vec<f64>> = frames.map(|t| posed(t).points.into_flattened()).collect();
+        let rest = posed(7 * (k - 1)).points;
+        let found = mean(&measure(&rest, &truth, &read_frames(&dir.path(&format!("two-{k}.npy")), rest.len())).l2);
+        assert!(found < 0.008, "{k}: {found}");
+        assert!(dir.json(&format!("two-{k}.json"))["changed_from"].is_null());
+    }
+    // They play as one: numbers and rate go on from one file to the next.
+    let list = dir.json("two.stretches.json");
+    assert_eq!(list["stretches"][1]["file"], "two-2.cager");
+    assert_eq!(
+        (list["stretches"][1]["first_frame"].as_f64(), list["stretches"][0]["frames"].as_u64()),
+        (Some(12.0), Some(7))
+    );
+    let shown = dir.cager("inspect two.stretches.json --json").succeeds();
+    let shown: serde_json::Value = serde_json::from_str(&shown.stdout).expect("JSON");
+    let numbers =
+        |k: usize| shown[k]["frame_numbers"].as_array().expect("numbers").iter().filter_map(serde_json::Value::as_f64);
+    assert_eq!(numbers(0).chain(numbers(1)).collect::<Vec<_>>(), (5..19).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(shown[1]["frame_rate"].as_f64(), Some(25.0));
+
+    let two = two.replace("two.cager", "three.cager");
+    refused(&dir, &two.replace("12:", "40:"), &["second.obj", "numbered 5 to 18"]);
+    refused(&dir, &two.replace("12:", ""), &["FRAME:second.obj"]);
+    refused(&dir, &two.replace("three.cager", "-"), &["standard output"]);
+    refused(&dir, &format!("{two} --cage rest.obj"), &["2 templates and 1 cages"]);
 }

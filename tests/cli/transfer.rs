@@ -5,7 +5,7 @@ use crate::support::{Dir, close, mean, measure, polygons, read_frames};
 use cager_geometry::mesh::{Model, Point, diagonal};
 
 /// Every quad of the model split at its centre: the original's points, then one for each face. Its motion follows the faces.
-fn remeshed(rest: &Model) -> Model {
+pub(crate) fn remeshed(rest: &Model) -> Model {
     let mut points = rest.points.clone();
     points.extend(centres(rest, rest.points.as_flattened()).as_chunks::<3>().0);
     let corner = |k: usize, face: &[u32]| face[k % face.len()];
@@ -17,7 +17,7 @@ fn remeshed(rest: &Model) -> Model {
     Model { points, faces, ..Model::default() }
 }
 
-fn centres(rest: &Model, frame: &[f64]) -> Vec<f64> {
+pub(crate) fn centres(rest: &Model, frame: &[f64]) -> Vec<f64> {
     let points: &[Point] = frame.as_chunks().0;
     let centre =
         |face: &[u32]| [0, 1, 2].map(|k| face.iter().map(|&i| points[i as usize][k]).sum::<f64>() / face.len() as f64);

@@ -41,7 +41,7 @@ fn a_misspelt_option_gets_a_suggestion() {
 #[test]
 fn help_of_every_command_shows_an_example() {
     let dir = Dir::new();
-    for command in ["encode", "decode", "inspect", "cage", "demo", "completions"] {
+    for command in ["encode", "decode", "inspect", "transfer", "explore", "cage", "demo", "completions"] {
         let help = dir.cager(&format!("{command} --help")).succeeds().stdout;
         assert!(help.contains(&format!("Example: cager {command}")), "{help}");
         assert!(dir.cager("--help").succeeds().stdout.contains(&format!("  {command} ")));

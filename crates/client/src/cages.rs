@@ -1,18 +1,15 @@
 //! Cage designs: requesting, following and downloading.
 
-use crate::body::json;
 use crate::client::Client;
-use crate::create::{MeshFile, part, random_key};
-use crate::error::{ClientError, Failure};
+use crate::create::MeshFile;
+use crate::error::ClientError;
 use crate::events::{Events, EventsOf};
+use crate::jobs::finite;
 use bytes::Bytes;
 use cager_proto::cage_messages::{CageJob, CageJobList, CageOptions, CageProgress, CageState};
 use cager_proto::messages::Problem;
 use futures_util::stream::BoxStream;
 use reqwest::Method;
-use reqwest::multipart::{Form, Part};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Polling intervals of [`Client::wait_cage`].
@@ -48,30 +45,9 @@ impl Client {
     /// [`ClientError::Mismatch`] for an option that is NaN or infinite, [`ClientError::Refused`] for bad input, and those of the
     /// connection.
     pub async fn design_cage(&self, new: &NewCage) -> Result<CageJob, ClientError> {
-        for (name, value) in [("mean_error", new.options.mean_error), ("time_limit_s", new.options.time_limit_s)] {
-            if let Some(value) = value.filter(|value| !value.is_finite()) {
-                return Err(ClientError::Mismatch(format!(
-                    "{name}: is {value}; give a finite number, or leave it out"
-                )));
-            }
-        }
-        let key = new.idempotency_key.clone().unwrap_or_else(random_key);
-        let options = serde_json::to_string(&new.options)
-            .map_err(|error| ClientError::Mismatch(format!("the options: {error}")))?;
-        let bytes = (new.rest.bytes.len() + new.frames.bytes.len()) as u64;
-        self.retrying(|| async {
-            let sent = Arc::new(AtomicU64::new(0));
-            let options = Part::text(options.clone()).mime_str("application/json");
-            let form = Form::new()
-                .part("options", options.map_err(|error| self.network(&error))?)
-                .part("rest", part(&new.rest, &sent))
-                .part("frames", part(&new.frames, &sent));
-            let request = self.request(Method::POST, &["v1", "cages"], &[]).await?;
-            let request = request.header("Idempotency-Key", &key).multipart(form);
-            let job: CageJob = json(self, self.send_for_work(request, &sent, bytes).await?).await?;
-            Ok::<_, Failure>(job)
-        })
-        .await
+        finite([("mean_error", &new.options.mean_error), ("time_limit_s", &new.options.time_limit_s)])?;
+        let files = vec![("rest", &new.rest), ("frames", &new.frames)];
+        self.create_job("cages", files, &new.options, new.idempotency_key.clone()).await
     }
 
     /// A cage design as it is now.
@@ -154,21 +130,6 @@ impl Client {
     /// [`ClientError::Refused`] with status 404 for an unknown id, and those of the connection.
     pub async fn delete_cage(&self, id: &str) -> Result<(), ClientError> {
         self.delete_job("cages", id).await
-    }
-
-    /// Deletes a job, once, over as many connections as it takes.
-    pub(crate) async fn delete_job(&self, resource: &str, id: &str) -> Result<(), ClientError> {
-        let asked = AtomicBool::new(false);
-        self.retrying(|| async {
-            let request = self.request(Method::DELETE, &["v1", resource, id], &[]).await?;
-            let again = asked.swap(true, Ordering::Relaxed);
-            match self.send(request).await {
-                // An earlier attempt deleted it, and its answer was lost.
-                Err(failure) if again && failure.status() == Some(404) => Ok(()),
-                answer => answer.map(drop),
-            }
-        })
-        .await
     }
 }
 

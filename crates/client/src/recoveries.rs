@@ -2,13 +2,14 @@
 
 use crate::body::json;
 use crate::client::Client;
-use crate::create::{MeshFile, part, random_key};
+use crate::create::{MeshFile, part};
 use crate::error::{ClientError, Failure};
 use crate::events::{Events, EventsOf};
+use crate::jobs::finite;
 use cager_proto::recovery_messages::{CompleteRecovery, PostedFrames, Recovery, RecoveryOptions, RecoveryProgress};
 use futures_util::stream::BoxStream;
 use reqwest::Method;
-use reqwest::multipart::{Form, Part};
+use reqwest::multipart::Form;
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -45,32 +46,11 @@ impl Client {
         let RecoveryOptions { frame_rate, start, max_error, mean_error, .. } = &new.options;
         let numbers =
             [("frame_rate", frame_rate), ("start", start), ("max_error", max_error), ("mean_error", mean_error)];
-        for (name, value) in numbers {
-            if let Some(value) = value.filter(|value| !value.is_finite()) {
-                return Err(ClientError::Mismatch(format!(
-                    "{name}: is {value}; give a finite number, or leave it out"
-                )));
-            }
-        }
-        let key = new.idempotency_key.clone().unwrap_or_else(random_key);
-        let options = serde_json::to_string(&new.options)
-            .map_err(|error| ClientError::Mismatch(format!("the options: {error}")))?;
+        finite(numbers)?;
         let person = new.person.iter().flat_map(|person| ["rig", "manifold"].into_iter().zip(person));
         let others = new.cage.iter().map(|cage| ("cage", cage)).chain(person);
-        let files: Vec<(&'static str, &MeshFile)> =
-            std::iter::once(("template", &new.template)).chain(others).collect();
-        let bytes = files.iter().map(|(_, file)| file.bytes.len() as u64).sum();
-        self.retrying(|| async {
-            let sent = Arc::new(AtomicU64::new(0));
-            let options = Part::text(options.clone()).mime_str("application/json");
-            let form = Form::new().part("options", options.map_err(|error| self.network(&error))?);
-            let form = files.iter().fold(form, |form, (name, file)| form.part(*name, part(file, &sent)));
-            let request = self.request(Method::POST, &["v1", "recoveries"], &[]).await?;
-            let request = request.header("Idempotency-Key", &key).multipart(form);
-            let recovery: Recovery = json(self, self.send_for_work(request, &sent, bytes).await?).await?;
-            Ok::<_, Failure>(recovery)
-        })
-        .await
+        let files = std::iter::once(("template", &new.template)).chain(others).collect();
+        self.create_job("recoveries", files, &new.options, new.idempotency_key.clone()).await
     }
 
     /// A recovery as it is now.

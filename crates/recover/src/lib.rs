@@ -4,6 +4,7 @@
 //! both to observed surfaces (`people`) and the paths of joints (`joints`), after Duveau, Courtemanche, Reveret and Boyer 2012, "Cage-based motion
 //! recovery using manifold learning".
 
+pub mod change;
 pub mod joints;
 pub mod manifold;
 pub mod offsets;

@@ -106,13 +106,21 @@ fn a_man_is_recovered_with_joints_by_the_poses_of_another_person() {
     )
     .unwrap();
     let mut sum = 0.0;
+    // Heights of the ankles, and what they should be.
+    let mut heights = [(); 2].map(|()| (Vec::new(), Vec::new()));
     for (cage, &f) in cages.iter().zip(&frames) {
         let found = joints.positions(cage);
+        for ((found_heights, true_heights), k) in heights.iter_mut().zip([2, 5]) {
+            found_heights.push(found[k][2]);
+            true_heights.push(truth(f, marked[k])[2]);
+        }
         sum += marked.iter().zip(&found).map(|(&j, p)| distance(*p, truth(f, j))).sum::<f64>();
     }
     let joint_error = 100.0 * sum / (frames.len() * marked.len()) as f64 / man.height;
-    eprintln!("joints {joint_error:.3} %");
+    let gait = heights.map(|(found, truth)| correlation(&found, &truth));
+    eprintln!("joints {joint_error:.3} %, correlation of ankle heights {gait:.4?}");
     assert!(mean < 1.3 && joint_error < 1.2, "{mean} {joint_error}");
+    assert!(gait.iter().all(|&r| r >= 0.995), "{gait:?}");
 }
 
 #[test]
@@ -130,6 +138,45 @@ fn a_woman_is_recovered_with_the_template_of_a_man() {
     let fit = PersonFit { model: &model, manifold: &manifold, options };
     let (mean, ..) = recovered("heavy woman by the man's template, PCA 10 of the clip", &fit, &woman, &frames, 0.0);
     assert!(mean < 2.5, "{mean}");
+}
+
+/// Pearson's.
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let centered = |x: &[f64]| {
+        let mean = x.iter().sum::<f64>() / x.len() as f64;
+        x.iter().map(|x| x - mean).collect::<Vec<f64>>()
+    };
+    let (a, b) = (centered(a), centered(b));
+    let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    inner(&a, &b) / (inner(&a, &a) * inner(&b, &b)).sqrt()
+}
+
+#[test]
+#[ignore = "needs the captures: make captures"]
+fn people_are_found_in_single_frames_whatever_their_heading() {
+    if !there("anny-man-02_02/rest.obj") {
+        return;
+    }
+    let man = capture("anny-man-02_02", 2);
+    let rig = rig_of(&man, [0.0, 0.0, 1.0]);
+    let manifold = learned(&rig, &poses(&rig, "131_01", 0..994, 8), Kind::Pca, 20);
+    let options = FitOptions::default();
+    let model = PersonModel::new(&man.rest, &rig, options.system, options.samples).unwrap();
+    let fit = PersonFit { model: &model, manifold: &manifold, options };
+    let mut all = Vec::new();
+    for f in (0..60).step_by(3) {
+        // Headings between those that the search tries, each another one.
+        let (sine, cosine) = (2.4 * f as f64).sin_cos();
+        let turned = |p: &Point| [cosine * p[0] - sine * p[1], sine * p[0] + cosine * p[1], p[2]];
+        let mut seen = seen(&man, f, 15_000, 0.005);
+        seen.points.iter_mut().chain(&mut seen.normals).for_each(|p| *p = turned(p));
+        let truth: Vec<Point> = man.frames[f].iter().map(turned).collect();
+        let found = fit.fit(&seen, None);
+        all.push(errors(&fit.model.deformed(&found.vertices), &truth, man.height)[0]);
+    }
+    let good = all.iter().filter(|&&error| error < 1.5).count();
+    eprintln!("{good} of {} single frames below 1.5 %: {all:.2?}", all.len());
+    assert!(20 * good >= 19 * all.len(), "{all:?}");
 }
 
 /// A joint in the rest pose: taken back by the rigid motions of the vertices around it.

@@ -29,7 +29,7 @@ pub struct Alignment {
     pub translation: Point,
     /// Root mean square distance both ways, of positions and normals together, as a share of the target's size.
     pub score: f64,
-    /// The score of the best one that is turned otherwise, over this one's: near one, either may be right. Infinite where there is none.
+    /// The score of the next best one that is turned otherwise, over this one's: near one, either may be right. Infinite where there is none.
     pub runner_up: f64,
 }
 
@@ -63,22 +63,32 @@ const MAX_CONTINUED: usize = 4;
 const NORMAL_LENGTH: f64 = 0.05;
 /// Distances count no more than this, of the target's size.
 const MAX_DISTANCE: f64 = 0.15;
+/// Iterations end early where they change rotation, scale and translation by less than this.
+const SAME_PLACE: f64 = 1e-7;
 /// Alignments turned by less than this, in degrees, are the same one.
 const SAME_TURN: f64 = 20.0;
 
-/// Lays `moved` onto `fixed`. Tried first are the surface as it stands, the turns that bring principal axes onto principal axes and, about a given axis up,
-/// eighths of a turn; then all points go to their nearest ones (Besl and McKay 1992), the nearest by normals as well. Runs on the current rayon pool; the result
-/// does not depend on it.
+/// Lays `moved` onto `fixed`: the best of [`alignments`].
 ///
 /// # Panics
 /// Where one of them has no points.
 pub fn align(moved: &Observation, fixed: &Observation, options: &AlignOptions) -> Alignment {
+    alignments(moved, fixed, options)[0]
+}
+
+/// Ways to lay `moved` onto `fixed`, the best first; there is one at least, and none are turned alike. Tried first are the surface as it stands, the turns
+/// that bring principal axes onto principal axes and, about a given axis up, eighths of a turn; then all points go to their nearest ones (Besl and McKay
+/// 1992), the nearest by normals as well. Runs on the current rayon pool; the result does not depend on it.
+///
+/// # Panics
+/// Where one of them has no points.
+pub fn alignments(moved: &Observation, fixed: &Observation, options: &AlignOptions) -> Vec<Alignment> {
     let (coarse, fine) = (Pair::new(moved, fixed, FIRST_POINTS), Pair::new(moved, fixed, LAST_POINTS));
     let scale = if options.scale { coarse.fixed.spread / coarse.moved.spread } else { 1.0 };
     let up = options.up.and_then(|up| DVec3::from(up).try_normalize());
     let mut tried: Vec<Placed> = starts(&coarse, up)
         .into_par_iter()
-        .map(|rotation| coarse.iterate(rotation, scale, up, options.scale, FIRST_ITERATIONS))
+        .map(|rotation| coarse.iterate(coarse.start(rotation, scale), up, options.scale, FIRST_ITERATIONS))
         .collect();
     tried.sort_by(|a, b| a.score.total_cmp(&b.score));
     let mut kept: Vec<Placed> = Vec::new();
@@ -89,17 +99,47 @@ pub fn align(moved: &Observation, fixed: &Observation, options: &AlignOptions) -
     }
     let mut done: Vec<Placed> = kept
         .iter()
-        .map(|placed| fine.iterate(placed.rotation, placed.scale, up, options.scale, LAST_ITERATIONS))
+        .map(|placed| fine.iterate(fine.start(placed.rotation, placed.scale), up, options.scale, LAST_ITERATIONS))
         .collect();
     done.sort_by(|a, b| a.score.total_cmp(&b.score));
-    let best = &done[0];
-    let other = done.iter().skip(1).find(|placed| angle(placed.rotation, best.rotation) > SAME_TURN);
+    let mut distinct: Vec<Placed> = Vec::new();
+    for placed in done {
+        if distinct.iter().all(|other| angle(other.rotation, placed.rotation) > SAME_TURN) {
+            distinct.push(placed);
+        }
+    }
+    let alignment = |k: usize| Alignment {
+        rotation: distinct[k].rotation.to_cols_array_2d(),
+        scale: distinct[k].scale,
+        translation: distinct[k].translation.to_array(),
+        score: distinct[k].score,
+        runner_up: distinct.get(k + 1).map_or(f64::INFINITY, |next| next.score / distinct[k].score),
+    };
+    (0..distinct.len()).map(alignment).collect()
+}
+
+/// Lays `moved` onto `fixed` from where pairs of their points lie on each other best, three at least that lie on no line.
+///
+/// # Panics
+/// Where one of the surfaces has no points.
+pub fn align_pairs(
+    moved: &Observation,
+    fixed: &Observation,
+    pairs: &[(Point, Point)],
+    options: &AlignOptions,
+) -> Alignment {
+    let up = options.up.and_then(|up| DVec3::from(up).try_normalize());
+    let pair = Pair::new(moved, fixed, LAST_POINTS);
+    let weighted: Vec<_> = pairs.iter().map(|&(p, q)| (p.into(), q.into(), 1.0)).collect();
+    let mut start = pair.start(DMat3::IDENTITY, pair.fixed.spread / pair.moved.spread);
+    start.take(&weighted, up, options.scale);
+    let placed = pair.iterate(start, up, options.scale, LAST_ITERATIONS);
     Alignment {
-        rotation: best.rotation.to_cols_array_2d(),
-        scale: best.scale,
-        translation: best.translation.to_array(),
-        score: best.score,
-        runner_up: other.map_or(f64::INFINITY, |placed| placed.score / best.score),
+        rotation: placed.rotation.to_cols_array_2d(),
+        scale: placed.scale,
+        translation: placed.translation.to_array(),
+        score: placed.score,
+        runner_up: f64::INFINITY,
     }
 }
 
@@ -140,6 +180,31 @@ struct Placed {
     score: f64,
 }
 
+impl Placed {
+    /// Brings points, each with its place and what it counts, as near to their places as can be.
+    fn take(&mut self, pairs: &[(DVec3, DVec3, f64)], up: Option<DVec3>, scales: bool) {
+        let total: f64 = pairs.iter().map(|(_, _, weight)| weight).sum();
+        if total <= 0.0 {
+            return;
+        }
+        let mean = |of: fn(&(DVec3, DVec3, f64)) -> DVec3| pairs.iter().map(|p| p.2 * of(p)).sum::<DVec3>() / total;
+        let (from, to) = (mean(|p| p.0), mean(|p| p.1));
+        let (mut covariance, mut size) = (DMat3::ZERO, 0.0);
+        for &(p, q, weight) in pairs {
+            let (p, q) = (p - from, weight * (q - to));
+            covariance += DMat3::from_cols(q * p.x, q * p.y, q * p.z);
+            size += weight * p.length_squared();
+        }
+        self.rotation = up.map_or_else(|| nearest_rotation(covariance), |up| turn_about(up, covariance));
+        if scales {
+            let product = covariance * self.rotation.transpose();
+            let found = (product.x_axis.x + product.y_axis.y + product.z_axis.z) / size.max(f64::MIN_POSITIVE);
+            self.scale = found.clamp(0.5 * self.scale, 2.0 * self.scale);
+        }
+        self.translation = to - self.scale * (self.rotation * from);
+    }
+}
+
 /// Two surfaces, one with a tree.
 struct Pair {
     moved: Cloud,
@@ -154,36 +219,22 @@ impl Pair {
         Self { moved, fixed, tree }
     }
 
-    /// Goes on from a rotation about the centres.
-    fn iterate(&self, rotation: DMat3, scale: f64, up: Option<DVec3>, scales: bool, iterations: usize) -> Placed {
-        let mut placed = Placed {
-            rotation,
-            scale,
-            translation: self.fixed.center - scale * (rotation * self.moved.center),
-            score: 0.0,
-        };
+    /// A rotation and a factor about the centres.
+    fn start(&self, rotation: DMat3, scale: f64) -> Placed {
+        let translation = self.fixed.center - scale * (rotation * self.moved.center);
+        Placed { rotation, scale, translation, score: 0.0 }
+    }
+
+    /// Goes on from somewhere.
+    fn iterate(&self, mut placed: Placed, up: Option<DVec3>, scales: bool, iterations: usize) -> Placed {
         for _ in 0..iterations {
-            let pairs = self.pairs(&placed);
-            let total: f64 = pairs.iter().map(|(_, _, weight)| weight).sum();
-            if total <= 0.0 {
+            let before = (placed.rotation, placed.scale, placed.translation);
+            placed.take(&self.pairs(&placed), up, scales);
+            let unturned = placed.rotation.abs_diff_eq(before.0, SAME_PLACE);
+            let scaled = (placed.scale - before.1).abs() > SAME_PLACE * placed.scale;
+            if unturned && !scaled && placed.translation.distance(before.2) < SAME_PLACE * self.fixed.spread {
                 break;
             }
-            let mean = |of: fn(&(DVec3, DVec3, f64)) -> DVec3| pairs.iter().map(|p| p.2 * of(p)).sum::<DVec3>() / total;
-            let (from, to) = (mean(|p| p.0), mean(|p| p.1));
-            let (mut covariance, mut size) = (DMat3::ZERO, 0.0);
-            for &(p, q, weight) in &pairs {
-                let (p, q) = (p - from, weight * (q - to));
-                covariance += DMat3::from_cols(q * p.x, q * p.y, q * p.z);
-                size += weight * p.length_squared();
-            }
-            let turned = up.map_or_else(|| nearest_rotation(covariance), |up| turn_about(up, covariance));
-            if scales {
-                let product = covariance * turned.transpose();
-                let found = (product.x_axis.x + product.y_axis.y + product.z_axis.z) / size.max(f64::MIN_POSITIVE);
-                placed.scale = found.clamp(0.5 * placed.scale, 2.0 * placed.scale);
-            }
-            placed.rotation = turned;
-            placed.translation = to - placed.scale * (turned * from);
         }
         placed.score = self.score(&placed);
         placed

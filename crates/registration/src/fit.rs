@@ -6,6 +6,7 @@ use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
+use crate::anchors::Anchors;
 use crate::matching::{OrientedPoints, match_weight};
 use crate::sparse_rows::{matrix, points, single, vectors};
 use crate::target::Target;
@@ -46,6 +47,8 @@ impl FitOptions {
 const START_WEIGHT: f64 = 1e-4;
 /// A fit ends early once the samples move by less than this share of the diagonal.
 const MIN_MOVE: f64 = 1e-4;
+/// Matches that count less than this share of what they could are of a surface out of reach.
+const MIN_WEIGHT: f64 = 1e-6;
 /// Of the residual of conjugate gradients, squared.
 const TOLERANCE: f64 = 1e-4;
 const BLOCK_ROWS: usize = 512;
@@ -55,6 +58,23 @@ struct Distances {
     hessians: Vec<DMat3>,
     pulls: Vec<DVec3>,
     single_hessians: Vec<Mat3A>,
+}
+
+impl Distances {
+    /// Sum of the traces of all Hessians: the weights of all matches, each a share of those one way, over the squared diagonal.
+    fn trace(&self) -> f64 {
+        self.hessians.iter().map(|b| b.x_axis.x + b.y_axis.y + b.z_axis.z).sum()
+    }
+}
+
+/// What holds the cage beside the matches.
+#[derive(Clone, Copy)]
+struct Held<'a> {
+    /// Weight of rigidity.
+    rigidity: f64,
+    /// Weight that holds the cage at its reference.
+    hold: f64,
+    anchors: Option<&'a Anchors>,
 }
 
 /// Matches of the iteration before, which are near those of the next one.
@@ -96,21 +116,45 @@ impl Template {
         reference: &[Point],
         options: &FitOptions,
     ) -> Vec<Point> {
+        self.fit_anchored(target, start, reference, options, None).0
+    }
+
+    /// [`Self::fit_beside`], with points that are pulled to their places; and whether the surface was in reach. Where it is not, nothing but anchors moves the
+    /// cage.
+    pub(crate) fn fit_anchored(
+        &self,
+        target: &Target,
+        start: &[Point],
+        reference: &[Point],
+        options: &FitOptions,
+        anchors: Option<&Anchors>,
+    ) -> (Vec<Point>, bool) {
         let reference = matrix(&vectors(reference));
         let mut cage = matrix(&vectors(start));
         let m = cage.nrows();
         let hold = options.hold / (self.diagonal * self.diagonal * m as f64);
+        let mut in_reach = true;
         let mut known = KnownMatches::none(self.samples.len(), target.points.len());
         for iteration in 0..options.iterations {
             let t = iteration as f64 / (options.iterations - 1).max(1) as f64;
             let between = |[first, last]: [f64; 2]| first * (last / first).powf(t);
             let (rigidity, reach) = (between(options.rigidity), between(options.reach) * self.diagonal);
             let distances = self.distances(target, cage.as_ref(), reach, (options.matched_back, iteration), &mut known);
+            let weight = distances.trace() * self.diagonal * self.diagonal;
+            // Both ways together they could count two. NaN is out of reach as well.
+            in_reach = anchors.is_some() || weight >= 2.0 * MIN_WEIGHT;
+            if !in_reach {
+                break;
+            }
             let mut pull = transposed_product(self.coordinates.as_ref(), matrix(&distances.pulls).as_ref(), BLOCK_ROWS);
             pull += faer::Scale(rigidity) * self.rigidity.pull(&self.rigidity.positions(cage.as_ref()));
             pull += faer::Scale(hold) * (&reference - &cage);
-            let Some(preconditioner) = self.preconditioner(&distances, rigidity, hold) else { break };
-            let change = self.solve(&distances, rigidity, hold, &preconditioner, pull, options.steps);
+            if let Some(anchors) = anchors {
+                pull += anchors.pull(cage.as_ref(), self.diagonal);
+            }
+            let held = Held { rigidity, hold, anchors };
+            let Some(preconditioner) = self.preconditioner(&distances, held) else { break };
+            let change = self.solve(&distances, held, &preconditioner, pull, options.steps);
             let moved = self.sparse.times(&single(change.as_ref()));
             cage += &change;
             let mean = moved.iter().map(|x| f64::from(x.length_squared())).sum::<f64>() / moved.len() as f64;
@@ -118,7 +162,7 @@ impl Template {
                 break;
             }
         }
-        plain(&points(cage.as_ref()))
+        (plain(&points(cage.as_ref())), in_reach)
     }
 
     /// Matches of every sample with the surface, and of a part of the surface with the samples.
@@ -173,30 +217,39 @@ impl Template {
     }
 
     /// The Cholesky factor of a Hessian in which every sample's is the mean of all in every direction.
-    fn preconditioner(&self, distances: &Distances, rigidity: f64, hold: f64) -> Option<Mat<f64>> {
-        let traces: f64 = distances.hessians.iter().map(|b| b.x_axis.x + b.y_axis.y + b.z_axis.z).sum();
-        let scale = traces * self.diagonal * self.diagonal / 3.0;
-        let mut sum = faer::Scale(scale) * &self.gram + faer::Scale(rigidity) * &self.rigidity_hessian;
-        (0..sum.nrows()).for_each(|k| sum[(k, k)] += hold + RIDGE);
+    fn preconditioner(&self, distances: &Distances, held: Held<'_>) -> Option<Mat<f64>> {
+        let scale = distances.trace() * self.diagonal * self.diagonal / 3.0;
+        let mut sum = faer::Scale(scale) * &self.gram + faer::Scale(held.rigidity) * &self.rigidity_hessian;
+        if let Some(anchors) = held.anchors {
+            sum += anchors.hessian(self.diagonal);
+        }
+        let ridge = RIDGE / (self.diagonal * self.diagonal);
+        (0..sum.nrows()).for_each(|k| sum[(k, k)] += held.hold + ridge);
         cholesky(sum)
     }
 
     /// The Hessian times a change of the cage, of coordinates without their small entries, in single precision.
-    fn hessian_times(&self, distances: &Distances, rigidity: f64, hold: f64, x: MatRef<'_, f64>) -> Mat<f64> {
+    fn hessian_times(&self, distances: &Distances, held: Held<'_>, x: MatRef<'_, f64>) -> Mat<f64> {
+        let Held { rigidity, hold, anchors } = held;
         let change = single(x);
         let moved = self.sparse.times(&change);
         let pulled: Vec<Vec3A> = moved.iter().zip(&distances.single_hessians).map(|(&x, &b)| b * x).collect();
         let sum = self.sparse.transposed_times(&pulled);
         let rigid = self.rigidity.hessian_times(&change);
-        Mat::from_fn(x.nrows(), 3, |i, k| f64::from(sum[i][k]) + rigidity * f64::from(rigid[i][k]) + hold * x[(i, k)])
+        let product = Mat::from_fn(x.nrows(), 3, |i, k| {
+            f64::from(sum[i][k]) + rigidity * f64::from(rigid[i][k]) + hold * x[(i, k)]
+        });
+        match anchors {
+            Some(anchors) => product + anchors.hessian_times(x, self.diagonal),
+            None => product,
+        }
     }
 
     /// Conjugate gradients from 0.
     fn solve(
         &self,
         distances: &Distances,
-        rigidity: f64,
-        hold: f64,
+        held: Held<'_>,
         preconditioner: &Mat<f64>,
         mut residual: Mat<f64>,
         steps: usize,
@@ -212,7 +265,7 @@ impl Template {
         let first = inner(&residual, &z);
         let mut size = first;
         for _ in 0..steps {
-            let image = self.hessian_times(distances, rigidity, hold, direction.as_ref());
+            let image = self.hessian_times(distances, held, direction.as_ref());
             let curvature = inner(&direction, &image);
             if curvature.is_nan() || curvature <= 0.0 {
                 break;
@@ -232,7 +285,7 @@ impl Template {
     }
 }
 
-/// Keeps the preconditioner definite.
+/// Keeps the preconditioner definite; over the squared diagonal, as all it is added to.
 const RIDGE: f64 = 1e-9;
 
 /// Sum of the products of entries.

@@ -2,8 +2,11 @@
 //! nothing of time, rigs or files. Plain data in, plain data out.
 
 mod align;
+mod anchors;
+mod closeness;
 mod dense_rows;
 mod fit;
+mod graph;
 mod matching;
 mod nearest;
 mod normals;
@@ -13,15 +16,20 @@ mod rigidity;
 mod sampling;
 mod score;
 mod sparse_rows;
+mod stages;
 mod target;
 mod template;
 
-pub use align::{AlignOptions, Alignment, align};
+pub use align::{AlignOptions, Alignment, align, align_pairs, alignments};
+pub use anchors::Anchors;
+pub use closeness::MeasuredSurface;
 pub use fit::FitOptions;
+pub use graph::NodeGraph;
 pub use matching::OrientedPoints;
 pub use nearest::NearestPoints;
 pub use observation::{Observation, ObservationError, ObservationNotes, ObservationOptions};
 pub use orientation::{outward, welded};
-pub use sampling::{SurfacePoint, farthest, sample_surface};
+pub use sampling::{SurfacePoint, farthest, sample_surface, surface_vertices};
+pub use stages::{Registration, StageOptions};
 pub use target::Target;
 pub use template::{RegistrationError, Template, TemplateOptions};

@@ -72,6 +72,25 @@ impl Rigidity {
         &self.edges[self.first[node] as usize..self.first[node + 1] as usize]
     }
 
+    /// The vectors of all edges at rest, to be given back to [`Self::restore`].
+    pub(crate) fn rest(&self) -> Vec<DVec3> {
+        self.edges.iter().map(|edge| edge.rest).collect()
+    }
+
+    /// Takes vectors of all edges for those at rest.
+    pub(crate) fn restore(&mut self, rest: &[DVec3]) {
+        self.edges.iter_mut().zip(rest).for_each(|(edge, &rest)| edge.rest = rest);
+    }
+
+    /// Takes the shape that the nodes have in these positions for the one at rest. Weights stay as they are.
+    pub(crate) fn set_rest(&mut self, positions: &[DVec3]) {
+        for node in 0..self.first.len() - 1 {
+            for edge in &mut self.edges[self.first[node] as usize..self.first[node + 1] as usize] {
+                edge.rest = positions[edge.to as usize] - positions[node];
+            }
+        }
+    }
+
     fn of_each_node<T: Send>(&self, what: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         (0..self.first.len() - 1).into_par_iter().with_min_len(64).map(what).collect()
     }

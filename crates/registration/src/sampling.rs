@@ -3,6 +3,8 @@
 use cager_geometry::vector::{Point, combination};
 use glam::DVec3;
 
+use crate::matching::join;
+
 /// A point of a triangle mesh, by its triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
@@ -17,6 +19,13 @@ impl SurfacePoint {
     pub fn at(&self, vertices: &[Point], triangles: &[[u32; 3]]) -> Point {
         combination(self.weights, triangles[self.face as usize].map(|v| vertices[v as usize]))
     }
+}
+
+/// The vertices that triangles use, in their order: what belongs to the surface. All of them where there are no triangles.
+pub fn surface_vertices(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<Point> {
+    let mut used = vec![triangles.is_empty(); vertices.len()];
+    triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+    vertices.iter().zip(used).filter(|(_, used)| *used).map(|(&p, _)| p).collect()
 }
 
 /// Twice the area of a triangle times its unit normal.
@@ -47,6 +56,26 @@ pub fn sample_surface(vertices: &[Point], triangles: &[[u32; 3]], count: usize, 
             SurfacePoint { face: face as u32, weights: [low, high - low, 1.0 - high] }
         })
         .collect()
+}
+
+/// Points that spread ones are chosen among, at the most.
+const MAX_CANDIDATES: usize = 20_000;
+
+/// Up to `count` of some points with these unit normals, spread by position and normal, where a normal counts as much as a distance of `normal_length`. Points
+/// without a normal are taken only where none has one; of very many, those are chosen among that `seed` draws.
+pub(crate) fn spread(points: &[Point], normals: &[Point], count: usize, normal_length: f64, seed: u64) -> Vec<u32> {
+    let mut candidates: Vec<u32> = (0..points.len() as u32).filter(|&v| normals[v as usize] != [0.0; 3]).collect();
+    if candidates.is_empty() {
+        candidates = (0..points.len() as u32).collect();
+    }
+    if candidates.len() > MAX_CANDIDATES {
+        fastrand::Rng::with_seed(seed).shuffle(&mut candidates);
+        candidates.truncate(MAX_CANDIDATES);
+        candidates.sort_unstable();
+    }
+    let joined: Vec<[f64; 6]> =
+        candidates.iter().map(|&v| join(points[v as usize], normals[v as usize], normal_length)).collect();
+    farthest(&joined, count).into_iter().map(|k| candidates[k as usize]).collect()
 }
 
 /// Up to `count` of some points, each the farthest from those before it; the first is the one of greatest second coordinate.
@@ -85,6 +114,20 @@ mod tests {
         assert!(samples.iter().all(|s| s.face < 2 && (s.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12));
         assert_eq!(samples, sample_surface(&vertices, &triangles, 4000, 7));
         assert_eq!(sample_surface(&vertices, &[[1, 1, 2]], 10, 7), []);
+    }
+
+    #[test]
+    fn of_very_many_points_some_are_chosen_among() {
+        let mut random = fastrand::Rng::with_seed(2);
+        let points: Vec<Point> = (0..100_000).map(|_| std::array::from_fn(|_| random.f64())).collect();
+        let normals = vec![[0.0, 0.0, 1.0]; points.len()];
+        let clock = std::time::Instant::now();
+        let chosen = spread(&points, &normals, 60, 0.1, 0);
+        let few = spread(&points[..20_000], &normals[..20_000], 60, 0.1, 0);
+        assert!(chosen.len() == 60 && few.len() == 60 && clock.elapsed().as_secs() < 20);
+        let highest = (0..100_000).max_by(|&i, &j| points[i][1].total_cmp(&points[j][1])).unwrap();
+        assert_ne!(chosen[0] as usize, highest);
+        assert_eq!(chosen, spread(&points, &normals, 60, 0.1, 0));
     }
 
     #[test]

@@ -23,7 +23,14 @@ impl Target {
     /// # Panics
     /// Where it has no points.
     pub fn new(observation: &Observation, diagonal: f64) -> Self {
-        let normal_length = NORMAL_LENGTH * diagonal;
+        Self::with_normal_length(observation, NORMAL_LENGTH * diagonal)
+    }
+
+    /// An observation in whose matches a normal counts as much as a distance of `normal_length`.
+    ///
+    /// # Panics
+    /// Where it has no points.
+    pub fn with_normal_length(observation: &Observation, normal_length: f64) -> Self {
         Self {
             points: vectors(&observation.points),
             normals: vectors(&observation.normals),

@@ -8,10 +8,9 @@ use faer::{Mat, MatRef};
 use glam::DVec3;
 
 use crate::dense_rows::DenseRows;
-use crate::matching::join;
 use crate::orientation::welded;
 use crate::rigidity::{Rigidity, node_edges};
-use crate::sampling::{SurfacePoint, area_normal, farthest, sample_surface};
+use crate::sampling::{SurfacePoint, area_normal, sample_surface, spread, surface_vertices};
 use crate::sparse_rows::{SparseRows, points, vectors};
 
 /// How closely a template is looked at.
@@ -57,7 +56,7 @@ pub enum RegistrationError {
 
 /// A template, its cage and its coordinates.
 pub struct Template {
-    /// Length of the rest pose's diagonal.
+    /// Length of the diagonal of the rest pose's surface.
     pub(crate) diagonal: f64,
     pub(crate) samples: Vec<Sample>,
     /// Coordinates of the corners of the samples' triangles.
@@ -82,8 +81,6 @@ pub(crate) struct Sample {
 const SPARSE_THRESHOLD: f64 = 3e-3;
 /// Blocks of rows in which products are summed.
 const BLOCK_ROWS: usize = 512;
-/// Vertices that nodes are chosen among, at the most.
-const MAX_CANDIDATES: usize = 20_000;
 /// What a vertex normal counts where nodes are spread, as a share of the diagonal.
 const NODE_NORMAL: f64 = 0.1;
 
@@ -111,7 +108,7 @@ impl Template {
         if drawn.is_empty() {
             return Err(RegistrationError::NoSurface);
         }
-        let diagonal = diagonal(&rest.vertices);
+        let diagonal = diagonal(&surface_vertices(&rest.vertices, &rest.triangles));
         let corners_of = |sample: &SurfacePoint| rest.triangles[sample.face as usize];
         let mut used: Vec<u32> = drawn.iter().flat_map(corners_of).collect();
         used.sort_unstable();
@@ -150,7 +147,7 @@ impl Template {
         self.samples.iter().map(|sample| pose(sample, &corners)).unzip()
     }
 
-    /// Length of the rest pose's diagonal.
+    /// Length of the diagonal of the rest pose's surface.
     pub fn diagonal(&self) -> f64 {
         self.diagonal
     }
@@ -178,18 +175,8 @@ fn nodes(rest: &TriMesh, count: usize, normal_length: f64, seed: u64) -> Vec<u32
         let normal = area_normal(triangle.map(|v| rest.vertices[v as usize]));
         triangle.iter().for_each(|&v| normals[v as usize] += normal);
     }
-    let mut candidates: Vec<u32> =
-        (0..rest.vertices.len() as u32).filter(|&v| normals[v as usize] != DVec3::ZERO).collect();
-    if candidates.len() > MAX_CANDIDATES {
-        fastrand::Rng::with_seed(seed).shuffle(&mut candidates);
-        candidates.truncate(MAX_CANDIDATES);
-        candidates.sort_unstable();
-    }
-    let joined: Vec<[f64; 6]> = candidates
-        .iter()
-        .map(|&v| join(rest.vertices[v as usize], normals[v as usize].normalize_or_zero().to_array(), normal_length))
-        .collect();
-    farthest(&joined, count).into_iter().map(|k| candidates[k as usize]).collect()
+    let normals: Vec<Point> = normals.iter().map(|n| n.normalize_or_zero().to_array()).collect();
+    spread(&rest.vertices, &normals, count, normal_length, seed)
 }
 
 /// The corners of a sample, its position and its unit normal.

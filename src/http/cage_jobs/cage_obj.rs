@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// The best cage so far, as an OBJ file. Its `ETag` changes with the cage; once the design is completed, it never changes.
 #[utoipa::path(
-    get, path = "/v1/cages/{id}/cage.obj", operation_id = "get_designed_cage", tag = "cages", params(openapi::CageId, openapi::Conditions),
+    get, path = "/v1/cages/{id}/cage.obj", operation_id = "get_designed_cage", tag = "cages", params(openapi::JobId, openapi::Conditions),
     responses(
         (status = 200, description = "The cage", content_type = "model/obj", body = String),
         (status = 206, description = "The range asked for", content_type = "model/obj", body = String),

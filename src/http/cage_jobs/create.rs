@@ -1,17 +1,18 @@
 //! `POST /v1/cages`: a cage is to be designed.
 
-use super::parts;
+use crate::auth::Tenant;
+use crate::cage_job::create::{NewCageJob, check_options};
 use crate::http::extract::Caller;
 use crate::http::frames::too_slow;
-use crate::http::multipart::{self, FormHeader};
+use crate::http::jobs::accepted;
+use crate::http::multipart::{self, FormHeader, bad};
 use crate::http::openapi;
+use crate::http::spooled::{self, FormParts};
 use crate::problem::ApiError;
 use crate::service::Service;
-use axum::Json;
 use axum::extract::{Request, State};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use cager_proto::cage_messages::CageJob;
-use http::{StatusCode, header};
 use std::sync::Arc;
 use tokio::time::timeout;
 
@@ -34,9 +35,40 @@ pub(crate) async fn create(
     let form = multipart::check_form_header(&service, &request, "rest, frames and options", limit)?;
     let FormHeader { idempotency_key, patience } = form;
     let _place = service.stream(&tenant)?;
-    let reading = parts::read(&service, &tenant, request, idempotency_key);
-    let new = timeout(patience, reading).await.map_err(|_| too_slow())??;
+    let new = timeout(patience, read(&service, &tenant, request, idempotency_key)).await.map_err(|_| too_slow())??;
     let job = service.create_cage_job(&tenant, new).await?;
-    let location = format!("/v1/cages/{}", job.meta.id);
-    Ok((StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(job.view())).into_response())
+    Ok(accepted(&job, job.view()))
+}
+
+/// Reads the parts of the form.
+pub(crate) async fn read(
+    service: &Arc<Service>,
+    tenant: &Arc<Tenant>,
+    request: Request,
+    idempotency_key: Option<String>,
+) -> Result<NewCageJob, ApiError> {
+    let parts = FormParts {
+        files: &["rest"],
+        many: None,
+        what: "the rest pose is",
+        large: &["frames"],
+        cure: "send every second or fewer, a design looks at 160 at most",
+        check: &|options| check_options(options, &service.config),
+    };
+    let mut form = spooled::read(service, tenant, request, &parts).await?;
+    let rest = form.files.remove("rest");
+    let rest = rest.ok_or_else(|| bad("part rest is missing; send the rest pose as a file".to_owned()))?;
+    let frames = form.large.ok_or_else(|| {
+        bad("part frames is missing; send frames as .npy or raw f32, or make a cage from the rest pose alone by POST /v1/sessions".to_owned())
+    })?;
+    Ok(NewCageJob {
+        rest_name: rest.name,
+        rest: rest.bytes,
+        frames_name: frames.name,
+        frames: frames.spool,
+        options: form.options,
+        idempotency_key,
+        room: form.room,
+        reserved: form.reserved,
+    })
 }

@@ -2,8 +2,8 @@
 
 use crate::cage_job::{CageDesign, CageJob};
 use crate::http::extract::{Caller, Query, Requested, RequestedJob};
-use crate::http::openapi;
 use crate::http::sessions::PageQuery;
+use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
 use crate::service::Service;
 use axum::Json;
@@ -17,24 +17,23 @@ use std::sync::Arc;
 pub(crate) async fn list(
     State(service): State<Arc<Service>>,
     Caller(tenant): Caller,
-    Query(query): Query<PageQuery>,
+    query: Query<PageQuery>,
 ) -> Json<CageJobList> {
-    let (page, next) = query.page(&service.cage_jobs, &tenant);
-    Json(CageJobList { cages: page.iter().map(|job| job.view()).collect(), next })
+    let (cages, next) = jobs::page(&service, &tenant, &query, CageJob::view);
+    Json(CageJobList { cages, next })
 }
 
 /// A cage design.
-#[utoipa::path(get, path = "/v1/cages/{id}", operation_id = "get_cage_design", tag = "cages", params(openapi::CageId), responses((status = 200, description = "The design", body = View)))]
+#[utoipa::path(get, path = "/v1/cages/{id}", operation_id = "get_cage_design", tag = "cages", params(openapi::JobId), responses((status = 200, description = "The design", body = View)))]
 pub(crate) async fn get(RequestedJob { job, .. }: RequestedJob<CageDesign>) -> Json<View> {
     Json(job.view())
 }
 
 /// Deletes a cage design; one that runs stops within a second. Sessions that took its cage keep it.
-#[utoipa::path(delete, path = "/v1/cages/{id}", operation_id = "delete_cage_design", tag = "cages", params(openapi::CageId), responses((status = 204, description = "It is gone")))]
+#[utoipa::path(delete, path = "/v1/cages/{id}", operation_id = "delete_cage_design", tag = "cages", params(openapi::JobId), responses((status = 204, description = "It is gone")))]
 pub(crate) async fn delete(
     State(service): State<Arc<Service>>,
     Requested(job): Requested<CageJob>,
 ) -> Result<StatusCode, ApiError> {
-    service.delete_job(&job).await?;
-    Ok(StatusCode::NO_CONTENT)
+    jobs::delete(&service, &job).await
 }

@@ -4,4 +4,3 @@ pub(super) mod cage_obj;
 pub(super) mod create;
 pub(super) mod events;
 pub(super) mod jobs;
-pub(super) mod parts;

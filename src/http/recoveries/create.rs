@@ -2,17 +2,16 @@
 
 use crate::http::extract::Caller;
 use crate::http::frames::too_slow;
+use crate::http::jobs::accepted;
 use crate::http::multipart::{self, FormHeader};
 use crate::http::openapi;
 use crate::problem::ApiError;
 use crate::recovery::NewRecovery;
 use crate::service::Service;
 use crate::store::RecoveryParts;
-use axum::Json;
 use axum::extract::{Request, State};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use cager_proto::recovery_messages::Recovery;
-use http::{StatusCode, header};
 use std::sync::Arc;
 use tokio::time::timeout;
 
@@ -42,6 +41,5 @@ pub(crate) async fn create(
     let parts = RecoveryParts { template, cage, rig, manifold };
     let new = NewRecovery { parts, options: form.options, idempotency_key, room: form.room };
     let job = service.create_recovery(&tenant, new).await?;
-    let location = format!("/v1/recoveries/{}", job.id());
-    Ok((StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(job.view())).into_response())
+    Ok(accepted(&job, job.view()))
 }

@@ -2,8 +2,8 @@
 
 use crate::http::events::Event;
 use crate::http::extract::RequestedJob;
-use crate::http::openapi;
-use crate::http::progress::{self, ProgressEvent, ProgressSource};
+use crate::http::progress::ProgressEvent;
+use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
 use crate::recovery::Recovery;
 use crate::service::Service;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// from there on.
 #[utoipa::path(
     get, path = "/v1/recoveries/{id}/events", operation_id = "get_recovery_events", tag = "recoveries",
-    params(openapi::RecoveryId, ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event received")),
+    params(openapi::JobId, ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event received")),
     responses((status = 200, description = "Events whose data is JSON", content_type = "text/event-stream", body = Event)),
 )]
 pub(crate) async fn get(
@@ -25,9 +25,7 @@ pub(crate) async fn get(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let place = service.stream(&tenant)?;
-    let (changes, deleted) = (job.changes(), job.deleted().clone());
-    let look = move |heard: Option<&str>| {
+    jobs::events(service, &tenant, job, &headers, |job, heard| {
         let told = heard.and_then(|id| id.split('.').next()?.parse().ok()).unwrap_or(0);
         let (progress, last) = job.progress_from(told);
         let up_to = progress.frames.last().map_or(told, |frame| frame.frame + 1);
@@ -37,6 +35,5 @@ pub(crate) async fn get(
             data: serde_json::to_string(&progress).unwrap_or_default(),
             last,
         }
-    };
-    Ok(progress::stream(service, place, &headers, ProgressSource { changes, deleted, look: Box::new(look) }))
+    })
 }

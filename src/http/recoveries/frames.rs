@@ -32,7 +32,7 @@ pub(crate) struct FramesQuery {
 /// Posts frames: one part `frame` for each, in their order, a mesh or point cloud whose file name says the format. The answer comes when all are on
 /// disk. A frame that holds no surface is refused by its number and name; those before it in the request are kept. The same frame again changes nothing.
 #[utoipa::path(
-    post, path = "/v1/recoveries/{id}/frames", operation_id = "post_recovery_frames", tag = "recoveries", params(openapi::RecoveryId, FramesQuery),
+    post, path = "/v1/recoveries/{id}/frames", operation_id = "post_recovery_frames", tag = "recoveries", params(openapi::JobId, FramesQuery),
     request_body(content = openapi::SurfacesForm, content_type = "multipart/form-data"),
     responses((status = 200, description = "The frames, which are on disk", body = PostedFrames)),
 )]

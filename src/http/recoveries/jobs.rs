@@ -1,8 +1,8 @@
 //! Listing, looking at, completing and deleting recoveries.
 
 use crate::http::extract::{Body, Caller, Query, Requested, RequestedJob};
-use crate::http::openapi;
 use crate::http::sessions::PageQuery;
+use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
 use crate::recovery::{Recovery, RecoveryJob};
 use crate::service::Service;
@@ -17,32 +17,31 @@ use std::sync::Arc;
 pub(crate) async fn list(
     State(service): State<Arc<Service>>,
     Caller(tenant): Caller,
-    Query(query): Query<PageQuery>,
+    query: Query<PageQuery>,
 ) -> Json<RecoveryList> {
-    let (page, next) = query.page(&service.recoveries, &tenant);
-    Json(RecoveryList { recoveries: page.iter().map(|job| job.view()).collect(), next })
+    let (recoveries, next) = jobs::page(&service, &tenant, &query, RecoveryJob::view);
+    Json(RecoveryList { recoveries, next })
 }
 
 /// A recovery.
-#[utoipa::path(get, path = "/v1/recoveries/{id}", operation_id = "get_recovery", tag = "recoveries", params(openapi::RecoveryId), responses((status = 200, description = "The recovery", body = View)))]
+#[utoipa::path(get, path = "/v1/recoveries/{id}", operation_id = "get_recovery", tag = "recoveries", params(openapi::JobId), responses((status = 200, description = "The recovery", body = View)))]
 pub(crate) async fn get(RequestedJob { job, .. }: RequestedJob<Recovery>) -> Json<View> {
     Json(job.view())
 }
 
 /// Deletes a recovery with all that belongs to it; what runs for it stops.
-#[utoipa::path(delete, path = "/v1/recoveries/{id}", operation_id = "delete_recovery", tag = "recoveries", params(openapi::RecoveryId), responses((status = 204, description = "It is gone")))]
+#[utoipa::path(delete, path = "/v1/recoveries/{id}", operation_id = "delete_recovery", tag = "recoveries", params(openapi::JobId), responses((status = 204, description = "It is gone")))]
 pub(crate) async fn delete(
     State(service): State<Arc<Service>>,
     Requested(job): Requested<RecoveryJob>,
 ) -> Result<StatusCode, ApiError> {
-    service.delete_job(&job).await?;
-    Ok(StatusCode::NO_CONTENT)
+    jobs::delete(&service, &job).await
 }
 
 /// Says that no more frames are coming. The last ones are followed, a second pass goes back to the first, and the container is written, in the
 /// background. Repeating it changes nothing.
 #[utoipa::path(
-    post, path = "/v1/recoveries/{id}/complete", operation_id = "complete_recovery", tag = "recoveries", params(openapi::RecoveryId),
+    post, path = "/v1/recoveries/{id}/complete", operation_id = "complete_recovery", tag = "recoveries", params(openapi::JobId),
     request_body = CompleteRecovery, responses((status = 202, description = "The recovery, which is being finished", body = View)),
 )]
 pub(crate) async fn complete(

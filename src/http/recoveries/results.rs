@@ -2,25 +2,20 @@
 
 use crate::auth::Tenant;
 use crate::http::extract::RequestedJob;
-use crate::http::openapi;
-use crate::http::ranged::Immutable;
-use crate::problem::{self, ApiError};
+use crate::http::{jobs, openapi};
+use crate::problem::ApiError;
 use crate::recovery::{Recovery, RecoveryJob};
 use crate::service::Service;
-use crate::store::StoreError;
-use crate::tasks::blocking;
 use axum::extract::State;
 use axum::response::Response;
-use http::header::CONTENT_DISPOSITION;
-use http::{HeaderMap, HeaderValue};
-use std::fs::File;
+use http::HeaderMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// The container of a completed recovery, byte for byte what `cager recover` writes for the same files and options.
 #[utoipa::path(
     get, path = "/v1/recoveries/{id}/capture.cager", operation_id = "get_recovered_container", tag = "recoveries",
-    params(openapi::RecoveryId, openapi::Conditions),
+    params(openapi::JobId, openapi::Conditions),
     responses(
         (status = 200, description = "The container", content_type = "application/vnd.cager", body = Vec<u8>),
         (status = 206, description = "The range asked for", content_type = "application/vnd.cager", body = Vec<u8>),
@@ -38,7 +33,7 @@ pub(crate) async fn container(
 /// How each frame was found and how far it lies from its surface, as `cager recover --report` writes it.
 #[utoipa::path(
     get, path = "/v1/recoveries/{id}/report", operation_id = "get_recovery_report", tag = "recoveries",
-    params(openapi::RecoveryId, openapi::Conditions),
+    params(openapi::JobId, openapi::Conditions),
     responses(
         (status = 200, description = "The report", content_type = "application/json", body = Object),
         (status = 206, description = "The range asked for", content_type = "application/json", body = Object),
@@ -56,7 +51,7 @@ pub(crate) async fn report(
 /// Where the rig's joints are in every frame, `frame,joint,x,y,z`.
 #[utoipa::path(
     get, path = "/v1/recoveries/{id}/joints.csv", operation_id = "get_joints_csv", tag = "recoveries",
-    params(openapi::RecoveryId, openapi::Conditions),
+    params(openapi::JobId, openapi::Conditions),
     responses(
         (status = 200, description = "The joints", content_type = "text/csv", body = String),
         (status = 206, description = "The range asked for", content_type = "text/csv", body = String),
@@ -74,7 +69,7 @@ pub(crate) async fn joints_csv(
 /// The rig's joints in every frame as a skeleton in motion.
 #[utoipa::path(
     get, path = "/v1/recoveries/{id}/joints.bvh", operation_id = "get_joints_bvh", tag = "recoveries",
-    params(openapi::RecoveryId, openapi::Conditions),
+    params(openapi::JobId, openapi::Conditions),
     responses(
         (status = 200, description = "The joints", content_type = "text/plain", body = String),
         (status = 206, description = "The range asked for", content_type = "text/plain", body = String),
@@ -98,21 +93,6 @@ pub(super) async fn file(
     (name, media_type): (&'static str, &'static str),
     headers: &HeaderMap,
 ) -> Result<Response, ApiError> {
-    let finished = job.finished()?;
-    let part = finished.files.into_iter().find(|part| part.name == name).ok_or_else(|| {
-        let detail = "there are joints where a rig and a manifold were sent; make the recovery anew with them";
-        ApiError::new(problem::NOT_FOUND, detail)
-    })?;
-    let path = service.store.recovery_file(job.id(), name)?;
-    let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
-    let opened = opened.map_err(|error| job.fail_if_damaged(&service.store, error))?;
-    let room = service.download_memory.nothing(&tenant.name);
-    let etag =
-        bytes.as_ref().map_or(part.blake3.clone(), |range| format!("{}-{}-{}", part.blake3, range.start, range.end));
-    let bytes = bytes.unwrap_or(0..part.bytes);
-    let file = Immutable::of_file(opened, bytes, etag, media_type, room, !service.access.is_guarded());
-    let mut response = file.respond(headers);
-    let disposition = HeaderValue::from_str(&format!("attachment; filename=\"{name}\""));
-    response.headers_mut().extend(disposition.ok().map(|value| (CONTENT_DISPOSITION, value)));
-    Ok(response)
+    let missing = "there are joints where a rig and a manifold were sent; make the recovery anew with them";
+    jobs::result(service, tenant, job, bytes, (name, media_type, missing), headers).await
 }

@@ -53,7 +53,9 @@ fn finish(store: &Store) -> Result<(), StoreError> {
     let workshop = store.workshop()?;
     workshop.write("capture.cager", RESULT)?;
     let results = [StoredPart::of("capture.cager", RESULT)];
-    store.finish_recovery("a", &OUTCOME, Some((&workshop, &results)))
+    store.finish_job(Kind::Recovery, "a", &OUTCOME, Some((&workshop, &results)))?;
+    store.forget_recovery_input("a");
+    Ok(())
 }
 
 /// A life of two recoveries. Every step is tried again once.
@@ -97,7 +99,7 @@ fn look(given: &Given, told: &Told, what: &str) {
         assert!(outcome.is_some() || !told.finished, "{what}: an outcome is lost");
         if let Some(outcome) = outcome {
             assert_eq!(outcome, OUTCOME, "{what}");
-            let path = store.recovery_file("a", "capture.cager").unwrap();
+            let path = store.job_file(Kind::Recovery, "a", "capture.cager").unwrap();
             assert_eq!(std::fs::read(path).unwrap(), RESULT, "{what}");
         } else {
             assert_eq!(store.recovery_parts(&meta("a")).unwrap(), parts(), "{what}");

@@ -33,7 +33,7 @@ fn contents(app: &TestApp) -> usize {
 async fn told(app: &TestApp, sessions: usize, cages: usize) {
     let ready: Value = app.get("/readyz").await.is(200);
     let detail = ready["detail"].as_str().unwrap_or_default();
-    let expected = format!("{sessions} sessions, {cages} cage designs and 0 recoveries cannot be read");
+    let expected = format!("{sessions} sessions, {cages} cage designs, 0 recoveries and 0 transfers cannot be read");
     assert_eq!(detail.starts_with(&expected), sessions + cages > 0, "{ready}");
     assert_eq!(app.metric("cager_unread{what=\"sessions\"}").await, sessions as f64);
     assert_eq!(app.metric("cager_unread{what=\"cages\"}").await, cages as f64);

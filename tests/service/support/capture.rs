@@ -109,6 +109,20 @@ impl Capture {
         out
     }
 
+    /// Frames as a NumPy array.
+    pub(crate) fn npy(&self, frames: Range<u32>) -> Vec<u8> {
+        let folder = super::folder();
+        let path = folder.path().join("frames.npy");
+        let options = FrameOptions::default();
+        let mut writer =
+            create_frames(path.clone(), self.points(), frames.len(), &Polygons::new(), &options).expect("frames");
+        for frame in frames {
+            writer.write_frame(&self.frames[frame as usize]).expect("a frame");
+        }
+        writer.finish().expect("frames");
+        std::fs::read(path).expect("frames")
+    }
+
     /// The container that `cager encode` makes of the first frames, without a service.
     pub(crate) fn encoded(&self, frames: u32) -> Vec<u8> {
         self.encoded_with(frames, &[])
@@ -120,14 +134,7 @@ impl Capture {
         let path = |name: &str| folder.path().join(name);
         std::fs::write(path("rest.obj"), &self.rest.obj).expect("a rest pose");
         std::fs::write(path("cage.obj"), &self.cage.obj).expect("a cage");
-        let count = frames as usize;
-        let options = FrameOptions::default();
-        let mut writer =
-            create_frames(path("frames.npy"), self.points(), count, &Polygons::new(), &options).expect("frames");
-        for frame in &self.frames[..count] {
-            writer.write_frame(frame).expect("a frame");
-        }
-        writer.finish().expect("frames");
+        std::fs::write(path("frames.npy"), self.npy(0..frames)).expect("frames");
         let done = Command::new(env!("CARGO_BIN_EXE_cager"))
             .args("encode --rest rest.obj --cage cage.obj --frames frames.npy -o out.cager".split(' '))
             .args(more)

@@ -1,3 +1,5 @@
 mod cages;
 mod recoveries;
 mod sessions;
+mod shapespaces;
+mod transfers;

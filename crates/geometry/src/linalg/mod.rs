@@ -6,6 +6,7 @@ mod products;
 mod rotation;
 mod small;
 mod sparse;
+mod sparse_cholesky;
 pub mod svd;
 mod zeros;
 
@@ -21,4 +22,5 @@ pub use products::{
 pub use rotation::nearest_rotation;
 pub use small::symmetric_eigen;
 pub use sparse::SparseMatrix;
+pub use sparse_cholesky::{SparseCholesky, SparsePattern};
 pub use zeros::zeros;

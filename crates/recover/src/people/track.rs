@@ -1,6 +1,7 @@
 //! A sequence: each frame from the one before, those that are lost anew, and back again.
 
 use super::fit::{FrameFit, PersonFit};
+use super::limbs::limb_scores;
 use cager_registration::Observation;
 
 /// A frame of a sequence.
@@ -8,7 +9,7 @@ use cager_registration::Observation;
 pub struct TrackedFrame {
     /// Its fit.
     pub fit: FrameFit,
-    /// Its score is far above that of the others, even from a search: the person is not there or not found.
+    /// Its score, or that of an arm or leg, is far above that of the others, even from a search: part of the person is not there or not found.
     pub lost: bool,
     /// It was found by a search.
     pub searched: bool,
@@ -17,7 +18,9 @@ pub struct TrackedFrame {
 /// A frame whose score is this many times the usual one of the frames before is searched for anew.
 const SUSPECT: f64 = 1.15;
 /// A frame is lost above this many times the usual score.
-const LOST: f64 = 2.0;
+const LOST: f64 = 1.5;
+/// And where a limb is, above this many times the usual score of the worst limb: an arm that lies elsewhere hardly moves the score of the whole.
+const LIMB_LOST: f64 = 1.85;
 /// No frame is found above this score, a share of the height.
 const MAX_SCORE: f64 = 0.03;
 /// Frames that the usual score is of.
@@ -71,6 +74,7 @@ impl<'f, 'a> PersonTracker<'f, 'a> {
 pub struct WayBack<'f, 'a> {
     fit: &'f PersonFit<'a>,
     frames: Vec<TrackedFrame>,
+    /// The usual score on the way forwards.
     usual: Option<f64>,
 }
 
@@ -83,17 +87,39 @@ impl WayBack<'_, '_> {
             return;
         }
         let again = self.fit.fit(&observation(), Some(&from.fit));
-        if again.score < frame.fit.score {
-            frame.fit = again;
-        }
-        let score = frame.fit.score;
-        frame.lost = score > MAX_SCORE || self.usual.is_some_and(|usual| score > LOST * usual);
+        frame.take_better(again, self.usual);
     }
 
-    /// All frames.
-    pub fn into_frames(self) -> Vec<TrackedFrame> {
+    /// All frames. Which are lost is judged anew, by what is usual in all of them.
+    pub fn into_frames(mut self) -> Vec<TrackedFrame> {
+        judge(&mut self.frames);
         self.frames
     }
+}
+
+impl TrackedFrame {
+    /// Takes another fit if it is better; the frame is found then, if it is good, so that the one before can be fitted from it.
+    fn take_better(&mut self, again: FrameFit, usual: Option<f64>) {
+        if again.score < self.fit.score {
+            self.lost = again.score > MAX_SCORE || usual.is_some_and(|usual| again.score > LOST * usual);
+            self.fit = again;
+        }
+    }
+}
+
+/// Says which frames are lost.
+fn judge(frames: &mut [TrackedFrame]) {
+    let usual = usual_of(frames.iter().map(|frame| frame.fit.score));
+    let usual_limb = usual_of(frames.iter().map(|frame| worst_limb(&frame.fit)));
+    let (Some(usual), Some(usual_limb)) = (usual, usual_limb) else { return };
+    for frame in frames {
+        let most = MAX_SCORE.min(LOST * usual);
+        frame.lost = frame.fit.score > most || worst_limb(&frame.fit) > LIMB_LOST * usual_limb;
+    }
+}
+
+fn worst_limb(fit: &FrameFit) -> f64 {
+    limb_scores(&fit.parts).into_iter().fold(0.0, f64::max)
 }
 
 /// Fits a sequence forwards and, where `back` says so, backwards from its end. `done` is told each frame of the first pass.
@@ -119,4 +145,47 @@ fn usual_of(scores: impl Iterator<Item = f64>) -> Option<f64> {
     let mut scores: Vec<f64> = scores.collect();
     scores.sort_unstable_by(f64::total_cmp);
     scores.get(scores.len() / 4).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{Placement, QUADS};
+
+    fn frame(score: f64, arm: f64) -> TrackedFrame {
+        let mut parts = [0.007; QUADS];
+        parts[5..9].fill(arm);
+        let fit = FrameFit {
+            placement: Placement::default(),
+            latent: Vec::new(),
+            pose: Vec::new(),
+            vertices: Vec::new(),
+            score,
+            parts,
+            stages: [Vec::new(), Vec::new()],
+        };
+        TrackedFrame { fit, lost: false, searched: false }
+    }
+
+    #[test]
+    fn a_lost_frame_that_is_fitted_better_on_the_way_back_is_found() {
+        let mut lost = TrackedFrame { lost: true, ..frame(0.04, 0.007) };
+        lost.take_better(frame(0.05, 0.007).fit, Some(0.01));
+        assert!(lost.lost && lost.fit.score == 0.04);
+        lost.take_better(frame(0.02, 0.007).fit, Some(0.01));
+        assert!(lost.lost && lost.fit.score == 0.02);
+        lost.take_better(frame(0.012, 0.007).fit, Some(0.01));
+        assert!(!lost.lost && lost.fit.score == 0.012);
+    }
+
+    #[test]
+    fn a_frame_is_lost_where_it_or_one_limb_lies_far_worse_than_usual() {
+        let mut frames: Vec<TrackedFrame> = (0..20).map(|k| frame(0.01, 0.007 + 1e-4 * f64::from(k % 5))).collect();
+        frames[3] = frame(0.011, 0.0145);
+        frames[7] = frame(0.016, 0.009);
+        frames[9].lost = true;
+        judge(&mut frames);
+        let lost: Vec<usize> = (0..20).filter(|&k| frames[k].lost).collect();
+        assert_eq!(lost, [3, 7]);
+    }
 }

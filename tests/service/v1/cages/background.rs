@@ -16,7 +16,7 @@ async fn one_is_designed_at_a_time_and_the_queue_ends_somewhere() {
     eventually("it runs", async || (app.cage_job(&first.id).await.state == CageState::Running).then_some(())).await;
     let waiting = [app.design(Capture::tiny(), &seeded(1)).await, app.design(Capture::tiny(), &seeded(2)).await];
     let reply = app.design_with(cage_form(Capture::tiny(), &seeded(3)), None).await;
-    reply.problem(503, "busy");
+    reply.problem(429, "too-many-jobs");
     assert!(reply.retry_after() > Duration::ZERO);
     // Its frames are read after it is said to run.
     eventually("it is designed", async || (slow.running.load(SeqCst) == 1).then_some(())).await;

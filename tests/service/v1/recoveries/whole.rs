@@ -56,6 +56,9 @@ async fn what_is_recovered_is_byte_for_byte_what_the_command_line_recovers() {
     let report: Value = app.get(&format!("/v1/recoveries/{}/report", job.id)).await.is(200);
     assert_eq!(report["frames"].as_array().map(Vec::len), Some(FRAMES as usize));
     assert_eq!((&report["frames"][0]["file"], &report["frames"][0]["number"]), (&json!("scan_5.ply"), &json!(5.0)));
+    // As browsers ask for it.
+    let packed = app.get_with(&format!("/v1/recoveries/{}/report", job.id), &[("accept-encoding", "gzip")]).await;
+    assert_eq!(packed.expect(200).header("content-encoding"), "gzip");
     app.get(&format!("/v1/recoveries/{}/joints.bvh", job.id)).await.problem(404, "not-found");
     let stride = 12 * done.cage_vertices.expect("a cage") as usize;
     let cages = app.get(&format!("/v1/recoveries/{}/cages", job.id)).await.expect(200).body;

@@ -1,0 +1,63 @@
+//! Shapes between poses that are found on the cage, fast enough to follow a pointer.
+
+use cager_core::cage::Cage;
+use cager_geometry::mesh::Point;
+use faer::Mat;
+
+use super::on_mesh::ShapeSpace;
+use super::pose_cages::PoseCages;
+use crate::error::ShapeError;
+
+/// The shapes that weights of some poses name, of a model in a cage.
+pub struct CagedShapes {
+    poses: PoseCages,
+    space: ShapeSpace,
+}
+
+impl CagedShapes {
+    /// Of a cage, coordinates in it, n × m with one column per vertex, and poses of the model; two or more.
+    ///
+    /// # Errors
+    /// See [`ShapeError`].
+    pub fn new(cage: &Cage, phi: Mat<f64>, poses: &[Vec<Point>]) -> Result<Self, ShapeError> {
+        let poses = PoseCages::new(cage, phi, poses)?;
+        let space = ShapeSpace::new(&cage.mesh().triangles, &poses.cages)?;
+        Ok(Self { poses, space })
+    }
+
+    /// The shape with these weights, one for each pose, as [`ShapeSpace::shape`] has it on the cage; with all weight on a pose, that pose.
+    ///
+    /// # Errors
+    /// As [`ShapeSpace::shape`].
+    pub fn shape(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
+        Ok(self.model(&self.space.shape(weights)?, weights))
+    }
+
+    /// The shape as [`ShapeSpace::rough_shape`] has it on the cage: fast enough to follow a pointer also where the cage has hundreds of vertices.
+    ///
+    /// # Errors
+    /// As [`ShapeSpace::shape`].
+    pub fn rough_shape(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
+        Ok(self.model(&self.space.rough_shape(weights)?, weights))
+    }
+
+    /// The cage of a shape.
+    ///
+    /// # Errors
+    /// As [`ShapeSpace::shape`].
+    pub fn cage(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
+        self.space.shape(weights)
+    }
+
+    /// The cage of a rough shape.
+    ///
+    /// # Errors
+    /// As [`ShapeSpace::shape`].
+    pub fn rough_cage(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
+        self.space.rough_shape(weights)
+    }
+
+    fn model(&self, cage: &[Point], weights: &[f64]) -> Vec<Point> {
+        self.poses.model(cage, &weights.iter().copied().enumerate().collect::<Vec<_>>())
+    }
+}

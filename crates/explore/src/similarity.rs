@@ -1,0 +1,81 @@
+//! Rotations, factors and translations in one.
+
+use cager_geometry::linalg::nearest_rotation;
+use cager_geometry::vector::Point;
+use glam::{DMat3, DVec3};
+
+/// `x → s R x + t`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Similarity {
+    /// The rotation R.
+    pub rotation: DMat3,
+    /// The factor s.
+    pub scale: f64,
+    /// The translation t.
+    pub translation: DVec3,
+}
+
+impl Similarity {
+    /// What moves nothing.
+    pub const IDENTITY: Self = Self { rotation: DMat3::IDENTITY, scale: 1.0, translation: DVec3::ZERO };
+
+    /// Where a point goes.
+    pub fn apply(&self, point: DVec3) -> DVec3 {
+        self.scale * (self.rotation * point) + self.translation
+    }
+
+    /// Where points go.
+    pub fn apply_all(&self, points: &[Point]) -> Vec<Point> {
+        points.iter().map(|&p| self.apply(p.into()).to_array()).collect()
+    }
+
+    /// First `first`, then this one.
+    #[must_use]
+    pub fn after(&self, first: &Self) -> Self {
+        Self {
+            rotation: self.rotation * first.rotation,
+            scale: self.scale * first.scale,
+            translation: self.apply(first.translation),
+        }
+    }
+
+    /// The way back.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let (rotation, scale) = (self.rotation.transpose(), 1.0 / self.scale);
+        Self { rotation, scale, translation: -scale * (rotation * self.translation) }
+    }
+
+    /// The angle by which it turns, in radians, between 0 and π.
+    pub fn angle(&self) -> f64 {
+        let trace = (0..3).map(|k| self.rotation.col(k)[k]).sum::<f64>();
+        (0.5 * (trace - 1.0)).clamp(-1.0, 1.0).acos()
+    }
+
+    /// The one that brings points nearest to others, pair by pair, in least squares with these weights (Horn 1987); sizes are kept where `scales` is false.
+    pub fn between(pairs: &[(DVec3, DVec3, f64)], scales: bool) -> Self {
+        let total: f64 = pairs.iter().map(|p| p.2).sum();
+        if total.is_nan() || total <= 0.0 {
+            return Self::IDENTITY;
+        }
+        let from = pairs.iter().map(|p| p.2 * p.0).sum::<DVec3>() / total;
+        let to = pairs.iter().map(|p| p.2 * p.1).sum::<DVec3>() / total;
+        let (mut covariance, mut size) = (DMat3::ZERO, 0.0);
+        for &(p, q, weight) in pairs {
+            let (p, q) = (p - from, weight * (q - to));
+            covariance += DMat3::from_cols(q * p.x, q * p.y, q * p.z);
+            size += weight * p.length_squared();
+        }
+        let rotation = nearest_rotation(covariance);
+        let product = covariance * rotation.transpose();
+        let trace = product.x_axis.x + product.y_axis.y + product.z_axis.z;
+        let scale = if scales && size > 0.0 && trace > 0.0 { trace / size } else { 1.0 };
+        Self { rotation, scale, translation: to - scale * (rotation * from) }
+    }
+
+    /// [`Self::between`] of points in the same order, all of the same weight.
+    pub fn of_points(from: &[Point], to: &[Point], scales: bool) -> Self {
+        let pairs: Vec<_> = from.iter().zip(to).map(|(&p, &q)| (p.into(), q.into(), 1.0)).collect();
+        Self::between(&pairs, scales)
+    }
+}

@@ -1,0 +1,52 @@
+//! How a motion is moved by the fitted cage.
+
+use cager_geometry::mesh::Point;
+use cager_registration::{ObservationOptions, StageOptions};
+
+use crate::alignment::AlignBy;
+use crate::pairs::VertexPair;
+
+/// Which pose the target has where the source is at rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pose {
+    /// Absolute for like shapes, relative for others, told by the registration's score.
+    #[default]
+    Auto,
+    /// Its own: what the source does to its rest pose, the target does to its own.
+    Relative,
+    /// The source's: limbs take the source's directions, however the target stands at rest.
+    Absolute,
+}
+
+/// How a motion is moved by the fitted cage.
+#[derive(Clone, Debug)]
+pub struct FittedOptions {
+    /// Which pose the target has at rest.
+    pub pose: Pose,
+    /// How the source is laid onto the target before its cage is fitted.
+    pub align: AlignBy,
+    /// The axis that points up in both, if known: turns are about it alone.
+    pub up: Option<Point>,
+    /// How often the source's gradients are smoothed over neighbouring triangles.
+    pub smoothing: usize,
+    /// How the cage is fitted.
+    pub stages: StageOptions,
+    /// Vertices that are known to correspond, if any: they pull alignment and registration.
+    pub pairs: Vec<VertexPair>,
+    /// What samples are drawn by.
+    pub seed: u64,
+}
+
+impl Default for FittedOptions {
+    fn default() -> Self {
+        let (pose, align, up) = (Pose::Auto, AlignBy::Surfaces, None);
+        Self { pose, align, up, smoothing: 1, stages: StageOptions::default(), pairs: Vec::new(), seed: 0 }
+    }
+}
+
+impl FittedOptions {
+    /// How samples are drawn.
+    pub(crate) fn observation(&self) -> ObservationOptions {
+        ObservationOptions { seed: self.seed, ..ObservationOptions::default() }
+    }
+}

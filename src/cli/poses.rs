@@ -1,0 +1,156 @@
+//! Poses of one model: meshes, and frames of .cager files.
+
+use super::{grouped, read_model};
+use crate::decode::{self, Decoding};
+use crate::origin::move_from;
+use crate::pose_faces::same_faces;
+use anyhow::{Context, Result, bail};
+use cager_core::cage::Cage;
+use cager_formats::{FrameRange, ScratchDir, open_frames};
+use cager_geometry::mesh::{Model, Point};
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Where a pose is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum PoseFile {
+    /// In a file of its own.
+    Mesh(PathBuf),
+    /// A frame of a .cager file, counted from 0.
+    Frame(PathBuf, usize),
+}
+
+impl PoseFile {
+    /// What a word of the command line names: a file, or a frame of one as `IN.cager@12`.
+    pub(super) fn named(word: &Path) -> Result<Self> {
+        if !word.exists() {
+            let text = word.to_str().unwrap_or_default();
+            let frame = text.rsplit_once('@').and_then(|(file, frame)| Some((file, frame.parse().ok()?)));
+            if let Some((file, frame)) = frame {
+                return Ok(Self::Frame(file.into(), frame));
+            }
+        } else if word.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("cager")) {
+            bail!("{}: holds many poses; name one by its frame, counted from 0, such as IN.cager@12", word.display());
+        }
+        Ok(Self::Mesh(word.to_owned()))
+    }
+
+    /// The file that is read.
+    pub(super) fn path(&self) -> &PathBuf {
+        match self {
+            Self::Mesh(path) | Self::Frame(path, _) => path,
+        }
+    }
+
+    /// The model that has this pose: of a mesh as it stands, of a .cager file at rest.
+    fn model(&self) -> Result<Model> {
+        let (path, frame) = match self {
+            Self::Mesh(path) => return Ok(read_model(path)?),
+            Self::Frame(path, frame) => (path, *frame),
+        };
+        let mut container = decode::open(path)?;
+        FrameRange::only(frame).check(container.frames(), path)?;
+        let mut rest = container.rest().with_context(|| path.display().to_string())?;
+        move_from(container.header().origin, &mut rest.points);
+        Ok(rest)
+    }
+
+    /// The cage that comes with the model.
+    fn cage(&self) -> Result<Option<Cage>> {
+        let Self::Frame(path, _) = self else { return Ok(None) };
+        let named = || path.display().to_string();
+        let mut container = decode::open(path)?;
+        let mut cage = container.cage().with_context(named)?;
+        move_from(container.header().origin, &mut cage.vertices);
+        Cage::new(cage).with_context(named).map(Some)
+    }
+}
+
+impl fmt::Display for PoseFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mesh(path) => write!(f, "{}", path.display()),
+            Self::Frame(path, frame) => write!(f, "{}@{frame}", path.display()),
+        }
+    }
+}
+
+/// Poses of one mesh, checked.
+pub(super) struct Poses {
+    files: Vec<PoseFile>,
+    /// The first one's: as it stands, or at rest.
+    pub(super) model: Model,
+    /// Of meshes; none of frames, which are decoded later.
+    read: Vec<Option<Vec<Point>>>,
+}
+
+impl Poses {
+    /// Reads meshes, and what .cager files have at rest; all have the points and faces of the first.
+    pub(super) fn open(files: Vec<PoseFile>) -> Result<Self> {
+        let (mut model, mut read) = (Model::default(), Vec::new());
+        for (k, file) in files.iter().enumerate() {
+            let found = file.model()?;
+            if k == 0 {
+                if found.faces.is_empty() {
+                    bail!("{file}: has no faces, and shapes are found between poses of a mesh; give one with faces");
+                }
+                model = found.clone();
+            }
+            let [count, expected] = [&found, &model].map(|model| model.points.len());
+            if count != expected {
+                bail!(
+                    "{file}: has {} points, {} has {}; poses have the same points in the same order",
+                    grouped(count),
+                    files[0],
+                    grouped(expected)
+                );
+            }
+            same_faces((file, &found.faces), (&files[0], &model.faces))?;
+            read.push(matches!(file, PoseFile::Mesh(_)).then_some(found.points));
+        }
+        Ok(Self { files, model, read })
+    }
+
+    /// Number of poses.
+    pub(super) fn len(&self) -> usize {
+        self.files.len()
+    }
+
+    /// Where a pose is.
+    pub(super) fn file(&self, pose: usize) -> &PoseFile {
+        &self.files[pose]
+    }
+
+    /// The cage that comes with the first one.
+    pub(super) fn cage(&self) -> Result<Option<Cage>> {
+        self.files[0].cage()
+    }
+
+    /// The points of every pose; frames are decoded into files beside `folder`'s, which go again.
+    pub(super) fn points(&self, folder: &Path) -> Result<Vec<Vec<Point>>> {
+        let mut scratch = None;
+        let mut all = Vec::with_capacity(self.len());
+        for (k, (file, read)) in self.files.iter().zip(&self.read).enumerate() {
+            all.push(match (read, file) {
+                (Some(points), _) => points.clone(),
+                (None, file) => {
+                    let scratch = match &mut scratch {
+                        Some(scratch) => scratch,
+                        none => none.insert(ScratchDir::create(folder)?),
+                    };
+                    decoded(file, &scratch.path().join(format!("{k}.npy")), self.model.points.len())?
+                }
+            });
+        }
+        Ok(all)
+    }
+}
+
+fn decoded(file: &PoseFile, into: &Path, points: usize) -> Result<Vec<Point>> {
+    let PoseFile::Frame(path, frame) = file else { bail!("{file}: is no frame of a .cager file") };
+    let what = Decoding { range: Some(FrameRange::only(*frame)), ..Decoding::default() };
+    decode::decode(path, into, what, &mut |_| ())?;
+    let mut values = Vec::new();
+    open_frames(into, points)?.read_next(&mut values)?;
+    Ok(values.as_chunks().0.to_vec())
+}

@@ -1,0 +1,229 @@
+//! `cager transfer`: the motion of one model on another, encoded as any capture.
+
+use super::checks::check_cage;
+use super::coding_args::goal;
+use super::design::{design, goal as design_goal};
+use super::dry_run::tell_dry_run;
+use super::motion_args::TransferMotionArgs;
+use super::outputs::{Outputs, folder_of};
+use super::solver_options::read_cage;
+use super::transfer_source::MotionSource;
+use super::vertex_pairs::read_pairs;
+use super::{grouped, human_bytes, progress, read_model, tell, warn};
+use crate::coding::InversionChoices;
+use crate::design::FRAMES;
+use crate::encode::{self, EncodeProgress, Encoded, Job, sample_frames};
+use crate::memory::Memory;
+use crate::origin::{move_to, own_origin};
+use crate::transfer::{MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, transfer};
+use anyhow::{Context, Result};
+use cager_cages::DesignOptions;
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::regularize::Regularizer;
+use cager_explore::TransferError;
+use cager_formats::{AtomicFile, ScratchDir, Target, commit_together};
+use cager_geometry::mesh::{Model, Point};
+use std::io::Write;
+use std::path::Path;
+
+pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
+    let inputs = args.source_rest.iter().chain(&args.source_frames).chain(&args.source).chain(&args.cage);
+    let mut outputs = Outputs::new(args.outputs, inputs.chain(&args.pairs).chain([&args.target]))?;
+    let output = outputs.binary(&args.output, "walk.cager")?;
+    let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
+    let method = args.method()?;
+    let align = args.alignment()?;
+    let mut target = read_model(&args.target)?;
+    let origin = own_origin(&target.points);
+    move_to(origin, &mut target.points);
+    // What is wrong with them is told before anything is computed.
+    goal(&args.coding, true, &target, 1)?;
+    let design = DesignOptions {
+        goal: design_goal(args.cage_vertices, args.coding.mean_error, target.points.len())?,
+        ..DesignOptions::default()
+    };
+    let source = MotionSource::open(args)?;
+    let pairs = args.pairs.as_ref().map(|path| read_pairs(path, source.rest.points.len(), target.points.len()));
+    let pairs = pairs.transpose()?.unwrap_or_default();
+    let given = cage(args, method, &source.rest, (&target, origin))?;
+    if args.outputs.dry_run {
+        let frames = source.check_frames()?;
+        let what = format!("{} frames of {} points", grouped(frames), grouped(target.points.len()));
+        tell_dry_run(&output, &what, &[report])?;
+        source.warn_of_departures();
+        return Ok(());
+    }
+    let report = report.map(AtomicFile::create).transpose()?;
+    let scratch = ScratchDir::create(folder_of(&output))?;
+    let mut frames = source.frames(scratch.path())?;
+    let own = source.cage.clone().filter(|_| method == MethodChoice::Fitted);
+    let bar = progress::frames("moving", frames.frames());
+    let job = TransferJob {
+        source: source.rest.clone(),
+        cage: given.or(own),
+        frames: frames.as_mut(),
+        target: &target,
+        method,
+        pose: args.pose(),
+        align: about_origin(align, origin),
+        up: args.axis(),
+        pairs,
+        detail: args.detail,
+        system: args.system(),
+        stopped: &|| false,
+        scratch: scratch.path(),
+    };
+    let moved = transfer(job, &|done| bar.set_position(done as u64));
+    bar.finish_and_clear();
+    let moved = moved.map_err(|error| named(error, args))?;
+    write(args, &output, (&target, origin), &design, moved, report)?;
+    source.warn_of_departures();
+    Ok(())
+}
+
+/// The cage that is given: around the source, or around both in the target's space.
+fn cage(
+    args: &TransferMotionArgs,
+    method: MethodChoice,
+    source: &Model,
+    (target, origin): (&Model, Option<Point>),
+) -> Result<Option<Cage>> {
+    let Some(path) = &args.cage else { return Ok(None) };
+    let (inside, origin) = if method == MethodChoice::Fitted { (source, None) } else { (target, origin) };
+    let cage = read_cage(path, false, origin)?;
+    check_cage((path, cage.mesh()), inside, &args.checks)?;
+    Ok(Some(cage))
+}
+
+/// Names the file or option that caused an error.
+fn named(error: TransferFailed, args: &TransferMotionArgs) -> anyhow::Error {
+    use TransferError::{
+        Ambiguous, Coordinates, FrameNotFinite, FramePoints, Inversion, OutOfReach, Outside, Rank, Source, SourceCage,
+        SourceSurface, Target, TargetSurface,
+    };
+    use TransferFailed::{Cage, Enclose, EndsEarly, NoCage, NoFaces, NoFrames, Transfer};
+    let source = args.source.as_ref().or(args.source_rest.as_ref());
+    let of = |whose: &str| if whose == "target" { Some(&args.target) } else { source };
+    let place = match &error {
+        Transfer(Ambiguous) => return anyhow::anyhow!("{}: {error} (--up, --align)", args.target.display()),
+        Transfer(Target(_) | TargetSurface(_) | OutOfReach { .. }) => Some(&args.target),
+        Transfer(Source(_) | SourceSurface(_) | Rank { .. } | Inversion(_)) => source,
+        Transfer(SourceCage(_)) => args.cage.as_ref().or(source),
+        Transfer(Coordinates { whose, .. } | Outside { whose, .. })
+        | NoFaces(whose)
+        | TransferFailed::Outside { whose, .. }
+        | Enclose { whose, .. }
+        | Cage { whose, .. } => of(whose),
+        Transfer(FrameNotFinite { .. } | FramePoints { .. }) | NoFrames | EndsEarly { .. } => {
+            args.source.as_ref().or(args.source_frames.as_ref())
+        }
+        NoCage => return anyhow::anyhow!("--cage: {error}"),
+        _ => None,
+    };
+    let place = place.map(|path| path.display().to_string());
+    let error = anyhow::Error::from(error);
+    match place {
+        Some(place) => error.context(place),
+        None => error,
+    }
+}
+
+/// Designs the target's cage, and encodes what was moved.
+fn write(
+    args: &TransferMotionArgs,
+    output: &Target,
+    (target, origin): (&Model, Option<Point>),
+    options: &DesignOptions,
+    moved: Transferred,
+    report_file: Option<AtomicFile>,
+) -> Result<()> {
+    let Transferred { mut frames, report, warnings } = moved;
+    let samples = sample_frames(&mut frames, FRAMES, false)?;
+    frames.rewind()?;
+    let design = design((&args.target, target), (&args.target, &samples), None, options)?;
+    warn(&design.warnings);
+    let cage = Cage::new(design.cage).with_context(|| args.target.display().to_string())?;
+    let system: &'static dyn CoordinateSystem = &MeanValue;
+    let goal = goal(&args.coding, true, target, report.frames)?;
+    let choices = InversionChoices {
+        system,
+        handles: None,
+        regularizer: Regularizer::default(),
+        spectrum: None,
+        lambda: None,
+        is_coded: goal.is_some(),
+    };
+    let bar = progress::PreparationBar::new("encoding", report.frames);
+    let job = Job {
+        rest: target,
+        cage: &cage,
+        frames: &mut frames,
+        output,
+        system,
+        options: choices.options(system.values(&cage).unknowns()),
+        matrix: None,
+        choose: None,
+        memory: Memory::half_of_free(),
+        goal,
+        origin,
+        exact_rest: args.coding.exact_rest,
+    };
+    let result = encode::encode(job, &|told| match told {
+        EncodeProgress::Preparing(step) => bar.preparing(step),
+        EncodeProgress::Frames(done) => bar.done(done),
+    });
+    bar.finish();
+    let Encoded { report: encoded, container } = result?;
+    let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
+    commit_together(report_file.into_iter().chain([container]).collect())?;
+    warn(&warnings);
+    warn(&encoded.warnings);
+    tell(&summary(&report, &encoded, cage.vertices().len(), output.path()))
+}
+
+fn write_report(mut file: AtomicFile, report: &TransferReport) -> Result<AtomicFile> {
+    let mut text = serde_json::to_vec_pretty(report)?;
+    text.push(b'\n');
+    file.write_all(&text)?;
+    Ok(file)
+}
+
+fn summary(report: &TransferReport, encoded: &cager_proto::report::Report, cage: usize, output: &Path) -> String {
+    let laid = report.score.map_or_else(String::new, |score| {
+        let pose = report.pose.unwrap_or("relative");
+        format!("  laid    the source lies {:.2} % of the diagonal from the target; {pose} pose\n", 100.0 * score)
+    });
+    let runner_up = report
+        .runner_up
+        .map_or_else(String::new, |times| format!("; the next best alignment leaves {times:.2} times the distance"));
+    format!(
+        "{}: {} frames of {} points as cages of {} vertices\n\
+         \x20 aligned turned by {:.1} degrees, scaled by {:.4}{runner_up}\n\
+         {laid}{}\x20 size    {}; errors of encoding: L2 {:.3} % on average, {:.3} % at most\n\
+         \x20 time    {:.3} s to prepare, {:.3} s to move, {:.3} s to measure\n",
+        output.display(),
+        grouped(report.frames),
+        grouped(report.points),
+        grouped(cage),
+        report.turned_degrees,
+        report.scale,
+        quality(report),
+        human_bytes(encoded.bytes.output),
+        100.0 * encoded.error.l2_mean,
+        100.0 * encoded.error.linf_max,
+        report.seconds.prepare,
+        report.seconds.frames,
+        report.seconds.measure,
+    )
+}
+
+fn quality(report: &TransferReport) -> String {
+    let found = report.quality;
+    let shares = [("folded", found.folded), ("stretched", found.stretched)];
+    let shares = shares.into_iter().filter_map(|(what, share)| Some(format!("{:.2} % {what}", 100.0 * share?)));
+    let volume = found.volume.map(|[least, most]| format!("volume {least:.2} to {most:.2} times that at rest"));
+    let jitter = found.jitter.map(|times| format!("jitter {times:.2} times the source's"));
+    let all: Vec<String> = shares.chain(volume).chain(jitter).collect();
+    if all.is_empty() { String::new() } else { format!("  quality {}\n", all.join(", ")) }
+}

@@ -1,0 +1,213 @@
+//! The method of a transfer made ready.
+
+use super::error::TransferFailed;
+use super::job::{MethodChoice, Public, TransferJob};
+use super::report::TransferReport;
+use cager_cages::{EncloseOptions, enclose};
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_explore::alignment::{AlignBy, Aligned, align_surfaces};
+use cager_explore::detail::Detail;
+use cager_explore::transfer::fitted::{CagedTarget, FittedTransfer};
+use cager_explore::transfer::public::PublicTransfer;
+use cager_explore::transfer::rigid::RigidTransfer;
+use cager_explore::transfer::{FittedOptions, Source, needs_cage};
+use cager_explore::{Similarity, TransferError};
+use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::spatial::outside;
+use cager_registration::{Observation, ObservationOptions};
+use faer::Mat;
+
+/// A transfer that is ready.
+pub(super) struct Mover {
+    method: Method,
+    detail: Option<Detail>,
+    cage_vertices: usize,
+    aligned: Aligned,
+}
+
+enum Method {
+    Fitted(Box<FittedTransfer>),
+    Public(Box<PublicTransfer>),
+    Rigid(Box<RigidTransfer>),
+}
+
+/// Vertices of the cages that are made.
+const CAGE_VERTICES: usize = 350;
+
+impl Mover {
+    pub(super) fn new(job: &TransferJob<'_>) -> Result<Self, TransferFailed> {
+        if job.source.faces.is_empty() {
+            return Err(TransferFailed::NoFaces("source"));
+        }
+        match job.method {
+            MethodChoice::Fitted => fitted(job),
+            MethodChoice::Public(cage) => public(job, cage, None),
+            MethodChoice::Rigid(cage, rigidity) => public(job, cage, Some(rigidity)),
+        }
+    }
+
+    pub(super) fn pose(&self, frame: usize, points: &[Point]) -> Result<Vec<Point>, TransferError> {
+        let pose = match &self.method {
+            Method::Fitted(transfer) => transfer.pose(frame, points),
+            Method::Public(transfer) => transfer.pose(frame, points),
+            Method::Rigid(transfer) => transfer.pose(frame, points),
+        }?;
+        Ok(match &self.detail {
+            Some(detail) => detail.add(&pose),
+            None => pose,
+        })
+    }
+
+    /// The source's points under the target's.
+    pub(super) fn under(&self, frame: usize, points: &[Point]) -> Result<Vec<Point>, TransferError> {
+        match &self.method {
+            Method::Fitted(transfer) => transfer.under(frame, points),
+            Method::Public(transfer) => transfer.under(frame, points),
+            Method::Rigid(transfer) => transfer.under(frame, points),
+        }
+    }
+
+    /// What is known before times and qualities are, and warnings.
+    pub(super) fn report(&self, points: usize, frames: usize) -> (TransferReport, Vec<String>) {
+        let similarity = self.aligned.similarity;
+        let mut report = TransferReport {
+            points,
+            frames,
+            turned_degrees: similarity.angle().to_degrees(),
+            scale: similarity.scale,
+            runner_up: Some(self.aligned.runner_up).filter(|score| score.is_finite()),
+            cage_vertices: self.cage_vertices,
+            detail: self.detail.is_some(),
+            method: "public",
+            ..TransferReport::default()
+        };
+        let mut warnings = Vec::new();
+        if self.aligned.doubtful() {
+            warnings.push(format!(
+                "another way to lay the source onto the target fits almost as well ({:.2} times the distance); look at the result, and give --up or --align where it is wrong",
+                self.aligned.runner_up
+            ));
+        }
+        match &self.method {
+            Method::Fitted(transfer) => {
+                let found = transfer.report();
+                report.method = "fitted";
+                report.score = Some(found.registration.score);
+                report.pose = Some(if found.absolute { "absolute" } else { "relative" });
+                report.turned_area = Some(found.turned);
+                report.correspondence = Some(transfer.source_points());
+            }
+            Method::Rigid(_) => report.method = "rigid",
+            Method::Public(_) => {}
+        }
+        (report, warnings)
+    }
+}
+
+fn fitted(job: &TransferJob<'_>) -> Result<Mover, TransferFailed> {
+    let made;
+    let cage = match &job.cage {
+        Some(cage) => cage,
+        None => {
+            made = around("source", &job.source)?;
+            &made
+        }
+    };
+    let phi = mean_value("source", cage, &job.source.points)?;
+    let rest = TriMesh::from(&job.source);
+    let source = Source { rest: &rest, cage, phi: phi.as_ref() };
+    let options = FittedOptions {
+        pose: job.pose,
+        align: job.align,
+        up: job.up,
+        pairs: job.pairs.clone(),
+        ..FittedOptions::default()
+    };
+    let target = TriMesh::from(job.target);
+    let transfer = if needs_cage(&target) {
+        let cage = around("target", job.target)?;
+        let phi = mean_value("target", &cage, &job.target.points)?;
+        let target = CagedTarget { model: job.target, cage: &cage, phi: phi.as_ref() };
+        FittedTransfer::through_cage(&source, &target, &options)?
+    } else {
+        FittedTransfer::new(&source, &target, &options)?
+    };
+    let aligned = transfer.report().aligned;
+    let method = Method::Fitted(Box::new(transfer));
+    Ok(Mover { method, detail: None, cage_vertices: cage.vertices().len(), aligned })
+}
+
+fn around(whose: &'static str, model: &Model) -> Result<Cage, TransferFailed> {
+    let vertices = CAGE_VERTICES.min(model.points.len() / 2).max(4);
+    let options = EncloseOptions { vertices, ..EncloseOptions::default() };
+    let mesh = enclose(model, &options).map_err(|error| TransferFailed::Enclose { whose, error })?;
+    Cage::new(mesh).map_err(|error| TransferFailed::Cage { whose, error })
+}
+
+fn mean_value(whose: &'static str, cage: &Cage, points: &[Point]) -> Result<Mat<f64>, TransferError> {
+    let found = MeanValue.coordinates(cage, points, None);
+    Ok(found.map_err(|error| TransferError::Coordinates { whose, error })?.phi)
+}
+
+fn public(job: &TransferJob<'_>, cage: Public, rigidity: Option<f64>) -> Result<Mover, TransferFailed> {
+    let (rest, target) = (TriMesh::from(&job.source), TriMesh::from(job.target));
+    let detail = match (job.detail, target.triangles.is_empty()) {
+        (true, true) => return Err(TransferFailed::NoFaces("target")),
+        (true, false) => Some(Detail::new(&target).map_err(TransferError::Target)?),
+        (false, _) => None,
+    };
+    let aligned = aligned(job, &rest, &target)?;
+    let similarity = aligned.similarity;
+    let made;
+    let cage = match (cage, &job.cage) {
+        (Public::Given, Some(cage)) => {
+            reject_outside("source", &similarity.apply_all(&rest.vertices), cage, job.system)?;
+            reject_outside("target", &target.vertices, cage, job.system)?;
+            cage
+        }
+        (Public::Given, None) => return Err(TransferFailed::NoCage),
+        (Public::Made(shape), _) => {
+            let moved = TriMesh { vertices: similarity.apply_all(&rest.vertices), triangles: rest.triangles.clone() };
+            let mesh = shape.around(&moved, &target).map_err(TransferError::from)?;
+            made = Cage::new(mesh).map_err(|error| TransferFailed::Cage { whose: "source and the target", error })?;
+            &made
+        }
+    };
+    let method = if let Some(rigidity) = rigidity {
+        Method::Rigid(Box::new(RigidTransfer::new(&rest, &target, similarity, cage, job.system, rigidity)?))
+    } else {
+        Method::Public(Box::new(PublicTransfer::new(&rest.vertices, &target.vertices, similarity, cage, job.system)?))
+    };
+    Ok(Mover { method, detail, cage_vertices: cage.vertices().len(), aligned })
+}
+
+/// Refuses points where coordinates other than mean value ones do not exist.
+fn reject_outside(
+    whose: &'static str,
+    points: &[Point],
+    cage: &Cage,
+    system: &dyn CoordinateSystem,
+) -> Result<(), TransferFailed> {
+    if system.name() == MeanValue.name() {
+        return Ok(());
+    }
+    let found = outside(cage.mesh(), points);
+    let Some(&(first, _)) = found.first() else { return Ok(()) };
+    Err(TransferFailed::Outside { whose, count: found.len(), first, system: system.name() })
+}
+
+fn aligned(job: &TransferJob<'_>, source: &TriMesh, target: &TriMesh) -> Result<Aligned, TransferError> {
+    let draw = ObservationOptions::default();
+    if job.align == AlignBy::AsTheyStand {
+        return Ok(Aligned { similarity: Similarity::IDENTITY, runner_up: f64::INFINITY });
+    }
+    let source =
+        Observation::of_mesh(&source.vertices, &source.triangles, &draw).map_err(TransferError::SourceSurface)?.0;
+    let target = if target.triangles.is_empty() {
+        Observation::of_cloud(&target.vertices, &job.target.normals, &draw)?.0
+    } else {
+        Observation::of_mesh(&target.vertices, &target.triangles, &draw)?.0
+    };
+    Ok(align_surfaces(&source, &target, None, job.align, job.up)[0])
+}

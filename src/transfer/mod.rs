@@ -1,0 +1,15 @@
+//! The motion of one model moved onto another: frames in, frames out that can be encoded as any capture.
+
+mod error;
+mod job;
+mod method;
+mod placing;
+mod report;
+mod run;
+
+pub use error::TransferFailed;
+pub use job::{MethodChoice, Public, TransferJob};
+pub(crate) use placing::{about_origin, similarity};
+pub use report::{QualityReport, Seconds, TransferReport};
+pub(crate) use run::MOVED;
+pub use run::{Transferred, transfer};

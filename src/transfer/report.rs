@@ -1,0 +1,69 @@
+//! What is told of a transfer.
+
+use cager_explore::MotionSummary;
+use serde::Serialize;
+
+/// How a motion was moved, as JSON.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct TransferReport {
+    /// `fitted`, `public` or `rigid`.
+    pub method: &'static str,
+    /// Points of the target.
+    pub points: usize,
+    /// Frames.
+    pub frames: usize,
+    /// The angle by which the source was turned to be aligned, in degrees.
+    pub turned_degrees: f64,
+    /// The factor by which it was scaled.
+    pub scale: f64,
+    /// The score of the next best alignment over that of the best: near one, either may be right. None where only one was tried.
+    pub runner_up: Option<f64>,
+    /// How far the source stays from the target where it was laid onto it, as a share of the diagonal; about 0.0015 for the same shape. Of the fitted cage alone.
+    pub score: Option<f64>,
+    /// `relative` or `absolute`. Of the fitted cage alone.
+    pub pose: Option<&'static str>,
+    /// The share of the source's area that was turned by more than 30 degrees to lie on the target. Of the fitted cage alone.
+    pub turned_area: Option<f64>,
+    /// Vertices of the source's cage, or of the one around both.
+    pub cage_vertices: usize,
+    /// Whether the detail of the target at rest was brought back to every frame.
+    pub detail: bool,
+    /// What the motion does to the target.
+    pub quality: QualityReport,
+    /// How long it took.
+    pub seconds: Seconds,
+    /// For each point of the target, the number of a point of the source that was laid there. Of the fitted cage alone.
+    pub correspondence: Option<Vec<u32>>,
+}
+
+/// Seconds of each part.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Cages, coordinates, alignment, registration.
+    pub prepare: f64,
+    /// All frames.
+    pub frames: f64,
+    /// What the quality was measured in.
+    pub measure: f64,
+}
+
+/// What a motion does to the model that took it, over all frames.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct QualityReport {
+    /// Share of the area that faces against the rotation of its surroundings, on average. None without faces.
+    pub folded: Option<f64>,
+    /// Share of the area that is twice as long, or half as long, in some direction, on average. None without faces.
+    pub stretched: Option<f64>,
+    /// The least and the largest volume, over that at rest. None where the mesh is not closed.
+    pub volume: Option<[f64; 2]>,
+    /// Mean second difference over time, over that of the source, each as a share of the model's size. None for fewer than three frames, and where the source
+    /// moves evenly.
+    pub jitter: Option<f64>,
+}
+
+impl From<MotionSummary> for QualityReport {
+    fn from(found: MotionSummary) -> Self {
+        let MotionSummary { folded, stretched, volume, jitter } = found;
+        Self { folded, stretched, volume, jitter }
+    }
+}

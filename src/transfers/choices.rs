@@ -1,0 +1,151 @@
+//! What the options of a transfer say.
+
+use crate::coding::Goal;
+use crate::design::default_vertices;
+use crate::preparation::{NAME_CHARACTERS, VERTICES, goal, vertices_detail};
+use crate::problem::{self, ApiError};
+use crate::transfer::{MethodChoice, Public, similarity};
+use cager_cages::DesignOptions;
+use cager_core::coordinates::{self, CoordinateSystem, MeanValue};
+use cager_explore::alignment::AlignBy;
+use cager_explore::public_cage::PublicCage;
+use cager_explore::transfer::Pose;
+use cager_explore::transfer::rigid::RIGIDITY;
+use cager_geometry::mesh::Point;
+use cager_proto::messages::SessionOptions;
+use cager_proto::transfer_messages::{PublicShape, RestPose, SourceAlignment, TransferMethod, TransferOptions, UpAxis};
+
+/// Numbers of frames lie below.
+const MAX_NUMBER: f64 = 1e9;
+
+/// Validated options.
+#[derive(Clone, Copy)]
+pub(super) struct Choices {
+    pub(super) method: MethodChoice,
+    pub(super) pose: Pose,
+    pub(super) align: AlignBy,
+    pub(super) up: Option<Point>,
+    pub(super) system: &'static dyn CoordinateSystem,
+    /// What the container is to meet; without it cages alone are stored.
+    pub(super) goal: Option<Goal>,
+}
+
+/// Validates options alone.
+///
+/// # Errors
+/// An option that is out of range, not available, or contradicts another.
+pub(crate) fn check_options(options: &TransferOptions) -> Result<(), ApiError> {
+    Choices::of(options, false).map(|_| ())
+}
+
+impl Choices {
+    /// Validates the options.
+    ///
+    /// # Errors
+    /// An option that is out of range, not available, or contradicts another.
+    pub(super) fn of(options: &TransferOptions, has_cage: bool) -> Result<Self, ApiError> {
+        let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+        if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
+            return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
+        }
+        if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
+            return refuse("frame_rate: give a positive number of frames per second".to_owned());
+        }
+        if options.start.is_some_and(|start| start.is_nan() || start.abs() >= MAX_NUMBER) {
+            return refuse("start: give the number of the first frame, or leave it out".to_owned());
+        }
+        if options.frames == Some(0) {
+            return refuse("frames: a motion has at least one frame".to_owned());
+        }
+        if let Some(vertices) = options.cage_vertices.filter(|vertices| !VERTICES.contains(vertices)) {
+            return refuse(format!("cage_{}", vertices_detail(vertices)));
+        }
+        if options.cage_vertices.is_some() && options.mean_error.is_some() {
+            return refuse(
+                "cage_vertices and mean_error: give the number of vertices or the error, not both".to_owned(),
+            );
+        }
+        let name = options.coordinates.as_deref().unwrap_or(MeanValue.name());
+        let Some(system) = coordinates::by_name(name) else {
+            let known = "mvc, harmonic, green and green-free";
+            return refuse(format!("coordinates: {name:?} is not available; give one of {known}"));
+        };
+        let TransferOptions { public, rigidity, align, matrix, .. } = *options;
+        let method = options.method.unwrap_or_default();
+        if method == TransferMethod::Fitted && (public.is_some() || options.coordinates.is_some()) {
+            return refuse("public and coordinates: belong to the methods public and rigid; leave them out".to_owned());
+        }
+        if method != TransferMethod::Fitted && options.pose.is_some() {
+            return refuse("pose: belongs to the method fitted; leave it out".to_owned());
+        }
+        if method != TransferMethod::Rigid && rigidity.is_some() {
+            return refuse("rigidity: belongs to the method rigid; leave it out".to_owned());
+        }
+        let rigidity = rigidity.unwrap_or(RIGIDITY);
+        if !(rigidity.is_finite() && rigidity >= 0.0) {
+            return refuse(format!("rigidity: is {rigidity}; give a number, 0 or more"));
+        }
+        if public.is_some() && has_cage {
+            return refuse("public: a cage is sent as well; leave out the part or the option".to_owned());
+        }
+        if method == TransferMethod::Rigid && system.name() == "green" {
+            let detail = "coordinates: with the method rigid, green has normals that follow from the vertices; take mvc or harmonic";
+            return refuse(detail.to_owned());
+        }
+        let cage = if has_cage { Public::Given } else { Public::Made(shape(public.unwrap_or(PublicShape::Sphere))) };
+        let align = match (align, matrix) {
+            (Some(_), Some(_)) => return refuse("align and matrix: give one of them".to_owned()),
+            (None | Some(SourceAlignment::Pca), None) => AlignBy::Surfaces,
+            (Some(SourceAlignment::None), None) => AlignBy::AsTheyStand,
+            (None, Some(matrix)) => match similarity(&matrix) {
+                Some(similarity) => AlignBy::Given(similarity),
+                None => {
+                    let detail = "matrix: does more than turn, scale evenly and move; give one without mirroring and shear, whose last row is 0 0 0 1";
+                    return refuse(detail.to_owned());
+                }
+            },
+        };
+        let TransferOptions { max_error, mean_error, target_size, .. } = *options;
+        let quality = options.quality.clone();
+        // Their number is known.
+        let frames = Some(1);
+        let coded = SessionOptions { max_error, mean_error, target_size, quality, frames, ..SessionOptions::default() };
+        Ok(Self {
+            method: match method {
+                TransferMethod::Fitted => MethodChoice::Fitted,
+                TransferMethod::Public => MethodChoice::Public(cage),
+                TransferMethod::Rigid => MethodChoice::Rigid(cage, rigidity),
+            },
+            pose: match options.pose.unwrap_or_default() {
+                RestPose::Auto => Pose::Auto,
+                RestPose::Relative => Pose::Relative,
+                RestPose::Absolute => Pose::Absolute,
+            },
+            align,
+            up: options.up.map(|up| match up {
+                UpAxis::X => [1.0, 0.0, 0.0],
+                UpAxis::Y => [0.0, 1.0, 0.0],
+                UpAxis::Z => [0.0, 0.0, 1.0],
+            }),
+            system,
+            goal: goal(&coded)?,
+        })
+    }
+}
+
+fn shape(shape: PublicShape) -> PublicCage {
+    match shape {
+        PublicShape::Box => PublicCage::Box,
+        PublicShape::Ico => PublicCage::Icosahedron,
+        PublicShape::Sphere => PublicCage::Sphere(162),
+        PublicShape::Hull => PublicCage::Hull(42),
+        PublicShape::Offset => PublicCage::Offset(350),
+    }
+}
+
+/// How the cage of a target of so many points is designed.
+pub(super) fn design_of(options: &TransferOptions, points: usize) -> DesignOptions {
+    let vertices = options.cage_vertices.map_or(default_vertices(points), |n| n as usize);
+    let goal = options.mean_error.map_or(cager_cages::Goal::Vertices(vertices), cager_cages::Goal::MeanError);
+    DesignOptions { goal, ..DesignOptions::default() }
+}
