@@ -78,6 +78,16 @@ export interface FrameErrors {
   readonly linf: Float32Array;
 }
 
+/** How the frames of a recovery were found, as its report tells; frames by their place in the capture. */
+export interface Tracking {
+  /** How well the template lies on the surface, as a fraction of its diagonal: less is better. NaN where there was no surface. */
+  readonly scores: Float32Array;
+  /** `followed`, found by a `wider_search`, `lost`, or `no_surface`. */
+  readonly outcomes: readonly string[];
+  /** Names of the files with the surfaces. */
+  readonly files: readonly string[];
+}
+
 /** How the frames of a session that is still running arrive. */
 export interface LiveStatus {
   /**
@@ -116,6 +126,8 @@ export interface ResidualLayers {
 /** A capture that is being looked at, from a file, a finished session or one that is still running. */
 export interface Capture {
   readonly name: string;
+  /** Id of the session that it is. */
+  session?: string;
   /** The same whenever this capture is opened; what the browser keeps of it is found by this. */
   identity?: string;
   readonly static: StaticPart;
@@ -129,6 +141,10 @@ export interface Capture {
   readonly complete: boolean;
   /** Errors of the frames known so far; may be shorter than `frames`. */
   readonly errors: FrameErrors;
+  /** For each point the one of the source that corresponds, of a motion that was moved here and whose report is there. */
+  correspondence?: readonly number[] | null;
+  /** How its frames were found, of a recovery whose report is there. */
+  tracking?: Tracking;
   /** Number where each frame comes from, or null if these count from 0 as frames do. */
   readonly frameNumbers: Float64Array | null;
   /** The block that has frame `frame`; waits for frames that are still to come where the capture is not complete. */

@@ -1,10 +1,12 @@
 import { fragmentOf, parseFragment, type Route } from './routes';
 import { page, tokens } from './style/tokens';
+import { isContainer, type Dropped } from './upload/classify';
+import { pickedFiles } from './upload/drop';
 
 document.adoptedStyleSheets = [tokens.styleSheet!, page.styleSheet!];
 
-/** The file that was dropped on the page last, for the route `#/file`. */
-let dropped: File | null = null;
+/** What was dropped on the page last, for the route `#/file`. */
+let dropped: readonly Dropped[] = [];
 /** The route that is shown: a change of the view alone does not load it anew. */
 let shown = '';
 
@@ -12,12 +14,14 @@ let shown = '';
 async function elementOf(route: Route, view: string): Promise<HTMLElement> {
   switch (route.page) {
     case 'session':
+    case 'recovery':
+    case 'transfer':
     case 'file': {
       const { ViewerPage } = await import('./viewer/viewerPage');
       const element = new ViewerPage();
       element.view = view;
-      if (route.page === 'session') element.session = route.id;
-      else element.file = dropped;
+      if (route.page === 'file') element.files = dropped;
+      else [element.kind, element.job] = [route.page, route.id];
       return element;
     }
     case 'upload':
@@ -51,37 +55,36 @@ async function show(anew = false) {
 
 /** A capture that is dropped anywhere plays; other files are for the page that is shown. */
 function dropCapture(event: DragEvent) {
-  const file = event.dataTransfer?.files[0];
-  if (event.defaultPrevented || !file) return;
+  const files = pickedFiles(event.dataTransfer?.files ?? []);
+  if (event.defaultPrevented || files.length === 0) return;
   event.preventDefault();
-  if (!/\.cager$/i.test(file.name)) return;
-  openFile(file);
+  if (files.some(isContainer)) openFiles(files);
 }
 
 /** Goes to the page of files; what was shown is closed. */
-function openFile(file: File) {
-  dropped = file;
+function openFiles(files: readonly Dropped[]) {
+  dropped = files;
   history.pushState(null, '', fragmentOf({ page: 'file' }));
   void show(true);
 }
 
-/** A file that is opened from a session moves to its own route, so that its frame and camera are not written into the session's link. */
-function chooseFile(event: CustomEvent<File>) {
+/** Files that are opened from a session move to their own route, so that frame and camera are not written into the session's link. */
+function chooseFiles(event: CustomEvent<readonly Dropped[]>) {
   if (parseFragment(location.hash).route.page === 'file') {
     dropped = event.detail;
     return;
   }
   event.preventDefault();
-  openFile(event.detail);
+  openFiles(event.detail);
 }
 
 addEventListener('hashchange', () => void show());
 addEventListener('dragover', (event) => event.preventDefault());
 addEventListener('drop', dropCapture);
-document.addEventListener('filechosen', (event) => chooseFile(event as CustomEvent<File>));
+document.addEventListener('filechosen', (event) => chooseFiles(event as CustomEvent<readonly Dropped[]>));
 document.addEventListener('viewchange', (event) => {
   const { route } = parseFragment(location.hash);
   const view = new URLSearchParams((event as CustomEvent<string>).detail);
-  if (route.page === 'session' || route.page === 'file') history.replaceState(null, '', fragmentOf(route, view));
+  if ('id' in route || route.page === 'file') history.replaceState(null, '', fragmentOf(route, view));
 });
 void show();

@@ -1,7 +1,10 @@
-/** Routes of the page, all in the fragment: `#/`, `#/session/ID`, `#/file`, `#/upload`. What follows `?` is the state of the view, for links. */
+/** Routes of the page, all in the fragment: `#/`, `#/session/ID`, `#/recovery/ID`, `#/transfer/ID`, `#/file`, `#/upload`. What follows `?` is the state of the view, for links. */
+
+import type { JobKind } from './viewer/jobCapture';
 
 /** Where in the page somebody is. */
-export type Route = { page: 'sessions' } | { page: 'session'; id: string } | { page: 'file' } | { page: 'upload' };
+export type Route =
+  { page: 'sessions' } | { page: 'session' | JobKind; id: string } | { page: 'file' } | { page: 'upload' };
 
 /** A route and the parameters of its view, such as the frame and the camera. */
 export interface Location {
@@ -13,10 +16,11 @@ export interface Location {
 export function parseFragment(fragment: string): Location {
   const [path, query] = splitOnce(fragment.replace(/^#/, ''), '?');
   const view = new URLSearchParams(query);
-  const parts = path.split('/').filter((part) => part !== '');
-  if (parts[0] === 'session' && parts.length === 2) return { route: { page: 'session', id: decoded(parts[1]) }, view };
-  if (parts[0] === 'file') return { route: { page: 'file' }, view };
-  if (parts[0] === 'upload') return { route: { page: 'upload' }, view };
+  const [page, id, ...more] = path.split('/').filter((part) => part !== '');
+  if ((page === 'session' || page === 'recovery' || page === 'transfer') && id && more.length === 0)
+    return { route: { page, id: decoded(id) }, view };
+  if (page === 'file') return { route: { page: 'file' }, view };
+  if (page === 'upload') return { route: { page: 'upload' }, view };
   return { route: { page: 'sessions' }, view };
 }
 
@@ -25,8 +29,8 @@ export function fragmentOf(route: Route, view = new URLSearchParams()): string {
   const path =
     route.page === 'sessions'
       ? '#/'
-      : route.page === 'session'
-        ? `#/session/${encodeURIComponent(route.id)}`
+      : 'id' in route
+        ? `#/${route.page}/${encodeURIComponent(route.id)}`
         : `#/${route.page}`;
   const query = view.toString();
   return query === '' ? path : `${path}?${query}`;

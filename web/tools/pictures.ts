@@ -1,9 +1,15 @@
-/** Takes the pictures of the page and of a report in docs/pictures, of the built-in demo. */
+/** Takes the pictures of the page and of a report in docs/pictures, of the built-in demo; and of a recovery, where `CAGER_CAPTURES` names the captures. */
 
-import { mkdir, writeFile } from 'node:fs/promises';
+import { execFileSync } from 'node:child_process';
+import { mkdir, mkdtemp, readdir, readFile, rm, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import type { ViewerPage } from '../src/viewer/viewerPage';
 import { launch } from '../tests/browser/harness/browser';
+import { cager } from '../tests/browser/harness/programs';
+import { dropOnViewer, inViewer } from '../tests/browser/harness/viewing';
+import { parseNpy } from '../tests/browser/npy';
 import { DemoComparison } from './demoComparison';
 import { DemoSite } from './demoSite';
 import { indexedPng } from './indexedPng';
@@ -52,6 +58,14 @@ try {
     { name: 'report-phone', ...report, viewport: PHONE, colorScheme: 'dark' },
   ];
   for (const picture of pictures) await take(browser, picture);
+  const captures = process.env.CAGER_CAPTURES;
+  if (captures) {
+    const recovery = await recovered(captures);
+    const shown = (page: Page) => recoveryShown(page, recovery);
+    const file = { url: `${site.page}#/file`, shown };
+    await take(browser, { name: 'recovery-light', ...file, viewport: DESKTOP, colorScheme: 'light' });
+    await take(browser, { name: 'recovery-phone', ...file, viewport: PHONE, colorScheme: 'dark' });
+  }
 } finally {
   await browser.close();
   await site.close();
@@ -80,6 +94,41 @@ async function modelShown(page: Page) {
     return player?.stage.decoder.ready === true && player.progress === null && !player.playback.buffering;
   };
   await page.waitForFunction(isShown, undefined, { timeout: READY_MS });
+}
+
+/** What a recovery of the first frame of `anny-man-02_02` makes of the surfaces of `observed-example`, and these themselves. */
+async function recovered(captures: string) {
+  const [folder, truth] = ['observed-example', 'anny-man-02_02'].map((name) => join(captures, name));
+  const surfaces = (await readdir(folder)).filter((name) => name.endsWith('.ply')).sort();
+  const made = await mkdtemp(join(tmpdir(), 'cager-recovery-'));
+  try {
+    const [container, report] = ['walk.cager', 'walk.json'].map((name) => join(made, name));
+    const { shape, values } = parseNpy(await readFile(join(truth, 'frames.npy')));
+    const points = Array.from({ length: shape[1] }, (_, p) => `v ${values.slice(3 * p, 3 * p + 3).join(' ')}`);
+    const faces = (await readFile(join(truth, 'rest.obj'), 'utf8')).match(/^f .*$/gm)!;
+    const template = join(made, 'template.obj');
+    await writeFile(template, [...points, ...faces].join('\n'));
+    const inputs = ['--template', template, '--frames', join(folder, '*.ply')];
+    execFileSync(cager!, ['recover', ...inputs, '-o', container, '--report', report, '--quiet'], { stdio: 'inherit' });
+    const read = async (names: readonly string[], from: string) =>
+      Object.fromEntries(
+        await Promise.all(names.map(async (name) => [name, await readFile(join(from, name))] as const)),
+      );
+    return { made: await read(['walk.cager', 'walk.json'], made), surfaces: await read(surfaces, folder) };
+  } finally {
+    await rm(made, { recursive: true });
+  }
+}
+
+/** Shows a recovery with its surfaces, in the frame that lies worst. */
+async function recoveryShown(page: Page, { made, surfaces }: Awaited<ReturnType<typeof recovered>>) {
+  await dropOnViewer(page, made);
+  await modelShown(page);
+  await inViewer(page, (viewer) => void (viewer.up = 'z'), null);
+  await dropOnViewer(page, surfaces);
+  await page.keyboard.press('m');
+  await page.getByText('Distance from the surface').waitFor({ timeout: READY_MS });
+  await page.waitForTimeout(5000);
 }
 
 /** Scrolls a report to the cages of its methods. */

@@ -1,4 +1,4 @@
-/** How far the points of a decoded frame are from where they were captured. */
+/** How far the points of a decoded frame are from where they were captured, or from the surface that was observed. */
 export interface PointErrors {
   /** Distance of each point as a fraction of the diagonal; NaN where a position is none. */
   readonly values: Float32Array;
@@ -14,12 +14,19 @@ export interface PointErrors {
 /** Distances between two frames, x y z of each point, as fractions of `diagonal`. */
 export function pointErrors(decoded: Float32Array, original: Float32Array, diagonal: number): PointErrors {
   const values = new Float32Array(decoded.length / 3);
-  let [worst, largest, squares, finite] = [0, 0, 0, 0];
   for (let point = 0; point < values.length; point++) {
     const k = 3 * point;
     const [x, y, z] = [decoded[k] - original[k], decoded[k + 1] - original[k + 1], decoded[k + 2] - original[k + 2]];
-    const distance = Math.sqrt(x * x + y * y + z * z) / diagonal;
-    values[point] = distance;
+    values[point] = Math.sqrt(x * x + y * y + z * z) / diagonal;
+  }
+  return errorsOf(values);
+}
+
+/** What distances of points, as fractions of the diagonal, say together. */
+export function errorsOf(values: Float32Array): PointErrors {
+  let [worst, largest, squares, finite] = [0, 0, 0, 0];
+  for (let point = 0; point < values.length; point++) {
+    const distance = values[point];
     if (!Number.isFinite(distance)) continue;
     finite++;
     squares += distance * distance;

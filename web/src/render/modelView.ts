@@ -12,26 +12,27 @@ export class ModelView {
   readonly wireframe: LineSegments;
   readonly points: Points;
   readonly handles: Points;
-  private readonly uniforms = modelUniforms();
+  /** What it is shaded by, and its colour. */
+  readonly uniforms = modelUniforms();
   private readonly cloudSize = { value: 1 };
   private readonly wireInk = { value: ink(this.uniforms.color.value, 0.5) };
   private readonly handleInk = { value: ink(this.uniforms.color.value, 1) };
   private readonly handleSize = { value: 1 };
   private heat: DataTexture | null = null;
   private hasHeat = false;
-  private readonly colors: DataTexture | null;
+  private colors: DataTexture | null = null;
+  private showsColors = true;
 
-  /** @param colors red, green and blue of each point, in sRGB */
+  /** @param ownColors red, green and blue of each point, in sRGB */
   constructor(
     private readonly decoder: Decoder,
     surface: Surface,
-    colors: Uint8Array | undefined,
+    private readonly ownColors: Uint8Array | undefined,
   ) {
     const uniforms = this.uniforms as Record<string, { value: unknown }>;
     uniforms.positions.value = decoder.positions satisfies Texture;
     uniforms.normals.value = decoder.normals;
-    this.colors = colors ? pointColorTexture(colors, decoder.bands) : null;
-    uniforms.colors.value = this.colors;
+    this.paint(null);
     const all = Uint32Array.from({ length: decoder.points }, (_, p) => p);
     const still = { towards: { value: 0 }, asPoints: { value: false }, pointSize: { value: 1 } };
     const shaded = (own: Record<string, { value: unknown }>) =>
@@ -77,7 +78,17 @@ export class ModelView {
 
   /** Shows the model in the colours of its points where it has any, or in one colour. */
   showColors(isShown: boolean) {
+    this.showsColors = isShown;
     this.uniforms.hasColors.value = isShown && this.colors !== null;
+  }
+
+  /** Takes colours in place of those that the points have; null for these again. */
+  paint(colors: Uint8Array | null) {
+    this.colors?.dispose();
+    const taken = colors ?? this.ownColors;
+    this.colors = taken ? pointColorTexture(taken, this.decoder.bands) : null;
+    (this.uniforms.colors as { value: unknown }).value = this.colors;
+    this.showColors(this.showsColors);
   }
 
   /** Shows the frame that the decoder was given as positions, in the model's own colour; or what it decoded. */

@@ -131,6 +131,27 @@ void main() {
   gl_PointSize = pointSize;
 }`;
 
+/** A surface that is no model: without normals, so that its faces are flat, and in one colour. */
+export const observedVertexShader = `${header}
+uniform mat4 modelViewMatrix;
+uniform mat4 projectionMatrix;
+uniform vec3 color;
+uniform float pointSize;
+in vec3 position;
+out vec3 viewPosition;
+out vec3 viewNormal;
+out float heatValue;
+out vec3 ownColor;
+void main() {
+  vec4 place = modelViewMatrix * vec4(position, 1.0);
+  viewPosition = place.xyz;
+  viewNormal = vec3(0.0);
+  heatValue = 0.0;
+  ownColor = color;
+  gl_Position = projectionMatrix * place;
+  gl_PointSize = pointSize / max(0.05, -place.z);
+}`;
+
 /** Squares along a side of the backdrop, whose colours are computed at their corners: at every pixel they would cost more than the model. */
 export const BACKDROP_SQUARES = 24;
 

@@ -1,5 +1,6 @@
 import { Color, Group, Matrix3, Matrix4, PerspectiveCamera, Scene, Vector2, Vector3, type WebGLRenderer } from 'three';
 import type { StaticPart } from '../capture';
+import type { Surface } from '../observed/surface';
 import { Backdrop } from './backdrop';
 import { boxOf } from './box';
 import { CageView } from './cageView';
@@ -9,6 +10,7 @@ import type { Covered, Layers, Side, StageColors } from './drawn';
 import { Ground } from './ground';
 import { GroundLevel } from './groundLevel';
 import { ModelView } from './modelView';
+import { ObservedView } from './observedView';
 import { drawSide } from './sides';
 import { surfaceOf } from './surface';
 import { createRenderer, isSoftwareRendered } from './webgl';
@@ -31,6 +33,10 @@ export class Stage {
   private readonly ground: Ground;
   private readonly backdrop = new Backdrop();
   private readonly hasFaces: boolean;
+  private observed: ObservedView | null = null;
+  private observedColor = new Color();
+  /** Pixels of the picture that something as large as its distance has, and those of a CSS pixel. */
+  private pixels = { perUnit: 1, ratio: 1 };
   /** What others draw together with the model, in its axes and in diagonals. */
   readonly extras = new Group();
   /** Called with the vertices of the cage whenever these have changed. */
@@ -134,10 +140,33 @@ export class Stage {
 
   setColors(colors: StageColors) {
     this.pictureIsOld = true;
+    this.observedColor = new Color(colors.handle);
+    this.observed?.setColor(this.observedColor);
     this.backdrop.setColors(colors.top, colors.bottom);
     this.model.setColors(new Color(colors.model), new Color(colors.wire), 0.42, new Color(colors.handle));
     this.cage.setColor(new Color(colors.cage));
     this.ground.setColors(new Color(colors.grid), colors.shadow);
+  }
+
+  /** Takes the surface that the pose which is shown was recovered from, in the capture's unit; null for none. */
+  setObserved(observed: Surface | null) {
+    this.pictureIsOld = true;
+    if (!observed) {
+      if (this.observed) this.upright.remove(this.observed.group);
+      this.observed?.dispose();
+      this.observed = null;
+      return;
+    }
+    if (!this.observed) {
+      this.observed = new ObservedView(this.model.uniforms);
+      this.upright.add(this.observed.group);
+      this.observed.setColor(this.observedColor);
+      this.observed.setSizes(this.pixels.perUnit, this.pixels.ratio);
+    }
+    const points = observed.points.slice();
+    this.decoder.place(points);
+    this.observed.set({ ...observed, points });
+    this.setSide(this.side, this.split);
   }
 
   /** Takes the original of the pose that is shown, x y z of each point in the capture's unit. */
@@ -151,6 +180,14 @@ export class Stage {
     this.side = side;
     this.pictureIsOld = true;
     this.split = split;
+    this.observed?.show(side);
+    this.model.group.visible = !this.observed || side !== 'original';
+  }
+
+  /** Shows the model in colours of its points, red, green and blue each, in place of its own; null for its own again. */
+  paint(colors: Uint8Array | null) {
+    this.model.paint(colors);
+    this.pictureIsOld = true;
   }
 
   setHandles(handles: Uint32Array) {
@@ -208,8 +245,9 @@ export class Stage {
     this.renderer.setSize(Math.max(1, width), Math.max(1, height), false);
     this.camera.aspect = Math.max(1, width) / Math.max(1, height);
     const { y: lines } = this.renderer.getDrawingBufferSize(new Vector2());
-    const pixelsPerUnit = lines / (2 * Math.tan(FIELD_OF_VIEW / 2));
-    this.model.setSizes(pixelsPerUnit, pixelRatio);
+    this.pixels = { perUnit: lines / (2 * Math.tan(FIELD_OF_VIEW / 2)), ratio: pixelRatio };
+    this.model.setSizes(this.pixels.perUnit, pixelRatio);
+    this.observed?.setSizes(this.pixels.perUnit, pixelRatio);
     this.cage.setSizes(pixelRatio);
   }
 
@@ -230,7 +268,7 @@ export class Stage {
     }
     this.renderer.setRenderTarget(null);
     this.renderer.clear();
-    const side = this.decoder.placedTextures ? this.side : 'decoded';
+    const side = this.decoder.placedTextures && !this.observed ? this.side : 'decoded';
     const drawDecoded = () => this.renderer.render(this.scene, camera);
     drawSide(this.renderer, side, this.split, drawDecoded, () => this.drawOriginal());
   }
@@ -245,6 +283,7 @@ export class Stage {
 
   dispose() {
     this.model.dispose();
+    this.observed?.dispose();
     this.cage.dispose();
     this.ground.dispose();
     this.decoder.dispose();

@@ -1,7 +1,7 @@
 /** Opens a session as a capture, whatever state it is in. */
 
 import type { Capture } from '../capture';
-import { openContainer } from '../container/open';
+import { openContainer, type OpenOptions } from '../container/open';
 import { httpSource, type Source } from '../container/source';
 import { type Retry, pause, persistently } from './backoff';
 import { basisRows } from './basisRows';
@@ -72,15 +72,25 @@ async function openFinished(
   service: Service,
   session: Session,
   signal: AbortSignal,
+  known?: (source: Source) => Source,
+): Promise<Capture> {
+  // The page cannot compute these coordinates, and coded cages are decoded with them.
+  const coordinates = session.coordinates === 'harmonic' ? basisRows(service, session.id, signal) : null;
+  const options = { name: session.name ?? session.id, signal, ...(coordinates && { coordinates }) };
+  return openStored(service, sessionPath(session.id, 'capture.cager'), options, known);
+}
+
+/** The capture in a container that the service has at `path`, which does not change any more; `known` adds what is here already. */
+export async function openStored(
+  service: Service,
+  path: string,
+  options: OpenOptions,
   known: (source: Source) => Source = (source) => source,
 ): Promise<Capture> {
-  const url = service.address(sessionPath(session.id, 'capture.cager'));
   try {
-    const source = await httpSource(url, { headers: () => service.authorization(), signal });
-    // The page cannot compute these coordinates, and coded cages are decoded with them.
-    const coordinates = session.coordinates === 'harmonic' ? basisRows(service, session.id, signal) : null;
-    const name = session.name ?? session.id;
-    return await openContainer(known(steady(source)), { name, signal, ...(coordinates && { coordinates }) });
+    const headers = () => service.authorization();
+    const source = await httpSource(service.address(path), { headers, signal: options.signal });
+    return await openContainer(known(steady(source)), options);
   } catch (error) {
     throw told(error);
   }

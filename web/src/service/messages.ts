@@ -104,6 +104,26 @@ export interface DesignOptions {
   time_limit_s?: number;
 }
 
+/** A recovery, as far as the page shows it. */
+export interface Recovery {
+  readonly id: string;
+  readonly name: string | null;
+  readonly state: 'ready' | 'following' | 'finishing' | 'completed' | 'failed';
+  readonly created: number;
+  readonly frames: { readonly received: number; readonly followed: number; readonly lost: number };
+  readonly problem?: ProblemDetails;
+}
+
+/** A motion that is moved onto another model, as far as the page shows it. */
+export interface Transfer {
+  readonly name: string | null;
+  readonly state: 'queued' | 'running' | 'completed' | 'failed';
+  readonly frames: number;
+  /** Frames that are moved. */
+  readonly moved: number;
+  readonly problem?: ProblemDetails;
+}
+
 /** Choices for a new session; what is left out has the service's default. */
 export interface SessionOptions {
   name?: string;

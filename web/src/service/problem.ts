@@ -24,7 +24,7 @@ const PASSING_WORDS = new Set(['not-ready', 'idempotency-key-in-use']);
 const INSTEAD: Readonly<Record<string, string>> = {
   unreachable: 'The service does not answer. Check that it runs and that this machine is on the network.',
   'not-found':
-    'There is no such session here: it was deleted, it expired, or it belongs to somebody else. Choose another one from the list.',
+    'There is no such thing here: it was deleted, it expired, or it belongs to somebody else. Choose another one from the list.',
   'session-deleted': 'This session was deleted. Choose another one from the list.',
   stopping: 'The service is stopping. This page goes on when it is back.',
 };

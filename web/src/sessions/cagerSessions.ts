@@ -16,6 +16,7 @@ import { FigureLoader } from './figures';
 import { isFiltering, matches, type StateFilter } from './filter';
 import { filterBar } from './filterBar';
 import { listHeader, listNotices } from './listHeader';
+import './recoveries';
 import { nameOf, row, tableHead } from './row';
 import { SessionList, isUnfinished } from './sessionList';
 import { sessionsStyle } from './sessionsStyle';
@@ -97,7 +98,8 @@ export class Sessions extends LitElement {
           onRetry: () => this.#list.refresh(),
           onClose: () => (this.failure = ''),
         })}
-        ${isEmpty ? emptyList() : html`${this.#filters()}${this.#table(sessions)}`} ${this.#confirmation()}
+        ${isEmpty ? emptyList() : html`${this.#filters()}${this.#table(sessions)}`}
+        <cager-recoveries></cager-recoveries> ${this.#confirmation()}
         <p class="visually-hidden" role="status">${this.said}</p>
       </main>
     `;

@@ -9,6 +9,11 @@ export interface Dropped {
   readonly path: string;
 }
 
+/** Whether something is an encoded capture, by its name. */
+export function isContainer({ path }: Dropped): boolean {
+  return /\.cager$/i.test(path);
+}
+
 export type Role = 'rest' | 'cage' | 'frames' | 'unused';
 
 /** A file, or a row of mesh files that are one frame each, and what it is taken for. */

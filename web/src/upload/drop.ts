@@ -24,8 +24,8 @@ export function pickFiles(folder: boolean, take: (files: Dropped[]) => void): vo
   input.click();
 }
 
-/** Files of an `<input type="file">`. */
-export function pickedFiles(files: FileList): Dropped[] {
+/** Files of an `<input type="file">`, or of a drop without those in folders. */
+export function pickedFiles(files: Iterable<File>): Dropped[] {
   return [...files].map((file) => ({ file, path: file.webkitRelativePath || file.name }));
 }
 

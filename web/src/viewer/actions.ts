@@ -56,6 +56,7 @@ export function perform(action: Action, viewer: CagerViewer) {
     fullscreen: () => void toggleFullscreen(viewer),
     figures: () => (viewer.figures = !viewer.figures),
     edit: () => void viewer.toggleEditing(),
+    poses: () => void viewer.togglePoses(),
     spectrum: () => void viewer.toggleSpectrum(),
     beside: () => viewer.toggleBeside(),
     help: () => viewer.openHelp(),
@@ -64,7 +65,8 @@ export function perform(action: Action, viewer: CagerViewer) {
 }
 
 function goToWorst(player: Player) {
-  const worst = worstFrame(player.capture.errors.linf);
+  const { tracking, errors } = player.capture;
+  const worst = worstFrame(tracking?.scores ?? errors.linf);
   if (worst !== null) player.transport = { ...sought(player.transport, worst), playing: false };
 }
 
@@ -76,7 +78,7 @@ function nextHeat({ heatMap: { kind, kinds } }: Player): Heat {
 function compare(player: Player) {
   const { comparison } = player;
   const next = { decoded: 'both', both: 'original', original: 'decoded' } as const;
-  if (comparison.original) comparison.side = next[comparison.side];
+  if (comparison.isOpen) comparison.side = next[comparison.side];
   else player.setHeat('error');
 }
 

@@ -2,6 +2,7 @@ import { html, nothing } from 'lit';
 import type { Capture, FrameErrors } from '../capture';
 import type { Dropped } from '../upload/classify';
 import { Beside } from './beside';
+import { paintCorrespondence } from './correspondence';
 import { numberAt, numberText } from './frameNumbers';
 import { glyph } from './glyphs';
 import { openFile } from './opener';
@@ -23,6 +24,8 @@ export interface BesideHost extends HTMLElement {
 /** A second capture in the viewer, beside the first one: its picture, its name and its errors. */
 export class BesideMode {
   pair: Beside | null = null;
+  /** Whether both are in the colours of what corresponds to each other. */
+  isPainted = false;
   private shown: Capture | null = null;
   private opened: Capture | null = null;
   private marks: PointMarks | null = null;
@@ -104,7 +107,20 @@ export class BesideMode {
     }
   }
 
+  /** Paints what corresponds to each other in both pictures in one colour. Throws one sentence for a person where the report is not of these two. */
+  paint(correspondence: readonly number[]) {
+    const { player: first } = this.host;
+    const { player: second } = this;
+    if (!first || !second) throw new Error('Show source and target beside each other first: drop the other one here.');
+    paintCorrespondence(correspondence, first, second);
+    this.isPainted = true;
+    first.layers = { ...first.layers, colors: true };
+    first.setHeat('none');
+  }
+
   unload() {
+    if (this.isPainted) this.host.player?.stage.paint(null);
+    this.isPainted = false;
     this.pair?.player.stage.canvas.remove();
     this.pair?.dispose();
     this.pair = this.shown = this.marks = null;
@@ -132,6 +148,7 @@ export class BesideMode {
           >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
           <span data-beside ?hidden=${Boolean(progress)}></span>
         </p>
+        ${this.isPainted ? html`<p>Places of one colour correspond</p>` : nothing}
       </section>
     </div>`;
   }
@@ -159,8 +176,14 @@ export class BesideMode {
     player.controls.onGrab = () => lead.controls.onGrab();
     this.marks = new PointMarks(pane);
     this.marks.follow(player.stage.canvas, player);
-    if (lead.comparison.original) void this.openOriginal(lead.comparison.files);
+    if (lead.comparison.isOpen) void this.openOriginal(lead.comparison.files);
     this.host.applyColors();
+    const correspondence = lead.capture.correspondence ?? player.capture.correspondence;
+    try {
+      if (correspondence) this.paint(correspondence);
+    } catch (error) {
+      this.host.report(sentence(error));
+    }
   }
 }
 

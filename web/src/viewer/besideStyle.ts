@@ -52,4 +52,9 @@ export const besideStyle = css`
     font-size: var(--cager-size-small);
     color: var(--cager-muted);
   }
+  @container (max-width: 680px) {
+    .caption p:has(+ p) {
+      display: none;
+    }
+  }
 `;

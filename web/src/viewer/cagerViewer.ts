@@ -3,7 +3,7 @@ import { html, nothing, type PropertyValues } from 'lit';
 import { customElement, property, query, state } from 'lit/decorators.js';
 import { EditMode } from '../editing/editMode';
 import { controls, tokens } from '../style/tokens';
-import type { Dropped } from '../upload/classify';
+import { isContainer, type Dropped } from '../upload/classify';
 import { perform, stem } from './actions';
 import { BesideMode } from './besideMode';
 import { besideStyle } from './besideStyle';
@@ -19,8 +19,10 @@ import { panelStyle } from './panelStyle';
 import { deck, helpSheet, legend, titleBox, toolbar } from './parts';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
+import { PoseMode } from './poseMode';
 import { writeReadout } from './readout';
 import { canRecord } from './recording';
+import { correspondenceOf, readReport, trackingOf } from './reports';
 import { actionOfKey, type Action } from './shortcuts';
 import { SpectrumMode } from './spectrumMode';
 import { followLooks, stageColors } from './stageColors';
@@ -41,7 +43,7 @@ import { viewerStyle } from './viewerStyle';
  * @fires framechange with the number of the frame that is shown
  * @fires viewchange with the view as text, when it rests, for links; set `view` to return to it
  * @fires problem with one sentence, when something failed
- * @fires filechosen with a container that somebody dropped or chose; whoever cancels it sees to the file
+ * @fires filechosen with files that somebody dropped or chose, a container among them; whoever cancels it sees to them
  * @fires besidewanted when somebody wants to see another capture beside this one; whoever cancels it sets `beside`, else a file is asked for
  * @fires besideclosed when somebody wants to see this capture alone again
  * @fires signin when somebody wants to sign in, to follow a session on
@@ -58,6 +60,7 @@ export class CagerViewer extends CaptureElement {
   @property({ attribute: false }) beside: Capture | null = null;
   readonly editing = new EditMode(this);
   readonly spectrum = new SpectrumMode(this);
+  readonly poses = new PoseMode(this);
   readonly pair = new BesideMode(this);
   private readonly files = new IncomingFiles(this);
   private readonly live = new LiveBadge(this);
@@ -67,14 +70,47 @@ export class CagerViewer extends CaptureElement {
   private look = 0;
   private readonly sizes = new ResizeObserver(() => this.resize());
 
-  /** Takes the frames that the capture was encoded from, and shows how far it is from them. */
-  async openOriginal(files: readonly Dropped[] | Promise<readonly Dropped[]>): Promise<void> {
+  /** Takes the frames that the capture was encoded from, or the surfaces that it was recovered from, and shows how far it is from them. */
+  async openOriginal(files: readonly Dropped[]): Promise<void> {
     const { player } = this;
     if (!player) return;
     try {
-      await player.comparison.open(await files);
+      await player.comparison.open(files);
       await this.pair.openOriginal(player.comparison.files);
       if (player.heatMap.kind !== 'error') player.setHeat('error');
+      this.problem = null;
+    } catch (error) {
+      this.report(sentence(error));
+    }
+  }
+
+  /**
+   * Plays the first container among files, or shows it beside the open capture, and a second one beside the first; then takes a report of the program and what
+   * a capture was encoded or recovered from.
+   */
+  async openFiles(files: readonly Dropped[], beside = false): Promise<void> {
+    const named = files.filter(isContainer);
+    const containers = named.length > 0 || this.isShowing ? named : files.slice(0, 1);
+    for (const [k, { file }] of containers.slice(0, beside ? 1 : 2).entries())
+      await (beside || k > 0 ? this.openBeside(file) : this.open(file));
+    const reports = files.filter(({ path }) => /\.json$/i.test(path));
+    for (const { file } of reports) await this.openReport(file);
+    const others = files.filter((each) => !containers.includes(each) && !reports.includes(each));
+    if (others.length > 0) await this.openOriginal(others);
+  }
+
+  /** Takes what a report of the program tells of the capture. */
+  async openReport(file: File): Promise<void> {
+    const { player } = this;
+    if (!player) return;
+    try {
+      const report = await readReport(file);
+      const correspondence = correspondenceOf(report);
+      // A second picture that is to come is there after the next render.
+      await this.updateComplete;
+      if (correspondence) this.pair.paint(correspondence);
+      else player.capture.tracking = trackingOf(report, player.capture.frames);
+      player.refresh();
       this.problem = null;
     } catch (error) {
       this.report(sentence(error));
@@ -99,13 +135,22 @@ export class CagerViewer extends CaptureElement {
   /** Begins or ends to edit the cage; its singular vectors are put away. */
   toggleEditing(): Promise<void> {
     this.spectrum.leave();
+    this.poses.leave();
     return this.editing.toggle();
   }
 
   /** Shows singular vectors on the cage, or puts them away; editing it ends. */
   async toggleSpectrum(): Promise<void> {
     if (this.editing.isOn) await this.editing.toggle();
+    this.poses.leave();
     await this.spectrum.toggle();
+  }
+
+  /** Shows the model between poses, or as its frames are again; editing it ends. */
+  async togglePoses(): Promise<void> {
+    if (this.editing.isOn) await this.editing.toggle();
+    this.spectrum.leave();
+    await this.poses.toggle();
   }
 
   /** Shows the keyboard shortcuts. */
@@ -140,7 +185,7 @@ export class CagerViewer extends CaptureElement {
       'aria-label',
       `${this.heading}: the model, drawn. Drag or use the keys A, D, W, X to turn it.`,
     );
-    if (this.layout.hasChanged(this.pair.player, this.panelShare)) this.resize();
+    if (this.layout.hasChanged(this.pair.player, this.coveredShare)) this.resize();
     this.writePlace();
   }
 
@@ -155,7 +200,7 @@ export class CagerViewer extends CaptureElement {
         // A capture that is edited has the viewer for itself.
         player && !this.editing.isOn ? this.pair.template() : nothing
       }
-      ${player ? this.overlay(player) : emptyState(opener.name, opener.failure, (file) => void this.files.choose(file))}
+      ${player ? this.overlay(player) : emptyState(opener.name, opener.failure, (files) => void this.files.choose(files))}
       ${helpSheet(() => this.sheet.close())} ${this.files.template()}
     `;
   }
@@ -171,15 +216,17 @@ export class CagerViewer extends CaptureElement {
         ${capture.complete ? nothing : this.live.template(player)}
       </div>
       ${toolbar(player, act, {
-        colors: [player, this.pair.player].some((shown) => shown?.capture.static.colors !== undefined),
+        colors:
+          this.pair.isPainted || [player, this.pair.player].some((shown) => shown?.capture.static.colors !== undefined),
         figures: this.figures,
         editing: this.editing.isOn,
         beside: this.beside !== null,
+        poses: this.poses.isOn,
         spectrum: this.spectrum.isOn,
         recording: this.recording !== null,
         recordable: canRecord(),
       })}
-      ${this.editing.panel(stem(this))} ${this.spectrum.panel(this.look)}
+      ${this.editing.panel(stem(this))} ${this.spectrum.panel(this.look)} ${this.poses.panel()}
       ${this.figures ? figuresPanel(player) : nothing} ${legend(player, this.comparisonActs, this.panelShare > 0)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
       ${
@@ -221,6 +268,7 @@ export class CagerViewer extends CaptureElement {
     this.recording?.abort();
     this.editing.close();
     this.spectrum.close();
+    this.poses.close();
     this.pair.unload();
     super.unload();
     this.live.stop();
@@ -259,11 +307,16 @@ export class CagerViewer extends CaptureElement {
 
   /** Part of a narrow picture's height that a panel takes. */
   private get panelShare(): number {
-    return Math.max(this.editing.panelShare, this.spectrum.panelShare);
+    return Math.max(this.editing.panelShare, this.spectrum.panelShare, this.poses.panelShare);
+  }
+
+  /** The same with the panel of a comparison. */
+  private get coveredShare(): number {
+    return Math.max(this.panelShare, this.player?.comparison.isOpen ? 0.2 : 0);
   }
 
   private resize() {
-    this.layout.apply(this.player, this.pair.player, this.panelShare);
+    this.layout.apply(this.player, this.pair.player, this.coveredShare);
     if (!this.link.cameraWasMoved) this.player?.goHome(true);
   }
 

@@ -1,15 +1,17 @@
 import type { Capture } from '../capture';
+import type { ObservedSurfaces } from '../observed/surfaces';
 import type { Original } from '../originals/original';
 import type { Side } from '../render/drawn';
 import type { Stage } from '../render/stage';
 import type { Dropped } from '../upload/classify';
 
-/** The capture beside the frames that it was encoded from, where somebody has given them to the page. */
+/** The capture beside the frames that it was encoded from, or the surfaces that it was recovered from, where somebody has given them to the page. */
 export class Comparison {
   /** Called when something else is to be shown. */
   onChange: () => void = () => undefined;
   original: Original | null = null;
-  /** The files of the original. */
+  surfaces: ObservedSurfaces | null = null;
+  /** The files of the original or the surfaces. */
   files: readonly Dropped[] = [];
   private shownSide: Side = 'decoded';
   private place = 0.5;
@@ -40,18 +42,33 @@ export class Comparison {
 
   /** Takes the original frames. Throws one sentence for a person where they are not those of this capture. */
   async open(files: readonly Dropped[]): Promise<void> {
-    const { openOriginal } = await import('../originals/original');
-    const original = await openOriginal(files, this.capture);
-    await original.load(0);
-    this.original = original;
+    const { openSurfaces } = await import('../observed/surfaces');
+    const surfaces = await openSurfaces(files, this.capture);
+    if (surfaces) {
+      this.close();
+      this.surfaces = surfaces;
+      this.side = 'both';
+    } else {
+      const { openOriginal } = await import('../originals/original');
+      const original = await openOriginal(files, this.capture);
+      await original.load(0);
+      this.close();
+      this.original = original;
+    }
     this.files = files;
     this.onChange();
   }
 
   close() {
-    this.original = null;
+    this.surfaces?.close();
+    this.original = this.surfaces = null;
     this.files = [];
+    this.stage.setObserved(null);
     this.side = 'decoded';
+  }
+
+  get isOpen(): boolean {
+    return this.original !== null || this.surfaces !== null;
   }
 
   /** Gives the picture the original of a frame, which is in memory. */
@@ -61,7 +78,7 @@ export class Comparison {
   }
 
   private apply() {
-    this.stage.setSide(this.original ? this.shownSide : 'decoded', this.place);
+    this.stage.setSide(this.isOpen ? this.shownSide : 'decoded', this.place);
     this.onChange();
   }
 }

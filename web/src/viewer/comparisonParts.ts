@@ -16,6 +16,8 @@ export interface ComparisonActs {
 }
 
 const SIDE_NAMES: Readonly<Record<Side, string>> = { decoded: 'Decoded', both: 'Both', original: 'Original' };
+/** The same where the original is no model but surfaces. */
+const SURFACE_NAMES: typeof SIDE_NAMES = { decoded: 'Template', both: 'Both', original: 'Observed' };
 /** Rounding of the picture that is a larger part of the errors than this is told. */
 const TELLING_PART = 0.05;
 /** A root mean square beyond this, in diagonals, means that the files are of something else. */
@@ -26,20 +28,24 @@ const KEY_STEP = 0.02;
 /** The colour bar, how to compare, and figures of the frame; or where the original could come from. */
 export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateResult {
   const { comparison, heatMap } = player;
-  const { original } = comparison;
-  if (!original) {
+  const { original, surfaces } = comparison;
+  const compared = original ?? surfaces;
+  if (!compared) {
+    const wanted = player.capture.tracking ? 'surfaces that it was recovered from' : 'original frames';
     return html`<p>
-        Drop the original frames here to see where the error is; neither the service nor the file keeps them. They are
-        not sent anywhere.
+        Drop the ${wanted} here to see where the error is; neither the service nor the file keeps them. They are not
+        sent anywhere.
       </p>
-      ${chooser('Choose the original frames', acts)}`;
+      ${chooser(`Choose the ${wanted}`, acts)}`;
   }
+  const names = surfaces ? SURFACE_NAMES : SIDE_NAMES;
+  const what = surfaces ? 'Distance from the surface' : 'Distance from the original';
   const { measured } = heatMap;
   const sides = Object.keys(SIDE_NAMES) as Side[];
   const showsErrors = heatMap.kind === 'error' && measured !== null;
   return html`
     <div class="source">
-      <span title=${original.name}>${showsErrors ? 'Distance from the original' : original.name}</span>
+      <span title=${compared.name}>${showsErrors ? what : compared.name}</span>
       <button class="quiet icon" aria-label="Put the original away" title="Put the original away" @click=${acts.close}>
         ${glyph('close')}
       </button>
@@ -49,14 +55,14 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
       ${sides.map(
         (side) =>
           html`<button aria-pressed=${String(comparison.side === side)} @click=${() => (comparison.side = side)}>
-            ${SIDE_NAMES[side]}
+            ${names[side]}
           </button>`,
       )}
     </div>
   `;
 }
 
-function errorFigures({ heatMap, stage }: Player, { worst, largest, l2 }: MeasuredFrame) {
+function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {
   const { diagonal, precision } = stage.decoder;
   const more = heatMap.largest < largest ? ' and more' : '';
   return html`<div class="bar" .style=${`background: ${heatGradient()}`}></div>
@@ -73,7 +79,8 @@ function errorFigures({ heatMap, stage }: Player, { worst, largest, l2 }: Measur
     ${
       l2 > UNLIKELY_ERROR
         ? html`<p class="remark">
-            That is far off: the files may have another unit, or their points in another order.
+            That is far off: the files may have another unit, or
+            ${comparison.surfaces ? 'be other frames' : 'their points in another order'}.
           </p>`
         : precision.error > TELLING_PART * largest
           ? html`<p class="remark">Up to ${percent(precision.error)} of it is the rounding of this picture.</p>`
@@ -88,7 +95,7 @@ function chooser(label: string, acts: ComparisonActs) {
   };
   return html`<label class="button" tabindex="0" @keydown=${pressLabel}>
     ${glyph('file')} ${label}
-    <input class="visually-hidden" type="file" multiple accept=".npy,.pc2,.obj" tabindex="-1" @change=${take} />
+    <input class="visually-hidden" type="file" multiple accept=".npy,.pc2,.obj,.ply" tabindex="-1" @change=${take} />
   </label>`;
 }
 

@@ -1,6 +1,7 @@
 import type { Capture } from '../capture';
 import type { Original } from '../originals/original';
-import { pointErrors, type PointErrors } from '../originals/pointErrors';
+import type { Observed, ObservedSurfaces } from '../observed/surfaces';
+import { errorsOf, pointErrors, type PointErrors } from '../originals/pointErrors';
 import type { FrameStore } from '../render/frameStore';
 import type { Stage } from '../render/stage';
 
@@ -68,8 +69,22 @@ export class HeatMap {
     if (this.kind !== 'error' || !positions || !this.stage.decoder.ready) return;
     const { decoder } = this.stage;
     const places = decoder.readPositions();
-    const errors = pointErrors(places, positions, decoder.diagonal);
-    decoder.place(places);
+    this.paint(pointErrors(places, positions, decoder.diagonal), frame, places);
+  }
+
+  /** The surface that a frame was recovered from; colours the model, which shows that frame, by how far it is from it. */
+  async observe(frame: number, surfaces: ObservedSurfaces): Promise<Observed> {
+    const { decoder } = this.stage;
+    const places = decoder.readPositions();
+    const observed = await surfaces.measure(frame, places);
+    const errors = errorsOf(observed.distances.map((distance) => distance / decoder.diagonal));
+    if (this.kind === 'error') this.paint(errors, frame, places);
+    return observed;
+  }
+
+  /** @param places points as they are decoded, in the capture's unit */
+  private paint(errors: PointErrors, frame: number, places: Float32Array) {
+    this.stage.decoder.place(places);
     this.measured = { ...errors, frame, places };
     this.raise(errors.usual);
     this.stage.setHeat(errors.values, this.largest);

@@ -1,6 +1,6 @@
 import { html, nothing } from 'lit';
-import type { Dropped } from '../upload/classify';
-import { droppedFiles } from '../upload/drop';
+import { isContainer, type Dropped } from '../upload/classify';
+import { droppedFiles, pickedFiles } from '../upload/drop';
 import { dropHint, dropQuestion } from './messages';
 import { checkContainer } from './opener';
 import { sentence } from './text';
@@ -12,9 +12,7 @@ export interface FilesHost extends HTMLElement {
   readonly isShowing: boolean;
   /** Whether one is being opened. */
   readonly isOpening: boolean;
-  open(file: File): Promise<void>;
-  openBeside(file: File): Promise<void>;
-  openOriginal(files: Promise<readonly Dropped[]>): Promise<void>;
+  openFiles(files: readonly Dropped[], beside?: boolean): Promise<void>;
   fail(error: unknown): void;
   report(problem: string): void;
   requestUpdate(): void;
@@ -23,8 +21,8 @@ export interface FilesHost extends HTMLElement {
 /** Files that somebody drops on the viewer or chooses, and what is done with them. */
 export class IncomingFiles {
   private isHeldAbove = false;
-  /** A container that was dropped on an open capture. */
-  private asked: File | null = null;
+  /** A container that was dropped on an open capture, and what came with it. */
+  private asked: readonly Dropped[] | null = null;
 
   constructor(private readonly host: FilesHost) {}
 
@@ -46,18 +44,20 @@ export class IncomingFiles {
     host.addEventListener('drop', (event) => this.take(event), { signal });
   }
 
-  /** Plays a file, unless its first bytes say that it is no container; asks where a capture is open. */
-  async choose(file: File) {
+  /** Plays a container among files, unless its first bytes say that it is none; asks where a capture is open, beside which other files are taken. */
+  async choose(chosen: readonly Dropped[] | Promise<readonly Dropped[]>) {
     const { host } = this;
     try {
-      await checkContainer(file);
+      const files = await chosen;
+      const container = files.find(isContainer) ?? (host.isShowing ? undefined : files.at(0));
+      if (container) await checkContainer(container.file);
+      if (!host.isShowing) await this.openInstead(files);
+      else if (container) this.asked = files;
+      else await host.openFiles(files);
     } catch (error) {
       if (host.isShowing || host.isOpening) host.report(sentence(error));
       else host.fail(error);
-      return;
     }
-    if (host.isShowing) this.asked = file;
-    else await this.openInstead(file);
     host.requestUpdate();
   }
 
@@ -75,8 +75,8 @@ export class IncomingFiles {
   template() {
     return html`
       ${this.isHeldAbove ? dropHint(this.host.isShowing) : nothing}
-      ${this.asked ? dropQuestion(this.asked.name, (choice) => void this.answer(choice)) : nothing}
-      <input class="beside-file" type="file" accept=".cager" hidden @change=${this.takeBeside} />
+      ${this.asked ? dropQuestion(this.asked.find(isContainer)!.file.name, (choice) => void this.answer(choice)) : nothing}
+      <input class="beside-file" type="file" accept=".cager,.json" multiple hidden @change=${this.takeBeside} />
     `;
   }
 
@@ -89,32 +89,29 @@ export class IncomingFiles {
   private take(event: DragEvent) {
     this.hold(false);
     const { dataTransfer } = event;
-    const file = dataTransfer?.files[0];
-    if (!file) return;
+    if (!dataTransfer?.files.length) return;
     event.preventDefault();
-    // Beside an open capture, whatever is no capture itself can only be what it was encoded from.
-    if (this.host.isShowing && !/\.cager$/i.test(file.name)) void this.host.openOriginal(droppedFiles(dataTransfer));
-    else void this.choose(file);
+    void this.choose(droppedFiles(dataTransfer));
   }
 
   private async answer(choice: 'instead' | 'beside' | null) {
-    const file = this.asked;
+    const files = this.asked;
     this.asked = null;
     this.host.requestUpdate();
-    if (!file) return;
-    if (choice === 'instead') await this.openInstead(file);
-    if (choice === 'beside') await this.host.openBeside(file);
+    if (!files) return;
+    if (choice === 'instead') await this.openInstead(files);
+    if (choice === 'beside') await this.host.openFiles(files, true);
   }
 
   private readonly takeBeside = (event: Event) => {
     const input = event.target as HTMLInputElement;
-    const file = input.files?.[0];
+    const files = pickedFiles(input.files ?? []);
     input.value = '';
-    if (file) void this.host.openBeside(file);
+    if (files.length > 0) void this.host.openFiles(files, true);
   };
 
-  private async openInstead(file: File) {
-    const chosen = new CustomEvent('filechosen', { detail: file, bubbles: true, composed: true, cancelable: true });
-    if (this.host.dispatchEvent(chosen)) await this.host.open(file);
+  private async openInstead(files: readonly Dropped[]) {
+    const chosen = new CustomEvent('filechosen', { detail: files, bubbles: true, composed: true, cancelable: true });
+    if (this.host.dispatchEvent(chosen)) await this.host.openFiles(files);
   }
 }

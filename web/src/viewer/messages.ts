@@ -1,4 +1,6 @@
 import { html, nothing, type TemplateResult } from 'lit';
+import type { Dropped } from '../upload/classify';
+import { pickedFiles } from '../upload/drop';
 import { glyph } from './glyphs';
 
 /** A sentence about something that went wrong, while the capture can still be looked at. */
@@ -33,7 +35,7 @@ export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside'
 /** What happens to files that are held above the viewer. */
 export function dropHint(isShowing: boolean): TemplateResult {
   return html`<div class="drop">
-    ${isShowing ? 'Drop another capture to play it or to see it beside this one, or the original frames to compare with' : 'Drop a capture to play it'}
+    ${isShowing ? 'Drop another capture to play it or to see it beside this one, the original frames to compare with, or a report' : 'Drop a capture to play it'}
   </div>`;
 }
 
@@ -59,7 +61,7 @@ export function progressBox(doing: string, fraction: number | null): TemplateRes
 export function emptyState(
   opening: string | null,
   failure: string | null,
-  choose: (file: File) => void,
+  choose: (files: readonly Dropped[]) => void,
 ): TemplateResult {
   if (opening !== null && failure === null) {
     return html`<div class="empty" role="status">
@@ -68,8 +70,8 @@ export function emptyState(
     </div>`;
   }
   const take = (event: Event) => {
-    const file = (event.target as HTMLInputElement).files?.[0];
-    if (file) choose(file);
+    const files = pickedFiles((event.target as HTMLInputElement).files ?? []);
+    if (files.length > 0) choose(files);
   };
   return html`<div class="empty">
     <div class="lead"><slot name="lead"></slot></div>
@@ -82,7 +84,7 @@ export function emptyState(
     }
     <label class="button primary" tabindex="0" @keydown=${pressLabel}>
       ${glyph('file')} Choose a file
-      <input class="visually-hidden" type="file" accept=".cager" tabindex="-1" @change=${take} />
+      <input class="visually-hidden" type="file" accept=".cager,.json" multiple tabindex="-1" @change=${take} />
     </label>
   </div>`;
 }

@@ -7,6 +7,7 @@ import { comparisonPanel, type ComparisonActs } from './comparisonParts';
 import { glyph, type GlyphName } from './glyphs';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
+import { isLost } from './reports';
 import { keyLabel, SHORTCUTS, type Action } from './shortcuts';
 import { grouped, percent } from './text';
 import './timeline';
@@ -54,6 +55,7 @@ export function toolbar(
     figures: boolean;
     editing: boolean;
     beside: boolean;
+    poses: boolean;
     spectrum: boolean;
     recording: boolean;
     recordable: boolean;
@@ -69,6 +71,7 @@ export function toolbar(
     ${possible.map((layer) => tool(layer, layer, LAYER_NAMES[layer], act, player.layers[layer]))}
     ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}
     ${tool('edit', 'edit', 'Edit the cage', act, shown.editing)}
+    ${player.capture.container ? tool('poses', 'poses', 'Blend poses', act, shown.poses) : nothing}
     ${tool('spectrum', 'spectrum', 'Singular values and vectors', act, shown.spectrum)}
     ${tool('beside', 'beside', 'Compare with another capture', act, shown.beside)}
     <hr />
@@ -91,13 +94,14 @@ export function toolbar(
 
 /** Name and size of the capture. */
 export function titleBox(heading: string, { capture }: Player, isEdited: boolean) {
-  const { static: part, frames } = capture;
+  const { static: part, frames, tracking } = capture;
+  const lost = tracking?.outcomes.filter((_, frame) => isLost(tracking, frame)).length ?? 0;
   return html`<div class="title glass">
     <h1 title=${heading}>${heading}</h1>
     <p class="figures">
       ${grouped(part.rest.length / 3)} points, ${grouped(frames)} frames<span class="more"
         >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
-      >${isEdited ? ', edited' : nothing}
+      >${lost > 0 ? html`, <span class="lost">${grouped(lost)} lost</span>` : nothing}${isEdited ? ', edited' : nothing}
     </p>
   </div>`;
 }
@@ -112,13 +116,14 @@ interface TimelineParts {
 /** The transport above the timeline. */
 export function deck(player: Player, act: Act, { besideErrors, range, look }: TimelineParts) {
   const { capture, transport } = player;
-  const hasErrors = capture.errors.linf.some(Number.isFinite);
+  const figures = capture.tracking ? scoreFigure : capture.errors.linf.some(Number.isFinite) ? errorFigures : null;
   return html`<div class="deck glass">
-    ${transportBar(player, act, (speed) => (player.transport = { ...transport, speed }), hasErrors)}
+    ${transportBar(player, act, (speed) => (player.transport = { ...transport, speed }), figures)}
     <cager-timeline
       .frames=${capture.frames}
       .errors=${capture.errors}
       .besideErrors=${besideErrors}
+      .tracking=${capture.tracking}
       .frameNumbers=${capture.frameNumbers}
       .range=${range}
       .look=${look}
@@ -129,7 +134,7 @@ export function deck(player: Player, act: Act, { besideErrors, range, look }: Ti
 }
 
 /** Play, step, speed, place and errors. */
-function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, hasErrors: boolean) {
+function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, figures: TemplateResult | null) {
   const { transport } = player;
   return html`<div class="transport">
     <button
@@ -142,7 +147,7 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
     </button>
     ${tool('previous', 'previous', 'One frame back', act)} ${tool('next', 'next', 'One frame on', act)}
     ${tool('loop', 'loop', 'Loop', act, transport.loop)}
-    ${hasErrors ? tool('worst', 'worst', 'Frame with the largest error', act) : nothing}
+    ${figures ? tool('worst', 'worst', 'Frame with the largest error', act) : nothing}
     <select
       class="figures"
       aria-label="Speed"
@@ -152,31 +157,37 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
       ${SPEEDS.map((speed) => html`<option value=${speed} .selected=${speed === transport.speed}>${speed}×</option>`)}
     </select>
     <div class="place figures"><span data-place></span><span class="clock muted" data-clock></span></div>
-    ${
-      hasErrors
-        ? html`<dl class="errors figures">
-            <div title="Root mean square of the distances of all points, as part of the diagonal">
-              <dt><i></i></dt>
-              <dt>L2</dt>
-              <dd data-l2></dd>
-            </div>
-            <div class="linf" title="Largest distance of a point, as part of the diagonal">
-              <dt><i></i></dt>
-              <dt>L∞</dt>
-              <dd data-linf></dd>
-            </div>
-          </dl>`
-        : nothing
-    }
+    ${figures ?? nothing}
   </div>`;
 }
+
+const errorFigures = html`<dl class="errors figures">
+  <div title="Root mean square of the distances of all points, as part of the diagonal">
+    <dt><i></i></dt>
+    <dt>L2</dt>
+    <dd data-l2></dd>
+  </div>
+  <div class="linf" title="Largest distance of a point, as part of the diagonal">
+    <dt><i></i></dt>
+    <dt>L∞</dt>
+    <dd data-linf></dd>
+  </div>
+</dl>`;
+
+const scoreFigure = html`<dl class="errors figures">
+  <div title="How well the template lies on the surface, as part of the diagonal: less is better">
+    <dt><i></i></dt>
+    <dt>Score</dt>
+    <dd data-score></dd>
+  </div>
+</dl>`;
 
 /** What the colours of the heat map mean, and how the original compares. */
 export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
   const { heatMap, comparison } = player;
-  if (heatMap.kind === 'none' && !comparison.original) return nothing;
+  if (heatMap.kind === 'none' && !comparison.isOpen) return nothing;
   const isMotion = heatMap.kind === 'motion';
-  const compares = !isMotion || comparison.original;
+  const compares = !isMotion || comparison.isOpen;
   return html`<div class="legend glass ${compares ? 'comparison' : ''} ${beside ? 'beside' : ''}">
     ${
       isMotion

@@ -12,6 +12,8 @@ import { framesAhead, sought, standing, USUAL_RATE, type Transport } from './tra
 export interface Deformation {
   /** Whether they change from picture to picture. */
   readonly isMoving: boolean;
+  /** Whether rows are of no frame: its residual is left out. */
+  readonly isWhole?: boolean;
   /** @param seconds of a clock that goes on while nothing plays */
   rows(rows: Float32Array | Float64Array, seconds: number): Float64Array;
 }
@@ -59,6 +61,8 @@ export class Playback {
   private readonly feed: FrameFeed;
   private state: Transport;
   private shownPosition = -1;
+  /** The frame whose distances from the surface it was recovered from are being measured. */
+  private observing: number | null = null;
   private captureProblem: string | null = null;
   private isClosed = false;
 
@@ -133,7 +137,7 @@ export class Playback {
     const next = advancing.playing ? this.feed.holes.past(advancing) : advancing;
     const original = this.wantedOriginal;
     // Between two frames there is nothing to compare.
-    const found = this.feed.at(original ? { ...next, smooth: false } : next);
+    const found = this.feed.at(original || this.isObserving ? { ...next, smooth: false } : next);
     this.feed.prefetch(next);
     if (typeof found === 'number') {
       this.buffering = next.frames > 0 && !this.feed.holes.at(found);
@@ -141,6 +145,8 @@ export class Playback {
       else this.stopAt(next);
       return;
     }
+    // Each frame is shown with its surface.
+    if (this.observing !== null && this.observing !== found.before) return;
     original?.prefetch(framesAhead(next, ORIGINALS_AHEAD));
     const lacksOriginal = original !== null && !original.peek(found.before);
     if (lacksOriginal) this.loadOriginal(original, found.before);
@@ -157,6 +163,7 @@ export class Playback {
   close() {
     this.isClosed = true;
     this.feed.close();
+    this.comparison.surfaces?.close();
   }
 
   private pose(found: Blend, original: Original | null, now: number) {
@@ -166,9 +173,27 @@ export class Playback {
     this.shownPosition = before + mix;
     this.heatMap.update(before, this.state.frames);
     const rows = this.deformation?.rows(blendedRows(found), now) ?? blendedRows(found);
-    this.stage.setPose({ rows, before: here.offsets, after: there?.offsets ?? null, mix });
+    const isWhole = this.deformation?.isWhole === true;
+    const [offsets, next] = isWhole ? [null, null] : [here.offsets, there?.offsets ?? null];
+    this.stage.setPose({ rows, before: offsets, after: next, mix });
     this.comparison.update(before);
     this.heatMap.measure(before, original);
+    if (this.isObserving && this.observing !== before) void this.observe(before);
+  }
+
+  /** Shows the surface that the frame which is shown was recovered from, and how far it is. */
+  private async observe(frame: number) {
+    const { surfaces } = this.comparison;
+    if (!surfaces || !this.stage.decoder.ready) return;
+    this.observing = frame;
+    try {
+      const observed = await this.heatMap.observe(frame, surfaces);
+      if (this.comparison.surfaces === surfaces) this.stage.setObserved(observed.surface);
+    } catch (error) {
+      if (this.comparison.surfaces === surfaces) this.failOriginal(error);
+    }
+    this.observing = null;
+    this.listener.wake();
   }
 
   /** Stops where playing cannot go on. */
@@ -182,6 +207,12 @@ export class Playback {
     this.feed.holes.clear();
     this.heatMap.refresh();
     this.listener.refresh();
+  }
+
+  /** Whether surfaces are shown, or distances from them. */
+  private get isObserving(): boolean {
+    const { surfaces, side } = this.comparison;
+    return surfaces !== null && (side !== 'decoded' || this.heatMap.kind === 'error');
   }
 
   /** The original, where what is shown needs it. */
@@ -198,7 +229,7 @@ export class Playback {
   }
 
   private failOriginal(error: unknown) {
-    if (this.isClosed || !this.comparison.original) return;
+    if (this.isClosed || !this.comparison.isOpen) return;
     this.buffering = false;
     this.comparison.close();
     this.heatMap.show('none');

@@ -46,7 +46,7 @@ export class PointMarks {
       width: stage.canvas.clientWidth,
       height: stage.canvas.clientHeight,
     };
-    const begin = comparison.side === 'both' ? comparison.split * picture.width : 0;
+    const begin = comparison.original && comparison.side === 'both' ? comparison.split * picture.width : 0;
     const put = (mark: HTMLElement, point: number) => {
       const spot = spotOf(measured.places, point, picture);
       mark.hidden = !spot || spot.x < begin;

@@ -1,5 +1,6 @@
 import { numberAt, numberText } from './frameNumbers';
 import type { Player } from './player';
+import { isLost } from './reports';
 import { clock, percent } from './text';
 
 /**
@@ -20,6 +21,10 @@ export function writeReadout(root: ParentNode, { capture, transport }: Player, i
   const hidden = isEdited(frame) || capture.residuals?.leftOut === true;
   const figure = (value: number | undefined) =>
     value === undefined || !Number.isFinite(value) || hidden ? '–' : percent(value);
+  write(
+    '[data-score]',
+    figure(capture.tracking?.scores[frame]) + (capture.tracking && isLost(capture.tracking, frame) ? ' lost' : ''),
+  );
   write('[data-l2]', figure(capture.errors.l2[frame]));
   write('[data-linf]', figure(capture.errors.linf[frame]));
 }

@@ -21,6 +21,7 @@ export async function sessionCapture(
     return service.request(below('decode'), { method: 'POST', headers, body: cages, signal: until ?? null });
   };
   capture.handles = (until) => service.handles(id, until);
+  capture.session = id;
   capture.identity = `session ${service.address(sessionPath(id))}`;
   return capture;
 }

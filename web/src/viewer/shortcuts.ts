@@ -37,6 +37,7 @@ export type Action =
   | 'edit'
   | 'beside'
   | 'spectrum'
+  | 'poses'
   | 'help';
 
 interface Shortcut {
@@ -94,6 +95,7 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'figures', keys: ['i'], label: 'Figures' },
       { action: 'edit', keys: ['e'], label: 'Edit the cage' },
       { action: 'beside', keys: ['b'], label: 'Another capture beside this one' },
+      { action: 'poses', keys: ['n'], label: 'Blend poses' },
       { action: 'spectrum', keys: ['v'], label: 'Singular values and vectors of Φ' },
       { action: 'picture', keys: ['p'], label: 'Save a picture' },
       { action: 'turntable', keys: ['t'], label: 'Record a turntable video' },

@@ -2,8 +2,8 @@ import { html, nothing } from 'lit';
 import type { SpectrumView } from '../spectrum/spectrumView';
 import type { Player } from './player';
 
-/** What showing singular vectors needs of the viewer around it. */
-interface SpectrumHost {
+/** What showing singular vectors, or shapes between frames, needs of the viewer around it. */
+export interface SpectrumHost {
   readonly player: Player | null;
   requestUpdate(): void;
   report(problem: string): void;

@@ -2,10 +2,11 @@ import { html, LitElement, unsafeCSS, type PropertyValues } from 'lit';
 import { customElement, property, query } from 'lit/decorators.js';
 import type uPlot from 'uplot';
 import uPlotStyle from 'uplot/dist/uPlot.min.css?inline';
-import type { FrameErrors } from '../capture';
+import type { FrameErrors, Tracking } from '../capture';
 import type { FrameRange } from '../editing/cageEdit';
 import { errorsChart } from './errorsChart';
 import { numberAt, numberText, placeOf, type FrameNumbers } from './frameNumbers';
+import { isLost, lostRuns } from './reports';
 import { percent } from './text';
 import { resolvedColor } from '../style/resolvedColor';
 import { timelineStyle } from './timelineStyle';
@@ -28,6 +29,8 @@ export class Timeline extends LitElement {
   @property({ attribute: false }) errors: FrameErrors | null = null;
   /** Errors of a capture that is shown beside this one, at the frames of this one. */
   @property({ attribute: false }) besideErrors: FrameErrors | null = null;
+  /** How frames were found, of a recovery: its scores are charted in place of errors, and lost frames are marked. */
+  @property({ attribute: false }) tracking: Tracking | undefined;
   /** Numbers of the frames where they come from, if these are others. */
   @property({ attribute: false }) frameNumbers: FrameNumbers = null;
   /** Frames that an edit is kept over, shown below to be dragged. */
@@ -79,6 +82,7 @@ export class Timeline extends LitElement {
         <div class="tip figures" hidden></div>
         <div class="track">
           <div class="rail"></div>
+          ${this.tracking ? lostRuns(this.tracking).map((run) => this.mark(run)) : null}
           <div class="done"></div>
           <div class="thumb"></div>
         </div>
@@ -110,12 +114,19 @@ export class Timeline extends LitElement {
 
   protected override updated(changed: PropertyValues) {
     if (changed.has('look') || !this.chartPlace || !this.chart) this.drawChart();
-    else if (['errors', 'besideErrors', 'frames', 'frameNumbers'].some((name) => changed.has(name)))
+    else if (['errors', 'besideErrors', 'tracking', 'frames', 'frameNumbers'].some((name) => changed.has(name)))
       this.chart.setData(this.chartData());
     this.resize();
   }
 
+  /** A mark of lost frames. */
+  private mark([first, last]: [number, number]) {
+    const [left, right] = [this.shareOf(first), this.shareOf(last)];
+    return html`<i class="lost" .style=${`left: ${100 * left}%; width: ${100 * (right - left)}%`}></i>`;
+  }
+
   private isMeasured(): boolean {
+    if (this.tracking) return this.frames > 1;
     const isKnown = (errors: FrameErrors | null) => errors?.linf.some(Number.isFinite) ?? false;
     return this.frames > 1 && (isKnown(this.errors) || isKnown(this.besideErrors));
   }
@@ -145,11 +156,11 @@ export class Timeline extends LitElement {
     const frames = Array.from({ length: this.frames }, (_, k) => k);
     const series = (values: Float32Array | undefined) =>
       frames.map((k) => (values && Number.isFinite(values[k]) ? values[k] : null));
-    const { errors, besideErrors } = this;
+    const { errors, besideErrors, tracking } = this;
     return [
       frames.map((frame) => this.shareOf(frame)),
-      series(errors?.linf),
-      series(errors?.l2),
+      series(tracking ? undefined : errors?.linf),
+      series(tracking?.scores ?? errors?.l2),
       series(besideErrors?.linf),
       series(besideErrors?.l2),
     ];
@@ -196,9 +207,8 @@ export class Timeline extends LitElement {
   }
 
   private description(frame: number): string {
-    const texts = [this.errors, this.besideErrors]
-      .map((errors) => errorsText(errors, frame))
-      .filter((text) => text !== '');
+    const own = this.tracking ? trackingText(this.tracking, frame) : errorsText(this.errors, frame);
+    const texts = [own, errorsText(this.besideErrors, frame)].filter((text) => text !== '');
     return [`frame ${numberText(this.numberOf(frame))}`, ...texts].join(this.besideErrors ? ' | ' : ' · ');
   }
 
@@ -247,4 +257,10 @@ export class Timeline extends LitElement {
 function errorsText(errors: FrameErrors | null, frame: number): string {
   const [l2, linf] = [errors?.l2[frame] ?? NaN, errors?.linf[frame] ?? NaN];
   return Number.isFinite(linf) ? `L2 ${percent(l2)} · L∞ ${percent(linf)}` : '';
+}
+
+function trackingText(tracking: Tracking, frame: number): string {
+  const score = tracking.scores[frame];
+  if (!Number.isFinite(score)) return 'no surface';
+  return `score ${percent(score)}${isLost(tracking, frame) ? ' · lost' : ''}`;
 }

@@ -37,6 +37,16 @@ export const timelineStyle = css`
     background: var(--cager-accent);
     transform-origin: left;
   }
+  .lost {
+    position: absolute;
+    top: 2px;
+    height: 14px;
+    margin-left: -1.5px;
+    box-sizing: content-box;
+    padding-right: 3px;
+    border-radius: 2px;
+    background: var(--cager-bad);
+  }
   .thumb {
     position: absolute;
     top: 2px;

@@ -6,13 +6,15 @@ import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import '../sessions/signIn';
 import { controls } from '../style/tokens';
+import type { Dropped } from '../upload/classify';
 import './cagerViewer';
 import type { CagerViewer } from './cagerViewer';
 import './compareDialog';
 import type { CompareChoice, CompareDialog } from './compareDialog';
+import { jobCapture, type JobKind } from './jobCapture';
 import { sessionCapture } from './sessionCapture';
 
-/** The page of one capture: a session of the service, or a file. */
+/** The page of one capture: a session or a recovery of the service, or a file. */
 @customElement('cager-viewer-page')
 export class ViewerPage extends LitElement {
   static override styles = [
@@ -59,9 +61,10 @@ export class ViewerPage extends LitElement {
     `,
   ];
 
-  /** The session to show; null for a file. */
-  @property() session: string | null = null;
-  @property({ attribute: false }) file: File | null = null;
+  /** The session, recovery or transfer to show; null for a file. */
+  @property() job: string | null = null;
+  @property() kind: 'session' | JobKind = 'session';
+  @property({ attribute: false }) files: readonly Dropped[] = [];
   /** The view to begin with. */
   @property() view = '';
   @state() private capture: Capture | null = null;
@@ -113,11 +116,11 @@ export class ViewerPage extends LitElement {
 
   protected override firstUpdated(changed: PropertyValues) {
     this.followBeside(this.view);
-    if (changed.has('file') && this.file) void this.viewer?.open(this.file);
+    if (changed.has('files')) void this.viewer?.openFiles(this.files);
   }
 
   override render() {
-    if (this.session !== null && !this.capture) {
+    if (this.job !== null && !this.capture) {
       return this.wantsToken ? html`<main><cager-sign-in></cager-sign-in></main>` : this.message();
     }
     return html`<main>
@@ -151,7 +154,7 @@ export class ViewerPage extends LitElement {
     return html`<main class="message">
       ${
         this.failure === null
-          ? html`<p role="status">${this.waiting || 'Opening the session'}</p>`
+          ? html`<p role="status">${this.waiting || `Opening the ${this.kind}`}</p>`
           : html`<p role="alert">${this.failure}</p>
               <button class="primary" @click=${this.retry}>Try again</button>`
       }
@@ -184,7 +187,7 @@ export class ViewerPage extends LitElement {
 
   private readonly askBeside = (event: Event) => {
     event.preventDefault();
-    void this.dialog?.ask(this.service, this.session);
+    void this.dialog?.ask(this.service, this.job);
   };
 
   private readonly compare = (event: CustomEvent<CompareChoice>) => {
@@ -233,8 +236,8 @@ export class ViewerPage extends LitElement {
   }
 
   private async openSession() {
-    const { session, service } = this;
-    if (session === null) return;
+    const { job, service } = this;
+    if (job === null) return;
     this.opening.abort();
     this.opening = new AbortController();
     const { signal } = this.opening;
@@ -242,7 +245,9 @@ export class ViewerPage extends LitElement {
     this.wantsToken = false;
     try {
       const onWaiting = (sentence: string) => (this.waiting = sentence);
-      const capture = await sessionCapture(session, { service, signal, onWaiting });
+      const options = { service, signal, onWaiting };
+      const { kind } = this;
+      const capture = await (kind === 'session' ? sessionCapture(job, options) : jobCapture(kind, job, options));
       if (signal.aborted) {
         capture.close();
         return;

@@ -151,6 +151,9 @@ export const viewerStyle = css`
     gap: 2px;
     min-width: 0;
   }
+  .title .lost {
+    color: var(--cager-bad);
+  }
   .transport .play {
     width: 42px;
     height: 42px;

@@ -244,7 +244,7 @@ describe.skipIf(missing)('a service with tokens', { timeout: 60_000 }, () => {
       },
       [TOKEN_A, theirs],
     );
-    expect(said).toMatch(/^There is no such session here: .* belongs to somebody else\./);
+    expect(said).toMatch(/^There is no such thing here: .* belongs to somebody else\./);
     await close();
   });
 });

@@ -1,0 +1,2 @@
+export { PoseView } from './poseView';
+import './posePanel';
