@@ -27,7 +27,7 @@ pub struct ShapeSpaceOptions {
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum ShapesOn {
-    /// On a cage: about a millisecond a shape.
+    /// On a cage: a few milliseconds a shape.
     #[default]
     Cage,
     /// On the model itself: exact, and slower.

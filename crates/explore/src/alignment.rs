@@ -27,7 +27,7 @@ pub enum AlignBy {
 pub struct Aligned {
     /// From the source's space to the target's.
     pub similarity: Similarity,
-    /// The score of the best alignment that is turned otherwise, over this one's; infinite where there is none or none was looked for.
+    /// The score of the next best alignment over this one's; infinite where no other was found or looked for.
     pub runner_up: f64,
 }
 

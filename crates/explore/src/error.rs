@@ -118,7 +118,7 @@ pub enum TransferError {
     /// No public cage can be made.
     #[error("no public cage can be made: {0}")]
     PublicCage(#[from] cager_cages::EncloseError),
-    /// The source's cage is none where the source is aligned.
+    /// The source's cage is not valid once the source is aligned.
     #[error("the source's cage cannot be used: {0}")]
     SourceCage(cager_core::cage::CageError),
     /// The source does not determine the public cage well enough to be inverted.
