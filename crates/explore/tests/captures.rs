@@ -204,7 +204,14 @@ fn a_gallop_goes_onto_a_cat_and_a_lion() {
             let shapes = moved(&transfer, &horse.rest, &gallop, &target.vertices, None);
             let row = row(&format!("{name}, {pose:?}"), &shapes, &[], &target, (&horse.rest, &gallop));
             if pose == Pose::Auto {
-                assert!(row.folded <= 0.3 && row.stretched <= 6.0 && row.jitter <= 1.3, "{name}");
+                // Where the target's points lie is no matter of how it trembles: it may have more of them in its legs.
+                let mut quality = MotionQuality::new(&target, &horse.rest.vertices);
+                let under = |(f, p): (usize, &Vec<Point>)| transfer.under(f, p).unwrap();
+                let under = gallop.iter().enumerate().map(under);
+                shapes.iter().zip(under).for_each(|(pose, under)| quality.push(pose, &under));
+                let jitter = quality.summary().jitter.unwrap();
+                eprintln!("  jitter over that of the points under it: {jitter:.2}");
+                assert!(row.folded <= 0.15 && row.stretched <= 5.0 && row.jitter <= 1.4, "{name}");
             }
         }
     }

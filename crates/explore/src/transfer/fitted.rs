@@ -70,9 +70,13 @@ pub struct CagedTarget<'a> {
 /// 0.26, in two of her poses 0.31; a horse onto a lion 0.52, onto a cat 0.56.
 const LIKE_SHAPES: f64 = 0.0042;
 /// Passes by which the registration's rotations are smoothed.
-const ROTATION_PASSES: usize = 30;
-/// Passes by which gradients are smoothed at the least where a cage carries the target.
+const ROTATION_PASSES: usize = 31;
+/// Passes by which the source's gradients are smoothed over neighbouring triangles: of like shapes, of like shapes where a cage carries the target, whose
+/// graph has longer edges than triangles have, and of unlike ones. A gallop on a cat, by 1, 3, 6, 10 and 20 passes: 3.7, 3.3, 3.0, 2.8 and 2.4 % stretched,
+/// with volumes down to 0.895, 0.889, 0.885, 0.881 and 0.874.
+const LIKE_PASSES: usize = 1;
 const GRAPH_PASSES: usize = 3;
+const UNLIKE_PASSES: usize = 10;
 /// Triangles turned by more count as turned, in degrees.
 const TURNED: f64 = 30.0;
 
@@ -134,13 +138,16 @@ impl FittedTransfer {
     ) -> Self {
         let Laid { aligned, rest, laid, registration, .. } = laid;
         let gradients = Gradients::new(&rest);
-        // Edges of the cage's graph are longer than triangles.
-        let smoothing =
-            if matches!(body, Body::Caged(_)) { options.smoothing.max(GRAPH_PASSES) } else { options.smoothing };
-        let turned_by = gradients.smoothed(gradients.of(&vectors(&laid)), options.smoothing + ROTATION_PASSES);
+        let like = registration.score < LIKE_SHAPES;
+        let smoothing = match body {
+            _ if !like => UNLIKE_PASSES,
+            Body::Caged(_) => GRAPH_PASSES,
+            Body::Mesh(_) => LIKE_PASSES,
+        };
+        let turned_by = gradients.smoothed(gradients.of(&vectors(&laid)), ROTATION_PASSES);
         let turns = Gradients::rotations(&turned_by);
         let absolute = match options.pose {
-            Pose::Auto => registration.score < LIKE_SHAPES,
+            Pose::Auto => like,
             pose => pose == Pose::Absolute,
         };
         let offset = mean(&vectors(target)) - mean_of(&vectors(&rest.vertices), &rest.triangles, &under);

@@ -27,8 +27,6 @@ pub struct FittedOptions {
     pub align: AlignBy,
     /// The axis that points up in both, if known: turns are about it alone.
     pub up: Option<Point>,
-    /// How often the source's gradients are smoothed over neighbouring triangles.
-    pub smoothing: usize,
     /// How the cage is fitted.
     pub stages: StageOptions,
     /// Vertices that are known to correspond, if any: they pull alignment and registration.
@@ -40,7 +38,7 @@ pub struct FittedOptions {
 impl Default for FittedOptions {
     fn default() -> Self {
         let (pose, align, up) = (Pose::Auto, AlignBy::Surfaces, None);
-        Self { pose, align, up, smoothing: 1, stages: StageOptions::default(), pairs: Vec::new(), seed: 0 }
+        Self { pose, align, up, stages: StageOptions::default(), pairs: Vec::new(), seed: 0 }
     }
 }
 
