@@ -57,6 +57,9 @@ const LAST_POINTS: usize = 2000;
 /// Iterations of each start, and of the few that are best then.
 const FIRST_ITERATIONS: usize = 12;
 const LAST_ITERATIONS: usize = 40;
+/// Iterations after which those are given up that score above so many times the best.
+const JUDGED_ITERATIONS: usize = 8;
+const HOPELESS: f64 = 1.3;
 /// Starts that are gone on with.
 const MAX_CONTINUED: usize = 4;
 /// What a normal counts beside distances, of the target's size.
@@ -97,9 +100,13 @@ pub fn alignments(moved: &Observation, fixed: &Observation, options: &AlignOptio
             kept.push(placed);
         }
     }
-    let mut done: Vec<Placed> = kept
-        .iter()
-        .map(|placed| fine.iterate(fine.start(placed.rotation, placed.scale), up, options.scale, LAST_ITERATIONS))
+    let go_on = |placed: Placed, iterations: usize| fine.iterate(placed, up, options.scale, iterations);
+    let starts = kept.into_par_iter().map(|placed| fine.start(placed.rotation, placed.scale));
+    let begun: Vec<Placed> = starts.map(|start| go_on(start, JUDGED_ITERATIONS)).collect();
+    let most = HOPELESS * begun.iter().map(|placed| placed.score).fold(f64::INFINITY, f64::min);
+    let mut done: Vec<Placed> = begun
+        .into_par_iter()
+        .map(|placed| if placed.score > most { placed } else { go_on(placed, LAST_ITERATIONS - JUDGED_ITERATIONS) })
         .collect();
     done.sort_by(|a, b| a.score.total_cmp(&b.score));
     let mut distinct: Vec<Placed> = Vec::new();
