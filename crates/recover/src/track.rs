@@ -1,7 +1,7 @@
 //! A template followed through surfaces without correspondence, by its cage alone: any subject.
 
 use cager_geometry::vector::{Point, along, dot, middle, norm, sub};
-use cager_registration::{FitOptions, Target, Template};
+use cager_registration::{FitOptions, KnownMatches, Target, Template};
 
 /// How a frame's cage was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub struct Tracker<'t> {
     searched: Option<usize>,
 }
 
+/// Of all points, every so manieth says which start is better.
+const STARTS_JUDGED_BY: usize = 4;
 /// Frames before that say what scores are usual just now: they change with the pose.
 const RECENT: usize = 9;
 /// A frame that scores above so many times the median of the recent ones is looked for further around.
@@ -66,11 +68,12 @@ impl<'t> Tracker<'t> {
         let template = self.template;
         let ahead = extrapolated(&self.last, &self.before);
         let mut starts = [&self.last, &ahead];
-        let near = starts.map(|start| template.score(surface, start));
+        let mut known = template.unmatched(surface);
+        let near = starts.map(|start| template.score_from(surface, start, STARTS_JUDGED_BY, &mut known));
         if near[1] < near[0] {
             starts.reverse();
         }
-        let mut best = Scored::fit(template, surface, starts[0], &FitOptions::NEAR);
+        let mut best = Scored::fit(template, surface, starts[0], &FitOptions::NEAR, &mut known);
         let mut outcome = Outcome::Followed;
         let usual = median(judging(&self.scores));
         let alike = farthest_apart(starts) < ALIKE * template.diagonal();
@@ -81,7 +84,7 @@ impl<'t> Tracker<'t> {
                 break;
             }
             self.searched = Some(self.scores.len());
-            let again = Scored::fit(template, surface, start, &FitOptions::FAR);
+            let again = Scored::fit(template, surface, start, &FitOptions::FAR, &mut known);
             if again.score < best.score {
                 (best, outcome) = (again, Outcome::SearchedWider);
             }
@@ -138,9 +141,15 @@ struct Scored {
 }
 
 impl Scored {
-    fn fit(template: &Template, surface: &Target, start: &[Point], options: &FitOptions) -> Self {
-        let cage = template.fit(surface, start, options);
-        let score = template.score(surface, &cage);
+    fn fit(
+        template: &Template,
+        surface: &Target,
+        start: &[Point],
+        options: &FitOptions,
+        known: &mut KnownMatches,
+    ) -> Self {
+        let cage = template.fit_from(surface, start, options, known);
+        let score = template.score_from(surface, &cage, 1, known);
         if score.is_finite() && cage.as_flattened().iter().all(|x| x.is_finite()) {
             Self { cage, score }
         } else {
@@ -185,9 +194,10 @@ impl<'t> SecondPass<'t> {
         let Some(&next) = after.first() else { return };
         let mut starts = vec![next.to_vec()];
         starts.extend(after.get(1).map(|beyond| extrapolated(next, beyond)));
+        let mut known = self.template.unmatched(surface);
         for options in [FitOptions::NEAR, FitOptions::FAR] {
             for start in &starts {
-                let again = Scored::fit(self.template, surface, start, &options);
+                let again = Scored::fit(self.template, surface, start, &options, &mut known);
                 if again.score < frame.score {
                     (frame.cage, frame.score) = (again.cage, again.score);
                     frame.outcome = Outcome::SearchedWider;

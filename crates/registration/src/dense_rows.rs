@@ -7,6 +7,8 @@ use rayon::prelude::*;
 /// Rows that sum to one, back to back. They take a quarter of the memory that passes through a product in double precision that packs them first, and that is what it waits for.
 pub(crate) struct DenseRows {
     columns: usize,
+    /// Columns with what fills them up to whole lanes.
+    stride: usize,
     entries: Vec<f32>,
 }
 
@@ -14,29 +16,31 @@ pub(crate) struct DenseRows {
 const LANES: usize = 8;
 /// Rows are computed by one thread at the least.
 const MIN_ROWS: usize = 128;
+/// Rows that are summed in single precision.
+const SUMMED_ROWS: usize = 128;
 
 impl DenseRows {
     /// The entries of a matrix.
     pub(crate) fn new(matrix: MatRef<'_, f64>) -> Self {
-        let columns = matrix.ncols().next_multiple_of(LANES);
-        let mut entries = vec![0.0; matrix.nrows() * columns];
-        for (i, row) in entries.chunks_exact_mut(columns.max(1)).enumerate() {
+        let (columns, stride) = (matrix.ncols(), matrix.ncols().next_multiple_of(LANES));
+        let mut entries = vec![0.0; matrix.nrows() * stride];
+        for (i, row) in entries.chunks_exact_mut(stride.max(1)).enumerate() {
             (0..matrix.ncols()).for_each(|j| row[j] = matrix[(i, j)] as f32);
         }
-        Self { columns, entries }
+        Self { columns, stride, entries }
     }
 
     /// `A x`, about the middle of `x`, so that it is as exact far from the origin as near it.
     pub(crate) fn times(&self, x: &[DVec3]) -> Vec<DVec3> {
         let middle = x.iter().sum::<DVec3>() / x.len().max(1) as f64;
-        let mut axes = [0; 3].map(|_| vec![0.0f32; self.columns]);
+        let mut axes = [0; 3].map(|_| vec![0.0f32; self.stride]);
         for (j, &p) in x.iter().enumerate() {
             (0..3).for_each(|k| axes[k][j] = (p - middle)[k] as f32);
         }
         let [xs, ys, zs] = axes;
         let lanes = [&xs, &ys, &zs].map(|axis| axis.as_chunks::<LANES>().0);
         self.entries
-            .par_chunks_exact(self.columns.max(1))
+            .par_chunks_exact(self.stride.max(1))
             .with_min_len(MIN_ROWS)
             .map(|row| {
                 let mut sums = [[0.0f32; LANES]; 3];
@@ -50,6 +54,30 @@ impl DenseRows {
                 middle + DVec3::from_array(sums.map(|sum| sum.iter().map(|&x| f64::from(x)).sum()))
             })
             .collect()
+    }
+
+    /// `Aᵀ y`, summed in blocks that depend on the shape alone.
+    pub(crate) fn transposed_times(&self, y: &[DVec3]) -> Vec<DVec3> {
+        let lanes = self.stride / LANES;
+        let parts: Vec<Vec<[f32; LANES]>> = self
+            .entries
+            .par_chunks(SUMMED_ROWS * self.stride.max(1))
+            .zip(y.par_chunks(SUMMED_ROWS))
+            .map(|(rows, y)| {
+                let mut sums = vec![[0.0f32; LANES]; 3 * lanes];
+                for (row, y) in rows.chunks_exact(self.stride).zip(y) {
+                    for (sums, y) in sums.chunks_exact_mut(lanes).zip(y.as_vec3().to_array()) {
+                        for (sum, row) in sums.iter_mut().zip(row.as_chunks::<LANES>().0) {
+                            (0..LANES).for_each(|k| sum[k] += y * row[k]);
+                        }
+                    }
+                }
+                sums
+            })
+            .collect();
+        let at = |part: &[[f32; LANES]], axis: usize, j: usize| f64::from(part[axis * lanes + j / LANES][j % LANES]);
+        let sum = |axis: usize, j: usize| parts.iter().map(|part| at(part, axis, j)).sum();
+        (0..self.columns).map(|j| DVec3::from_array([0, 1, 2].map(|axis| sum(axis, j)))).collect()
     }
 }
 
@@ -70,6 +98,13 @@ mod tests {
         for (i, found) in DenseRows::new(rows.as_ref()).times(&x).into_iter().enumerate() {
             let exact: DVec3 = (0..45).map(|j| rows[(i, j)] * x[j]).sum();
             assert!(found.distance(exact) < 1e-6, "{found} is not {exact}");
+        }
+        let y: Vec<DVec3> = (0..300).map(|_| DVec3::new(random.f64() - 0.5, random.f64(), 1.0)).collect();
+        let sums = DenseRows::new(rows.as_ref()).transposed_times(&y);
+        assert_eq!(sums.len(), 45);
+        for (j, found) in sums.into_iter().enumerate() {
+            let exact: DVec3 = (0..300).map(|i| rows[(i, j)] * y[i]).sum();
+            assert!(found.distance(exact) < 1e-5, "{found} is not {exact}");
         }
     }
 }

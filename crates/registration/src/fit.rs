@@ -1,13 +1,13 @@
 //! A template's cage fitted to a surface without correspondence: matches both ways, point to plane, as rigid as possible.
 
-use cager_geometry::linalg::{cholesky, solve_cholesky, transposed_product};
+use cager_geometry::linalg::{cholesky, solve_cholesky};
 use cager_geometry::vector::Point;
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::anchors::Anchors;
-use crate::matching::{OrientedPoints, match_weight};
+use crate::matching::{KnownMatches, OrientedPoints, match_weight};
 use crate::sparse_rows::{matrix, points, single, vectors};
 use crate::target::Target;
 use crate::template::{Template, plain};
@@ -51,7 +51,6 @@ const MIN_MOVE: f64 = 1e-4;
 const MIN_WEIGHT: f64 = 1e-6;
 /// Of the residual of conjugate gradients, squared.
 const TOLERANCE: f64 = 1e-4;
-const BLOCK_ROWS: usize = 512;
 
 /// Weighted squared distances along normals, by sample: `½ xᵢᵀ Bᵢ xᵢ − bᵢᵀ xᵢ` of a sample's displacement.
 struct Distances {
@@ -77,35 +76,26 @@ struct Held<'a> {
     anchors: Option<&'a Anchors>,
 }
 
-/// Matches of the iteration before, which are near those of the next one.
-struct KnownMatches {
-    /// The observed point of each sample.
-    there: Vec<Option<u32>>,
-    /// The sample of each observed point.
-    back: Vec<Option<u32>>,
-}
-
-impl KnownMatches {
-    fn none(samples: usize, points: usize) -> Self {
-        Self { there: vec![None; samples], back: vec![None; points] }
-    }
-}
-
-/// The nearest of some points, from the one that was it before; it is remembered.
-fn found(tree: &OrientedPoints, point: DVec3, normal: DVec3, known: &mut Option<u32>) -> usize {
-    let (point, normal) = (point.to_array(), normal.to_array());
-    let (found, _) = match *known {
-        Some(known) => tree.nearest_from(point, normal, known as usize),
-        None => tree.nearest(point, normal),
-    };
-    *known = Some(found as u32);
-    found
-}
-
 impl Template {
     /// The cage that lays the template onto a surface, from a cage near it. Runs on the current rayon pool; the result does not depend on it.
     pub fn fit(&self, target: &Target, start: &[Point], options: &FitOptions) -> Vec<Point> {
         self.fit_beside(target, start, start, options)
+    }
+
+    /// [`Self::fit`], whose matches are looked for near the last ones.
+    pub fn fit_from(
+        &self,
+        target: &Target,
+        start: &[Point],
+        options: &FitOptions,
+        known: &mut KnownMatches,
+    ) -> Vec<Point> {
+        self.fit_anchored(target, start, start, options, None, known).0
+    }
+
+    /// No matches with a surface, before the first.
+    pub fn unmatched(&self, target: &Target) -> KnownMatches {
+        KnownMatches::none(self.samples.len(), target.points.len())
     }
 
     /// [`Self::fit`], held at another cage than where it starts.
@@ -116,7 +106,7 @@ impl Template {
         reference: &[Point],
         options: &FitOptions,
     ) -> Vec<Point> {
-        self.fit_anchored(target, start, reference, options, None).0
+        self.fit_anchored(target, start, reference, options, None, &mut self.unmatched(target)).0
     }
 
     /// [`Self::fit_beside`], with points that are pulled to their places; and whether the surface was in reach. Where it is not, nothing but anchors moves the
@@ -128,32 +118,36 @@ impl Template {
         reference: &[Point],
         options: &FitOptions,
         anchors: Option<&Anchors>,
+        known: &mut KnownMatches,
     ) -> (Vec<Point>, bool) {
         let reference = matrix(&vectors(reference));
         let mut cage = matrix(&vectors(start));
         let m = cage.nrows();
         let hold = options.hold / (self.diagonal * self.diagonal * m as f64);
         let mut in_reach = true;
-        let mut known = KnownMatches::none(self.samples.len(), target.points.len());
         for iteration in 0..options.iterations {
             let t = iteration as f64 / (options.iterations - 1).max(1) as f64;
             let between = |[first, last]: [f64; 2]| first * (last / first).powf(t);
             let (rigidity, reach) = (between(options.rigidity), between(options.reach) * self.diagonal);
-            let distances = self.distances(target, cage.as_ref(), reach, (options.matched_back, iteration), &mut known);
+            let distances = self.distances(target, cage.as_ref(), reach, (options.matched_back, iteration), known);
             let weight = distances.trace() * self.diagonal * self.diagonal;
             // Both ways together they could count two. NaN is out of reach as well.
             in_reach = anchors.is_some() || weight >= 2.0 * MIN_WEIGHT;
             if !in_reach {
                 break;
             }
-            let mut pull = transposed_product(self.coordinates.as_ref(), matrix(&distances.pulls).as_ref(), BLOCK_ROWS);
-            pull += faer::Scale(rigidity) * self.rigidity.pull(&self.rigidity.positions(cage.as_ref()));
-            pull += faer::Scale(hold) * (&reference - &cage);
-            if let Some(anchors) = anchors {
-                pull += anchors.pull(cage.as_ref(), self.diagonal);
-            }
             let held = Held { rigidity, hold, anchors };
-            let Some(preconditioner) = self.preconditioner(&distances, held) else { break };
+            let pulls = || {
+                let mut pull = matrix(&self.coordinates.transposed_times(&distances.pulls));
+                pull += faer::Scale(rigidity) * self.rigidity.pull(&self.rigidity.positions(cage.as_ref()));
+                pull += faer::Scale(hold) * (&reference - &cage);
+                match anchors {
+                    Some(anchors) => pull + anchors.pull(cage.as_ref(), self.diagonal),
+                    None => pull,
+                }
+            };
+            let (pull, preconditioner) = rayon::join(pulls, || self.preconditioner(&distances, held));
+            let Some(preconditioner) = preconditioner else { break };
             let change = self.solve(&distances, held, &preconditioner, pull, options.steps);
             let moved = self.sparse.times(&single(change.as_ref()));
             cage += &change;
@@ -188,7 +182,7 @@ impl Template {
             .zip(&mut known.there)
             .with_min_len(64)
             .map(|((&p, &n), known)| {
-                let j = found(&target.tree, p, n, known);
+                let (j, _) = target.tree.nearest_again(p, n, known);
                 let (offset, normal) = (p - target.points[j], target.normals[j]);
                 term(normal, share * match_weight(n.dot(normal), offset, reach), offset)
             })
@@ -202,7 +196,7 @@ impl Template {
             .with_min_len(64)
             .map(|&k| {
                 let (point, normal, mut match_of) = (target.points[k], target.normals[k], known.back[k]);
-                let i = found(&samples, point, normal, &mut match_of);
+                let (i, _) = samples.nearest_again(point, normal, &mut match_of);
                 let offset = positions[i] - point;
                 (i, term(normal, share * match_weight(normals[i].dot(normal), offset, reach), offset))
             })

@@ -25,7 +25,7 @@ pub use anchors::Anchors;
 pub use closeness::MeasuredSurface;
 pub use fit::FitOptions;
 pub use graph::NodeGraph;
-pub use matching::OrientedPoints;
+pub use matching::{KnownMatches, OrientedPoints};
 pub use nearest::NearestPoints;
 pub use observation::{Observation, ObservationError, ObservationNotes, ObservationOptions};
 pub use orientation::{outward, welded};

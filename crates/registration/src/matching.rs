@@ -31,6 +31,32 @@ impl OrientedPoints {
     pub fn nearest_from(&self, point: Point, normal: Point, known: usize) -> (usize, f64) {
         self.tree.nearest_from(join(point, normal, self.normal_length), known)
     }
+
+    /// [`Self::nearest`], from the one that was it before, if any; it is remembered.
+    pub(crate) fn nearest_again(&self, point: DVec3, normal: DVec3, known: &mut Option<u32>) -> (usize, f64) {
+        let (point, normal) = (point.to_array(), normal.to_array());
+        let found = match *known {
+            Some(known) => self.nearest_from(point, normal, known as usize),
+            None => self.nearest(point, normal),
+        };
+        *known = Some(found.0 as u32);
+        found
+    }
+}
+
+/// The last matches of a template with a surface, near which the next ones are.
+pub struct KnownMatches {
+    /// The observed point of each sample.
+    pub(crate) there: Vec<Option<u32>>,
+    /// The sample of each observed point.
+    pub(crate) back: Vec<Option<u32>>,
+}
+
+impl KnownMatches {
+    /// None yet.
+    pub(crate) fn none(samples: usize, points: usize) -> Self {
+        Self { there: vec![None; samples], back: vec![None; points] }
+    }
 }
 
 /// A point with its normal in six dimensions.

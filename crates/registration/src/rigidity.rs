@@ -4,20 +4,21 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use cager_geometry::linalg::{gram, nearest_rotation, tall_product};
+use cager_geometry::linalg::{gram, nearest_rotation};
 use cager_geometry::mesh::Polygons;
 use cager_geometry::topology::{Adjacency, UnionFind};
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3, Vec3A};
 use rayon::prelude::*;
 
-use crate::nearest::NearestPoints;
+use crate::dense_rows::DenseRows;
 use crate::sparse_rows::{SparseRows, matrix, points};
 
 /// Nodes and the edges between them.
 pub(crate) struct Rigidity {
     /// Coordinates of the nodes of the model, and the identity for the cage's vertices, k × m.
     coordinates: Mat<f64>,
+    dense: DenseRows,
     sparse: SparseRows,
     /// The first edge of each node, and their number.
     first: Vec<u32>,
@@ -65,7 +66,8 @@ impl Rigidity {
             Some(*sum)
         }));
         let sparse = SparseRows::new(coordinates.as_ref(), threshold);
-        Self { coordinates, sparse, first, edges: by_node.into_iter().flatten().collect() }
+        let dense = DenseRows::new(coordinates.as_ref());
+        Self { coordinates, dense, sparse, first, edges: by_node.into_iter().flatten().collect() }
     }
 
     fn edges(&self, node: usize) -> &[Edge] {
@@ -111,7 +113,7 @@ impl Rigidity {
 
     /// Where the nodes are in a cage, m × 3.
     pub(crate) fn positions(&self, cage: MatRef<'_, f64>) -> Vec<DVec3> {
-        points(tall_product(self.coordinates.as_ref(), cage).as_ref())
+        self.dense.times(&points(cage))
     }
 
     /// What pulls the cage's vertices towards local rigidity, m × 3: minus half the gradient.
@@ -130,7 +132,7 @@ impl Rigidity {
                 sum + edge.weight * (2.0 * (positions[j] - positions[i]) - turned)
             })
         });
-        cager_geometry::linalg::transposed_product(self.coordinates.as_ref(), matrix(&forces).as_ref(), BLOCK_ROWS)
+        matrix(&self.dense.transposed_times(&forces))
     }
 
     /// The Hessian, of coordinates without their small entries, times a change of the cage.
@@ -191,32 +193,46 @@ fn cells(vertices: &[DVec3], adjacency: &Adjacency, nodes: &[u32]) -> Vec<u32> {
     cell
 }
 
-/// Adds edges until all nodes are connected.
+/// Adds edges until all nodes are connected: to the largest part comes the one that is nearest to it, again and again (Prim's algorithm).
 fn tie_parts(nodes: &[DVec3], mut edges: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
     let mut parts = UnionFind::new(nodes.len());
     edges.iter().for_each(|&[a, b]| {
         parts.join(a, b);
     });
-    loop {
-        let part: Vec<u32> = (0..nodes.len() as u32).map(|k| parts.root(k)).collect();
-        let mut sizes = vec![0; nodes.len()];
-        part.iter().for_each(|&p| sizes[p as usize] += 1);
-        let Some(largest) = (0..nodes.len()).max_by_key(|&p| (sizes[p], Reverse(p))) else { return edges };
-        let (inside, outside): (Vec<u32>, Vec<u32>) =
-            (0..nodes.len() as u32).partition(|&k| part[k as usize] == largest as u32);
-        let tree = NearestPoints::new(inside.iter().map(|&k| nodes[k as usize].to_array()));
-        let mut ways: Vec<(f64, [u32; 2])> = outside
-            .iter()
-            .map(|&k| {
-                let (found, d2) = tree.nearest(nodes[k as usize].to_array());
-                (d2, [k, inside[found]])
-            })
-            .collect();
-        ways.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let Some(&(_, [nearest, _])) = ways.first() else { return edges };
-        for &(_, [a, b]) in ways.iter().take(3).filter(|(_, [a, _])| part[*a as usize] == part[nearest as usize]) {
-            parts.join(a, b);
-            edges.push([a.min(b), a.max(b)]);
+    let part: Vec<u32> = (0..nodes.len() as u32).map(|k| parts.root(k)).collect();
+    let mut sizes = vec![0; nodes.len()];
+    part.iter().for_each(|&p| sizes[p as usize] += 1);
+    let Some(largest) = (0..nodes.len()).max_by_key(|&p| (sizes[p], Reverse(p))) else { return edges };
+    let mut joined: Vec<u32> = (0..nodes.len() as u32).filter(|&k| part[k as usize] == largest as u32).collect();
+    // Nodes outside with their nearest node inside: squared distance, both numbers.
+    let mut ways: Vec<(f64, [u32; 2])> = (0..nodes.len() as u32)
+        .filter(|&k| part[k as usize] != largest as u32)
+        .map(|k| (f64::INFINITY, [k, joined[0]]))
+        .collect();
+    let order = |a: &(f64, [u32; 2]), b: &(f64, [u32; 2])| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    while !ways.is_empty() {
+        for way in &mut ways {
+            let from = nodes[way.1[0] as usize];
+            for &inside in &joined {
+                let d2 = from.distance_squared(nodes[inside as usize]);
+                if d2 < way.0 {
+                    *way = (d2, [way.1[0], inside]);
+                }
+            }
         }
+        if ways.len() > MAX_TIES {
+            ways.select_nth_unstable_by(MAX_TIES, order);
+        }
+        let mut ties = ways[..MAX_TIES.min(ways.len())].to_vec();
+        ties.sort_by(order);
+        let nearest = part[ties[0].1[0] as usize];
+        let ties = ties.iter().filter(|(_, [a, _])| part[*a as usize] == nearest);
+        edges.extend(ties.map(|&(_, [a, b])| [a.min(b), a.max(b)]));
+        joined = ways.iter().map(|way| way.1[0]).filter(|&k| part[k as usize] == nearest).collect();
+        ways.retain(|way| part[way.1[0] as usize] != nearest);
     }
+    edges
 }
+
+/// Edges that tie a part, at the most.
+const MAX_TIES: usize = 3;

@@ -4,7 +4,7 @@ use cager_geometry::vector::Point;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::matching::OrientedPoints;
+use crate::matching::{KnownMatches, OrientedPoints};
 use crate::sparse_rows::{matrix, vectors};
 use crate::target::{NORMAL_LENGTH, Target};
 use crate::template::{Template, plain};
@@ -18,6 +18,11 @@ impl Template {
     /// How well the template lies on a surface in a cage: the root mean square, both ways, of the distance from the plane of the nearest point and of the difference of
     /// normals together, as a share of the diagonal; distances beyond 5 % count as 5 %.
     pub fn score(&self, target: &Target, cage: &[Point]) -> f64 {
+        self.score_from(target, cage, 1, &mut self.unmatched(target))
+    }
+
+    /// [`Self::score`] of every so manieth point alone, whose matches are looked for near the last ones.
+    pub fn score_from(&self, target: &Target, cage: &[Point], every: usize, known: &mut KnownMatches) -> f64 {
         let (positions, normals) = self.samples_in(matrix(&vectors(cage)).as_ref());
         let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);
         let scored = |offset: DVec3, own: DVec3, other: DVec3, d2: f64| {
@@ -29,19 +34,23 @@ impl Template {
         let there: Vec<f64> = positions
             .par_iter()
             .zip(&normals)
+            .zip(&mut known.there)
+            .step_by(every)
             .with_min_len(64)
-            .map(|(&p, &n)| {
-                let (j, d2) = target.tree.nearest(p.to_array(), n.to_array());
+            .map(|((&p, &n), known)| {
+                let (j, d2) = target.tree.nearest_again(p, n, known);
                 scored(p - target.points[j], n, target.normals[j], d2)
             })
             .collect();
-        let back: Vec<f64> = (0..target.points.len())
-            .into_par_iter()
-            .step_by(SCORED_EVERY)
+        let back: Vec<f64> = known
+            .back
+            .par_iter_mut()
+            .enumerate()
+            .step_by(SCORED_EVERY * every)
             .with_min_len(64)
-            .map(|k| {
+            .map(|(k, known)| {
                 let (point, normal) = (target.points[k], target.normals[k]);
-                let (i, d2) = samples.nearest(point.to_array(), normal.to_array());
+                let (i, d2) = samples.nearest_again(point, normal, known);
                 scored(point - positions[i], normal, normals[i], d2)
             })
             .collect();

@@ -65,7 +65,16 @@ impl Compressed {
     fn times(&self, x: &[Vec3A]) -> Vec<Vec3A> {
         let row = |i: usize| -> Vec3A {
             let entries = &self.entries[self.first[i] as usize..self.first[i + 1] as usize];
-            entries.iter().fold(Vec3A::ZERO, |sum, &(j, value)| sum + value * x[j as usize])
+            // Sums that are kept apart need not wait for each other.
+            let (lanes, rest) = entries.as_chunks::<4>();
+            let mut sums = [Vec3A::ZERO; 4];
+            for lane in lanes {
+                for (sum, &(j, value)) in sums.iter_mut().zip(lane) {
+                    *sum += value * x[j as usize];
+                }
+            }
+            let sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+            rest.iter().fold(sum, |sum, &(j, value)| sum + value * x[j as usize])
         };
         let lists = self.first.len() - 1;
         if self.entries.len() < MIN_PARALLEL_ENTRIES {

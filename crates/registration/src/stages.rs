@@ -6,6 +6,7 @@ use faer::MatRef;
 use crate::anchors::Anchors;
 use crate::closeness::MeasuredSurface;
 use crate::fit::FitOptions;
+use crate::matching::KnownMatches;
 use crate::observation::Observation;
 use crate::sparse_rows::{matrix, vectors};
 use crate::target::Target;
@@ -107,6 +108,7 @@ impl Template {
         let at_rest = self.rigidity.rest();
         let last = options.stages.saturating_sub(1).max(1) as f64;
         let narrowing = (options.reach[1] / options.reach[0]).powf(1.0 / options.stages.max(1) as f64);
+        let mut known = KnownMatches::none(self.samples.len(), observation.points.len());
         let mut moved = cage.to_vec();
         for stage in 0..options.stages {
             let rigidity = options.rigidity[0] * (softest / options.rigidity[0]).powf(stage as f64 / last);
@@ -121,7 +123,7 @@ impl Template {
                 ..FitOptions::NEAR
             };
             let anchors = anchors.filter(|_| stage + FREE_STAGES < options.stages);
-            let (found, in_reach) = self.fit_anchored(&target, &moved, cage, &fit, anchors);
+            let (found, in_reach) = self.fit_anchored(&target, &moved, cage, &fit, anchors, &mut known);
             moved = found;
             if !in_reach {
                 // Later stages see less far.

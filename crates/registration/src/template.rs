@@ -62,7 +62,7 @@ pub struct Template {
     /// Coordinates of the corners of the samples' triangles.
     pub(crate) corner_coordinates: DenseRows,
     /// Coordinates of the samples, s × m.
-    pub(crate) coordinates: Mat<f64>,
+    pub(crate) coordinates: DenseRows,
     pub(crate) sparse: SparseRows,
     /// `ΦᵀΦ / (s d²)` of the samples, its lower triangle.
     pub(crate) gram: Mat<f64>,
@@ -134,7 +134,7 @@ impl Template {
             samples,
             corner_coordinates: DenseRows::new(corner_coordinates.as_ref()),
             sparse: SparseRows::new(coordinates.as_ref(), SPARSE_THRESHOLD),
-            coordinates,
+            coordinates: DenseRows::new(coordinates.as_ref()),
             gram: scaled,
             rigidity_hessian: rigidity.hessian(),
             rigidity,
