@@ -34,6 +34,9 @@ pub struct TransferOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(minimum = 0))]
     pub rigidity: Option<f64>,
+    /// Bring the detail of the target at rest, which a cage around both loses, back to every frame, with `public` and `rigid`.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub detail: bool,
     /// Which pose the target has at rest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose: Option<RestPose>,

@@ -39,7 +39,6 @@ mod stretches;
 mod transfer;
 mod transfer_args;
 mod transfer_source;
-mod vertex_pairs;
 
 use args::{Cli, Command};
 use cager_geometry::mesh::Model;

@@ -8,15 +8,16 @@ use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
 use super::solver_options::read_cage;
 use super::transfer_source::MotionSource;
-use super::vertex_pairs::read_pairs;
 use super::{grouped, human_bytes, progress, read_model, tell, warn};
 use crate::coding::InversionChoices;
 use crate::design::FRAMES;
 use crate::encode::{self, EncodeProgress, Encoded, Job, sample_frames};
 use crate::memory::Memory;
 use crate::origin::{move_to, own_origin};
-use crate::transfer::{MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, transfer};
-use anyhow::{Context, Result};
+use crate::transfer::{
+    MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer,
+};
+use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
@@ -44,7 +45,12 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
         ..DesignOptions::default()
     };
     let source = MotionSource::open(args)?;
-    let pairs = args.pairs.as_ref().map(|path| read_pairs(path, source.rest.points.len(), target.points.len()));
+    let pairs = args.pairs.as_ref().map(|path| {
+        let text = std::fs::read_to_string(path).map_err(Error::from);
+        let read = text
+            .and_then(|text| read_pairs(&text, [&source.rest, &target].map(|m| m.points.len())).map_err(Error::msg));
+        read.with_context(|| path.display().to_string())
+    });
     let pairs = pairs.transpose()?.unwrap_or_default();
     let given = cage(args, method, &source.rest, (&target, origin))?;
     if args.outputs.dry_run {
@@ -97,7 +103,7 @@ fn cage(
 }
 
 /// Names the file or option that caused an error.
-fn named(error: TransferFailed, args: &TransferMotionArgs) -> anyhow::Error {
+fn named(error: TransferFailed, args: &TransferMotionArgs) -> Error {
     use TransferError::{
         Ambiguous, Coordinates, FrameNotFinite, FramePoints, Inversion, OutOfReach, Outside, Rank, Source, SourceCage,
         SourceSurface, Target, TargetSurface,
@@ -122,7 +128,7 @@ fn named(error: TransferFailed, args: &TransferMotionArgs) -> anyhow::Error {
         _ => None,
     };
     let place = place.map(|path| path.display().to_string());
-    let error = anyhow::Error::from(error);
+    let error = Error::from(error);
     match place {
         Some(place) => error.context(place),
         None => error,

@@ -94,6 +94,10 @@ pub(crate) struct NewTransferForm {
     /// Closed cage: around the source, or with the methods `public` and `rigid` around both, in the target's space; one is made where it is left out.
     #[schema(value_type = String, format = Binary, required = false)]
     cage: Vec<u8>,
+    /// With `fitted`, vertices that correspond, where some are known: text with a vertex of the source and one of the target on each line, both counted
+    /// from 0; # begins a comment.
+    #[schema(value_type = String, format = Binary, required = false)]
+    pairs: Vec<u8>,
     /// Choices.
     #[schema(required = false)]
     options: TransferOptions,

@@ -65,7 +65,7 @@ pub(crate) use scan::FolderMeta;
 pub use scan::{Kind, Unreadable};
 pub use sessions::{Completion, Container, Idempotency, SessionBytes, SessionMeta};
 pub use spool::{Spool, StoredFile};
-pub use transfers::{SOURCE, SOURCE_FRAMES, TransferMeta};
+pub use transfers::{PAIRS, SOURCE, SOURCE_FRAMES, TransferMeta};
 pub use workshop::Workshop;
 
 /// The data folder. Clones share it.

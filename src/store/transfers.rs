@@ -25,7 +25,7 @@ pub struct TransferMeta {
     pub frames: u32,
     /// What is subtracted from the target's points, where they lie far away.
     pub origin: Option<[f64; 3]>,
-    /// The files by the names of their parts: `target`, [`SOURCE`] or `source_rest` and [`SOURCE_FRAMES`], and perhaps `cage`.
+    /// The files by the names of their parts: `target`, [`SOURCE`] or `source_rest` and [`SOURCE_FRAMES`], and perhaps `cage` and [`PAIRS`].
     pub parts: BTreeMap<String, StoredPart>,
     /// Idempotency key and fingerprint of the request that created it.
     pub idempotency: Option<Idempotency>,
@@ -35,6 +35,8 @@ job_meta!(TransferMeta, Kind::Transfer, "transfer.json", |meta| meta.parts.value
 
 /// The part that is a whole container.
 pub const SOURCE: &str = "source";
+/// The part that says what corresponds.
+pub const PAIRS: &str = "pairs";
 /// The part that is frames of the source alone.
 pub const SOURCE_FRAMES: &str = "source_frames";
 
@@ -75,6 +77,10 @@ impl Store {
 
     /// Removes the input of a transfer that is over, best effort: files that remain are removed at the next start.
     pub fn forget_transfer_input(&self, id: &str) {
-        self.forget_files(Kind::Transfer, id, ["target", SOURCE, "source_rest", SOURCE_FRAMES, "cage", ATTEMPTS]);
+        self.forget_files(
+            Kind::Transfer,
+            id,
+            ["target", SOURCE, "source_rest", SOURCE_FRAMES, "cage", PAIRS, ATTEMPTS],
+        );
     }
 }

@@ -3,12 +3,14 @@
 mod error;
 mod job;
 mod method;
+mod pairs;
 mod placing;
 mod report;
 mod run;
 
 pub use error::TransferFailed;
 pub use job::{MethodChoice, Public, TransferJob};
+pub(crate) use pairs::read_pairs;
 pub(crate) use placing::{about_origin, similarity};
 pub use report::{QualityReport, Seconds, TransferReport};
 pub(crate) use run::MOVED;

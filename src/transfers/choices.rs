@@ -72,8 +72,9 @@ impl Choices {
         };
         let TransferOptions { public, rigidity, align, matrix, .. } = *options;
         let method = options.method.unwrap_or_default();
-        if method == TransferMethod::Fitted && (public.is_some() || options.coordinates.is_some()) {
-            return refuse("public and coordinates: belong to the methods public and rigid; leave them out".to_owned());
+        if method == TransferMethod::Fitted && (public.is_some() || options.coordinates.is_some() || options.detail) {
+            let detail = "public, coordinates and detail: belong to the methods public and rigid; leave them out";
+            return refuse(detail.to_owned());
         }
         if method != TransferMethod::Fitted && options.pose.is_some() {
             return refuse("pose: belongs to the method fitted; leave it out".to_owned());

@@ -12,10 +12,11 @@ use crate::preparation::{cage_of, check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::registry::Reserved;
-use crate::store::{Idempotency, NamedFile, SOURCE, SOURCE_FRAMES, Spool, StoredPart, TransferMeta};
+use crate::store::{Idempotency, NamedFile, PAIRS, SOURCE, SOURCE_FRAMES, Spool, StoredPart, TransferMeta};
 use crate::tasks::blocking;
-use crate::transfer::{MethodChoice, TransferFailed};
+use crate::transfer::{MethodChoice, TransferFailed, read_pairs};
 use cager_core::inversion::reject_far_points;
+use cager_explore::transfer::VertexPair;
 use cager_geometry::mesh::Point;
 use cager_proto::container::ContainerReader;
 use cager_proto::transfer_messages::TransferOptions;
@@ -30,7 +31,7 @@ const MAX_FRAMES: u32 = 100_000;
 
 /// A request to move a motion.
 pub(crate) struct NewTransfer {
-    /// `target`, `cage` and `source_rest`, as far as they were sent.
+    /// `target`, `cage`, [`PAIRS`] and `source_rest`, as far as they were sent.
     pub(crate) files: BTreeMap<&'static str, NamedFile>,
     /// The large part, [`SOURCE`] or [`SOURCE_FRAMES`], and the name of its file.
     pub(crate) large: Option<(&'static str, String, Spool)>,
@@ -152,10 +153,21 @@ fn check(
     let target = read_part("target", &file.name, &file.bytes)?;
     check_extent("target", &target)?;
     let origin = own_origin(&target.points);
-    let (frames, source_points) = frames_of(&new, &large, choices.method == MethodChoice::Fitted)?;
+    let is_fitted = choices.method == MethodChoice::Fitted;
+    let (frames, source_points) = frames_of(&new, &large, is_fitted)?;
+    if let Some(pairs) = new.files.get(PAIRS) {
+        if !is_fitted {
+            let detail = "pairs: belong to the method fitted; leave out the part, or take that method";
+            return Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+        }
+        pairs_of(pairs, [source_points, target.points.len()])?;
+    }
+    if new.options.detail && target.faces.is_empty() {
+        return Err(geometry(format!("target: {}: {}", file.name, TransferFailed::NoFaces("target"))));
+    }
     check_scratch(service, (target.points.len(), source_points), frames)?;
     if let Some(cage) = cage {
-        cage_of(cage, origin.filter(|_| choices.method != MethodChoice::Fitted))?;
+        cage_of(cage, origin.filter(|_| !is_fitted))?;
     }
     let points = target.points.len() as u32;
     Ok(Checked { new, large, points, frames, origin })
@@ -226,6 +238,16 @@ fn frames_of(
             "has {frames} frames, and a transfer has at most {MAX_FRAMES}; make one for each part of the motion"
         ))),
     }
+}
+
+/// Pairs as they were sent, of a source and a target of so many points.
+///
+/// # Errors
+/// What cannot be read, with its line.
+pub(super) fn pairs_of(file: &NamedFile, points: [usize; 2]) -> Result<Vec<VertexPair>, ApiError> {
+    let pairs = str::from_utf8(&file.bytes).map_err(|error| error.to_string());
+    let pairs = pairs.and_then(|text| read_pairs(text, points));
+    pairs.map_err(|error| geometry(format!("pairs: {}: {error}", file.name)))
 }
 
 /// A copy of a session's container, since the session may be deleted. Blocks.

@@ -8,6 +8,7 @@ mod view;
 
 pub(crate) use choices::check_options;
 pub(crate) use create::NewTransfer;
+use create::pairs_of;
 pub(crate) use view::TransferFrames;
 
 use crate::config::ServeConfig;

@@ -1,7 +1,7 @@
 //! Moving motions: a limited number of transfers at a time, tenants in turn, on the threads of the lowest priority.
 
 use super::choices::{Choices, design_of};
-use super::{Finished, TransferJob};
+use super::{Finished, TransferJob, pairs_of};
 use crate::admission::Held;
 use crate::cage_job::samples;
 use crate::decode::{self, DecodeError, Decoding};
@@ -13,7 +13,7 @@ use crate::preparation::{cage_of, read_part};
 use crate::problem::{self, ApiError};
 use crate::recover::Encoding;
 use crate::service::Service;
-use crate::store::{Kind, SOURCE, SOURCE_FRAMES, StoreError, TransferMeta, Workshop};
+use crate::store::{Kind, PAIRS, SOURCE, SOURCE_FRAMES, StoreError, TransferMeta, Workshop};
 use crate::tasks::blocking;
 use crate::timing::Timing;
 use crate::transfer::{self, MethodChoice, TransferFailed, Transferred, about_origin};
@@ -96,6 +96,8 @@ impl Service {
             None => Source::of_container(&self.store.transfer_source(job.id())?, workshop.path())?,
         };
         let Source { rest, cage: own_cage, mut frames, frame_rate, numbers } = source;
+        let points = [&rest, &target].map(|model| model.points.len());
+        let pairs = part(PAIRS)?.map(|file| pairs_of(&file, points)).transpose()?.unwrap_or_default();
         let timing = Timing { fps: meta.options.frame_rate, start: meta.options.start };
         let stopped = || self.is_stopped(job);
         let timing = (timing.fps.or(frame_rate), Some(timing.numbers(numbers)));
@@ -109,8 +111,8 @@ impl Service {
             pose: choices.pose,
             align: about_origin(choices.align, meta.origin),
             up: choices.up,
-            pairs: Vec::new(),
-            detail: false,
+            pairs,
+            detail: meta.options.detail,
             system: choices.system,
             stopped: &stopped,
             scratch: workshop.path(),

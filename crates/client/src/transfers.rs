@@ -31,6 +31,8 @@ pub struct NewTransfer {
     pub target: MeshFile,
     /// A cage around the source, or with the methods `public` and `rigid` around both; without one the service makes one.
     pub cage: Option<MeshFile>,
+    /// Vertices that correspond, as `cager transfer --pairs` reads them.
+    pub pairs: Option<MeshFile>,
     /// Choices; what is left out has the service's default.
     pub options: TransferOptions,
     /// Makes the request idempotent; random if not given.
@@ -40,7 +42,7 @@ pub struct NewTransfer {
 impl NewTransfer {
     /// A transfer with the service's defaults.
     pub fn new(source: TransferSource, target: MeshFile) -> Self {
-        Self { source, target, cage: None, options: TransferOptions::default(), idempotency_key: None }
+        Self { source, target, cage: None, pairs: None, options: TransferOptions::default(), idempotency_key: None }
     }
 
     /// All files, by the names of their parts.
@@ -50,8 +52,9 @@ impl NewTransfer {
             TransferSource::Container(container) => vec![("source", container)],
             TransferSource::Session => Vec::new(),
         };
-        let others = self.cage.iter().map(|cage| ("cage", cage)).chain([("target", &self.target)]);
-        others.chain(source).collect()
+        let named = [("cage", &self.cage), ("pairs", &self.pairs)];
+        let others = named.into_iter().filter_map(|(part, file)| Some((part, file.as_ref()?)));
+        others.chain([("target", &self.target)]).chain(source).collect()
     }
 }
 
@@ -62,8 +65,11 @@ impl Client {
     /// [`ClientError::Mismatch`] for an option that is NaN or infinite, [`ClientError::Refused`] for bad input, and those of the
     /// connection.
     pub async fn create_transfer(&self, new: &NewTransfer) -> Result<Transfer, ClientError> {
-        let TransferOptions { rigidity, max_error, mean_error, .. } = &new.options;
-        finite([("rigidity", rigidity), ("max_error", max_error), ("mean_error", mean_error)])?;
+        let TransferOptions { rigidity, frame_rate, start, max_error, mean_error, .. } = &new.options;
+        let timing = [("frame_rate", frame_rate), ("start", start)];
+        finite(
+            [("rigidity", rigidity), ("max_error", max_error), ("mean_error", mean_error)].into_iter().chain(timing),
+        )?;
         self.create_job("transfers", new.files(), &new.options, new.idempotency_key.clone()).await
     }
 

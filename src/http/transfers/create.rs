@@ -8,7 +8,7 @@ use crate::http::openapi;
 use crate::http::spooled::{self, FormParts};
 use crate::problem::ApiError;
 use crate::service::Service;
-use crate::store::{SOURCE, SOURCE_FRAMES};
+use crate::store::{PAIRS, SOURCE, SOURCE_FRAMES};
 use crate::transfers::{NewTransfer, check_options};
 use axum::extract::{Request, State};
 use axum::response::Response;
@@ -17,8 +17,8 @@ use std::sync::Arc;
 use tokio::time::timeout;
 
 /// Moves the motion of one model onto another that shares nothing with it: parts `source_rest` and `source_frames` are the source, or part `source` a
-/// container, or `options.source_session` a completed session; part `target` is the model that is to move, part `cage` a cage of yours, part `options`
-/// JSON. It runs in the background, below all frames of sessions.
+/// container, or `options.source_session` a completed session; part `target` is the model that is to move, part `cage` a cage of yours, part
+/// `pairs` what corresponds, where you know some of it, part `options` JSON. It runs in the background, below all frames of sessions.
 #[utoipa::path(
     post, path = "/v1/transfers", operation_id = "create_transfer", tag = "transfers",
     params(("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[ -~]+$", description = "A repetition with the same key and content gives the same transfer")),
@@ -32,13 +32,13 @@ pub(crate) async fn create(
     request: Request,
 ) -> Result<Response, ApiError> {
     let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
-    let parts = "source_rest and source_frames or source, target, cage and options";
+    let parts = "source_rest and source_frames or source, target, cage, pairs and options";
     let FormHeader { idempotency_key, patience } = multipart::check_form_header(&service, &request, parts, limit)?;
     let _place = service.stream(&tenant)?;
     let parts = FormParts {
-        files: &["source_rest", "target", "cage"],
+        files: &["source_rest", "target", "cage", PAIRS],
         many: None,
-        what: "source, target and cage at rest are",
+        what: "source, target and cage at rest, and pairs, are",
         large: &[SOURCE_FRAMES, SOURCE],
         cure: "make a transfer for each part of the motion",
         check: &check_options,

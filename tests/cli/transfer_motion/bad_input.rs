@@ -131,7 +131,7 @@ fn pairs_that_are_none() {
         ("0 -1\n".to_owned(), ["line 1", "\"-1\""]),
         (format!("1 1\n{n} 0\n"), ["line 2", "no vertex 600 in the source"]),
         (format!("1 {}\n", copy.points.len()), ["line 1", "no vertex 1221 in the target"]),
-        ("# nothing\n".to_owned(), ["no pairs", "--pairs"]),
+        ("# nothing\n".to_owned(), ["no pairs", "leave the pairs out"]),
     ] {
         dir.write("pairs.txt", &text);
         let words = words.map(|word| word.replace("600", &n.to_string()));

@@ -17,6 +17,8 @@ use std::time::{Duration, Instant};
 
 /// Longer than any transfer here takes, also on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(300);
+/// What corresponds: the target has the source's points first. One pair is a little off, so that it shows.
+const PAIRS: &str = "0 0 # as they are\n100 100\n200,215\n";
 /// Frames of the motion.
 const FRAMES: u32 = 5;
 
@@ -72,6 +74,7 @@ impl Motion {
             ("frames.npy", &self.frames),
             ("copy.obj", &self.target),
             ("in.cager", container),
+            ("pairs.txt", PAIRS.as_bytes()),
         ];
         files.iter().for_each(|(name, bytes)| std::fs::write(folder.path().join(name), bytes).expect("a file"));
         let done = Command::new(env!("CARGO_BIN_EXE_cager"))

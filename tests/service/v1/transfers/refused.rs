@@ -24,6 +24,25 @@ async fn files_and_options_that_cannot_be_used_are_refused_at_once() {
         (target().part("source", file("a.cager", b"nothing")), 422, "invalid-geometry", "source: a.cager"),
         (framed().part("source_rest", file("other.obj", &other.rest.obj)), 422, "invalid-frame", "frames"),
         (whole().part("cage", file("cage.obj", cloud)), 422, "invalid-geometry", "cage.obj: has no faces"),
+        (whole().part("pairs", file("p.txt", b"1 1\n2\n")), 422, "invalid-geometry", "pairs: p.txt: line 2: a pair is"),
+        (whole().part("pairs", file("p.txt", b"1 99999")), 422, "invalid-geometry", "no vertex 99999 in the target"),
+        (whole().part("pairs", file("p.txt", b"\xff")), 422, "invalid-geometry", "p.txt: invalid utf-8"),
+        (
+            whole().part("pairs", file("p.txt", b"1 1")).part("options", text(&json!({"method": "public"}))),
+            422,
+            "invalid-options",
+            "pairs: belong to the method fitted",
+        ),
+        (
+            Form::new()
+                .part("source_rest", file("rest.obj", &motion.capture.rest.obj))
+                .part("source_frames", file("frames.npy", &motion.frames))
+                .part("target", file("cloud.obj", cloud))
+                .part("options", text(&json!({"method": "rigid", "detail": true}))),
+            422,
+            "invalid-geometry",
+            "target: cloud.obj: the target has no faces",
+        ),
         (
             target()
                 .part("source_rest", file("cloud.obj", cloud))
@@ -40,6 +59,7 @@ async fn files_and_options_that_cannot_be_used_are_refused_at_once() {
     for (options, said) in [
         (json!({"method": "magic"}), "magic"),
         (json!({"public": "ico"}), "public"),
+        (json!({"detail": true}), "detail"),
         (json!({"rigidity": 1.0}), "rigidity"),
         (json!({"method": "rigid", "rigidity": -1.0}), "rigidity"),
         (json!({"method": "rigid", "coordinates": "green"}), "green"),

@@ -1,6 +1,6 @@
 //! From a motion and another model to an animation of that.
 
-use super::{FRAMES, completed, create, created, ended, motion, transfer};
+use super::{FRAMES, PAIRS, completed, create, created, ended, motion, transfer};
 use crate::support::{TestApp, file, text};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
 use cager_proto::messages::JobState;
@@ -85,10 +85,26 @@ async fn a_container_and_a_completed_session_are_sources_as_well() {
 #[tokio::test]
 async fn methods_cages_and_errors_are_those_of_the_command_line() {
     let app = TestApp::start();
-    let options = json!({"align": "none", "method": "public", "public": "ico", "max_error": 1e-3, "cage_vertices": 20});
+    let options = json!({"align": "none", "method": "public", "public": "ico", "detail": true, "max_error": 1e-3, "cage_vertices": 20});
     let job = created(&app, &options).await;
-    let expected = motion().moved("--align none --method public --public ico --max-error 1e-3 --cage-vertices 20");
+    let expected =
+        motion().moved("--align none --method public --public ico --detail --max-error 1e-3 --cage-vertices 20");
     assert!(completed(&app, &job.id).await == expected, "another file than that of the command line");
+    let report: Value = app.get(&format!("/v1/transfers/{}/report", job.id)).await.is(200);
+    assert_eq!(report["detail"], true);
+}
+
+#[tokio::test]
+async fn pairs_pull_as_those_of_the_command_line_do() {
+    let app = TestApp::start();
+    let form = motion().form(&json!({"align": "none"})).part("pairs", file("pairs.txt", PAIRS.as_bytes()));
+    let job: Transfer = create(&app, form, Some("pairs")).await.is(202);
+    let found = completed(&app, &job.id).await;
+    assert!(found == motion().moved("--align none --pairs pairs.txt"), "another file than that of the command line");
+    assert!(found != motion().moved("--align none"), "the pairs pull at nothing");
+    // Without them it is another request.
+    let without = create(&app, motion().form(&json!({"align": "none"})), Some("pairs")).await;
+    without.problem(422, "idempotency-key-reused");
 }
 
 #[tokio::test]
