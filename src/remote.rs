@@ -6,11 +6,13 @@ mod error;
 mod frames;
 mod recover;
 mod same;
+mod transfer;
 
 pub use cage::RemoteCage;
 pub use error::{Difference, RemoteError};
 pub use frames::FileFrames;
 pub use recover::{RemoteRecovery, RemoteRecoveryProgress, recover_remotely};
+pub use transfer::{RemoteTransfer, transfer_remotely};
 
 use crate::design;
 use crate::encode::Encoded;

@@ -18,6 +18,7 @@ use cager_formats::{AtomicFile, Target, obj_bytes};
 use cager_geometry::mesh::{Model, Point, Polygons};
 use cager_proto::container::{ContainerReader, ContainerWriter, counted_from_zero};
 use std::io::{BufReader, BufWriter};
+use std::path::Path;
 use std::time::Instant;
 
 /// Bytes of an origin in a container, rather too many.
@@ -63,11 +64,7 @@ pub(super) fn run(
     // As it was read: welded and turned around.
     let moved_cage = cage.filter(|_| files.origin.is_some()).map(|cage| MeshFile::new("cage.obj", cage_obj(cage)));
     let mut options = SessionOptions {
-        name: args
-            .output
-            .file_stem()
-            .filter(|&name| name != "-")
-            .map(|name| name.to_string_lossy().chars().take(200).collect()),
+        name: session_name(&args.output),
         coordinates: Some(args.solver.coordinates.name().to_owned()),
         handles: args.solver.handles.map(|handles| handles.name().to_owned()),
         handle_count: handle_count.context("--handle-count: is larger than any number of points")?,
@@ -171,6 +168,12 @@ fn with_origin(encoded: Encoded, origin: Point, output: &Target) -> Result<Encod
 }
 
 /// What the container is to meet, as a session is asked for it.
+/// What a service calls what is written there.
+pub(super) fn session_name(output: &Path) -> Option<String> {
+    let name = output.file_stem().filter(|&name| name != "-")?;
+    Some(name.to_string_lossy().chars().take(200).collect())
+}
+
 pub(super) fn coding_options(goal: Option<Goal>, exact_rest: bool) -> SessionOptions {
     let options = SessionOptions { exact_rest, ..SessionOptions::default() };
     match goal {

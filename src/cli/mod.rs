@@ -34,10 +34,12 @@ mod recover_remote;
 mod recover_stretch;
 mod rig;
 pub(crate) mod serve;
+mod service_args;
 mod solver_options;
 mod stretches;
 mod transfer;
 mod transfer_args;
+mod transfer_remote;
 mod transfer_source;
 
 use args::{Cli, Command};

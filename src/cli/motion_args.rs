@@ -4,16 +4,14 @@ use super::args::CodingArgs;
 use super::checks::{CheckArgs, TimingArgs};
 use super::names;
 use super::outputs::OutputArgs;
-use crate::report_page::Up;
-use crate::transfer::{MethodChoice, Public, similarity};
+use super::service_args::ServiceArgs;
+use crate::transfer::{MethodChoice, words};
 use anyhow::{Context, Result, bail};
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_explore::alignment::AlignBy;
-use cager_explore::public_cage::PublicCage;
-use cager_explore::transfer::Pose;
-use cager_explore::transfer::rigid::RIGIDITY;
-use cager_geometry::mesh::Point;
-use clap::{Args, ValueEnum};
+use cager_proto::transfer_messages::{PublicShape, RestPose, SourceAlignment, TransferMethod, UpAxis};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Move the motion of one model onto another that shares nothing with it: other points, other faces, another body.
@@ -41,24 +39,25 @@ pub(crate) struct TransferMotionArgs {
     pub(super) target: PathBuf,
 
     /// How the motion is moved.
-    #[arg(long, value_enum, value_name = "METHOD", default_value = "fitted")]
-    method: MethodArg,
+    #[arg(long, value_parser = word::<TransferMethod>(&["fitted", "public", "rigid"]), value_name = "METHOD", default_value = "fitted")]
+    pub(super) method: TransferMethod,
 
     /// Closed cage: with fitted around the source, with public and rigid around both, in the target's space [default: one is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "public")]
     pub(super) cage: Option<PathBuf>,
 
-    /// The cage around both, with --method public or rigid [default: sphere].
-    #[arg(long, value_enum, value_name = "SHAPE", hide_default_value = true)]
-    public: Option<PublicArg>,
+    /// The cage around both, with --method public or rigid: a box, an icosahedron (ico), a sphere of 162 vertices, the convex hull (42), or an offset surface (350)
+    /// [default: sphere].
+    #[arg(long, value_parser = word::<PublicShape>(&["box", "ico", "sphere", "hull", "offset"]), value_name = "SHAPE", hide_default_value = true)]
+    pub(super) public: Option<PublicShape>,
 
     /// Coordinates in the cage around both, with --method public or rigid [default: mvc].
     #[arg(long, value_parser = names::coordinates())]
-    coordinates: Option<&'static dyn CoordinateSystem>,
+    pub(super) coordinates: Option<&'static dyn CoordinateSystem>,
 
     /// Weight of the target's rigidity, with --method rigid [default: 0.01].
     #[arg(long, value_name = "MU", value_parser = weight)]
-    rigidity: Option<f64>,
+    pub(super) rigidity: Option<f64>,
 
     /// Bring the detail of the target at rest, which a cage around both loses, back to every frame, with --method public or rigid.
     #[arg(long)]
@@ -66,8 +65,8 @@ pub(crate) struct TransferMotionArgs {
 
     /// With fitted, relative: what the source does to its rest pose, the target does to its own; absolute: limbs take the source's directions, for like bodies that stand
     /// differently at rest; auto decides by how alike the shapes are [default: auto].
-    #[arg(long, value_enum, value_name = "POSE")]
-    pose: Option<PoseArg>,
+    #[arg(long, value_parser = word::<RestPose>(&["auto", "relative", "absolute"]), value_name = "POSE")]
+    pub(super) pose: Option<RestPose>,
 
     /// How the source is laid onto the target at first: pca by their surfaces, none as they stand, or a file or list of the 16 numbers, row by row, of the matrix
     /// that turns, scales and moves it there.
@@ -75,8 +74,8 @@ pub(crate) struct TransferMotionArgs {
     align: String,
 
     /// Axis that points up in both: the source is turned about it alone, feet stand on the floor and do not slide.
-    #[arg(long, value_enum, value_name = "AXIS")]
-    up: Option<Up>,
+    #[arg(long, value_parser = word::<UpAxis>(&["x", "y", "z"]), value_name = "AXIS")]
+    pub(super) up: Option<UpAxis>,
 
     /// With fitted, vertices that correspond, where some are known: a text file with a vertex of the source and one of the target on each line, both counted from 0; # begins
     /// a comment.
@@ -106,34 +105,16 @@ pub(crate) struct TransferMotionArgs {
     /// Write how source and target were brought together and what the motion does to the target as JSON.
     #[arg(long, value_name = "REPORT.json")]
     pub(super) report: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(super) service: ServiceArgs,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum MethodArg {
-    Fitted,
-    Public,
-    Rigid,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum PublicArg {
-    /// 8 vertices.
-    Box,
-    /// 12 vertices.
-    Ico,
-    /// 162 vertices.
-    Sphere,
-    /// The convex hull, 42 vertices.
-    Hull,
-    /// An offset surface, 350 vertices.
-    Offset,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum PoseArg {
-    Auto,
-    Relative,
-    Absolute,
+/// One of the words that the service's options have too.
+fn word<T: DeserializeOwned + Clone + Send + Sync + 'static>(
+    words: &'static [&'static str],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(words).try_map(|word| serde_json::from_value(word.into()))
 }
 
 fn weight(text: &str) -> Result<f64, String> {
@@ -142,62 +123,36 @@ fn weight(text: &str) -> Result<f64, String> {
 }
 
 impl TransferMotionArgs {
-    /// The axis that points up.
-    pub(super) fn axis(&self) -> Option<Point> {
-        self.up.map(|up| match up {
-            Up::X => [1.0, 0.0, 0.0],
-            Up::Y => [0.0, 1.0, 0.0],
-            Up::Z => [0.0, 0.0, 1.0],
-        })
-    }
-
-    /// Which pose the target has at rest.
-    pub(super) fn pose(&self) -> Pose {
-        match self.pose {
-            None | Some(PoseArg::Auto) => Pose::Auto,
-            Some(PoseArg::Relative) => Pose::Relative,
-            Some(PoseArg::Absolute) => Pose::Absolute,
-        }
-    }
-
     /// Coordinates in the cage around both.
     pub(super) fn system(&self) -> &'static dyn CoordinateSystem {
         self.coordinates.unwrap_or(&MeanValue)
     }
 
-    /// How source and target are aligned.
-    pub(super) fn alignment(&self) -> Result<AlignBy> {
-        alignment(&self.align)
+    /// How source and target are aligned, as the service is told it.
+    pub(super) fn alignment(&self) -> Result<(Option<SourceAlignment>, Option<[f64; 16]>)> {
+        Ok(match &self.align[..] {
+            "pca" => (Some(SourceAlignment::Pca), None),
+            "none" => (Some(SourceAlignment::None), None),
+            text => (None, Some(matrix(text)?)),
+        })
     }
 
     /// How the motion is moved.
     pub(super) fn method(&self) -> Result<MethodChoice> {
         self.refuse_strangers()?;
-        let cage = match (self.public, &self.cage) {
-            (None, Some(_)) => Public::Given,
-            (shape, _) => Public::Made(match shape.unwrap_or(PublicArg::Sphere) {
-                PublicArg::Box => PublicCage::Box,
-                PublicArg::Ico => PublicCage::Icosahedron,
-                PublicArg::Sphere => PublicCage::Sphere(162),
-                PublicArg::Hull => PublicCage::Hull(42),
-                PublicArg::Offset => PublicCage::Offset(350),
-            }),
-        };
-        Ok(match self.method {
-            MethodArg::Fitted => MethodChoice::Fitted,
-            MethodArg::Public => MethodChoice::Public(cage),
-            MethodArg::Rigid if self.system().name() == "green" => bail!(
+        if self.method == TransferMethod::Rigid && self.system().name() == "green" {
+            bail!(
                 "--coordinates: with --method rigid, green has normals that follow from the vertices; take mvc or harmonic"
-            ),
-            MethodArg::Rigid => MethodChoice::Rigid(cage, self.rigidity.unwrap_or(RIGIDITY)),
-        })
+            );
+        }
+        Ok(words::method(self.method, (self.cage.is_some(), self.public), self.rigidity))
     }
 
     /// Refuses what another method is told by.
     fn refuse_strangers(&self) -> Result<()> {
-        use MethodArg::{Fitted, Public, Rigid};
-        let both: &[MethodArg] = &[Public, Rigid];
-        let options: [(&str, bool, &[MethodArg], &str); 6] = [
+        use TransferMethod::{Fitted, Public, Rigid};
+        let both: &[TransferMethod] = &[Public, Rigid];
+        let options: [(&str, bool, &[TransferMethod], &str); 6] = [
             ("--public", self.public.is_some(), both, "public and rigid"),
             ("--coordinates", self.coordinates.is_some(), both, "public and rigid"),
             ("--detail", self.detail, both, "public and rigid"),
@@ -214,12 +169,7 @@ impl TransferMotionArgs {
     }
 }
 
-fn alignment(text: &str) -> Result<AlignBy> {
-    match text {
-        "pca" => return Ok(AlignBy::Surfaces),
-        "none" => return Ok(AlignBy::AsTheyStand),
-        _ => {}
-    }
+fn matrix(text: &str) -> Result<[f64; 16]> {
     let read = if Path::new(text).is_file() {
         std::fs::read_to_string(text).with_context(|| format!("--align: {text}"))?
     } else {
@@ -227,13 +177,14 @@ fn alignment(text: &str) -> Result<AlignBy> {
     };
     let words = read.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty());
     let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
-    let Some(m) = numbers.filter(|m| m.len() == 16 && m.iter().all(|x| x.is_finite())) else {
+    let numbers = numbers.filter(|m| m.iter().all(|x| x.is_finite())).and_then(|m| <[f64; 16]>::try_from(m).ok());
+    let Some(matrix) = numbers else {
         bail!("--align: {text}: is none of pca and none, and no file or list of 16 numbers");
     };
-    let Some(similarity) = <&[f64; 16]>::try_from(&*m).ok().and_then(similarity) else {
+    if words::align(None, Some(matrix)).is_none() {
         bail!(
             "--align: {text}: does more than turn, scale evenly and move; give a matrix without mirroring and shear, whose last row is 0 0 0 1"
         );
-    };
-    Ok(AlignBy::Given(similarity))
+    }
+    Ok(matrix)
 }

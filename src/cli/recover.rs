@@ -35,7 +35,7 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     let gait = args.gait.as_ref().map(|path| picture_target(&mut outputs, path)).transpose()?;
     let templates = args.template.iter().map(|key| template(args, &key.path)).collect::<Result<Vec<_>>>()?;
     let stretches = cut(frames(args)?, &args.template)?;
-    if let (Some(address), false) = (args.server.as_deref(), args.outputs.dry_run)
+    if let (Some(address), false) = (args.service.server.as_deref(), args.outputs.dry_run)
         && let [(output, report)] = &targets[..]
     {
         return recover_remote::run(args, address, &templates[0].0, &stretches[0], output, report.clone(), joints);
@@ -95,7 +95,7 @@ fn refuse_several(args: &RecoverArgs) -> Result<()> {
     if templates > 1 {
         for (given, option, why) in [
             (args.rig.is_some(), "--rig", "is made for one template"),
-            (args.server.is_some(), "--server", "follows one template"),
+            (args.service.server.is_some(), "--server", "follows one template"),
             (args.output.as_os_str() == "-", "-", "standard output cannot hold a file for each template"),
         ] {
             if given {

@@ -3,6 +3,7 @@
 use super::args::CodingArgs;
 use super::checks::TimingArgs;
 use super::outputs::OutputArgs;
+use super::service_args::ServiceArgs;
 use super::stretches::KeyTemplate;
 use crate::mismatch::Up;
 use clap::builder::{OsStringValueParser, TypedValueParser};
@@ -91,13 +92,8 @@ pub(crate) struct RecoverArgs {
     #[arg(long, value_name = "REPORT.json")]
     pub(super) report: Option<PathBuf>,
 
-    /// Have a service compute: its address, such as http://127.0.0.1:8080. The same command goes on where the connection broke.
-    #[arg(long, value_name = "URL")]
-    pub(super) server: Option<String>,
-
-    /// Token to show to the service [default: the environment's CAGER_TOKEN, which other users of this machine do not see].
-    #[arg(long, value_name = "T", requires = "server", hide_default_value = true)]
-    pub(super) token: Option<String>,
+    #[command(flatten)]
+    pub(super) service: ServiceArgs,
 
     /// Go on past files that hold no surface, and where the template seems turned or of another size.
     #[arg(long)]

@@ -1,7 +1,7 @@
 //! `cager recover --server`.
 
 use super::coding_args::goal;
-use super::encode_remote::coding_options;
+use super::encode_remote::{coding_options, session_name};
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
 use super::{grouped, human_bytes, plain, progress, tell, warn};
 use crate::mismatch::Up;
@@ -37,7 +37,7 @@ pub(super) fn run(
     let mut outputs = vec![("capture.cager", &mut container)];
     outputs.extend(report.as_mut().map(|file| ("report", file)));
     outputs.extend(joints.as_mut().map(|(name, file)| (*name, file)));
-    let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
+    let token = args.service.token();
     let job = RemoteRecovery { address, token: token.as_deref(), new, files: &files.files, outputs };
     let bar = progress::frames("sending", files.files.len());
     let result = recover_remotely(job, &mut |told| match told {
@@ -74,9 +74,8 @@ fn options(args: &RecoverArgs, template: &Model, frames: usize, has_rig: bool) -
         PersonMethod::Robust => "robust",
         PersonMethod::Paper => "paper",
     };
-    let name = args.output.file_stem().filter(|&name| name != "-");
     Ok(RecoveryOptions {
-        name: name.map(|name| name.to_string_lossy().chars().take(200).collect()),
+        name: session_name(&args.output),
         align: placing(args.align),
         scale: placing(args.scale),
         up: args.up.map(|up| if up == Up::Z { "z" } else { "y" }.to_owned()),

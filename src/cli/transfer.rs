@@ -8,14 +8,14 @@ use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
 use super::solver_options::read_cage;
 use super::transfer_source::MotionSource;
-use super::{grouped, human_bytes, progress, read_model, tell, warn};
+use super::{grouped, human_bytes, progress, read_model, tell, transfer_remote, warn};
 use crate::coding::InversionChoices;
 use crate::design::FRAMES;
 use crate::encode::{self, EncodeProgress, Encoded, Job, sample_frames};
 use crate::memory::Memory;
 use crate::origin::{move_to, own_origin};
 use crate::transfer::{
-    MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer,
+    MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer, words,
 };
 use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
@@ -23,6 +23,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::regularize::Regularizer;
 use cager_explore::TransferError;
+use cager_explore::alignment::AlignBy;
 use cager_formats::{AtomicFile, ScratchDir, Target, commit_together};
 use cager_geometry::mesh::{Model, Point};
 use std::io::Write;
@@ -34,7 +35,8 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let output = outputs.binary(&args.output, "walk.cager")?;
     let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
     let method = args.method()?;
-    let align = args.alignment()?;
+    let (align, matrix) = args.alignment()?;
+    let align = words::align(align, matrix).unwrap_or(AlignBy::Surfaces);
     let mut target = read_model(&args.target)?;
     let origin = own_origin(&target.points);
     move_to(origin, &mut target.points);
@@ -60,6 +62,11 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
         source.warn_of_departures();
         return Ok(());
     }
+    if let Some(address) = &args.service.server {
+        transfer_remote::run(args, address, (&source, &target), (&output, report))?;
+        source.warn_of_departures();
+        return Ok(());
+    }
     let report = report.map(AtomicFile::create).transpose()?;
     let scratch = ScratchDir::create(folder_of(&output))?;
     let mut frames = source.frames(scratch.path())?;
@@ -71,9 +78,9 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
         frames: frames.as_mut(),
         target: &target,
         method,
-        pose: args.pose(),
+        pose: words::pose(args.pose),
         align: about_origin(align, origin),
-        up: args.axis(),
+        up: args.up.map(words::axis),
         pairs,
         detail: args.detail,
         system: args.system(),

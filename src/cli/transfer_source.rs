@@ -4,13 +4,12 @@ use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::dry_run::read_files;
 use super::motion_args::TransferMotionArgs;
 use super::read_model;
-use crate::decode::{self, Decoding};
 use crate::frames::CaptureFiles;
-use crate::origin::move_from;
 use crate::timing::Timing;
-use anyhow::{Context, Result, bail};
+use crate::transfer::{MotionFile, decoded};
+use anyhow::{Result, bail};
 use cager_core::cage::Cage;
-use cager_formats::{Error, FrameReader, open_frames};
+use cager_formats::{Error, FrameReader};
 use cager_geometry::mesh::Model;
 use std::path::{Path, PathBuf};
 
@@ -47,25 +46,9 @@ impl MotionSource {
     }
 
     fn of_container(path: &Path, timing: Timing) -> Result<Self> {
-        let named = || path.display().to_string();
-        let mut container = decode::open(path)?;
-        let (origin, frame_rate) = (container.header().origin, container.header().frame_rate);
-        let mut rest = container.rest().with_context(named)?;
-        let mut cage = container.cage().with_context(named)?;
-        // Both are about the origin that the file may have.
-        move_from(origin, &mut rest.points);
-        move_from(origin, &mut cage.vertices);
-        let numbers = container.frame_numbers().with_context(named)?;
-        let numbers = match container.frames() {
-            there if numbers.len() == there => numbers,
-            there => (0..there).map(|frame| frame as f64).collect(),
-        };
-        let frames = Frames::Container {
-            path: path.to_owned(),
-            numbers: timing.numbers(numbers),
-            frame_rate: timing.fps.or(frame_rate),
-        };
-        Ok(Self { rest, cage: Some(Cage::new(cage).with_context(named)?), frames })
+        let MotionFile { rest, cage, numbers, frame_rate } = MotionFile::open(path)?;
+        let (numbers, frame_rate) = (timing.numbers(numbers), timing.fps.or(frame_rate));
+        Ok(Self { rest, cage: Some(cage), frames: Frames::Container { path: path.to_owned(), numbers, frame_rate } })
     }
 
     /// Reads and checks what can be without decoding; gives the number of frames.
@@ -81,9 +64,7 @@ impl MotionSource {
         match &self.frames {
             Frames::Files(files) => Ok(files.open()?),
             Frames::Container { path, numbers, frame_rate } => {
-                let decoded = scratch.join("decoded.npy");
-                decode::decode(path, &*decoded, Decoding::default(), &mut |_| ())?;
-                let frames = open_frames(&decoded, self.rest.points.len())?;
+                let frames = decoded(path, self.rest.points.len(), scratch)?;
                 Ok(Box::new(Timed { frames, numbers: numbers.clone(), frame_rate: *frame_rate }))
             }
         }

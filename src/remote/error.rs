@@ -59,9 +59,9 @@ pub enum RemoteError {
         /// Why it broke off.
         cause: Box<Self>,
     },
-    /// The service could not recover anything.
+    /// The service could not do it.
     #[error("{0}")]
-    Recovery(String),
+    Failed(String),
     /// The network runtime cannot be started.
     #[error("the network cannot be used ({0}); free some memory or files and try again")]
     Runtime(io::Error),

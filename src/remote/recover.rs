@@ -68,7 +68,7 @@ async fn recover(
     }
     client.delete_recovery(&id).await?;
     match ended.problem {
-        Some(problem) => Err(RemoteError::Recovery(problem.detail)),
+        Some(problem) => Err(RemoteError::Failed(problem.detail)),
         None => Ok(ended),
     }
 }

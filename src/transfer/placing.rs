@@ -7,7 +7,7 @@ use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};
 
 /// The similarity of a matrix of 4 × 4 numbers, row by row; `None` where it does more than turn, scale evenly and move.
-pub(crate) fn similarity(m: &[f64; 16]) -> Option<Similarity> {
+pub(super) fn similarity(m: &[f64; 16]) -> Option<Similarity> {
     let linear = DMat3::from_cols_array_2d(&[[m[0], m[4], m[8]], [m[1], m[5], m[9]], [m[2], m[6], m[10]]]);
     let scale = linear.determinant().cbrt();
     let rotation = linear * (1.0 / scale);

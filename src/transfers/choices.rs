@@ -4,16 +4,14 @@ use crate::coding::Goal;
 use crate::design::default_vertices;
 use crate::preparation::{NAME_CHARACTERS, VERTICES, goal, vertices_detail};
 use crate::problem::{self, ApiError};
-use crate::transfer::{MethodChoice, Public, similarity};
+use crate::transfer::{MethodChoice, words};
 use cager_cages::DesignOptions;
 use cager_core::coordinates::{self, CoordinateSystem, MeanValue};
 use cager_explore::alignment::AlignBy;
-use cager_explore::public_cage::PublicCage;
 use cager_explore::transfer::Pose;
-use cager_explore::transfer::rigid::RIGIDITY;
 use cager_geometry::mesh::Point;
 use cager_proto::messages::SessionOptions;
-use cager_proto::transfer_messages::{PublicShape, RestPose, SourceAlignment, TransferMethod, TransferOptions, UpAxis};
+use cager_proto::transfer_messages::{TransferMethod, TransferOptions};
 
 /// Numbers of frames lie below.
 const MAX_NUMBER: f64 = 1e9;
@@ -82,8 +80,7 @@ impl Choices {
         if method != TransferMethod::Rigid && rigidity.is_some() {
             return refuse("rigidity: belongs to the method rigid; leave it out".to_owned());
         }
-        let rigidity = rigidity.unwrap_or(RIGIDITY);
-        if !(rigidity.is_finite() && rigidity >= 0.0) {
+        if let Some(rigidity) = rigidity.filter(|rigidity| !(rigidity.is_finite() && *rigidity >= 0.0)) {
             return refuse(format!("rigidity: is {rigidity}; give a number, 0 or more"));
         }
         if public.is_some() && has_cage {
@@ -93,18 +90,12 @@ impl Choices {
             let detail = "coordinates: with the method rigid, green has normals that follow from the vertices; take mvc or harmonic";
             return refuse(detail.to_owned());
         }
-        let cage = if has_cage { Public::Given } else { Public::Made(shape(public.unwrap_or(PublicShape::Sphere))) };
-        let align = match (align, matrix) {
-            (Some(_), Some(_)) => return refuse("align and matrix: give one of them".to_owned()),
-            (None | Some(SourceAlignment::Pca), None) => AlignBy::Surfaces,
-            (Some(SourceAlignment::None), None) => AlignBy::AsTheyStand,
-            (None, Some(matrix)) => match similarity(&matrix) {
-                Some(similarity) => AlignBy::Given(similarity),
-                None => {
-                    let detail = "matrix: does more than turn, scale evenly and move; give one without mirroring and shear, whose last row is 0 0 0 1";
-                    return refuse(detail.to_owned());
-                }
-            },
+        if align.is_some() && matrix.is_some() {
+            return refuse("align and matrix: give one of them".to_owned());
+        }
+        let Some(align) = words::align(align, matrix) else {
+            let detail = "matrix: does more than turn, scale evenly and move; give one without mirroring and shear, whose last row is 0 0 0 1";
+            return refuse(detail.to_owned());
         };
         let TransferOptions { max_error, mean_error, target_size, .. } = *options;
         let quality = options.quality.clone();
@@ -112,35 +103,13 @@ impl Choices {
         let frames = Some(1);
         let coded = SessionOptions { max_error, mean_error, target_size, quality, frames, ..SessionOptions::default() };
         Ok(Self {
-            method: match method {
-                TransferMethod::Fitted => MethodChoice::Fitted,
-                TransferMethod::Public => MethodChoice::Public(cage),
-                TransferMethod::Rigid => MethodChoice::Rigid(cage, rigidity),
-            },
-            pose: match options.pose.unwrap_or_default() {
-                RestPose::Auto => Pose::Auto,
-                RestPose::Relative => Pose::Relative,
-                RestPose::Absolute => Pose::Absolute,
-            },
+            method: words::method(method, (has_cage, public), rigidity),
+            pose: words::pose(options.pose),
             align,
-            up: options.up.map(|up| match up {
-                UpAxis::X => [1.0, 0.0, 0.0],
-                UpAxis::Y => [0.0, 1.0, 0.0],
-                UpAxis::Z => [0.0, 0.0, 1.0],
-            }),
+            up: options.up.map(words::axis),
             system,
             goal: goal(&coded)?,
         })
-    }
-}
-
-fn shape(shape: PublicShape) -> PublicCage {
-    match shape {
-        PublicShape::Box => PublicCage::Box,
-        PublicShape::Ico => PublicCage::Icosahedron,
-        PublicShape::Sphere => PublicCage::Sphere(162),
-        PublicShape::Hull => PublicCage::Hull(42),
-        PublicShape::Offset => PublicCage::Offset(350),
     }
 }
 

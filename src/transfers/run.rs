@@ -4,11 +4,11 @@ use super::choices::{Choices, design_of};
 use super::{Finished, TransferJob, pairs_of};
 use crate::admission::Held;
 use crate::cage_job::samples;
-use crate::decode::{self, DecodeError, Decoding};
+use crate::decode::DecodeError;
 use crate::design::FRAMES;
 use crate::encode::{EncodeError, EncodeProgress, Encoded, sample_frames};
 use crate::jobs::{Ended, MAX_ATTEMPTS, Phase, ResultsError, Stoppable};
-use crate::origin::{move_from, move_to};
+use crate::origin::move_to;
 use crate::preparation::{cage_of, read_part};
 use crate::problem::{self, ApiError};
 use crate::recover::Encoding;
@@ -16,12 +16,12 @@ use crate::service::Service;
 use crate::store::{Kind, PAIRS, SOURCE, SOURCE_FRAMES, StoreError, TransferMeta, Workshop};
 use crate::tasks::blocking;
 use crate::timing::Timing;
-use crate::transfer::{self, MethodChoice, TransferFailed, Transferred, about_origin};
+use crate::transfer::{self, MethodChoice, MotionFile, TransferFailed, Transferred, about_origin, decoded};
 use cager_cages::{DesignError, Progress as DesignProgress};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_explore::TransferError;
-use cager_formats::{FrameReader, Target, open_frames};
+use cager_formats::{FrameReader, Target};
 use cager_geometry::mesh::Model;
 use cager_proto::transfer_messages::TransferStage;
 use std::fmt::Display;
@@ -210,28 +210,19 @@ impl Source {
 
     /// Of a container, whose frames are decoded into a folder.
     fn of_container(path: &Path, scratch: &Path) -> Result<Self, ApiError> {
-        let refuse = |error: &dyn Display| ApiError::new(problem::INVALID_GEOMETRY, format!("source: {error}"));
-        let unreadable = |error: DecodeError| match error {
-            DecodeError::Formats(_) | DecodeError::Memory { .. } => ApiError::internal(&error),
-            error => refuse(&error),
+        let unreadable = |error: DecodeError| {
+            let refuse = |error: &dyn Display| ApiError::new(problem::INVALID_GEOMETRY, format!("source: {error}"));
+            match &error {
+                DecodeError::Formats(_) | DecodeError::Memory { .. } => ApiError::internal(&error),
+                // Without the path, which is the service's own.
+                DecodeError::Container { cause, .. } => refuse(cause),
+                DecodeError::Cage { cause, .. } => refuse(cause),
+                error => refuse(error),
+            }
         };
-        let of_section = |error| unreadable(DecodeError::container(path, error));
-        let mut container = decode::open(path).map_err(unreadable)?;
-        let (origin, frame_rate) = (container.header().origin, container.header().frame_rate);
-        let mut rest = container.rest().map_err(of_section)?;
-        let mut cage = container.cage().map_err(of_section)?;
-        move_from(origin, &mut rest.points);
-        move_from(origin, &mut cage.vertices);
-        let mut numbers = container.frame_numbers().map_err(of_section)?;
-        if numbers.len() != container.frames() {
-            numbers = (0..container.frames()).map(|frame| frame as f64).collect();
-        }
-        drop(container);
-        let decoded = scratch.join("source.npy");
-        decode::decode(path, &*decoded, Decoding::default(), &mut |_| ()).map_err(unreadable)?;
-        let frames = open_frames(&decoded, rest.points.len()).map_err(|error| ApiError::internal(&error))?;
-        let cage = Some(Cage::new(cage).map_err(|error| refuse(&error))?);
-        Ok(Self { rest, cage, frames, frame_rate, numbers })
+        let MotionFile { rest, cage, numbers, frame_rate } = MotionFile::open(path).map_err(unreadable)?;
+        let frames = decoded(path, rest.points.len(), scratch).map_err(unreadable)?;
+        Ok(Self { rest, cage: Some(cage), frames, frame_rate, numbers })
     }
 }
 

@@ -4,7 +4,7 @@ use super::{FRAMES, PAIRS, completed, create, created, ended, motion, transfer};
 use crate::support::{TestApp, file, text};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
 use cager_proto::messages::JobState;
-use cager_proto::transfer_messages::{SourceAlignment, Transfer, TransferProgress};
+use cager_proto::transfer_messages::{SourceAlignment, Transfer, TransferList, TransferProgress};
 use futures_util::StreamExt as _;
 use reqwest::multipart::Form;
 use serde_json::{Value, json};
@@ -105,6 +105,25 @@ async fn pairs_pull_as_those_of_the_command_line_do() {
     // Without them it is another request.
     let without = create(&app, motion().form(&json!({"align": "none"})), Some("pairs")).await;
     without.problem(422, "idempotency-key-reused");
+}
+
+#[tokio::test]
+async fn the_command_line_has_a_service_move_the_same_and_leaves_nothing_there() {
+    let app = TestApp::start();
+    let session = app.completed(&motion().capture, FRAMES).await;
+    let container = app.get(&format!("/v1/sessions/{}/capture.cager", session.id)).await.expect(200).body;
+    let files = "--source-rest rest.obj --source-frames frames.npy";
+    for (source, more) in [
+        (files, "--align none --fps 12.5 --start 101 --pairs pairs.txt"),
+        (files, "--align 1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1 --method rigid --rigidity 0.02 --detail --quality standard"),
+        ("--source in.cager", "--align none --pose relative --up y --cage-vertices 20"),
+    ] {
+        let moved = |service: &str| motion().moved_from(source, &container, &format!("{more}{service}"));
+        let there = moved(&format!(" --server http://{}", app.address));
+        assert!(there == moved(""), "{source} {more}: another file than without a service");
+    }
+    let list: TransferList = app.get("/v1/transfers").await.is(200);
+    assert!(list.transfers.is_empty(), "{list:?}");
 }
 
 #[tokio::test]

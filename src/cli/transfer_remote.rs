@@ -1,0 +1,119 @@
+//! `cager transfer --server`.
+
+use super::coding_args::goal;
+use super::encode_remote::{coding_options, session_name};
+use super::motion_args::TransferMotionArgs;
+use super::transfer_source::MotionSource;
+use super::{grouped, human_bytes, plain, progress, tell, warn};
+use crate::coding::Goal;
+use crate::remote::{RemoteTransfer, mesh_file, transfer_remotely};
+use anyhow::{Result, bail};
+use cager_client::messages::SessionOptions;
+use cager_client::transfer_messages::{TransferOptions, TransferStage};
+use cager_client::{MeshFile, NewTransfer, TransferSource};
+use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
+use cager_geometry::mesh::Model;
+use std::path::{Path, PathBuf};
+
+/// Has a service move what the arguments say. Frames are read into memory, in double precision.
+pub(super) fn run(
+    args: &TransferMotionArgs,
+    address: &str,
+    (source, target): (&MotionSource, &Model),
+    (output, report): (&Target, Option<Target>),
+) -> Result<()> {
+    let mut container = AtomicFile::create(output)?;
+    let mut report = report.map(AtomicFile::create).transpose()?;
+    let file = |path: &PathBuf| mesh_file(path);
+    let frames = args.source_rest.as_ref().map(|_| source.frames(Path::new(""))).transpose()?;
+    let count = frames.as_ref().map_or_else(|| source.check_frames(), |frames| Ok(frames.frames()))?;
+    let mut options = options(args, goal(&args.coding, true, target, count)?)?;
+    let sent = match (frames, &args.source_rest) {
+        (Some(mut frames), Some(rest)) => {
+            options.frame_rate = frames.frame_rate();
+            options.start = Some(frames.number(0));
+            TransferSource::Files([mesh_file(rest)?, MeshFile::new("frames.npy", array(frames.as_mut())?)])
+        }
+        _ => args.source.as_ref().map(file).transpose()?.map_or(TransferSource::Session, TransferSource::Container),
+    };
+    let [cage, pairs] = [&args.cage, &args.pairs].map(|path| path.as_ref().map(file).transpose());
+    let new = NewTransfer { cage: cage?, pairs: pairs?, options, ..NewTransfer::new(sent, mesh_file(&args.target)?) };
+    let mut outputs = vec![("capture.cager", &mut container)];
+    outputs.extend(report.as_mut().map(|file| ("report", file)));
+    let token = args.service.token();
+    let job = RemoteTransfer { address, token: token.as_deref(), new, outputs };
+    let bar = progress::frames("sending", count);
+    let result = transfer_remotely(job, &mut |told| {
+        bar.set_message(match told.stage {
+            Some(TransferStage::Moving) => "moving",
+            Some(TransferStage::Designing) => "designing",
+            Some(TransferStage::Encoding) => "encoding",
+            Some(TransferStage::Preparing) => "preparing",
+            None => "waiting",
+        });
+        bar.set_position(u64::from(told.moved));
+    });
+    bar.finish_and_clear();
+    let done = result?;
+    let bytes = container.complete()?;
+    commit_together(report.into_iter().chain([container]).collect())?;
+    warn(&done.warnings);
+    tell(&format!(
+        "{}: {} frames of {} points as cages of {} vertices\n  size    {}\n  service {}\n",
+        output.path().display(),
+        grouped(done.frames as usize),
+        grouped(done.points as usize),
+        grouped(done.cage_vertices.unwrap_or(0) as usize),
+        human_bytes(bytes),
+        plain(address),
+    ))
+}
+
+fn options(args: &TransferMotionArgs, goal: Option<Goal>) -> Result<TransferOptions> {
+    let SessionOptions { max_error, mean_error, target_size, quality, exact_rest, .. } =
+        coding_options(goal, args.coding.exact_rest);
+    let (align, matrix) = args.alignment()?;
+    Ok(TransferOptions {
+        name: session_name(&args.output),
+        source_session: None,
+        frames: None,
+        method: Some(args.method),
+        public: args.public,
+        coordinates: args.coordinates.map(|system| system.name().to_owned()),
+        rigidity: args.rigidity,
+        detail: args.detail,
+        pose: args.pose,
+        align,
+        matrix,
+        up: args.up,
+        cage_vertices: args.cage_vertices,
+        frame_rate: args.timing.fps,
+        start: args.timing.start,
+        max_error,
+        mean_error,
+        target_size,
+        quality,
+        exact_rest,
+    })
+}
+
+/// All frames as a .npy file. Their numbers must go on one by one, since a service is told the first alone.
+fn array(frames: &mut dyn FrameReader) -> Result<Vec<u8>> {
+    let (count, points) = (frames.frames(), frames.points());
+    let first = frames.number(0);
+    if let Some(frame) = (1..count).find(|&frame| frames.number(frame) != first + frame as f64) {
+        bail!(
+            "--server: frame {} follows frame {}, and a service counts frames one by one; give the first number as --start, or move them here",
+            frames.number(frame),
+            frames.number(frame - 1)
+        );
+    }
+    let mut bytes = b"\x93NUMPY\x01\0\x76\0".to_vec();
+    let shape = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({count}, {points}, 3), }}");
+    bytes.extend_from_slice(format!("{shape:<117}\n").as_bytes());
+    let mut frame = Vec::new();
+    while frames.read_next(&mut frame)? {
+        bytes.extend(frame.iter().flat_map(|x| x.to_le_bytes()));
+    }
+    Ok(bytes)
+}
