@@ -50,9 +50,6 @@ pub enum TransferFailed {
     /// No cage around both, where the method takes one that is given.
     #[error("no cage around source and target is there; give one, or name the shape of one that is made")]
     NoCage,
-    /// It was told to stop.
-    #[error("the transfer was stopped")]
-    Stopped,
     /// No frames at all.
     #[error("the source has no frames")]
     NoFrames,

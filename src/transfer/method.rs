@@ -3,7 +3,7 @@
 use super::error::TransferFailed;
 use super::job::{MethodChoice, Public, TransferJob};
 use super::report::TransferReport;
-use cager_cages::{EncloseOptions, enclose};
+use cager_cages::{EncloseOptions, enclose_watched};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_explore::alignment::{AlignBy, Aligned, align_surfaces};
@@ -17,6 +17,7 @@ use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::spatial::outside;
 use cager_registration::{Observation, ObservationOptions};
 use faer::Mat;
+use std::ops::ControlFlow;
 
 /// A transfer that is ready.
 pub(super) struct Mover {
@@ -110,7 +111,7 @@ fn fitted(job: &TransferJob<'_>) -> Result<Mover, TransferFailed> {
     let cage = match &job.cage {
         Some(cage) => cage,
         None => {
-            made = around("source", &job.source)?;
+            made = around("source", &job.source, job.stopped)?;
             &made
         }
     };
@@ -122,11 +123,12 @@ fn fitted(job: &TransferJob<'_>) -> Result<Mover, TransferFailed> {
         align: job.align,
         up: job.up,
         pairs: job.pairs.clone(),
+        stopped: job.stopped,
         ..FittedOptions::default()
     };
     let target = TriMesh::from(job.target);
     let transfer = if needs_cage(&target) {
-        let cage = around("target", job.target)?;
+        let cage = around("target", job.target, job.stopped)?;
         let phi = mean_value("target", &cage, &job.target.points)?;
         let target = CagedTarget { model: job.target, cage: &cage, phi: phi.as_ref() };
         FittedTransfer::through_cage(&source, &target, &options)?
@@ -138,10 +140,11 @@ fn fitted(job: &TransferJob<'_>) -> Result<Mover, TransferFailed> {
     Ok(Mover { method, detail: None, cage_vertices: cage.vertices().len(), aligned })
 }
 
-fn around(whose: &'static str, model: &Model) -> Result<Cage, TransferFailed> {
+fn around(whose: &'static str, model: &Model, stopped: &dyn Fn() -> bool) -> Result<Cage, TransferFailed> {
+    let go_on = &mut || if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let vertices = CAGE_VERTICES.min(model.points.len() / 2).max(4);
     let options = EncloseOptions { vertices, ..EncloseOptions::default() };
-    let mesh = enclose(model, &options).map_err(|error| TransferFailed::Enclose { whose, error })?;
+    let mesh = enclose_watched(model, &options, go_on).map_err(|error| TransferFailed::Enclose { whose, error })?;
     Cage::new(mesh).map_err(|error| TransferFailed::Cage { whose, error })
 }
 

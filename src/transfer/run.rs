@@ -5,8 +5,8 @@ use super::job::TransferJob;
 use super::method::Mover;
 use super::report::{QualityReport, TransferReport};
 use crate::recover::RecoveredFrames;
-use cager_explore::MotionQuality;
 use cager_explore::placement::{Placement, lowest};
+use cager_explore::{MotionQuality, TransferError};
 use cager_formats::FrameReader;
 use cager_geometry::mesh::{Point, TriMesh};
 use rayon::prelude::*;
@@ -64,7 +64,7 @@ pub fn transfer(mut job: TransferJob<'_>, progress: &dyn Fn(usize)) -> Result<Tr
 }
 
 fn go_on(job: &TransferJob<'_>) -> Result<(), TransferFailed> {
-    if (job.stopped)() { Err(TransferFailed::Stopped) } else { Ok(()) }
+    if (job.stopped)() { Err(TransferError::Stopped.into()) } else { Ok(()) }
 }
 
 /// What files of frames on their way are made of.

@@ -228,9 +228,11 @@ impl Source {
 
 /// The response for a motion that cannot be moved.
 fn refused(error: &TransferFailed, meta: &TransferMeta) -> ApiError {
-    use TransferError::{Ambiguous, FrameNotFinite, FramePoints};
+    use TransferError::{Ambiguous, FrameNotFinite, FramePoints, Stopped};
     match error {
-        TransferFailed::Formats(cager_formats::Error::Io { .. }) | TransferFailed::Stopped => ApiError::internal(error),
+        TransferFailed::Formats(cager_formats::Error::Io { .. }) | TransferFailed::Transfer(Stopped) => {
+            ApiError::internal(error)
+        }
         TransferFailed::Formats(_) | TransferFailed::NoFrames => {
             let part = meta.parts.get_key_value(SOURCE).or_else(|| meta.parts.get_key_value(SOURCE_FRAMES));
             let place = part.map_or_else(String::new, |(name, file)| format!("{name}: {}: ", file.name));

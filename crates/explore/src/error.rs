@@ -121,6 +121,9 @@ pub enum TransferError {
     /// The source's cage is not valid once the source is aligned.
     #[error("the source's cage cannot be used: {0}")]
     SourceCage(cager_core::cage::CageError),
+    /// It was told to stop.
+    #[error("the transfer was stopped")]
+    Stopped,
     /// The source does not determine the public cage well enough to be inverted.
     #[error("the source cannot be expressed by the public cage: {0}")]
     Inversion(PrepareError),

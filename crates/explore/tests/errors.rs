@@ -15,6 +15,7 @@ use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use cager_geometry::vector::distance;
 use common::{Caged, lumpy};
 use glam::{DMat3, DVec3};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 fn body() -> TriMesh {
     lumpy(10, [1.0, 0.8, 0.6], 0.3)
@@ -51,6 +52,26 @@ fn a_target_that_the_source_cannot_be_laid_onto_is_refused() {
     let nothing = TriMesh { triangles: Vec::new(), ..body() };
     let error = FittedTransfer::new(&source.source(), &nothing, &options).map(|_| ()).unwrap_err();
     assert!(matches!(error, TransferError::Target(MeshError::NoArea)), "{error}");
+}
+
+#[test]
+fn a_transfer_stops_between_two_stages_wherever_it_is_told_to() {
+    let source = Caged::new(body(), 40);
+    let asked = AtomicUsize::new(0);
+    let told_after = |most: usize, align: AlignBy| {
+        asked.store(0, Relaxed);
+        let stopped = || asked.fetch_add(1, Relaxed) >= most;
+        let options = FittedOptions { align, stopped: &stopped, ..FittedOptions::default() };
+        FittedTransfer::new(&source.source(), &body(), &options).map(|_| ())
+    };
+    for (most, align) in [(0, AlignBy::Surfaces), (3, AlignBy::AsTheyStand)] {
+        let error = told_after(most, align).unwrap_err();
+        assert!(matches!(error, TransferError::Stopped), "{error}");
+        // What is stopped asks once more, and no stage follows.
+        assert!(asked.load(Relaxed) <= most + 3, "asked {} times", asked.load(Relaxed));
+    }
+    told_after(usize::MAX, AlignBy::AsTheyStand).unwrap();
+    assert!(asked.load(Relaxed) > 8);
 }
 
 #[test]

@@ -27,7 +27,7 @@ fn pair() -> (Caged, TriMesh) {
 /// A frame of the source to a pose of the target.
 type Method<'a> = dyn Fn(&[Point]) -> Vec<Point> + 'a;
 
-fn relative() -> FittedOptions {
+fn relative() -> FittedOptions<'static> {
     FittedOptions { pose: Pose::Relative, ..FittedOptions::default() }
 }
 

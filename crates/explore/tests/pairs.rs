@@ -38,7 +38,7 @@ fn side(rings: u32, quarter: u32) -> u32 {
     1 + (rings / 2 - 1) * 2 * rings + quarter * rings / 2
 }
 
-fn options(pairs: Vec<VertexPair>) -> FittedOptions {
+fn options(pairs: Vec<VertexPair>) -> FittedOptions<'static> {
     FittedOptions { pose: Pose::Relative, pairs, ..FittedOptions::default() }
 }
 

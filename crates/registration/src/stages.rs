@@ -68,7 +68,7 @@ const FREE_STAGES: usize = 2;
 
 impl Template {
     /// Lays the template, from where `cage` has it, onto another shape (coarse to fine as in Amberg et al. 2007, in the space of the cage), some of its points
-    /// to where they belong, if that is known. `score` tells how far a cage leaves it from there. Runs on the current rayon pool; the result does not depend on
+    /// to where they belong, if that is known. `score` tells how far a cage leaves it from there. Once `stopped`, nothing better is looked for. Runs on the current rayon pool; the result does not depend on
     /// it. The template is as before afterwards.
     ///
     /// # Panics
@@ -80,9 +80,10 @@ impl Template {
         anchors: Option<&Anchors>,
         options: &StageOptions,
         score: &dyn Fn(&[Point]) -> f64,
+        stopped: &dyn Fn() -> bool,
     ) -> Registration {
         let mut to = |softest: f64| {
-            let cage = self.register_to(cage, observation, anchors, options, softest);
+            let cage = self.register_to(cage, observation, anchors, options, softest, stopped);
             let score = score(&cage);
             Registration { cage, score, rigidity: softest }
         };
@@ -90,7 +91,7 @@ impl Template {
         if first.score <= options.good_score || first.rigidity <= options.softest {
             return first;
         }
-        if first.score > HOPELESS {
+        if first.score > HOPELESS || stopped() {
             return first;
         }
         let second = to(options.softest);
@@ -104,6 +105,7 @@ impl Template {
         anchors: Option<&Anchors>,
         options: &StageOptions,
         softest: f64,
+        stopped: &dyn Fn() -> bool,
     ) -> Vec<Point> {
         let at_rest = self.rigidity.rest();
         let last = options.stages.saturating_sub(1).max(1) as f64;
@@ -111,6 +113,9 @@ impl Template {
         let mut known = KnownMatches::none(self.samples.len(), observation.points.len());
         let mut moved = cage.to_vec();
         for stage in 0..options.stages {
+            if stopped() {
+                break;
+            }
             let rigidity = options.rigidity[0] * (softest / options.rigidity[0]).powf(stage as f64 / last);
             let reach = options.reach[0] * narrowing.powi(stage as i32);
             let normal_length = FIRST_NORMAL_LENGTH * NORMAL_DECAY.powi(stage as i32) * self.diagonal;
@@ -191,7 +196,7 @@ mod tests {
         };
         let before = score(cage.vertices());
         let mut lay = |anchors: Option<&Anchors>, options: &StageOptions| {
-            template.register(cage.vertices(), &seen, anchors, options, &score)
+            template.register(cage.vertices(), &seen, anchors, options, &score, &|| false)
         };
         let found = lay(None, &StageOptions::default());
         assert!(found.score < 0.004 && found.score < 0.2 * before, "{} after {before}", found.score);
@@ -202,10 +207,13 @@ mod tests {
         // A surface out of reach is left at once, and not tried again.
         let far = |points: &[Point]| points.iter().map(|p| p.map(|x| 0.02 * x + 90.0)).collect();
         let far = Observation { points: far(&seen.points), normals: seen.normals.clone() };
-        let unreached = template.register(cage.vertices(), &far, None, &StageOptions::default(), &|_| 0.05);
+        let unreached = template.register(cage.vertices(), &far, None, &StageOptions::default(), &|_| 0.05, &|| false);
         assert!(unreached.cage == cage.vertices() && unreached.rigidity == StageOptions::default().rigidity[1]);
+        // One that is stopped at once stays where it is.
+        let stopped = template.register(cage.vertices(), &seen, None, &StageOptions::default(), &|_| 0.02, &|| true);
+        assert!(stopped.cage == cage.vertices() && stopped.rigidity == StageOptions::default().rigidity[1]);
         let mut lay = |anchors: Option<&Anchors>, options: &StageOptions| {
-            template.register(cage.vertices(), &seen, anchors, options, &score)
+            template.register(cage.vertices(), &seen, anchors, options, &score, &|| false)
         };
         // The first vertex belongs somewhere else on the surface than where it lies nearest.
         let place = target.vertices[40];

@@ -86,7 +86,7 @@ impl FittedTransfer {
     ///
     /// # Errors
     /// See [`TransferError`].
-    pub fn new(source: &Source<'_>, target: &TriMesh, options: &FittedOptions) -> Result<Self, TransferError> {
+    pub fn new(source: &Source<'_>, target: &TriMesh, options: &FittedOptions<'_>) -> Result<Self, TransferError> {
         let body = Poisson::new(target).map_err(TransferError::Target)?;
         let seen = Observation::of_mesh(&target.vertices, &target.triangles, &options.observation())?.0;
         let triangles = outward(&target.vertices, &target.triangles);
@@ -105,7 +105,7 @@ impl FittedTransfer {
     pub fn through_cage(
         source: &Source<'_>,
         target: &CagedTarget<'_>,
-        options: &FittedOptions,
+        options: &FittedOptions<'_>,
     ) -> Result<Self, TransferError> {
         let points = &target.model.points;
         let draw = options.observation();
@@ -134,7 +134,7 @@ impl FittedTransfer {
         matches: Vec<u32>,
         under: Vec<u32>,
         target: &[Point],
-        options: &FittedOptions,
+        options: &FittedOptions<'_>,
     ) -> Self {
         let Laid { aligned, rest, laid, registration, .. } = laid;
         let gradients = Gradients::new(&rest);

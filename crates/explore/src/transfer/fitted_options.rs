@@ -19,8 +19,8 @@ pub enum Pose {
 }
 
 /// How a motion is moved by the fitted cage.
-#[derive(Clone, Debug)]
-pub struct FittedOptions {
+#[derive(Clone)]
+pub struct FittedOptions<'a> {
     /// Which pose the target has at rest.
     pub pose: Pose,
     /// How the source is laid onto the target before its cage is fitted.
@@ -33,16 +33,19 @@ pub struct FittedOptions {
     pub pairs: Vec<VertexPair>,
     /// What samples are drawn by.
     pub seed: u64,
+    /// Whether to stop; asked before each stage of a registration.
+    pub stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl Default for FittedOptions {
+impl Default for FittedOptions<'_> {
     fn default() -> Self {
         let (pose, align, up) = (Pose::Auto, AlignBy::Surfaces, None);
-        Self { pose, align, up, stages: StageOptions::default(), pairs: Vec::new(), seed: 0 }
+        let (stages, pairs) = (StageOptions::default(), Vec::new());
+        Self { pose, align, up, stages, pairs, seed: 0, stopped: &|| false }
     }
 }
 
-impl FittedOptions {
+impl FittedOptions<'_> {
     /// How samples are drawn.
     pub(crate) fn observation(&self) -> ObservationOptions {
         ObservationOptions { seed: self.seed, ..ObservationOptions::default() }

@@ -56,7 +56,11 @@ pub(crate) struct Laid {
 }
 
 impl Laid {
-    pub(crate) fn new(source: &Source<'_>, goal: &Goal<'_>, options: &FittedOptions) -> Result<Self, TransferError> {
+    pub(crate) fn new(
+        source: &Source<'_>,
+        goal: &Goal<'_>,
+        options: &FittedOptions<'_>,
+    ) -> Result<Self, TransferError> {
         let (vertices, triangles) = (&source.rest.vertices, &source.rest.triangles);
         check_coordinates(source)?;
         let pairs = Pairs::new(&options.pairs, vertices, goal.points)?;
@@ -68,8 +72,8 @@ impl Laid {
             Surface::new(vertices, goal.triangles.to_vec())
         });
         let found = align_with(&seen, goal.seen, surface.as_ref(), options.align, options.up, &pairs);
-        let fitting = Fitting::new(source, &triangles, goal, &pairs, options.seed);
-        let aligned = fitting.chosen(found, &options.stages)?;
+        let fitting = Fitting::new(source, &triangles, goal, &pairs, options);
+        let aligned = fitting.chosen(found)?;
         let registration = fitting.fit(&aligned.similarity, &options.stages)?;
         if registration.score.is_nan() || registration.score > OUT_OF_REACH {
             let [score, limit] = [registration.score, OUT_OF_REACH].map(|x| 100.0 * x);
@@ -106,11 +110,17 @@ struct Fitting<'a> {
     surface: MeasuredSurface,
     size: f64,
     anchors: Option<Anchors>,
-    seed: u64,
+    options: &'a FittedOptions<'a>,
 }
 
 impl<'a> Fitting<'a> {
-    fn new(source: &'a Source<'a>, triangles: &'a [[u32; 3]], goal: &Goal<'_>, pairs: &Pairs, seed: u64) -> Self {
+    fn new(
+        source: &'a Source<'a>,
+        triangles: &'a [[u32; 3]],
+        goal: &Goal<'_>,
+        pairs: &Pairs,
+        options: &'a FittedOptions<'a>,
+    ) -> Self {
         let frame = canonical_frame(&goal.seen.points);
         let points = frame.apply_all(goal.points);
         let size = diagonal(&surface_vertices(&points, goal.triangles));
@@ -127,15 +137,15 @@ impl<'a> Fitting<'a> {
             let places: Vec<Point> = pairs.to.iter().map(|&p| frame.apply(p).to_array()).collect();
             Anchors::new(rows_of(source.phi, &pairs.vertices), &places, PAIRS_WEIGHT)
         });
-        Self { source, triangles, frame, seen, surface, size, anchors, seed }
+        Self { source, triangles, frame, seen, surface, size, anchors, options }
     }
 
     /// Of several alignments the one from which the cage fits best, after few iterations.
-    fn chosen(&self, found: Vec<Aligned>, stages: &StageOptions) -> Result<Aligned, TransferError> {
+    fn chosen(&self, found: Vec<Aligned>) -> Result<Aligned, TransferError> {
         if found.len() < 2 {
             return Ok(found[0]);
         }
-        let quick = StageOptions { iterations: FIRST_ITERATIONS, good_score: f64::INFINITY, ..*stages };
+        let quick = StageOptions { iterations: FIRST_ITERATIONS, good_score: f64::INFINITY, ..self.options.stages };
         let mut scored = Vec::new();
         for aligned in found {
             scored.push((self.fit(&aligned.similarity, &quick)?, aligned));
@@ -164,10 +174,15 @@ impl<'a> Fitting<'a> {
         let cage = self.source.cage.mesh();
         let cage = TriMesh { vertices: there.apply_all(&cage.vertices), triangles: cage.triangles.clone() };
         let cage = Cage::new(cage).map_err(TransferError::SourceCage)?;
-        let template = TemplateOptions { seed: self.seed, ..TemplateOptions::default() };
+        let (seed, stopped) = (self.options.seed, self.options.stopped);
+        let template = TemplateOptions { seed, ..TemplateOptions::default() };
         let mut template = Template::new(&rest, &cage, self.source.phi, &template)?;
-        let score = |cage: &[Point]| self.surface.distance(&self.seen, &self.laid(cage), self.triangles, self.seed);
-        let mut registration = template.register(cage.vertices(), &self.seen, self.anchors.as_ref(), stages, &score);
+        let score = |cage: &[Point]| self.surface.distance(&self.seen, &self.laid(cage), self.triangles, seed);
+        let anchors = self.anchors.as_ref();
+        let mut registration = template.register(cage.vertices(), &self.seen, anchors, stages, &score, stopped);
+        if stopped() {
+            return Err(TransferError::Stopped);
+        }
         registration.cage = self.frame.inverse().apply_all(&registration.cage);
         Ok(registration)
     }
