@@ -1,6 +1,6 @@
 //! Creating, resuming and deleting cage jobs.
 
-use super::{CageDesign, CageJob, Finished, options, samples};
+use super::{CageJob, Finished, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
@@ -102,12 +102,12 @@ impl Service {
         {
             return Ok(job);
         }
-        self.check_job_queue::<CageDesign>(&tenant.name)?;
+        let place = self.job_place(&tenant.name)?;
         self.reserve_more(tenant, &mut reserved, meta.rest.bytes)?;
         let bytes = meta.rest.bytes + meta.frames.bytes;
         let (store, kept) = (self.store.clone(), meta.clone());
         blocking(move || store.create_cage_job(&kept, &rest, frames)).await??;
-        let job = self.begin_job(meta, bytes);
+        let job = self.begin_job(place, meta, bytes);
         drop(reserved);
         Ok(job)
     }

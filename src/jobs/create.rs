@@ -1,5 +1,6 @@
 //! Creating a job: its input is looked at as long as the client waits, then it is stored and begun to the end.
 
+use super::registry::Place;
 use super::{Job, Phase, Work};
 use crate::auth::Tenant;
 use crate::idempotency::{made_before, once};
@@ -52,14 +53,14 @@ impl Service {
         .await
     }
 
-    /// Refuses a new job where too many of the tenant's wait.
+    /// A place for a new job among those of the tenant that wait.
     ///
     /// # Errors
-    /// 429.
-    pub(crate) fn check_job_queue<W: Work>(&self, tenant: &str) -> Result<(), ApiError> {
+    /// 429 where too many wait or are being stored.
+    pub(crate) fn job_place<W: Work>(self: &Arc<Self>, tenant: &str) -> Result<Place<W>, ApiError> {
         let most = W::most_waiting(&self.config);
-        if W::jobs(self).waiting_of(tenant) < most {
-            return Ok(());
+        if let Some(place) = W::jobs(self).place(Arc::clone(self), tenant, most) {
+            return Ok(place);
         }
         self.rejected(W::QUEUE);
         let detail =
@@ -67,10 +68,10 @@ impl Service {
         Err(ApiError::new(problem::TOO_MANY_JOBS, detail).limit(most as u64).retry_after(10))
     }
 
-    /// Begins a job that is stored.
-    pub(crate) fn begin_job<W: Work>(self: &Arc<Self>, meta: W::Meta, bytes: u64) -> Arc<Job<W>> {
+    /// Begins a job that is stored, in its place.
+    pub(crate) fn begin_job<W: Work>(self: &Arc<Self>, place: Place<W>, meta: W::Meta, bytes: u64) -> Arc<Job<W>> {
         let job = Arc::new(Job::<W>::new(meta, Phase::Waiting, bytes));
-        W::jobs(self).insert(Arc::clone(&job));
+        W::jobs(self).insert_at(place, Arc::clone(&job));
         W::begin(Arc::clone(self), Arc::clone(&job));
         job
     }

@@ -3,9 +3,11 @@
 use super::{Job, Work};
 use crate::idempotency::{Keyed, Requests};
 use crate::problem::{self, ApiError};
+use crate::service::Service;
 use crate::store::JobMeta as _;
 use crate::sync::lock;
 use std::collections::BTreeMap;
+use std::marker::PhantomData;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
@@ -17,21 +19,72 @@ pub(crate) struct Jobs<W: Work> {
 struct Inner<W: Work> {
     jobs: BTreeMap<String, Arc<Job<W>>>,
     requests: Requests,
+    /// The tenants of jobs that are being stored.
+    coming: Vec<String>,
+}
+
+/// A place among a tenant's jobs that wait, for one that is being stored; free again when it is dropped.
+pub(crate) struct Place<W: Work> {
+    service: Arc<Service>,
+    /// None once the job is there.
+    tenant: Option<String>,
+    kind: PhantomData<W>,
+}
+
+impl<W: Work> Drop for Place<W> {
+    fn drop(&mut self) {
+        if let Some(tenant) = self.tenant.take() {
+            lock(&W::jobs(&self.service).inner).came(&tenant);
+        }
+    }
+}
+
+impl<W: Work> Inner<W> {
+    fn insert(&mut self, job: Arc<Job<W>>) {
+        if let Some(idempotency) = job.meta.idempotency() {
+            self.requests.made(job.meta.tenant(), idempotency, job.id());
+        }
+        self.jobs.insert(job.id().to_owned(), job);
+    }
+
+    /// One job less is being stored.
+    fn came(&mut self, tenant: &str) {
+        if let Some(at) = self.coming.iter().position(|of| of == tenant) {
+            self.coming.swap_remove(at);
+        }
+    }
 }
 
 impl<W: Work> Default for Jobs<W> {
     fn default() -> Self {
-        Self { inner: Mutex::new(Inner { jobs: BTreeMap::new(), requests: Requests::default() }) }
+        Self { inner: Mutex::new(Inner { jobs: BTreeMap::new(), requests: Requests::default(), coming: Vec::new() }) }
     }
 }
 
 impl<W: Work> Jobs<W> {
     pub(crate) fn insert(&self, job: Arc<Job<W>>) {
+        lock(&self.inner).insert(job);
+    }
+
+    /// Inserts a job where a place was kept for it.
+    pub(super) fn insert_at(&self, mut place: Place<W>, job: Arc<Job<W>>) {
         let mut inner = lock(&self.inner);
-        if let Some(idempotency) = job.meta.idempotency() {
-            inner.requests.made(job.meta.tenant(), idempotency, job.id());
+        inner.insert(job);
+        if let Some(tenant) = place.tenant.take() {
+            inner.came(&tenant);
         }
-        inner.jobs.insert(job.id().to_owned(), job);
+    }
+
+    /// A place among a tenant's jobs that wait, of which there are so many; none where they are taken.
+    pub(super) fn place(&self, service: Arc<Service>, tenant: &str, most: usize) -> Option<Place<W>> {
+        let mut inner = lock(&self.inner);
+        let mine = inner.jobs.values().filter(|job| job.meta.tenant() == tenant);
+        let waiting = mine.filter(|job| W::waits(&job.status())).count();
+        if waiting + inner.coming.iter().filter(|of| *of == tenant).count() >= most {
+            return None;
+        }
+        inner.coming.push(tenant.to_owned());
+        Some(Place { service, tenant: Some(tenant.to_owned()), kind: PhantomData })
     }
 
     pub(crate) fn remove(&self, id: &str) {
@@ -82,11 +135,6 @@ impl<W: Work> Jobs<W> {
     /// Number of jobs that run or wait.
     pub(crate) fn unfinished(&self) -> usize {
         lock(&self.inner).jobs.values().filter(|job| !job.status().phase.is_final()).count()
-    }
-
-    /// Number of a tenant's jobs that wait.
-    pub(super) fn waiting_of(&self, tenant: &str) -> usize {
-        self.of(tenant).iter().filter(|job| W::waits(&job.status())).count()
     }
 }
 

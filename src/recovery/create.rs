@@ -64,7 +64,7 @@ impl Service {
         checked: Checked,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<RecoveryJob>, ApiError> {
-        self.check_job_queue::<Recovery>(&tenant.name)?;
+        let place = self.job_place(&tenant.name)?;
         let NewRecovery { parts, options, room, .. } = new;
         let bytes = parts.named().map(|(_, part)| part.bytes.len() as u64).sum();
         let _reserved = self.reserve(tenant, bytes)?;
@@ -77,7 +77,7 @@ impl Service {
             let meta = RecoveryMeta { id, tenant, created_ms, options, points, origin, parts: stored, idempotency };
             store.create_recovery(&meta, &parts).map(|()| meta)
         });
-        Ok(self.begin_job(meta.await??, bytes))
+        Ok(self.begin_job(place, meta.await??, bytes))
     }
 }
 

@@ -86,7 +86,7 @@ impl Service {
         checked: Checked,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<TransferJob>, ApiError> {
-        self.check_job_queue::<Transfer>(&tenant.name)?;
+        let place = self.job_place(&tenant.name)?;
         let Checked { new, large: (part, file, spool), points, frames, origin } = checked;
         let NewTransfer { files, options, room, mut reserved, .. } = new;
         self.reserve_more(tenant, &mut reserved, files.values().map(|file| file.bytes.len() as u64).sum())?;
@@ -104,7 +104,7 @@ impl Service {
         });
         let meta = meta.await??;
         let bytes = meta.parts.values().map(|part| part.bytes).sum();
-        let job = self.begin_job(meta, bytes);
+        let job = self.begin_job(place, meta, bytes);
         drop(reserved);
         Ok(job)
     }
