@@ -55,6 +55,17 @@ pub(crate) fn request<'a>(
     Some(Idempotency { key, fingerprint: format!("{SENT}{sent}") })
 }
 
+/// A request with a key for files, by their parts, names and digests, and options, as [`request`].
+pub(crate) fn request_of_files<'a>(
+    key: Option<String>,
+    files: impl IntoIterator<Item = (&'a str, &'a str, blake3::Hash)>,
+    options: &impl Serialize,
+) -> Option<Idempotency> {
+    let files: Vec<_> = files.into_iter().map(|(part, name, digest)| (part, extension(name), digest)).collect();
+    let sent = files.iter().flat_map(|(part, name, digest)| [part.as_bytes(), name.as_bytes(), digest.as_bytes()]);
+    request(key, sent, options)
+}
+
 /// The part of a file's name that says something about its content, in lower case.
 pub(crate) fn extension(name: &str) -> String {
     name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase()

@@ -2,12 +2,14 @@
 
 use crate::admission::{Budget, Held};
 use crate::decode::{self, DecodeError, Positions};
+use crate::idempotency::{Keyed, Requests};
+use crate::jobs::new_job;
 use crate::origin::{move_to, own_origin};
 use crate::pose_cage;
 use crate::pose_faces::same_faces;
 use crate::preparation::{NAME_CHARACTERS, cage_of, check_extent, read_part};
 use crate::problem::{self, ApiError};
-use crate::store::NamedFile;
+use crate::store::{Idempotency, NamedFile};
 use crate::sync::lock;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem as _, MeanValue};
@@ -28,14 +30,35 @@ const MOST_POSES: usize = 64;
 
 /// All shape spaces by id; ids are in order of creation.
 pub(crate) struct ShapeSpaces {
-    all: Mutex<BTreeMap<String, Arc<KeptSpace>>>,
+    all: Mutex<Kept>,
     memory: Arc<Budget>,
     idle: Duration,
+}
+
+#[derive(Default)]
+struct Kept {
+    spaces: BTreeMap<String, Arc<KeptSpace>>,
+    requests: Requests,
+}
+
+impl Kept {
+    /// Forgets the others, with the keys that they were made for.
+    fn retain(&mut self, keeps: impl Fn(&KeptSpace) -> bool) {
+        let Self { spaces, requests } = self;
+        spaces.retain(|_, kept| {
+            let stays = keeps(kept);
+            if let Some(idempotency) = kept.idempotency.as_ref().filter(|_| !stays) {
+                requests.forget(&kept.tenant, idempotency);
+            }
+            stays
+        });
+    }
 }
 
 /// A shape space in memory.
 pub(crate) struct KeptSpace {
     tenant: String,
+    idempotency: Option<Idempotency>,
     pub(crate) view: View,
     shapes: Shapes,
     used: Mutex<Instant>,
@@ -81,10 +104,10 @@ impl ShapeSpaces {
     /// Poses that do not go together.
     pub(crate) fn create(
         &self,
-        (id, created_ms): (String, u64),
         tenant: &str,
         options: ShapeSpaceOptions,
         poses: Poses,
+        idempotency: Option<Idempotency>,
     ) -> Result<Arc<KeptSpace>, ApiError> {
         let Poses { model, cage, poses, origin, memory } = poses;
         let on = options.on.unwrap_or_default();
@@ -105,6 +128,7 @@ impl ShapeSpaces {
             let mesh = TriMesh::from(&model);
             Shapes::Mesh(Box::new(ShapeSpace::new(&mesh.triangles, &poses).map_err(refuse)?))
         };
+        let (id, created_ms) = new_job();
         let view = View {
             id: id.clone(),
             name: options.name,
@@ -115,9 +139,13 @@ impl ShapeSpaces {
             cage_vertices,
             origin,
         };
-        let used = Mutex::new(Instant::now());
-        let kept = Arc::new(KeptSpace { tenant: tenant.to_owned(), view, shapes, used, _memory: memory });
-        lock(&self.all).insert(id, Arc::clone(&kept));
+        let (tenant, used) = (tenant.to_owned(), Mutex::new(Instant::now()));
+        let kept = Arc::new(KeptSpace { tenant, idempotency, view, shapes, used, _memory: memory });
+        let mut all = lock(&self.all);
+        if let Some(idempotency) = &kept.idempotency {
+            all.requests.made(&kept.tenant, idempotency, &id);
+        }
+        all.spaces.insert(id, Arc::clone(&kept));
         Ok(kept)
     }
 
@@ -143,7 +171,7 @@ impl ShapeSpaces {
     /// 404 where there is none.
     pub(crate) fn find(&self, tenant: &str, id: &str) -> Result<Arc<KeptSpace>, ApiError> {
         self.forget_idle();
-        let found = lock(&self.all).get(id).filter(|kept| kept.tenant == tenant).cloned();
+        let found = lock(&self.all).spaces.get(id).filter(|kept| kept.tenant == tenant).cloned();
         let found = found.ok_or_else(|| {
             let detail = "there is no shape space with this id; they are forgotten after a while without a request, and when the service starts anew: make it again";
             ApiError::new(problem::NOT_FOUND, detail)
@@ -156,25 +184,38 @@ impl ShapeSpaces {
     pub(crate) fn of(&self, tenant: &str) -> Vec<View> {
         self.forget_idle();
         let all = lock(&self.all);
-        all.values().rev().filter(|kept| kept.tenant == tenant).map(|kept| kept.view.clone()).collect()
+        all.spaces.values().rev().filter(|kept| kept.tenant == tenant).map(|kept| kept.view.clone()).collect()
     }
 
     pub(crate) fn remove(&self, id: &str) {
-        lock(&self.all).remove(id);
+        lock(&self.all).retain(|kept| kept.view.id != id);
     }
 
     /// Forgets those that nobody asked for in a while.
     pub(crate) fn forget_idle(&self) {
-        lock(&self.all).retain(|_, kept| lock(&kept.used).elapsed() < self.idle);
+        lock(&self.all).retain(|kept| lock(&kept.used).elapsed() < self.idle);
     }
 
     pub(crate) fn count(&self) -> usize {
-        lock(&self.all).len()
+        lock(&self.all).spaces.len()
     }
 
     /// Their memory, in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.memory.used()
+    }
+}
+
+impl Keyed<KeptSpace> for ShapeSpaces {
+    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R {
+        self.forget_idle();
+        work(&mut lock(&self.all).requests)
+    }
+
+    fn made(&self, id: &str) -> Option<Arc<KeptSpace>> {
+        let made = lock(&self.all).spaces.get(id).cloned()?;
+        *lock(&made.used) = Instant::now();
+        Some(made)
     }
 }
 

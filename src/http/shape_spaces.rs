@@ -5,17 +5,18 @@ use super::frames::too_slow;
 use super::job_frames::OCTETS;
 use super::multipart::{self, FormHeader};
 use super::openapi;
-use super::spooled::{self, FormParts};
-use crate::jobs::new_job;
+use super::spooled::{self, FormParts, SpooledForm};
+use crate::auth::Tenant;
+use crate::idempotency::{once, request_of_files};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::shape_spaces::{KeptSpace, Wanted, check_options};
-use crate::store::SOURCE;
-use crate::tasks::blocking;
+use crate::store::{Idempotency, SOURCE};
+use crate::tasks::{blocking, to_the_end};
 use axum::Json;
 use axum::extract::{FromRequestParts, Path, Request, State};
 use axum::response::{IntoResponse, Response};
-use cager_proto::shape_messages::{ShapeSpace, ShapeSpaceList};
+use cager_proto::shape_messages::{ShapeSpace, ShapeSpaceList, ShapeSpaceOptions};
 use http::request::Parts;
 use http::{StatusCode, header};
 use serde::Deserialize;
@@ -41,6 +42,7 @@ impl FromRequestParts<Arc<Service>> for RequestedSpace {
 /// container's model. It is kept in memory, and forgotten after a while without a request.
 #[utoipa::path(
     post, path = "/v1/shapespaces", operation_id = "create_shape_space", tag = "shapespaces",
+    params(("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[ -~]+$", description = "A repetition with the same key and content gives the same shape space")),
     request_body(content = openapi::NewShapeSpaceForm, content_type = "multipart/form-data"),
     responses((status = 201, description = "The shape space", body = ShapeSpace, headers(("Location" = String, description = "Address of the shape space")))),
 )]
@@ -51,7 +53,7 @@ pub(crate) async fn create(
 ) -> Result<Response, ApiError> {
     let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
     let parts = "pose, two or more, or source, cage and options";
-    let FormHeader { patience, .. } = multipart::check_form_header(&service, &request, parts, limit)?;
+    let FormHeader { idempotency_key, patience } = multipart::check_form_header(&service, &request, parts, limit)?;
     let _place = service.stream(&tenant)?;
     let parts = FormParts {
         files: &["cage"],
@@ -63,14 +65,41 @@ pub(crate) async fn create(
     };
     let reading = spooled::read(&service, &tenant, request, &parts);
     let form = timeout(patience, reading).await.map_err(|_| too_slow())??;
+    let (form, request) = blocking(move || {
+        let request = request_of(idempotency_key, &form);
+        (form, request)
+    })
+    .await?;
+    let kept = to_the_end(async move {
+        let (making, owner) = (Arc::clone(&service), Arc::clone(&tenant));
+        once(&service.shape_spaces, &tenant.name, request, |request| make(making, owner, form, request)).await
+    });
+    let view = kept.await?.view.clone();
+    let location = format!("/v1/shapespaces/{}", view.id);
+    Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(view)).into_response())
+}
+
+/// The request with an idempotency key that this form is. Blocks.
+fn request_of(key: Option<String>, form: &SpooledForm<ShapeSpaceOptions>) -> Option<Idempotency> {
+    let files = form.many.iter().map(|file| ("pose", file)).chain(form.files.iter().map(|(part, file)| (*part, file)));
+    let files = files.map(|(part, file)| (part, &file.name[..], blake3::hash(&file.bytes)));
+    let large = form.large.iter().map(|large| (large.part, &large.name[..], large.spool.digest()));
+    request_of_files(key, files.chain(large), &form.options)
+}
+
+async fn make(
+    service: Arc<Service>,
+    tenant: Arc<Tenant>,
+    form: SpooledForm<ShapeSpaceOptions>,
+    request: Option<Idempotency>,
+) -> Result<Arc<KeptSpace>, ApiError> {
     let session = match form.options.source_session.clone() {
         Some(id) => Some(service.completed_container(&tenant.name, &id).await?),
         None => None,
     };
     let place = service.reading.take(&tenant.name, 1).await;
-    let making = Arc::clone(&service);
-    let kept = blocking(move || {
-        let (_place, threads) = (place, making.solvers.pool());
+    blocking(move || {
+        let (_place, threads) = (place, service.solvers.pool());
         threads.install(|| {
             let cage = form.files.get("cage");
             let source = form.large.as_ref().map(|large| large.spool.path()).or(session.as_deref());
@@ -79,18 +108,16 @@ pub(crate) async fn create(
                 let detail = "send the poses as parts pose, or one container as source, or name a session as options.source_session";
                 return Err(ApiError::new(problem::BAD_REQUEST, detail));
             }
-            let spaces = &making.shape_spaces;
+            let spaces = &service.shape_spaces;
             let wanted = Wanted { spaces, tenant: &tenant.name, options: &form.options, cage };
             let poses = match source {
                 Some(path) => wanted.of_container(path)?,
                 None => wanted.of_files(&form.many)?,
             };
-            spaces.create(new_job(), &tenant.name, form.options, poses)
+            spaces.create(&tenant.name, form.options, poses, request)
         })
-    });
-    let view = kept.await??.view.clone();
-    let location = format!("/v1/shapespaces/{}", view.id);
-    Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(view)).into_response())
+    })
+    .await?
 }
 
 /// Lists the tenant's shape spaces, newest first.

@@ -5,7 +5,7 @@ use super::{Transfer, TransferJob};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::cage_job::samples;
-use crate::idempotency::{extension, request};
+use crate::idempotency::request_of_files;
 use crate::jobs::new_job;
 use crate::origin::own_origin;
 use crate::preparation::{cage_of, check_extent, read_part};
@@ -112,12 +112,9 @@ impl Service {
 
 /// The request with an idempotency key that this input is. Blocks.
 fn request_of(new: &NewTransfer) -> Option<Idempotency> {
-    let files = new.files.iter().map(|(part, file)| (*part, &file.name, blake3::hash(&file.bytes)));
-    let large = new.large.iter().map(|(part, name, spool)| (*part, name, spool.digest()));
-    let parts: Vec<(&str, String, blake3::Hash)> =
-        files.chain(large).map(|(part, name, digest)| (part, extension(name), digest)).collect();
-    let sent = parts.iter().flat_map(|(part, name, digest)| [part.as_bytes(), name.as_bytes(), digest.as_bytes()]);
-    request(new.idempotency_key.clone(), sent, &new.options)
+    let files = new.files.iter().map(|(part, file)| (*part, &file.name[..], blake3::hash(&file.bytes)));
+    let large = new.large.iter().map(|(part, name, spool)| (*part, &name[..], spool.digest()));
+    request_of_files(new.idempotency_key.clone(), files.chain(large), &new.options)
 }
 
 fn geometry(detail: String) -> ApiError {

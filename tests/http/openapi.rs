@@ -87,7 +87,7 @@ fn headers_that_clients_rely_on_are_described() {
         };
         operations.iter().filter(|(_, _, o)| takes(o)).map(|(path, _, _)| path.rsplit('/').next().unwrap()).collect()
     };
-    assert_eq!(taking("Idempotency-Key"), ["cages", "recoveries", "sessions", "transfers"]);
+    assert_eq!(taking("Idempotency-Key"), ["cages", "recoveries", "sessions", "shapespaces", "transfers"]);
     assert_eq!(taking("Last-Event-ID"), ["events"; 4]);
     for header in ["Range", "If-Range", "If-None-Match"] {
         let recovered = ["cages", "capture.cager", "joints.bvh", "joints.csv", "report"];

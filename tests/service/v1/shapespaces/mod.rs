@@ -44,6 +44,11 @@ async fn create(api: &Api, form: Form) -> Reply {
     api.send(api.request(http::Method::POST, "/v1/shapespaces").multipart(form)).await
 }
 
+async fn create_keyed(api: &Api, form: Form, key: &str) -> Reply {
+    let request = api.request(http::Method::POST, "/v1/shapespaces").header("idempotency-key", key);
+    api.send(request.multipart(form)).await
+}
+
 async fn shape(api: &Api, id: &str, query: &str) -> Vec<f32> {
     let bytes = api.get(&format!("/v1/shapespaces/{id}/pose?{query}")).await.expect(200).body;
     bytes.as_chunks().0.iter().map(|&x| f32::from_le_bytes(x)).collect()
@@ -178,14 +183,41 @@ async fn what_one_tenant_cannot_have_is_refused_before_it_is_made() {
 }
 
 #[tokio::test]
+async fn the_same_request_again_gives_the_same_shape_space() {
+    let app = TestApp::start();
+    let options = json!({"on": "mesh"});
+    let (one, other) = tokio::join!(create_keyed(&app, poses(&options), "k"), create_keyed(&app, poses(&options), "k"));
+    let made: Vec<ShapeSpace> =
+        [&one, &other].into_iter().filter(|reply| reply.status == 201).map(|reply| reply.json()).collect();
+    assert!(made.len() == 2 || [one.status, other.status].contains(&409), "{} {}", one.status, other.status);
+    let again: ShapeSpace = create_keyed(&app, poses(&options), "k").await.is(201);
+    assert!(made.iter().all(|made| made.id == again.id));
+    create_keyed(&app, poses(&json!({})), "k").await.problem(422, "idempotency-key-reused");
+    let turned = Form::new().part("options", text(&options));
+    let turned = turned.part("pose", file("a.obj", &pose(10))).part("pose", file("b.obj", &pose(0)));
+    create_keyed(&app, turned, "k").await.problem(422, "idempotency-key-reused");
+    let list: ShapeSpaceList = app.get("/v1/shapespaces").await.is(200);
+    assert_eq!(list.shapespaces.len(), 1);
+    // The key goes with what it made.
+    app.delete(&format!("/v1/shapespaces/{}", again.id)).await.expect(204);
+    let anew: ShapeSpace = create_keyed(&app, poses(&options), "k").await.is(201);
+    assert_ne!(anew.id, again.id);
+    // What is refused takes no key.
+    create_keyed(&app, Form::new(), "none").await.problem(400, "bad-request");
+    create_keyed(&app, poses(&options), "none").await.expect(201);
+}
+
+#[tokio::test]
 async fn shape_spaces_belong_to_their_tenant_and_are_forgotten_after_a_while() {
     let app = TestApp::guarded_with(&[("anna", ANNA, ""), ("bert", BERT, "")], &["shape_idle_s=1"]);
     let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
-    let made: ShapeSpace = create(&anna, poses(&json!({}))).await.is(201);
+    let made: ShapeSpace = create_keyed(&anna, poses(&json!({})), "k").await.is(201);
     bert.get(&format!("/v1/shapespaces/{}/pose?weights=1,0", made.id)).await.problem(404, "not-found");
     let list: ShapeSpaceList = bert.get("/v1/shapespaces").await.is(200);
     assert!(list.shapespaces.is_empty());
     shape(&anna, &made.id, "weights=1,0").await;
     tokio::time::sleep(Duration::from_millis(1100)).await;
     anna.get(&format!("/v1/shapespaces/{}/pose?weights=1,0", made.id)).await.problem(404, "not-found");
+    // So is the key.
+    assert_ne!(create_keyed(&anna, poses(&json!({})), "k").await.is::<ShapeSpace>(201).id, made.id);
 }
