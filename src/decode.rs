@@ -278,16 +278,18 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
-    /// Of a container.
+    /// Of a container. `keeps` tells whether coordinates of so many bytes may be kept; otherwise they are computed for each reading.
     ///
     /// # Errors
     /// As [`decode`].
-    pub(crate) fn open(path: &Path) -> Result<Self, DecodeError> {
+    pub(crate) fn open(path: &Path, keeps: impl FnOnce(u64) -> bool) -> Result<Self, DecodeError> {
         let mut container = open(path)?;
         container.limit_coordinates(free_bytes());
         let memory = Memory::half_of_free();
         let batches = container.frames().div_ceil(BATCH);
-        let model = bind(&mut container, path, None, None, |points, columns| memory.keeps(points, columns, batches))?;
+        let model = bind(&mut container, path, None, None, |points, columns| {
+            memory.keeps(points, columns, batches) && keeps(4 * (points * columns) as u64)
+        })?;
         Ok(Self { container, model, path: path.to_owned() })
     }
 

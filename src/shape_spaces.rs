@@ -322,7 +322,7 @@ impl Wanted<'_> {
             None => None,
         };
         drop(container);
-        let mut positions = Positions::open(path).map_err(|error| unreadable(&error))?;
+        let mut positions = Positions::open(path, |_| true).map_err(|error| unreadable(&error))?;
         let mut poses = Vec::with_capacity(frames.len());
         for &frame in frames {
             let found = positions.read(&[frame as usize]).map_err(|error| unreadable(&error))?.concat();

@@ -1,15 +1,22 @@
 //! Transfers as the service tells of them.
 
 use super::TransferJob;
+use crate::admission::Held;
 use crate::decode::Positions;
 use crate::jobs::{Phase, Piece};
-use crate::store::{Kind, Store};
+use crate::service::Service;
+use crate::store::Kind;
 use cager_proto::messages::JobState;
 use cager_proto::transfer_messages::{Transfer as View, TransferProgress};
 use std::fs::File;
 use std::io;
+use std::ops::Range;
 use std::os::unix::fs::FileExt as _;
 use std::sync::Arc;
+use tokio::runtime::Handle;
+
+/// Part of a tenant's share of the memory for downloads that the coordinates for one reader may take.
+const PARTS: u64 = 4;
 
 impl TransferJob {
     /// The transfer as returned by the API.
@@ -62,50 +69,73 @@ impl TransferJob {
 enum Positioned {
     /// As they are moved.
     Live(Arc<File>),
-    /// What a decoder gets back.
-    Decoded(Box<Positions>),
+    /// What a decoder gets back, with the permit for the coordinates that it keeps.
+    Decoded { positions: Box<Positions>, _memory: Option<Held> },
 }
 
 /// Positions of a transfer for one reader, who gets all from one place: as they are moved where it runs, else decoded.
-#[derive(Default)]
-pub(crate) struct TransferFrames(Option<Positioned>);
+pub(crate) struct TransferFrames {
+    service: Arc<Service>,
+    from: Option<Positioned>,
+}
 
 impl TransferFrames {
-    /// Positions from frame `first` on, at most `most`, n × 12 bytes each. Blocks.
+    pub(crate) fn new(service: Arc<Service>) -> Self {
+        Self { service, from: None }
+    }
+
+    /// Positions from frame `first` on, at most `most`, n × 12 bytes each. Call on a thread that may block, within a tokio runtime.
     ///
     /// # Errors
-    /// The transfer failed, or its files cannot be read.
-    pub(crate) fn read(&mut self, job: &TransferJob, store: &Store, first: u32, most: u32) -> io::Result<Piece> {
+    /// The transfer failed or is deleted, its files cannot be read, or the service stops.
+    pub(crate) fn read(&mut self, job: &TransferJob, first: u32, most: u32) -> io::Result<Piece> {
         let (phase, live) = (job.phase(), job.status().progress.live.clone());
-        if self.0.is_none() {
-            self.0 = match (&phase, live) {
-                (Phase::Completed(_), _) => {
-                    let path = store.job_file(Kind::Transfer, job.id(), "capture.cager").map_err(io::Error::other)?;
-                    Some(Positioned::Decoded(Box::new(Positions::open(&path).map_err(io::Error::other)?)))
-                }
-                (_, live) => live.map(Positioned::Live),
-            };
-        }
         if let Phase::Failed(_) = phase {
             return Err(io::Error::other("the transfer failed"));
         }
-        let done = job.progress().moved;
-        let frames = most.min(done.saturating_sub(first));
+        self.from = self.from.take().or_else(|| live.map(Positioned::Live));
+        let frames = most.min(job.progress().moved.saturating_sub(first));
         let is_last = first >= job.meta.frames;
-        let numbers: Vec<f32> = match &mut self.0 {
+        let numbers: Vec<f32> = match &self.from {
             _ if frames == 0 => Vec::new(),
-            None => return Ok(Piece { is_last, ..Piece::default() }),
-            Some(Positioned::Decoded(positions)) => {
-                let wanted: Vec<usize> = (first..first + frames).map(|frame| frame as usize).collect();
-                positions.read(&wanted).map_err(io::Error::other)?.concat()
-            }
+            None if !phase.is_final() => return Ok(Piece { is_last, ..Piece::default() }),
             Some(Positioned::Live(file)) => {
                 let stride = 24 * u64::from(job.meta.points);
                 let mut bytes = vec![0; (stride * u64::from(frames)) as usize];
                 file.read_exact_at(&mut bytes, stride * u64::from(first))?;
                 bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x) as f32).collect()
             }
+            _ => self.decoded(job, first..first + frames)?,
         };
         Ok(Piece { bytes: numbers.iter().flat_map(|x| x.to_le_bytes()).collect(), frames, is_last })
+    }
+
+    /// Positions of these frames from the container, on the threads that decode, in a place among what they do.
+    fn decoded(&mut self, job: &TransferJob, frames: Range<u32>) -> io::Result<Vec<f32>> {
+        let Self { service, from } = self;
+        let _place = Handle::current().block_on(async {
+            tokio::select! {
+                place = service.coding.take(&job.meta.tenant, 1) => Ok(place),
+                () = job.deleted().cancelled() => Err(io::Error::other("the transfer was deleted")),
+                () = service.stopping().cancelled() => Err(io::Error::other("the service is stopping")),
+            }
+        })?;
+        let frames: Vec<usize> = frames.map(|frame| frame as usize).collect();
+        service.coders.install(|| {
+            if from.is_none() {
+                let path =
+                    service.store.job_file(Kind::Transfer, job.id(), "capture.cager").map_err(io::Error::other)?;
+                let (memory, mut held) = (&service.download_memory, None);
+                // Without room for them, coordinates are computed anew for each piece.
+                let keeps = |bytes: u64| {
+                    held = memory.try_take(&job.meta.tenant, bytes).ok().filter(|_| bytes <= memory.most() / PARTS);
+                    held.is_some()
+                };
+                let positions = Positions::open(&path, keeps).map_err(io::Error::other)?;
+                *from = Some(Positioned::Decoded { positions: Box::new(positions), _memory: held });
+            }
+            let Some(Positioned::Decoded { positions, .. }) = from else { return Ok(Vec::new()) };
+            Ok(positions.read(&frames).map_err(io::Error::other)?.concat())
+        })
     }
 }

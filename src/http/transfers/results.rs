@@ -30,8 +30,8 @@ pub(crate) async fn frames(
     let there = query.there(&job, job.progress().moved)?;
     let frame_bytes = 12 * u64::from(job.meta.points);
     let piece = (PIECE_BYTES / frame_bytes).clamp(1, PIECE_FRAMES);
-    let (store, mut frames) = (service.store.clone(), TransferFrames::default());
-    let read = Box::new(move |job: &TransferJob, next: u32, most: u32| frames.read(job, &store, next, most));
+    let mut frames = TransferFrames::new(Arc::clone(&service));
+    let read = Box::new(move |job: &TransferJob, next: u32, most: u32| frames.read(job, next, most));
     stream(service, &tenant, job, (query, there), (piece as u32, piece * frame_bytes), read)
 }
 
