@@ -7,7 +7,7 @@ use crate::jobs::new_job;
 use crate::origin::{move_to, own_origin};
 use crate::pose_cage;
 use crate::pose_faces::same_faces;
-use crate::preparation::{NAME_CHARACTERS, cage_of, check_extent, read_part};
+use crate::preparation::{cage_of, check_extent, check_told, read_part};
 use crate::problem::{self, ApiError};
 use crate::store::{Idempotency, NamedFile};
 use crate::sync::lock;
@@ -356,9 +356,7 @@ impl Wanted<'_> {
 /// An option that is out of range.
 pub(crate) fn check_options(options: &ShapeSpaceOptions) -> Result<(), ApiError> {
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
-    if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
-        return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
-    }
+    check_told(options.name.as_deref(), None, None)?;
     let frames = &options.frames;
     if frames.len() > MOST_POSES {
         return refuse(format!("frames: there are {} poses, of at most {MOST_POSES}; name fewer", frames.len()));

@@ -1,6 +1,6 @@
 //! Validation of the options of a cage design.
 
-use crate::preparation::{NAME_CHARACTERS, VERTICES, vertices_detail};
+use crate::preparation::{VERTICES, check_told, vertices_detail};
 use crate::problem::{self, ApiError};
 use cager_cages::{DesignOptions, Goal, Style};
 use cager_proto::cage_messages::{CageOptions, CageStyle};
@@ -13,9 +13,7 @@ use std::time::Duration;
 pub(super) fn design_options(options: &CageOptions, max_seconds: u64) -> Result<DesignOptions, ApiError> {
     let mut design = DesignOptions::default();
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
-    if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
-        return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
-    }
+    check_told(options.name.as_deref(), None, None)?;
     if let Some(name) = options.coordinates.as_deref().filter(|&name| name != "mvc") {
         return refuse(format!("coordinates: cages are designed for mvc only, not for {name:?}; leave it out"));
     }

@@ -62,7 +62,7 @@ pub(super) fn events<W: Work>(
     Ok(progress::stream(service, place, headers, ProgressSource { changes, deleted, look }))
 }
 
-/// A result, or these bytes of it, which never change; `missing` says why a completed job may not have it.
+/// A result, or these bytes of it, which never change.
 ///
 /// # Errors
 /// A job that is not completed, a result that it does not have, and storage errors.
@@ -71,12 +71,12 @@ pub(super) async fn result<W: Work>(
     tenant: &Tenant,
     job: &Arc<Job<W>>,
     bytes: Option<Range<u64>>,
-    (name, media_type, missing): (&str, &'static str, &str),
+    (name, media_type): (&str, &'static str),
     headers: &HeaderMap,
 ) -> Result<Response, ApiError> {
     let finished = job.finished()?;
     let part = W::files(&finished).iter().find(|part| part.name == name);
-    let part = part.ok_or_else(|| ApiError::new(problem::NOT_FOUND, missing))?;
+    let part = part.ok_or_else(|| ApiError::new(problem::NOT_FOUND, W::MISSING))?;
     let path = service.store.job_file(crate::jobs::kind_of::<W>(), job.id(), name)?;
     let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
     let opened = opened.map_err(|error| job.fail_if_damaged(&service.store, error))?;

@@ -45,6 +45,8 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
     const FAILED: problem::Kind;
     /// What has to happen before there are results.
     const UNFINISHED: &'static str;
+    /// Why a completed one may not have a result.
+    const MISSING: &'static str = "it has no such result";
     /// The reason that is counted where too many wait.
     const QUEUE: &'static str;
 

@@ -22,7 +22,27 @@ pub(crate) struct Choices {
 }
 
 /// Most characters of a name that a user gives.
-pub(crate) const NAME_CHARACTERS: usize = 200;
+const NAME_CHARACTERS: usize = 200;
+/// Numbers of frames lie below.
+const MAX_NUMBER: f64 = 1e9;
+
+/// Refuses names that are too long, and rates and numbers of frames that are none.
+///
+/// # Errors
+/// Such an option.
+pub(crate) fn check_told(name: Option<&str>, frame_rate: Option<f64>, start: Option<f64>) -> Result<(), ApiError> {
+    let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
+    if name.is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
+        return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
+    }
+    if frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
+        return refuse("frame_rate: give a positive number of frames per second".to_owned());
+    }
+    if start.is_some_and(|start| start.is_nan() || start.abs() >= MAX_NUMBER) {
+        return refuse("start: give the number of the first frame, or leave it out".to_owned());
+    }
+    Ok(())
+}
 
 impl Choices {
     /// Validates what does not depend on the cage.
@@ -31,12 +51,7 @@ impl Choices {
     /// An option that is unknown, out of range or not available.
     pub(crate) fn of(options: &SessionOptions) -> Result<Self, ApiError> {
         let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
-        if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
-            return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
-        }
-        if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
-            return refuse("frame_rate: give a positive number of frames per second".to_owned());
-        }
+        check_told(options.name.as_deref(), options.frame_rate, None)?;
         if options.frames == Some(0) {
             return refuse(
                 "frames: a capture has at least one frame; leave it out where their number is not known".to_owned(),

@@ -11,7 +11,7 @@ pub(crate) use cage_maker::{
     CAGE_NAME, CageMaker, Enclosed, VERTICES, check_extent, obj_of, refuse_cage, vertices_detail,
 };
 pub(crate) use checks::{cannot_be_coded, check, check_model};
-pub(crate) use choices::{Choices, NAME_CHARACTERS, content_key, goal};
+pub(crate) use choices::{Choices, check_told, content_key, goal};
 pub(crate) use geometry::{Geometry, cage_of, read, read_cage, read_part};
 pub(crate) use solvers::{SolverRequest, SolverResponse, Solvers};
 

@@ -3,7 +3,7 @@
 use super::frames::MAX_FRAMES;
 use crate::coding::Goal;
 use crate::mismatch::Up;
-use crate::preparation::{NAME_CHARACTERS, goal};
+use crate::preparation::{check_told, goal};
 use crate::problem::{self, ApiError};
 use crate::recover::RecoverOptions;
 use cager_proto::messages::SessionOptions;
@@ -13,8 +13,6 @@ use std::ops::RangeInclusive;
 
 const POINTS: RangeInclusive<u32> = 100..=1_000_000;
 const DEFAULT_POINTS: u32 = 15_000;
-/// Numbers of frames lie below.
-const MAX_NUMBER: f64 = 1e9;
 
 /// Validated options.
 #[derive(Clone, Copy)]
@@ -32,15 +30,7 @@ impl Choices {
     /// An option that is out of range, not available, or contradicts another.
     pub(super) fn of(options: &RecoveryOptions, has_rig: bool) -> Result<Self, ApiError> {
         let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
-        if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
-            return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
-        }
-        if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
-            return refuse("frame_rate: give a positive number of frames per second".to_owned());
-        }
-        if options.start.is_some_and(|start| start.is_nan() || start.abs() >= MAX_NUMBER) {
-            return refuse("start: give the number of the first frame, or leave it out".to_owned());
-        }
+        check_told(options.name.as_deref(), options.frame_rate, options.start)?;
         if options.frames == Some(0) {
             return refuse(
                 "frames: an animation has at least one frame; leave it out where it is not known".to_owned(),

@@ -38,6 +38,8 @@ impl Work for Recovery {
     const ENDED: &'static str = "cager_recoveries_total";
     const FAILED: problem::Kind = problem::RECOVERY_FAILED;
     const UNFINISHED: &'static str = "results are written when the recovery is completed; post {\"frames\": F} to complete, and wait until its state is completed";
+    const MISSING: &'static str =
+        "there are joints where a rig and a manifold were sent; make the recovery anew with them";
     const QUEUE: &'static str = "recovery_queue";
 
     fn jobs(service: &Service) -> &Jobs<Self> {

@@ -2,7 +2,7 @@
 
 use crate::coding::Goal;
 use crate::design::default_vertices;
-use crate::preparation::{NAME_CHARACTERS, VERTICES, goal, vertices_detail};
+use crate::preparation::{VERTICES, check_told, goal, vertices_detail};
 use crate::problem::{self, ApiError};
 use crate::transfer::{MethodChoice, words};
 use cager_cages::DesignOptions;
@@ -12,9 +12,6 @@ use cager_explore::transfer::Pose;
 use cager_geometry::mesh::Point;
 use cager_proto::messages::SessionOptions;
 use cager_proto::transfer_messages::{TransferMethod, TransferOptions};
-
-/// Numbers of frames lie below.
-const MAX_NUMBER: f64 = 1e9;
 
 /// Validated options.
 #[derive(Clone, Copy)]
@@ -43,15 +40,7 @@ impl Choices {
     /// An option that is out of range, not available, or contradicts another.
     pub(super) fn of(options: &TransferOptions, has_cage: bool) -> Result<Self, ApiError> {
         let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, detail));
-        if options.name.as_ref().is_some_and(|name| name.chars().count() > NAME_CHARACTERS) {
-            return refuse(format!("name: is longer than {NAME_CHARACTERS} characters; shorten it"));
-        }
-        if options.frame_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
-            return refuse("frame_rate: give a positive number of frames per second".to_owned());
-        }
-        if options.start.is_some_and(|start| start.is_nan() || start.abs() >= MAX_NUMBER) {
-            return refuse("start: give the number of the first frame, or leave it out".to_owned());
-        }
+        check_told(options.name.as_deref(), options.frame_rate, options.start)?;
         if options.frames == Some(0) {
             return refuse("frames: a motion has at least one frame".to_owned());
         }

@@ -1,9 +1,8 @@
 //! `GET /v1/recoveries/{id}/cages`: cages as frames are followed, and in the end those of the whole.
 
-use super::results::file;
 use crate::http::extract::{Query, RequestedJob};
 use crate::http::job_frames::{FramesOfJob, OCTETS, stream};
-use crate::http::openapi;
+use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
 use crate::recovery::{Recovery, RecoveryJob};
 use crate::service::Service;
@@ -38,7 +37,7 @@ pub(crate) async fn get(
         let stride = 12 * u64::from(finished.cage_vertices);
         let begin = stride * u64::from(query.first);
         let bytes = begin..begin + stride * u64::from(query.count.unwrap_or(there));
-        return file(&service, &tenant, &job, Some(bytes), ("cages", OCTETS), &headers).await;
+        return jobs::result(&service, &tenant, &job, Some(bytes), ("cages", OCTETS), &headers).await;
     }
     let store = service.store.clone();
     let read = Box::new(move |job: &RecoveryJob, next: u32, most: u32| match &finished {

@@ -1,15 +1,13 @@
 //! Results of a completed recovery: the container, joints and the report, files that never change.
 
-use crate::auth::Tenant;
 use crate::http::extract::RequestedJob;
 use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
-use crate::recovery::{Recovery, RecoveryJob};
+use crate::recovery::Recovery;
 use crate::service::Service;
 use axum::extract::State;
 use axum::response::Response;
 use http::HeaderMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// The container of a completed recovery, byte for byte what `cager recover` writes for the same files and options.
@@ -27,7 +25,7 @@ pub(crate) async fn container(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, None, ("capture.cager", "application/vnd.cager"), &headers).await
+    jobs::result(&service, &tenant, &job, None, ("capture.cager", "application/vnd.cager"), &headers).await
 }
 
 /// How each frame was found and how far it lies from its surface, as `cager recover --report` writes it.
@@ -45,7 +43,7 @@ pub(crate) async fn report(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, None, ("report.json", "application/json"), &headers).await
+    jobs::result(&service, &tenant, &job, None, ("report.json", "application/json"), &headers).await
 }
 
 /// Where the rig's joints are in every frame, `frame,joint,x,y,z`.
@@ -63,7 +61,7 @@ pub(crate) async fn joints_csv(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, None, ("joints.csv", "text/csv"), &headers).await
+    jobs::result(&service, &tenant, &job, None, ("joints.csv", "text/csv"), &headers).await
 }
 
 /// The rig's joints in every frame as a skeleton in motion.
@@ -81,18 +79,5 @@ pub(crate) async fn joints_bvh(
     RequestedJob { job, tenant }: RequestedJob<Recovery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    file(&service, &tenant, &job, None, ("joints.bvh", "text/plain"), &headers).await
-}
-
-/// A result, or these bytes of it.
-pub(super) async fn file(
-    service: &Service,
-    tenant: &Tenant,
-    job: &Arc<RecoveryJob>,
-    bytes: Option<Range<u64>>,
-    (name, media_type): (&'static str, &'static str),
-    headers: &HeaderMap,
-) -> Result<Response, ApiError> {
-    let missing = "there are joints where a rig and a manifold were sent; make the recovery anew with them";
-    jobs::result(service, tenant, job, bytes, (name, media_type, missing), headers).await
+    jobs::result(&service, &tenant, &job, None, ("joints.bvh", "text/plain"), &headers).await
 }

@@ -11,7 +11,6 @@ use axum::response::Response;
 use http::HeaderMap;
 use std::sync::Arc;
 
-const MISSING: &str = "this transfer has no such result";
 /// Frames read and sent at a time, at most, and their bytes, unless one is larger.
 const PIECE_FRAMES: u64 = 16;
 const PIECE_BYTES: u64 = 8 << 20;
@@ -50,8 +49,7 @@ pub(crate) async fn container(
     RequestedJob { job, tenant }: RequestedJob<Transfer>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let what = ("capture.cager", "application/vnd.cager", MISSING);
-    jobs::result(&service, &tenant, &job, None, what, &headers).await
+    jobs::result(&service, &tenant, &job, None, ("capture.cager", "application/vnd.cager"), &headers).await
 }
 
 /// How source and target were brought together, as `cager transfer --report` writes it.
@@ -69,5 +67,5 @@ pub(crate) async fn report(
     RequestedJob { job, tenant }: RequestedJob<Transfer>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    jobs::result(&service, &tenant, &job, None, ("report.json", "application/json", MISSING), &headers).await
+    jobs::result(&service, &tenant, &job, None, ("report.json", "application/json"), &headers).await
 }
