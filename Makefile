@@ -9,13 +9,14 @@ SCHEMATHESIS := target/schemathesis/bin/python
 DENY := target/deny/bin/cargo-deny
 
 BLENDER := target/blender/bin/python
+ALEMBIC := target/alembic/bin/python
 
 LINT := target/lint-deploy
 
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -78,6 +79,14 @@ blender: $(BLENDER) ## the round trip through Blender itself; installs bpy, whic
 $(BLENDER): Makefile
 	python3.11 -m venv target/blender
 	target/blender/bin/pip install --quiet bpy==4.5.15
+	@touch $@
+
+alembic: $(ALEMBIC) ## written archives through the Alembic library; installs alembic3d
+	CAGER_ALEMBIC_PYTHON=$(abspath $(ALEMBIC)) $(CARGO) test --locked -p cager-formats --test alembic library -- --nocapture
+
+$(ALEMBIC): Makefile
+	$(PYTHON) -m venv target/alembic
+	target/alembic/bin/pip install --quiet alembic3d==1.8.12.1
 	@touch $@
 
 soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when

@@ -69,6 +69,7 @@ short! {
     npy "npy" 240_000;
     pc2 "pc2" 240_000;
     mdd "mdd" 240_000;
+    abc "abc" 60_000;
     npz "npz" 6_000;
     container "container" 30_000;
     record "record" 360_000;

@@ -80,7 +80,7 @@ pub(crate) enum Command {
 /// Example: cager encode --rest rest.obj --frames 'walk/*.obj' -o walk.cager
 #[derive(Args)]
 pub(crate) struct EncodeArgs {
-    /// Model in its rest pose: .obj .ply .off .stl .glb; a point cloud will do.
+    /// Model in its rest pose: .obj .ply .off .stl .glb .abc; a point cloud will do.
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
@@ -92,7 +92,8 @@ pub(crate) struct EncodeArgs {
     pub(crate) design: DesignArgs,
 
     /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of
-    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2 or .mdd.
+    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd
+    /// or .abc.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
@@ -246,7 +247,7 @@ pub(crate) struct DecodeArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Where to write: .npy, .pc2, .mdd, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
+    /// Where to write: .npy, .pc2, .mdd, .abc, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
     /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), of one frame (--frame) .obj, .ply, .off or .stl, or - for .npy on
     /// standard output.
     #[arg(short, long, value_name = "OUT")]
@@ -298,7 +299,7 @@ pub(crate) struct InspectArgs {
 /// coordinates, and 10 seconds with --coordinates mvc. Example: cager compare --rest rest.obj --cage cage.obj --frames walk.npy -o walk.html
 #[derive(Args)]
 pub(crate) struct CompareArgs {
-    /// Model in its rest pose: .obj .ply .off .stl .glb; a point cloud will do.
+    /// Model in its rest pose: .obj .ply .off .stl .glb .abc; a point cloud will do.
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
@@ -306,7 +307,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: PathBuf,
 
-    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2 or .mdd.
+    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd or .abc.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 

@@ -5,7 +5,7 @@ use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design;
 use super::dry_run::{read_files, tell_dry_run};
 use super::outputs::Outputs;
-use super::{grouped, progress, read_model, tell, warn};
+use super::{grouped, progress, read_model, read_prim, tell, warn};
 use crate::design::default_vertices;
 use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
@@ -45,7 +45,8 @@ struct CageReport {
 pub(super) fn run(args: &CageArgs) -> Result<()> {
     let clock = Instant::now();
     let targets = Targets::new(args)?;
-    let models: Vec<Model> = args.rest.iter().map(|path| read_model(path)).collect::<Result<_, _>>()?;
+    let prim = args.checks.prim.as_deref();
+    let models: Vec<Model> = args.rest.iter().map(|path| read_prim(path, prim)).collect::<Result<_, _>>()?;
     if models.len() > 1 && args.general.is_none() {
         bail!("--rest: was given {} times; only --general takes several models", models.len());
     }

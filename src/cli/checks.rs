@@ -38,6 +38,10 @@ pub(crate) struct CaptureArgs {
 /// What is accepted of a capture.
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
+    /// The mesh to take of Alembic archives (rest pose and capture) with several: its path, such as /walk/body, or its name.
+    #[arg(long, value_name = "PATH")]
+    pub(super) prim: Option<String>,
+
     /// Go on where numbers are missing from the names of the capture's files.
     #[arg(long)]
     pub(super) allow_gaps: bool,
@@ -98,6 +102,7 @@ pub(super) fn checked_files<'a>(
     files.allow_gaps = args.allow_gaps;
     files.selection.no_frames = no_frames.into_iter().cloned().collect();
     files.selection.join_sequences = args.all_files;
+    files.selection.prim.clone_from(&args.prim);
     files
 }
 

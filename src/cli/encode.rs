@@ -9,7 +9,7 @@ use super::outputs::Outputs;
 use super::solver_options::{
     check_inversion, designed_spectrum, inversion_choices, matrix, read_cage, spectrum_bound, with_input_name,
 };
-use super::{design, encode_remote, grouped, human_bytes, progress, read_model, tell, warn};
+use super::{design, encode_remote, grouped, human_bytes, progress, read_prim, tell, warn};
 use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
 use crate::design::{read_frames, report as design_report};
 use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
@@ -31,7 +31,7 @@ use std::time::{Duration, Instant};
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
     let targets = Targets::new(args)?;
-    let mut rest = read_model(&args.rest)?;
+    let mut rest = read_prim(&args.rest, args.capture.checks.prim.as_deref())?;
     let no_frames = [&args.rest].into_iter().chain(&args.cage);
     let mut files = capture_files(&args.capture, &args.frames, &mut rest, no_frames);
     files.selection.range = args.frames_range;

@@ -129,7 +129,12 @@ fn print(text: &str) -> anyhow::Result<()> {
 
 /// Reads a model, and tells what is left out of it.
 fn read_model(path: &Path) -> Result<Model, cager_formats::Error> {
-    let (model, note) = cager_formats::read_model_with_note(path)?;
+    read_prim(path, None)
+}
+
+/// As [`read_model`], of an Alembic archive the mesh that `prim` names.
+fn read_prim(path: &Path, prim: Option<&str>) -> Result<Model, cager_formats::Error> {
+    let (model, note) = cager_formats::read_prim_with_note(path, prim)?;
     warn(note.as_slice());
     Ok(model)
 }

@@ -315,7 +315,7 @@ fn output_that_cannot_be_written_is_refused_before_the_work() {
         // The report's place is looked at before anything is written, so that there is no .cager without its report.
         refused(&dir, &format!("{line} -o new.cager --report {place}"), &[place]);
     }
-    for place in ["rest.obj/back.npy", "nowhere/back.pc2", "nowhere/poses", "back.abc", "rest.obj/"] {
+    for place in ["rest.obj/back.npy", "nowhere/back.pc2", "nowhere/poses", "back.fbx", "rest.obj/"] {
         refused(&dir, &format!("decode out.cager -o {place}"), &[place]);
     }
     dir.write("full/keep.txt", "mine");

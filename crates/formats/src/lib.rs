@@ -3,6 +3,7 @@
 //! Readers take bytes of any origin: they return an error for whatever they do not understand, never panic, and never
 //! allocate more than a small multiple of what the file holds. Writers make files that appear whole or not at all.
 
+mod alembic;
 pub mod atomic;
 pub mod biovision;
 mod error;
@@ -21,5 +22,8 @@ pub use frames::{
     open_frames_in, open_selected_frames,
 };
 pub use matrix::{read_matrix, read_matrix_bytes};
-pub use mesh::{MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_with_note, write_model};
+pub use mesh::{
+    MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_with_note, read_prim_with_note,
+    write_model,
+};
 pub use signature::Signature;

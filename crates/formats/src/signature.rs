@@ -19,6 +19,8 @@ pub enum Signature {
     Zip,
     /// A point cache of 3ds Max and Blender.
     Pc2,
+    /// Alembic in the Ogawa container.
+    Abc,
     /// Wavefront OBJ.
     Obj,
     /// Polygon File Format.
@@ -56,7 +58,7 @@ const BEGINNINGS: &[(&[u8], Signature)] = &[
     (b"glTF\x01\0\0\0", Signature::Glb),
     (b"glTF\x02\0\0\0", Signature::Glb),
     (b"\x89CGR\r\n\x1a\n", Signature::Cager),
-    (b"Ogawa", Signature::Scene("Alembic")),
+    (b"Ogawa", Signature::Abc),
     (b"\x89HDF\r\n\x1a\n", Signature::Scene("HDF5")),
     (b"PXR-USDC", Signature::Scene("USD")),
     (b"#usda", Signature::Scene("USD")),
@@ -107,6 +109,10 @@ impl Signature {
     /// Why a file named `.extension` that begins with `bytes` is another kind of file, if it is: a sentence to follow its name.
     pub fn other_than(extension: &str, bytes: &[u8]) -> Option<String> {
         let found = Self::of(bytes)?;
+        if extension == "abc" && found == Self::Scene("HDF5") {
+            let what = "is an Alembic archive of the old kind, HDF5, which is not read; write it as Ogawa with abcconvert -toOgawa, or export it again";
+            return Some(what.to_owned());
+        }
         let is_own = found.extensions().contains(&extension) || found == Self::Text;
         found.stand_in().or_else(|| {
             (!is_own)
@@ -141,6 +147,7 @@ impl Signature {
             Self::Npy => &["npy"],
             Self::Zip => &["npz", "zip"],
             Self::Pc2 => &["pc2"],
+            Self::Abc => &["abc"],
             Self::Obj => &["obj"],
             Self::Ply => &["ply"],
             Self::Off => &["off"],

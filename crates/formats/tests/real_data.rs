@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cager_formats::{FrameOptions, create_frames, open_frames, read_model, write_model};
+use cager_formats::{
+    CacheFormat, FrameOptions, create_frames, open_frames, open_frames_bytes, read_model, write_model,
+};
 
 fn data() -> PathBuf {
     std::env::var_os("CAGER_CAPTURES")
@@ -76,7 +78,7 @@ fn captures_survive_every_format_of_frames() {
     let source = data.join("supercages-arm/frames.npy");
     let points = rest.points.len();
     let (mut frame, mut copied) = (Vec::new(), Vec::new());
-    for name in ["a.npy", "a.pc2", "a.mdd", "frames"] {
+    for name in ["a.npy", "a.pc2", "a.mdd", "a.abc", "frames"] {
         let path = folder.path().join(name);
         let mut reader = open_frames(&source, points).unwrap();
         let mut writer = create_frames(&path, points, reader.frames(), &rest.faces, &FrameOptions::default()).unwrap();
@@ -91,4 +93,65 @@ fn captures_survive_every_format_of_frames() {
             assert!(copied.iter().zip(&frame).all(|(a, b)| *a as f32 == *b as f32), "{name}");
         }
     }
+}
+
+/// Archives that Blender wrote, frame k of which is frame `step` × k of a capture.
+const ARCHIVES: [(&str, &str, usize, usize); 2] = [("arm", "supercages-arm", 13, 10), ("horse", "horse-gallop", 12, 1)];
+
+#[test]
+#[ignore = "needs the captures: make captures"]
+fn archives_of_blender_hold_what_they_were_made_from() {
+    let data = data();
+    for (name, capture, frames, step) in ARCHIVES {
+        let rest = read_model(&data.join(capture).join("rest.obj")).unwrap();
+        let path = data.join("studio").join(format!("{name}.abc"));
+        let mut truth = open_frames(data.join(capture).join("frames.npy"), rest.points.len()).unwrap();
+        let mut reader = open_frames(&path, rest.points.len()).unwrap();
+        assert_eq!((reader.frames(), reader.frame_rate(), reader.number(0)), (frames, Some(24.0), 1.0), "{name}");
+        let extent = cager_geometry::mesh::diagonal(&rest.points);
+        let (mut frame, mut expected) = (Vec::new(), Vec::new());
+        for k in 0..frames {
+            assert!(reader.read_next(&mut frame).unwrap() && truth.read_next(&mut expected).unwrap());
+            let far = frame.iter().zip(&expected).fold(0.0, |far: f64, (a, b)| far.max((a - b).abs()));
+            assert!(far <= 4e-8 * extent, "{name}: frame {k} is off by {far}");
+            for _ in 1..step {
+                truth.skip().unwrap();
+            }
+        }
+        assert!(!reader.read_next(&mut frame).unwrap());
+        let model = read_model(&path).unwrap();
+        assert_eq!(model.faces, rest.faces, "{name}");
+    }
+}
+
+#[test]
+#[ignore = "needs the captures: make captures"]
+fn damaged_archives_of_blender_are_answered() {
+    let bytes = fs::read(data().join("studio/arm.abc")).unwrap();
+    let mut state = 1_u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    let mut answered = [0, 0];
+    for _ in 0..500 {
+        let mut bytes = bytes.clone();
+        for _ in 0..=random(8) {
+            // Half of the damage in the tables, which lie at the end.
+            let from = if random(2) == 0 { bytes.len() - 4096 } else { 0 };
+            let at = from + random(bytes.len() - from);
+            bytes[at] = random(256) as u8;
+        }
+        let opened = open_frames_bytes(CacheFormat::Abc, Path::new("a.abc"), &bytes, 2089);
+        let mut frame = Vec::new();
+        let read = opened.and_then(|mut reader| {
+            while reader.read_next(&mut frame)? {}
+            Ok(())
+        });
+        if let Err(error) = &read {
+            assert!(error.to_string().starts_with("a.abc: ") && error.to_string().len() < 500, "{error}");
+        }
+        answered[usize::from(read.is_err())] += 1;
+    }
+    assert!(answered[0] > 50 && answered[1] > 50, "{answered:?}");
 }

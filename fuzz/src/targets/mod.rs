@@ -1,5 +1,6 @@
 //! All targets.
 
+mod alembic;
 mod bodies;
 mod container;
 mod frames;
@@ -22,6 +23,7 @@ pub const TARGETS: &[Target] = &[
     frames::NPY,
     frames::PC2,
     frames::MDD,
+    alembic::ABC,
     frames::NPZ,
     container::CONTAINER,
     bodies::RECORD,

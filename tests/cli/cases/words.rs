@@ -20,12 +20,30 @@ fn scenes_that_are_not_read_name_the_way_out() {
     let dir = Dir::with_case(CASE);
     dir.write("scene.blend", "BLENDER");
     dir.write("walk.USDZ", "PK");
-    dir.write("scenes/f1.abc", "Ogawa");
-    dir.write("scenes/f2.abc", "Ogawa");
-    for frames in ["walk.abc", "walk.usd", "walk.fbx", "walk.USDZ", "scene.blend", "scenes", "scenes/*.abc"] {
+    dir.write("scenes/f1.fbx", "Kaydara");
+    dir.write("scenes/f2.fbx", "Kaydara");
+    for frames in ["walk.usd", "walk.fbx", "walk.USDZ", "scene.blend", "scenes", "scenes/*.fbx"] {
         let line = format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o out.cager");
-        refused(&dir, &line, &["not read", ".pc2 or .mdd", "blender/export.py"]);
+        refused(&dir, &line, &["not read", ".abc, .pc2 or .mdd", "blender/export.py"]);
     }
+}
+
+#[test]
+fn alembic_archives_go_in_and_out() {
+    let dir = Dir::with_case(CASE);
+    let points = read_model(&dir.path("rest.obj")).expect("the rest pose").points.len();
+    dir.cager("decode walk.cager -o out.abc").succeeds();
+    dir.cager("decode walk.cager -o out.npy").succeeds();
+    assert_eq!(read_frames(&dir.path("out.abc"), points), read_frames(&dir.path("out.npy"), points));
+    dir.cager("encode --rest out.abc --cage cage.obj --frames out.abc --prim outShape -o again.cager").succeeds();
+    dir.cager("decode again.cager -o again.abc").succeeds();
+    let line = "encode --rest rest.obj --cage cage.obj --frames";
+    refused(
+        &dir,
+        &format!("{line} out.abc --prim hat -o no.cager"),
+        &["holds no mesh hat, but /out/outShape (", "--prim"],
+    );
+    refused(&dir, &format!("{line} walk.abc -o no.cager"), &["walk.abc", "export it again"]);
 }
 
 #[test]

@@ -5,21 +5,25 @@ use std::path::{Path, PathBuf};
 
 use super::fortran::Transposed;
 use super::layout::{LONGEST_HEADER, Layout, Order};
+use super::times::Times;
 use super::widen::{Scalar, widen};
 use super::{CacheFormat, FrameReader, mdd, npy, pc2};
+use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
 
 /// Bytes read at once: few calls, and still within the fast caches.
 const BLOCK: usize = 1 << 17;
 
-/// Opens a cache: reads the header and compares its promise with `length`, the bytes there are, and with the points that are expected.
+/// Opens a cache: reads the header and compares its promise with `length`, the bytes there are, and with the points that are expected. `prim` is the
+/// mesh of an archive of several.
 pub(super) fn open<'a>(
     format: CacheFormat,
     path: &Path,
     mut source: impl Read + Seek + Send + 'a,
     length: u64,
     expected_points: usize,
+    prim: Option<&str>,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let read = |cause| Error::read(path, cause);
     let mut head = Vec::new();
@@ -32,13 +36,14 @@ pub(super) fn open<'a>(
         CacheFormat::Npy => npy::layout(&head, expected_points as u64, place),
         CacheFormat::Pc2 => pc2::layout(&head),
         CacheFormat::Mdd => mdd::layout(&head),
+        CacheFormat::Abc => return alembic::open_frames(path, source, length, expected_points, prim),
     };
     let mut layout = layout.map_err(|fault| fault.at(path))?;
     if format == CacheFormat::Mdd && layout.check(length, expected_points, path).is_ok() {
         // No more than the file holds, as its length is right.
         let mut times = vec![0; 4 * layout.frames as usize];
         source.seek(SeekFrom::Start(mdd::HEADER)).and_then(|_| source.read_exact(&mut times)).map_err(read)?;
-        mdd::set_times(&mut layout, &times).map_err(|fault| fault.at(path))?;
+        layout.times = mdd::times(&times).map_err(|fault| fault.at(path))?;
     }
     open_layout(path, source, layout, length, expected_points)
 }
@@ -69,11 +74,7 @@ struct CacheReader<R> {
     start: u64,
     scalar: Scalar,
     order: Order,
-    frame_rate: Option<f64>,
-    first: f64,
-    step: f64,
-    numbers: Option<Vec<f64>>,
-    note: Option<String>,
+    times: Times,
     points: usize,
     frames: usize,
     next: usize,
@@ -90,11 +91,7 @@ impl<R: Read + Seek> CacheReader<R> {
             start: layout.start,
             scalar: layout.scalar,
             order: layout.order,
-            frame_rate: layout.frame_rate,
-            first: layout.first,
-            step: layout.step,
-            numbers: layout.numbers,
-            note: layout.note,
+            times: layout.times,
             points,
             // No more than the bytes of the file, which fit.
             frames: layout.frames as usize,
@@ -155,20 +152,19 @@ impl<R: Read + Seek + Send> FrameReader for CacheReader<R> {
     }
 
     fn frame_rate(&self) -> Option<f64> {
-        self.frame_rate
+        self.times.frame_rate
     }
 
     fn number(&self, frame: usize) -> f64 {
-        let told = self.numbers.as_ref().and_then(|numbers| numbers.get(frame));
-        told.copied().unwrap_or(self.first + self.step * frame as f64)
+        self.times.number(frame)
     }
 
     fn numbers_are_times(&self) -> bool {
-        self.numbers.is_some()
+        self.times.numbers.is_some()
     }
 
     fn notes(&self) -> Vec<String> {
-        self.note.iter().map(|note| format!("{}: {note}", self.path.display())).collect()
+        self.times.note.iter().map(|note| format!("{}: {note}", self.path.display())).collect()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

@@ -3,6 +3,7 @@
 use std::io::{self, SeekFrom};
 use std::path::Path;
 
+use super::times::Times;
 use super::widen::Scalar;
 use crate::error::{Error, Fault};
 
@@ -17,15 +18,8 @@ pub(super) struct Layout {
     pub(super) order: Order,
     /// Of an array whose first index varies fastest: how many rows each frame has.
     pub(super) fortran: Option<u64>,
-    /// Frames per second, where the header tells.
-    pub(super) frame_rate: Option<f64>,
-    /// Number of the first frame, and the distance of two.
-    pub(super) first: f64,
-    pub(super) step: f64,
-    /// Numbers of all frames, where these do not have the same distance.
-    pub(super) numbers: Option<Vec<f64>>,
-    /// What the user should know of the file.
-    pub(super) note: Option<String>,
+    /// When its frames are, where the header tells.
+    pub(super) times: Times,
 }
 
 /// How the coordinates of a frame follow each other.
@@ -55,9 +49,7 @@ pub(super) const LONGEST_HEADER: usize = 12 + (1 << 16);
 impl Layout {
     /// As most formats have it, frames numbered from 0.
     pub(super) fn new(points: u64, frames: u64, start: u64, scalar: Scalar) -> Self {
-        let order = Order::Points;
-        let (fortran, frame_rate, numbers, note) = (None, None, None, None);
-        Self { points, frames, start, scalar, order, fortran, frame_rate, first: 0.0, step: 1.0, numbers, note }
+        Self { points, frames, start, scalar, order: Order::Points, fortran: None, times: Times::default() }
     }
 
     /// Compares what the header promises with the points that are expected and the bytes there are.

@@ -22,6 +22,7 @@ mod sequence;
 mod several;
 mod single;
 mod source;
+mod times;
 mod widen;
 mod write;
 
@@ -38,6 +39,8 @@ pub use source::{
     MeshSequence, frame_files, frame_numbers, mesh_sequence, open_frames, open_frames_bytes, open_frames_in,
     open_selected_frames,
 };
+pub(crate) use times::Times;
+pub(crate) use widen::{Scalar, widen};
 pub use write::{FrameOptions, FrameWriter, create_frames, frames_path};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
@@ -100,11 +103,13 @@ pub enum CacheFormat {
     Pc2,
     /// Motion Designer point cache of LightWave.
     Mdd,
+    /// Alembic in the Ogawa container: one polygon mesh, with the transforms above it.
+    Abc,
 }
 
 impl CacheFormat {
     /// All formats.
-    pub const ALL: [Self; 3] = [Self::Npy, Self::Pc2, Self::Mdd];
+    pub const ALL: [Self; 4] = [Self::Npy, Self::Pc2, Self::Mdd, Self::Abc];
 
     /// The file name extension, without the dot.
     pub fn extension(self) -> &'static str {
@@ -112,6 +117,7 @@ impl CacheFormat {
             Self::Npy => "npy",
             Self::Pc2 => "pc2",
             Self::Mdd => "mdd",
+            Self::Abc => "abc",
         }
     }
 

@@ -62,7 +62,7 @@ pub(super) fn open<'a>(
     }
     let Array { entry, layout, .. } = chosen(found, &arrays, expected_points as u64, path)?;
     let mut layout = layout.map_err(|fault| fault.at(path))?;
-    layout.frame_rate = fps;
+    layout.times.frame_rate = fps;
     let unpacked = Unpacked::new(source, entry).map_err(|cause| Error::read(path, cause))?;
     cache::open_layout(path, unpacked, layout, entry.length, expected_points)
 }

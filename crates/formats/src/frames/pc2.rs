@@ -33,7 +33,7 @@ pub(super) fn layout(head: &[u8]) -> Result<Layout, Fault> {
         _ => (0.0, 1.0),
     };
     let mut layout = Layout::new(points, frames, HEADER as u64, Scalar::F32Little);
-    (layout.first, layout.step) = (first, step);
+    (layout.times.first, layout.times.step) = (first, step);
     Ok(layout)
 }
 

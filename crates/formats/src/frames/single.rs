@@ -23,7 +23,12 @@ fn is_archive(path: &Path) -> bool {
 }
 
 /// Opens a point cache, or the frames in an archive of arrays.
-pub(super) fn open_cache(path: &Path, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+/// `prim` is the mesh of an archive of several.
+pub(super) fn open_cache(
+    path: &Path,
+    expected_points: usize,
+    prim: Option<&str>,
+) -> Result<Box<dyn FrameReader>, Error> {
     let read = |cause| Error::read(path, cause);
     let open = || File::open(path).map_err(read);
     if is_archive(path) {
@@ -32,7 +37,7 @@ pub(super) fn open_cache(path: &Path, expected_points: usize) -> Result<Box<dyn 
     let Some(format) = CacheFormat::from_path(path) else { return Err(unknown(path)) };
     let file = open()?;
     let length = file.metadata().map_err(read)?.len();
-    cache::open(format, path, file, length, expected_points)
+    cache::open(format, path, file, length, expected_points, prim)
 }
 
 /// A file that is not read, and how its contents can come here.
@@ -40,8 +45,8 @@ pub(super) fn unknown(path: &Path) -> Error {
     let what = match way_out(path) {
         Some(way_out) => way_out,
         None => format!(
-            "is not a capture that is read; give .npy .pc2 .mdd .npz, or {} files in a folder",
-            extensions(&MeshFormat::ALL)
+            "is not a capture that is read; give .npy .pc2 .mdd .abc .npz, or {} files in a folder",
+            extensions(&MeshFormat::STILL)
         ),
     };
     Fault::unsupported(what).at(path)
@@ -51,7 +56,6 @@ pub(super) fn unknown(path: &Path) -> Error {
 pub(super) fn way_out(path: &Path) -> Option<String> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     let kind = match extension.as_str() {
-        "abc" => "Alembic",
         "usd" | "usda" | "usdc" | "usdz" => "Universal Scene Description",
         "fbx" => "an FBX scene",
         "dae" => "a Collada scene",
@@ -65,6 +69,6 @@ pub(super) fn way_out(path: &Path) -> Option<String> {
         _ => return None,
     };
     Some(format!(
-        "is {kind}, which is not read; export the animated mesh as a point cache, .pc2 or .mdd, or open it in Blender and run blender/export.py, which writes rest.obj and frames.npy"
+        "is {kind}, which is not read; export the animated mesh as Alembic or a point cache, .abc, .pc2 or .mdd, or open it in Blender and run blender/export.py, which writes rest.obj and frames.npy"
     ))
 }

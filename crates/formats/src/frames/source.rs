@@ -14,7 +14,7 @@ use crate::mesh::{MeshFormat, extensions};
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2` or `.mdd` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
+/// `source` is a `.npy`, `.pc2`, `.mdd` or `.abc` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
 /// one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
 /// `10.obj` and `1.5.obj` before `2.obj`; other files, and in a folder hidden ones, are passed over. In a pattern every part of the path may be a glob
 /// or have `%04d` or `####` in place of a number; what is there by that name is no pattern.
@@ -40,7 +40,7 @@ pub fn open_selected_frames(
     let reader = match fs::metadata(path) {
         Ok(found) if found.is_dir() => open_files(path, files::in_folder(path)?, expected_points, selection),
         Ok(found) if !found.is_file() => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
-        Ok(_) => open_file(path, expected_points),
+        Ok(_) => open_file(path, expected_points, selection.prim.as_deref()),
         Err(_) if files::is_pattern(path) => open_files(path, files::matching(path)?, expected_points, selection),
         Err(cause) => Err(Error::read(path, cause)),
     }?;
@@ -125,15 +125,15 @@ pub fn open_frames_in<'a>(
     length: u64,
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
-    cache::open(format, name, source, length, expected_points)
+    cache::open(format, name, source, length, expected_points, None)
 }
 
-fn open_file(path: &Path, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
+fn open_file(path: &Path, expected_points: usize, prim: Option<&str>) -> Result<Box<dyn FrameReader>, Error> {
     if MeshFormat::guess(path).is_some() {
         let sequence = Sequence::of_all(vec![path.to_owned()]);
         return Ok(Box::new(SequenceReader::new(sequence, expected_points, Vec::new())));
     }
-    single::open_cache(path, expected_points)
+    single::open_cache(path, expected_points, prim)
 }
 
 /// Opens what a folder holds or a pattern matches: meshes where there are any, else caches.
@@ -152,7 +152,7 @@ fn open_files(
     }
     match caches.as_slice() {
         [] => Err(no_frames_in(source, &others)),
-        [cache] => single::open_cache(cache, expected_points),
+        [cache] => single::open_cache(cache, expected_points, selection.prim.as_deref()),
         several if several.iter().all(|path| single::is_array(path)) => {
             open_sequence(source, caches, Vec::new(), expected_points, selection)
         }
@@ -229,7 +229,7 @@ fn no_frames_in(source: &Path, others: &[PathBuf]) -> Error {
             "for one file in each of its folders give the pattern '{}'",
             source.join("*").join(format!("*.{}", extension.display())).display()
         ),
-        None => format!("give a folder or pattern of {} files", extensions(&MeshFormat::ALL)),
+        None => format!("give a folder or pattern of {} files", extensions(&MeshFormat::STILL)),
     };
     Fault::invalid(format!("holds no mesh files; {cure}")).at(source)
 }

@@ -2,7 +2,7 @@
 
 /// How a coordinate is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub(crate) enum Scalar {
     F32Little,
     F32Big,
     F64Little,
@@ -11,7 +11,7 @@ pub(super) enum Scalar {
 
 impl Scalar {
     /// Bytes of a coordinate.
-    pub(super) fn size(self) -> usize {
+    pub(crate) fn size(self) -> usize {
         match self {
             Self::F32Little | Self::F32Big => 4,
             Self::F64Little | Self::F64Big => 8,
@@ -20,7 +20,7 @@ impl Scalar {
 }
 
 /// Converts `bytes` into `out`, which has as many values; false if any is NaN or infinite.
-pub(super) fn widen(scalar: Scalar, bytes: &[u8], out: &mut [f64]) -> bool {
+pub(crate) fn widen(scalar: Scalar, bytes: &[u8], out: &mut [f64]) -> bool {
     match scalar {
         Scalar::F32Little => single(bytes, out, u32::from_le_bytes),
         Scalar::F32Big => single(bytes, out, u32::from_be_bytes),

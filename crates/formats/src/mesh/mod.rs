@@ -9,17 +9,20 @@ mod ply;
 mod stl;
 mod write;
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
 use cager_geometry::mesh::{Model, Polygons};
 
+use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
 use crate::text::{Lines, quoted};
 
 pub(crate) use parsed::Contents;
 use parsed::Parsed;
+pub(crate) use parsed::check_face;
 pub use write::{model_bytes, obj_bytes, write_model};
 pub(crate) use write::{write_obj_faces, write_off, write_ply, write_stl};
 
@@ -36,11 +39,16 @@ pub enum MeshFormat {
     Stl,
     /// Binary glTF 2.0.
     Glb,
+    /// Alembic in the Ogawa container: the first frame of its mesh.
+    Abc,
 }
 
 impl MeshFormat {
     /// All formats.
-    pub const ALL: [Self; 5] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb];
+    pub const ALL: [Self; 6] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb, Self::Abc];
+
+    /// Formats of one mesh that stands still, of which each file of a folder may be a frame.
+    pub(crate) const STILL: [Self; 5] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb];
 
     /// The file name extension, without the dot.
     pub fn extension(self) -> &'static str {
@@ -50,6 +58,7 @@ impl MeshFormat {
             Self::Off => "off",
             Self::Stl => "stl",
             Self::Glb => "glb",
+            Self::Abc => "abc",
         }
     }
 
@@ -58,7 +67,7 @@ impl MeshFormat {
     /// # Errors
     /// [`Error::Unsupported`] lists the extensions that are read.
     pub fn from_path(path: &Path) -> Result<Self, Error> {
-        if let Some(format) = Self::guess(path) {
+        if let Some(format) = Self::among(&Self::ALL, path) {
             return Ok(format);
         }
         let found = match path.extension() {
@@ -75,9 +84,14 @@ impl MeshFormat {
         Err(Fault::unsupported(found).at(path))
     }
 
+    /// The format of a file of one mesh that stands still, by its name.
     pub(crate) fn guess(path: &Path) -> Option<Self> {
+        Self::among(&Self::STILL, path)
+    }
+
+    fn among(formats: &[Self], path: &Path) -> Option<Self> {
         let found = path.extension()?;
-        Self::ALL.into_iter().find(|format| found.eq_ignore_ascii_case(format.extension()))
+        formats.iter().copied().find(|format| found.eq_ignore_ascii_case(format.extension()))
     }
 }
 
@@ -92,7 +106,7 @@ pub(crate) fn extensions(formats: &[MeshFormat]) -> String {
 /// # Errors
 /// As [`read_model_bytes`], and [`Error::Io`] where the file cannot be read.
 pub fn read_model(path: &Path) -> Result<Model, Error> {
-    parse_file(path, Contents::PointsAndFaces).map(|parsed| parsed.model)
+    parse_file(path, None).map(|parsed| parsed.model)
 }
 
 /// As [`read_model`], with what was left out of the file, in words.
@@ -100,7 +114,15 @@ pub fn read_model(path: &Path) -> Result<Model, Error> {
 /// # Errors
 /// As [`read_model`].
 pub fn read_model_with_note(path: &Path) -> Result<(Model, Option<String>), Error> {
-    let Parsed { model, left_out } = parse_file(path, Contents::PointsAndFaces)?;
+    read_prim_with_note(path, None)
+}
+
+/// As [`read_model_with_note`], of an Alembic archive the mesh that `prim` names by its path or name, where it has several.
+///
+/// # Errors
+/// As [`read_model`]; no such mesh, or several of that name.
+pub fn read_prim_with_note(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>), Error> {
+    let Parsed { model, left_out } = parse_file(path, prim)?;
     let faces = if left_out == 1 { "face" } else { "faces" };
     let note =
         format!("{}: left out {left_out} {faces} of fewer than three corners, which have no area", path.display());
@@ -147,9 +169,26 @@ fn read_named(path: &Path) -> Result<(MeshFormat, Vec<u8>), Error> {
     Ok((format, fs::read(path).map_err(|cause| Error::read(path, cause))?))
 }
 
-fn parse_file(path: &Path, contents: Contents) -> Result<Parsed, Error> {
+fn parse_file(path: &Path, prim: Option<&str>) -> Result<Parsed, Error> {
+    if MeshFormat::from_path(path)? == MeshFormat::Abc {
+        // Of which all but the first frame is left where it is.
+        let read = |cause| Error::read(path, cause);
+        let file = File::open(path).map_err(read)?;
+        let length = file.metadata().map_err(read)?.len();
+        return read_archive(path, file, length, prim);
+    }
     let (format, bytes) = read_named(path)?;
-    read_bytes(format, path, &bytes, contents)
+    read_bytes(format, path, &bytes, Contents::PointsAndFaces)
+}
+
+fn read_archive(
+    name: &Path,
+    source: impl Read + Seek + Send,
+    length: u64,
+    prim: Option<&str>,
+) -> Result<Parsed, Error> {
+    let (model, left_out) = alembic::read_model(name, source, length, prim)?;
+    Ok(Parsed { model, left_out })
 }
 
 fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Parsed, Error> {
@@ -162,6 +201,7 @@ fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents)
             MeshFormat::Off => off::read(bytes, contents),
             MeshFormat::Stl => stl::read(bytes).map(Parsed::from),
             MeshFormat::Glb => glb::read(bytes).map(Parsed::from),
+            MeshFormat::Abc => return read_archive(name, Cursor::new(bytes), bytes.len() as u64, None),
         }
     };
     parsed

@@ -34,7 +34,7 @@ impl From<Model> for Parsed {
 }
 
 /// Checks the corners of one face, which `place` names in messages, against the number of points.
-pub(super) fn check_face(corners: &[u32], points: usize, place: impl Fn() -> String) -> Result<(), Fault> {
+pub(crate) fn check_face(corners: &[u32], points: usize, place: impl Fn() -> String) -> Result<(), Fault> {
     match corners.iter().find(|&&index| index as usize >= points) {
         Some(&index) => Err(no_such_vertex(&place(), index.into(), points)),
         None => Ok(()),

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, unreachable_pub)]
 
+pub mod archive;
+
 use std::path::Path;
 
 use cager_formats::{Error, MeshFormat, read_model_bytes};
@@ -156,6 +158,7 @@ pub fn meshes() -> Vec<(&'static str, Vec<u8>)> {
         ("a.stl", stl_ascii()),
         ("b.stl", stl_binary()),
         ("a.glb", glb()),
+        ("a.abc", abc_mesh()),
     ]
 }
 
@@ -198,6 +201,26 @@ pub fn mdd() -> Vec<u8> {
     file
 }
 
+/// At 24 frames per second.
+pub fn abc() -> Vec<u8> {
+    let frames: Vec<Vec<f32>> = coordinates().chunks(6).map(<[f32]>::to_vec).collect();
+    archive::archive("", &[(1.0 / 24.0, &[0.0])], &[archive::mesh("m", archive::positions(&frames), &[])])
+}
+
+pub fn abc_mesh() -> Vec<u8> {
+    let faces = FACES.map(|face| face.map(|index| index as i32).into_iter().rev().collect::<Vec<_>>());
+    let faces: Vec<&[i32]> = faces.iter().map(Vec::as_slice).collect();
+    let points: Vec<f32> = POINTS.as_flattened().iter().map(|&x| x as f32).collect();
+    let mesh = archive::mesh("m", archive::positions(&[points]), &faces);
+    let still = archive::transform("t", &[0x10], 0, &[vec![0.0; 3]], vec![mesh]);
+    archive::archive("", &[(1.0 / 24.0, &[0.0])], &[still])
+}
+
 pub fn caches() -> Vec<(&'static str, Vec<u8>)> {
+    [plain_caches(), vec![("a.abc", abc())]].concat()
+}
+
+/// Those that are a header and all coordinates.
+pub fn plain_caches() -> Vec<(&'static str, Vec<u8>)> {
     vec![("a.npy", npy_f4()), ("a.pc2", pc2()), ("a.mdd", mdd())]
 }

@@ -46,7 +46,12 @@ impl CacheWriter {
         };
         if format == CacheFormat::Pc2 {
             return Self::begin(announced, target, (Numbers::Single, options.origin), |file| {
-                file.write_all(&pc2::header(points, frames, options.number(0) as f32, options.step() as f32))
+                file.write_all(&pc2::header(
+                    points,
+                    frames,
+                    options.number(0) as f32,
+                    options.even_step().unwrap_or(1.0) as f32,
+                ))
             });
         }
         Self::begin(announced, target, (Numbers::SingleBigEndian, options.origin), |file| {

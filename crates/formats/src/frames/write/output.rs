@@ -26,9 +26,9 @@ pub trait FrameWriter: Send {
 /// What some formats store beside the positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
-    /// Frames per second, for the times in `.mdd`: 24 by default.
+    /// Frames per second, for the times in `.mdd` and `.abc`: 24 by default.
     pub fps: f64,
-    /// The number of each frame, ascending, for the names of files and the times in `.pc2` and `.mdd`; 0, 1, 2, … where the list is empty.
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd` and `.abc`; 0, 1, 2, … where the list is empty.
     pub numbers: Vec<f64>,
     /// What is added to all positions, which are then written in double precision by the formats that have it.
     pub origin: Option<Point>,
@@ -41,11 +41,11 @@ impl FrameOptions {
         self.numbers.get(frame).copied().unwrap_or(frame as f64)
     }
 
-    /// The distance of two frames; 1 where it is not the same throughout.
-    pub(super) fn step(&self) -> f64 {
+    /// The distance of two frames, where it is the same throughout.
+    pub(super) fn even_step(&self) -> Option<f64> {
         let mut steps = self.numbers.windows(2).map(|pair| pair[1] - pair[0]);
         let first = steps.next().unwrap_or(1.0);
-        if steps.all(|step| (step - first).abs() <= 1e-6 * first) { first } else { 1.0 }
+        steps.all(|step| (step - first).abs() <= 1e-6 * first).then_some(first)
     }
 }
 

@@ -1,0 +1,148 @@
+//! The tree of objects of an archive: what each is called, what it is, what it lies below.
+
+use std::io::{Read, Seek};
+
+use super::fields::Fields;
+use super::ogawa::{Container, DATA, Failure, damaged};
+use super::sampling::Sampling;
+use crate::error::Fault;
+
+/// Bytes at the end of the headers of a group's objects that tell its contents apart from others.
+const HASHES: usize = 32;
+/// In place of an index of metadata that is told beside it.
+pub(super) const INLINE: usize = 0xff;
+
+/// What an object is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// A polygon mesh, or the control mesh of a subdivision surface.
+    Mesh,
+    Transform,
+    /// Another object once more.
+    Instance,
+    Other,
+}
+
+impl Kind {
+    fn of(metadata: &[u8]) -> Self {
+        let value = |key: &[u8]| {
+            let mut entries = metadata.split(|&b| b == b';');
+            entries.find_map(|entry| entry.strip_prefix(key)?.strip_prefix(b"="))
+        };
+        let schema = value(b"schema").unwrap_or_default();
+        match schema {
+            _ if value(b"isInstance") == Some(b"1") => Self::Instance,
+            _ if schema.starts_with(b"AbcGeom_PolyMesh_") || schema.starts_with(b"AbcGeom_SubD_") => Self::Mesh,
+            _ if schema.starts_with(b"AbcGeom_Xform_") => Self::Transform,
+            _ => Self::Other,
+        }
+    }
+}
+
+#[derive(Debug)]
+pub(super) struct Object {
+    pub(super) name: Vec<u8>,
+    pub(super) kind: Kind,
+    /// Index of the object that it lies below; none for those at the top.
+    pub(super) parent: Option<usize>,
+    /// Offset of its group.
+    pub(super) group: u64,
+}
+
+/// An archive without the contents of its objects.
+pub(super) struct Archive<R> {
+    pub(super) container: Container<R>,
+    pub(super) samplings: Vec<Sampling>,
+    /// Frames per second of the program that wrote it.
+    pub(super) frame_rate: Option<f64>,
+    /// Each comes before what lies below it, and that before its next sibling.
+    pub(super) objects: Vec<Object>,
+}
+
+impl<R: Read + Seek> Archive<R> {
+    pub(super) fn open(source: R, length: u64) -> Result<Self, Failure> {
+        let (mut container, root) = Container::open(source, length)?;
+        let children = container.children(root)?;
+        let &[_, _, top, information, times, metadata, ..] = children.as_slice() else {
+            return Err(damaged("it has no contents").into());
+        };
+        let frame_rate = frame_rate(&container.contents(information)?);
+        let samplings = Sampling::table(&container.contents(times)?)?;
+        let metadata = container.contents(metadata)?;
+        let kinds = kinds(&metadata)?;
+        let mut objects = Vec::new();
+        // Objects that are yet to be entered, the next one last.
+        let mut waiting = children_of(&mut container, (top, None), &kinds)?;
+        while let Some(object) = waiting.pop() {
+            if object.group & DATA == 0 {
+                waiting.extend(children_of(&mut container, (object.group, Some(objects.len())), &kinds)?);
+            }
+            objects.push(object);
+        }
+        // What follows reads the properties of some objects, some of them twice.
+        container.allow(4);
+        Ok(Self { container, samplings, frame_rate, objects })
+    }
+
+    /// The object and what it lies below, from the inside to the outside.
+    pub(super) fn ancestry(&self, object: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(object), |&k| self.objects[k].parent)
+    }
+
+    /// The names from the top to an object, each after a `/`.
+    pub(super) fn path(&self, object: usize) -> String {
+        let mut names: Vec<_> = self.ancestry(object).map(|k| String::from_utf8_lossy(&self.objects[k].name)).collect();
+        names.push("".into());
+        names.reverse();
+        names.join("/")
+    }
+}
+
+/// The objects that a group has, the last one first.
+fn children_of<R: Read + Seek>(
+    container: &mut Container<R>,
+    (group, parent): (u64, Option<usize>),
+    kinds: &[Kind],
+) -> Result<Vec<Object>, Failure> {
+    let children = container.children(group)?;
+    // The first are its own properties, the last are the headers of the others.
+    let [_, groups @ .., headers] = children.as_slice() else { return Ok(Vec::new()) };
+    if headers & DATA == 0 {
+        return Ok(Vec::new());
+    }
+    let headers = container.contents(*headers)?;
+    let mut fields = Fields(&headers[..headers.len().saturating_sub(HASHES)]);
+    let mut objects = Vec::new();
+    for &group in groups {
+        let length = fields.number(2)?;
+        let name = fields.take(length)?.to_vec();
+        let kind = match fields.number(0)? {
+            INLINE => {
+                let length = fields.number(2)?;
+                Kind::of(fields.take(length)?)
+            }
+            index => *kinds.get(index).ok_or_else(|| damaged("an object has metadata that are not there"))?,
+        };
+        objects.push(Object { name, kind, parent, group });
+    }
+    objects.reverse();
+    Ok(objects)
+}
+
+/// What objects are by the index of their metadata; the first index says that there are none.
+fn kinds(table: &[u8]) -> Result<Vec<Kind>, Fault> {
+    let (mut fields, mut kinds) = (Fields(table), vec![Kind::Other]);
+    while !fields.is_empty() {
+        let length = fields.number(0)?;
+        kinds.push(Kind::of(fields.take(length)?));
+    }
+    Ok(kinds)
+}
+
+/// What programs write beside each other as `key=value;key=value`.
+fn frame_rate(information: &[u8]) -> Option<f64> {
+    let text = String::from_utf8_lossy(information);
+    let value = |key: &str| text.split(';').find_map(|entry| entry.trim().strip_prefix(key)?.strip_prefix('='));
+    let told = ["_ai_DCC_FPS", "FramesPerTimeUnit"].into_iter().find_map(value)?;
+    told.trim().parse().ok().filter(|rate: &f64| (1e-3..1e6).contains(rate))
+}

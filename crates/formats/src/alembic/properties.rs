@@ -1,0 +1,149 @@
+//! Properties of an object: what their headers say, and where their samples lie.
+
+use std::io::{Read, Seek};
+
+use super::fields::Fields;
+use super::objects::{Archive, INLINE};
+use super::ogawa::{Block, Container, DATA, DIGEST, Failure, damaged};
+
+/// Types of numbers, as headers tell them.
+pub(super) const BOOL: u8 = 0;
+pub(super) const U8: u8 = 1;
+pub(super) const U32: u8 = 5;
+pub(super) const I32: u8 = 6;
+pub(super) const F32: u8 = 10;
+pub(super) const F64: u8 = 11;
+
+/// What a property holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Other properties.
+    Compound = 0,
+    /// One value, of one or several numbers.
+    Scalar = 1,
+    /// Any number of values.
+    Array = 2,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Property {
+    pub(super) name: Vec<u8>,
+    pub(super) kind: Kind,
+    /// The type of the numbers.
+    pub(super) number: u8,
+    /// Numbers of a value.
+    pub(super) extent: u8,
+    pub(super) samples: usize,
+    /// The first sample that differs from the one before it, and the last one; 0 and 0 where all are the same.
+    first: usize,
+    last: usize,
+    /// Index of the times of its samples.
+    pub(super) sampling: usize,
+    group: u64,
+}
+
+impl Property {
+    /// Whether all samples are the same.
+    pub(super) fn is_constant(&self) -> bool {
+        self.samples < 2 || (self.first, self.last) == (0, 0)
+    }
+
+    /// Where a sample lies among those that are stored: repetitions at the beginning and the end are not.
+    fn place(&self, sample: usize) -> u64 {
+        if self.is_constant() || sample < self.first {
+            return 0;
+        }
+        (sample.min(self.last) + 1).saturating_sub(self.first) as u64
+    }
+
+    /// Where the values of a sample are.
+    pub(super) fn sample<R: Read + Seek>(&self, container: &mut Container<R>, sample: usize) -> Result<Block, Failure> {
+        // Arrays have their sizes between.
+        let step = if self.kind == Kind::Array { 2 } else { 1 };
+        let data = container.child(self.group, self.place(sample) * step)?;
+        let Block { start, length } = container.data(data)?;
+        let digest = DIGEST.min(length);
+        if length > 0 && length < DIGEST {
+            return Err(damaged("a sample is too short").into());
+        }
+        Ok(Block { start: start + digest, length: length - digest })
+    }
+
+    /// The bytes of a sample that is small.
+    pub(super) fn table<R: Read + Seek>(
+        &self,
+        container: &mut Container<R>,
+        sample: usize,
+    ) -> Result<Vec<u8>, Failure> {
+        let block = self.sample(container, sample)?;
+        // As much as the file has at the most.
+        let mut bytes = vec![0; block.length as usize];
+        container.read(block.start, &mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+/// The property of a name, if it is of this kind.
+pub(super) fn find<'a>(properties: &'a [Property], name: &str, kind: Kind) -> Option<&'a Property> {
+    properties.iter().find(|property| property.name == name.as_bytes() && property.kind == kind)
+}
+
+impl<R: Read + Seek> Archive<R> {
+    /// The properties of an object.
+    pub(super) fn top_properties(&mut self, object: usize) -> Result<Vec<Property>, Failure> {
+        let children = self.container.children(self.objects[object].group)?;
+        match children.first() {
+            Some(&group) if group & DATA == 0 => self.properties(group),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// The properties in an object's compound of this name, `.geom` or `.xform`; none where it has no such.
+    pub(super) fn schema(&mut self, object: usize, name: &str) -> Result<Vec<Property>, Failure> {
+        let all = self.top_properties(object)?;
+        find(&all, name, Kind::Compound).map_or(Ok(Vec::new()), |compound| self.properties(compound.group))
+    }
+
+    fn properties(&mut self, group: u64) -> Result<Vec<Property>, Failure> {
+        let children = self.container.children(group)?;
+        let Some((&headers, groups)) = children.split_last() else { return Ok(Vec::new()) };
+        let headers = self.container.contents(headers)?;
+        let mut fields = Fields(&headers);
+        groups.iter().map(|&group| self.property(&mut fields, group)).collect()
+    }
+
+    /// The next header. Its first four bytes are bits: 0–1 the kind, 2–3 the width of its numbers, 4–7 the type of the values, 8 whether times are
+    /// told, 9 whether the first and the last change are, 11 whether there is none, 12–19 the extent, 20–27 the metadata.
+    fn property(&self, fields: &mut Fields<'_>, group: u64) -> Result<Property, Failure> {
+        let bits = fields.number(2)?;
+        let (width, bit) = ((bits >> 2 & 3) as u32, |k: u32| bits >> k & 1 == 1);
+        let kind = match bits & 3 {
+            0 => Kind::Compound,
+            1 => Kind::Scalar,
+            _ => Kind::Array,
+        };
+        let (mut samples, mut first, mut last, mut sampling) = (0, 0, 0, 0);
+        if kind != Kind::Compound {
+            samples = fields.number(width)?;
+            if bit(9) {
+                (first, last) = (fields.number(width)?, fields.number(width)?);
+            } else if !bit(11) {
+                (first, last) = (1, samples.saturating_sub(1));
+            }
+            if bit(8) {
+                sampling = fields.number(width)?;
+            }
+            if sampling >= self.samplings.len() {
+                return Err(damaged("a property has times that are not there").into());
+            }
+        }
+        let length = fields.number(width)?;
+        let name = fields.take(length)?.to_vec();
+        if bits >> 20 & 0xff == INLINE {
+            let length = fields.number(width)?;
+            fields.take(length)?;
+        }
+        let (number, extent) = ((bits >> 4 & 15) as u8, (bits >> 12 & 0xff) as u8);
+        Ok(Property { name, kind, number, extent, samples, first, last, sampling, group })
+    }
+}

@@ -1,0 +1,244 @@
+//! Transforms above a mesh, still or animated: a stack of operations, of which each has some numbers. Points are rows, so that a matrix stands behind
+//! what it moves.
+
+use std::io::{Read, Seek};
+
+use super::objects::{Archive, Kind as ObjectKind};
+use super::ogawa::{Container, Failure, damaged};
+use super::properties::{BOOL, F64, Kind, Property, U8, find};
+use super::sampling::Sampling;
+use crate::error::Fault;
+
+pub(super) type Matrix = [[f64; 4]; 4];
+
+const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+/// Programs write a handful.
+const MOST_OPERATIONS: usize = 256;
+
+/// The transforms above an object.
+pub(super) struct Chain {
+    /// From the inside to the outside, without those that are the identity.
+    links: Vec<Link>,
+}
+
+/// One transform.
+struct Link {
+    /// The kinds of the operations, outermost first.
+    operations: Vec<u8>,
+    /// Their numbers, back to back.
+    values: Property,
+    /// The matrix, where it does not change.
+    fixed: Option<Matrix>,
+}
+
+/// A moment at which a transform is wanted: a time, which is that of a sample of some property.
+#[derive(Clone, Copy)]
+pub(super) struct Moment {
+    pub(super) sample: usize,
+    /// Index of the times of that property.
+    pub(super) sampling: usize,
+    pub(super) seconds: f64,
+}
+
+impl Moment {
+    /// The sample of another property at this moment, and how far the moment is on its way to the next.
+    pub(super) fn of(self, property: &Property, samplings: &[Sampling]) -> (usize, f64) {
+        if property.sampling == self.sampling {
+            return (self.sample.min(property.samples.saturating_sub(1)), 0.0);
+        }
+        samplings[property.sampling].find(self.seconds, property.samples)
+    }
+}
+
+impl Chain {
+    /// The transforms above an object, up to one that does not inherit what is above it.
+    pub(super) fn of<R: Read + Seek>(archive: &mut Archive<R>, object: usize) -> Result<Self, Failure> {
+        let mut links = Vec::new();
+        for above in archive.ancestry(object).skip(1).collect::<Vec<_>>() {
+            if archive.objects[above].kind != ObjectKind::Transform {
+                continue;
+            }
+            let properties = archive.schema(above, ".xform")?;
+            links.extend(link(&mut archive.container, &properties)?);
+            if !inherits(&mut archive.container, &properties)? {
+                break;
+            }
+        }
+        Ok(Self { links })
+    }
+
+    /// The property that changes most often, if any does.
+    pub(super) fn animated(&self) -> Option<&Property> {
+        let moving = self.links.iter().filter(|link| link.fixed.is_none());
+        moving.map(|link| &link.values).max_by_key(|values| values.samples)
+    }
+
+    /// The product of all transforms at a moment; none for the identity.
+    pub(super) fn matrix<R: Read + Seek>(
+        &self,
+        container: &mut Container<R>,
+        samplings: &[Sampling],
+        moment: Moment,
+    ) -> Result<Option<Matrix>, Failure> {
+        let mut product: Option<Matrix> = None;
+        for link in &self.links {
+            let matrix = match link.fixed {
+                Some(fixed) => fixed,
+                None => link.at(container, moment.of(&link.values, samplings))?,
+            };
+            product = Some(product.map_or(matrix, |inner| multiply(&inner, &matrix)));
+        }
+        match product {
+            Some(matrix) if !matrix.as_flattened().iter().all(|x| x.is_finite()) => {
+                Err(Fault::invalid("has a transform that is NaN or infinite; repair it or bake it into the points")
+                    .into())
+            }
+            product => Ok(product.filter(|matrix| *matrix != IDENTITY)),
+        }
+    }
+}
+
+/// A transform that does something.
+fn link<R: Read + Seek>(container: &mut Container<R>, properties: &[Property]) -> Result<Option<Link>, Failure> {
+    let named = |name: &str| properties.iter().find(|property| property.name == name.as_bytes());
+    let (Some(operations), Some(values)) = (named(".ops"), named(".vals")) else { return Ok(None) };
+    if operations.number != U8 || values.number != F64 || values.samples == 0 || operations.samples == 0 {
+        return Err(damaged("a transform has no numbers, or of an unknown type").into());
+    }
+    let operations = operations.table(container, 0)?;
+    if operations.len() > MOST_OPERATIONS {
+        return Err(damaged("a transform has more operations than any program writes").into());
+    }
+    let mut link = Link { operations, values: values.clone(), fixed: None };
+    let first = link.at(container, (0, 0.0))?;
+    if values.is_constant() {
+        link.fixed = Some(first);
+    }
+    Ok((link.fixed != Some(IDENTITY)).then_some(link))
+}
+
+/// Whether what is above a transform moves it too.
+fn inherits<R: Read + Seek>(container: &mut Container<R>, properties: &[Property]) -> Result<bool, Failure> {
+    let Some(told) = find(properties, ".inherits", Kind::Scalar).filter(|told| told.number == BOOL) else {
+        return Ok(true);
+    };
+    if !told.is_constant() {
+        let what = "has a transform that is moved by what is above it in some frames only; bake it into the points";
+        return Err(Fault::unsupported(what).into());
+    }
+    Ok(told.table(container, 0)?.first() != Some(&0))
+}
+
+impl Link {
+    /// The matrix at a sample, or on the way to the next one, where each number is interpolated.
+    fn at<R: Read + Seek>(
+        &self,
+        container: &mut Container<R>,
+        (sample, share): (usize, f64),
+    ) -> Result<Matrix, Failure> {
+        let mut read = |sample| -> Result<Vec<f64>, Failure> {
+            let bytes = self.values.table(container, sample)?;
+            Ok(bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+        };
+        let mut values = read(sample)?;
+        if share > 0.0 {
+            let next = read(sample + 1)?;
+            values.iter_mut().zip(next).for_each(|(value, next)| *value += share * (next - *value));
+        }
+        Ok(matrix(&self.operations, &values)?)
+    }
+}
+
+/// The product of some operations.
+fn matrix(operations: &[u8], mut values: &[f64]) -> Result<Matrix, Fault> {
+    let mut product = IDENTITY;
+    for operation in operations {
+        let kind = operation >> 4;
+        let count = match kind {
+            0 | 1 => 3,
+            2 => 4,
+            3 => 16,
+            4..=6 => 1,
+            _ => return Err(Fault::unsupported("has a transform of an unknown kind; bake it into the points")),
+        };
+        let (taken, rest) = values.split_at_checked(count).ok_or_else(|| damaged("a transform has too few numbers"))?;
+        values = rest;
+        let mut step = IDENTITY;
+        match (kind, taken) {
+            (0, _) => (0..3).for_each(|k| step[k][k] = taken[k]),
+            (1, _) => step[3][..3].copy_from_slice(taken),
+            (2, &[x, y, z, degrees]) => step = rotation([x, y, z], degrees),
+            (3, _) => step.as_flattened_mut().copy_from_slice(taken),
+            _ => step = rotation([4, 5, 6].map(|axis| f64::from(u8::from(kind == axis))), taken[0]),
+        }
+        product = multiply(&step, &product);
+    }
+    Ok(product)
+}
+
+fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+/// Of rows, about an axis; the identity where there is none.
+fn rotation(axis: [f64; 3], degrees: f64) -> Matrix {
+    let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length == 0.0 {
+        return IDENTITY;
+    }
+    let [x, y, z] = axis.map(|value| value / length);
+    let (s, c) = degrees.to_radians().sin_cos();
+    let t = 1.0 - c;
+    [
+        [c + t * x * x, t * x * y + s * z, t * x * z - s * y, 0.0],
+        [t * x * y - s * z, c + t * y * y, t * y * z + s * x, 0.0],
+        [t * x * z + s * y, t * y * z - s * x, c + t * z * z, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+}
+
+/// Moves points, `x y z x y z …`.
+pub(super) fn apply(m: &Matrix, points: &mut [f64]) {
+    for point in points.as_chunks_mut::<3>().0 {
+        let [x, y, z] = *point;
+        *point = std::array::from_fn(|k| x * m[0][k] + y * m[1][k] + z * m[2][k] + m[3][k]);
+    }
+}
+
+/// Whether a matrix turns the inside out.
+pub(super) fn mirrors(m: &Matrix) -> bool {
+    let [a, b, c] = [m[0], m[1], m[2]];
+    let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+    a[0] * minor(1, 2) - a[1] * minor(0, 2) + a[2] * minor(0, 1) < 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved(operations: &[u8], values: &[f64], point: [f64; 3]) -> [f64; 3] {
+        let mut point = point.to_vec();
+        apply(&matrix(operations, values).unwrap(), &mut point);
+        [point[0], point[1], point[2]].map(|x| (1e9 * x).round() / 1e9)
+    }
+
+    #[test]
+    fn operations_act_from_the_last_to_the_first() {
+        let (scale, translate) = ([2.0, 3.0, 4.0], [10.0, 0.0, 0.0]);
+        assert_eq!(moved(&[0x10, 0x00], &[translate, scale].concat(), [1.0, 1.0, 1.0]), [12.0, 3.0, 4.0]);
+        assert_eq!(moved(&[0x00, 0x10], &[scale, translate].concat(), [1.0, 1.0, 1.0]), [22.0, 3.0, 4.0]);
+        assert_eq!(moved(&[0x20], &[0.0, 0.0, 2.0, 90.0], [1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]);
+        assert_eq!(moved(&[0x40], &[90.0], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+        assert_eq!(moved(&[0x50], &[90.0], [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]);
+        let rows: Vec<f64> = (0..16).map(f64::from).collect();
+        assert_eq!(moved(&[0x30], &rows, [1.0, 0.0, 0.0]), [12.0, 14.0, 16.0]);
+    }
+
+    #[test]
+    fn transforms_that_cannot_be_are_refused() {
+        assert!(matrix(&[0x70], &[0.0; 16]).is_err());
+        assert!(matrix(&[0x30], &[0.0; 15]).is_err());
+        assert!(mirrors(&matrix(&[0x00], &[-1.0, 1.0, 1.0]).unwrap()) && !mirrors(&IDENTITY));
+    }
+}

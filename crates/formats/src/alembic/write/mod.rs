@@ -1,0 +1,168 @@
+//! Writes an archive of one polygon mesh below one transform, frame by frame.
+
+mod ogawa;
+mod tables;
+
+use std::io::{self, Seek, Write};
+
+use cager_geometry::mesh::{Point, Polygons};
+
+use super::ogawa::DATA;
+use super::properties::{BOOL, F32, F64, I32, Kind, U8};
+use super::sampling::ACYCLIC;
+use ogawa::Sink;
+use tables::{Compound, Metadata, Values, write_object};
+
+/// Version 1.8.8 of the library whose files these are like.
+const LIBRARY: i32 = 10808;
+const MESH: &str = "schema=AbcGeom_PolyMesh_v1;schemaBaseType=AbcGeom_GeomBase_v1";
+const MESH_OBJECT: &str =
+    "schema=AbcGeom_PolyMesh_v1;schemaBaseType=AbcGeom_GeomBase_v1;schemaObjTitle=AbcGeom_PolyMesh_v1:.geom";
+const TRANSFORM: &str = "schema=AbcGeom_Xform_v3";
+const TRANSFORM_OBJECT: &str = "schema=AbcGeom_Xform_v3;schemaObjTitle=AbcGeom_Xform_v3:.xform";
+/// A translation, among the operations of a transform.
+const TRANSLATE: u8 = 0x10;
+/// Index of the times of the frames; the first times of an archive are those of what has none.
+const FRAMES: u32 = 1;
+
+/// When frames are.
+#[derive(Clone, Debug)]
+pub(crate) struct Schedule {
+    /// Frames per second.
+    pub(crate) fps: f64,
+    /// Numbers of all frames, ascending.
+    pub(crate) numbers: Numbers,
+}
+
+/// Numbers of frames: a number over the frame rate is its frame's time in seconds.
+#[derive(Clone, Debug)]
+pub(crate) enum Numbers {
+    Even { first: f64, step: f64 },
+    Uneven(Vec<f64>),
+}
+
+/// A mesh that is being written. Memory does not grow with the frames but by 24 bytes for each.
+pub(crate) struct MeshWriter<W> {
+    sink: Sink<W>,
+    schedule: Schedule,
+    /// Name of the transform; that of the mesh has `Shape` behind it.
+    name: String,
+    origin: Option<Point>,
+    /// Samples of what is the same in all frames: corners of all faces, and numbers of corners.
+    faces: [u64; 2],
+    positions: Vec<u64>,
+    bounds: Vec<u64>,
+    bytes: Vec<u8>,
+}
+
+impl<W: Write + Seek> MeshWriter<W> {
+    /// Begins an archive; what lies far away gets `origin` as the translation above it, which keeps its positions exact.
+    pub(crate) fn new(
+        out: W,
+        name: &str,
+        faces: &Polygons,
+        schedule: Schedule,
+        origin: Option<Point>,
+    ) -> io::Result<Self> {
+        let mut sink = Sink::new(out)?;
+        let corners: Vec<u8> = faces.iter().flat_map(|face| face.iter().rev()).flat_map(|k| k.to_le_bytes()).collect();
+        let counts: Vec<u8> = faces.arities().iter().flat_map(|count| count.to_le_bytes()).collect();
+        let faces = [sink.sample(&corners)?, sink.sample(&counts)?];
+        let (positions, bounds, bytes) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { sink, schedule, name: name.to_owned(), origin, faces, positions, bounds, bytes })
+    }
+
+    /// Writes a frame, `x y z x y z …`.
+    pub(crate) fn write_frame(&mut self, positions: &[f32]) -> io::Result<()> {
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for point in positions.as_chunks::<3>().0 {
+            for k in 0..3 {
+                low[k] = low[k].min(point[k]);
+                high[k] = high[k].max(point[k]);
+            }
+        }
+        self.bytes.clear();
+        self.bytes.extend(positions.iter().flat_map(|x| x.to_le_bytes()));
+        // Arrays have their sizes beside them, where these are not those of a list.
+        self.positions.extend([self.sink.sample(&self.bytes)?, DATA]);
+        let bounds: Vec<u8> = low.iter().chain(&high).flat_map(|&x| f64::from(x).to_le_bytes()).collect();
+        self.bounds.push(self.sink.sample(&bounds)?);
+        Ok(())
+    }
+
+    /// Writes what says where the frames are; gives the file back.
+    pub(crate) fn finish(mut self) -> io::Result<W> {
+        let frames = self.bounds.len() as u32;
+        let (sink, mut metadata) = (&mut self.sink, Metadata::default());
+        let moving = |kind, number, extent| Values { kind, number, extent, samples: frames, sampling: FRAMES };
+        let still = |kind, number, extent| Values { kind, number, extent, samples: 1, sampling: 0 };
+
+        let mut geometry = Compound::default();
+        let group = sink.group(&self.bounds)?;
+        geometry.add(&mut metadata, (".selfBnds", "interpretation=box"), group, &moving(Kind::Scalar, F64, 6));
+        let group = sink.group(&self.positions)?;
+        let positions = moving(Kind::Array, F32, 3);
+        geometry.add(&mut metadata, ("P", "geoScope=vtx;interpretation=point"), group, &positions);
+        for (name, sample) in [".faceIndices", ".faceCounts"].into_iter().zip(self.faces) {
+            let group = sink.group(&[sample, DATA])?;
+            geometry.add(&mut metadata, (name, ""), group, &still(Kind::Array, I32, 1));
+        }
+        let geometry = geometry.write(sink)?;
+        let mut properties = Compound::default();
+        properties.add_compound(&mut metadata, (".geom", MESH), &geometry);
+        let properties = properties.write(sink)?;
+        let mesh = write_object(sink, &mut metadata, &properties, None)?;
+
+        // Maya shows no mesh without one above it.
+        let mut transform = Compound::default();
+        if let Some(origin) = self.origin {
+            let sample = sink.sample(&[TRANSLATE])?;
+            let group = sink.group(&[sample])?;
+            transform.add(&mut metadata, (".ops", ""), group, &still(Kind::Scalar, U8, 1));
+            let sample = sink.sample(origin.map(f64::to_le_bytes).as_flattened())?;
+            let group = sink.group(&[sample])?;
+            transform.add(&mut metadata, (".vals", ""), group, &still(Kind::Scalar, F64, 3));
+        }
+        let sample = sink.sample(&[1])?;
+        let group = sink.group(&[sample])?;
+        transform.add(&mut metadata, (".inherits", ""), group, &still(Kind::Scalar, BOOL, 1));
+        let transform = transform.write(sink)?;
+        let mut properties = Compound::default();
+        properties.add_compound(&mut metadata, (".xform", TRANSFORM), &transform);
+        let properties = properties.write(sink)?;
+        let shape = format!("{}Shape", self.name);
+        let transform = write_object(sink, &mut metadata, &properties, Some(((&shape, MESH_OBJECT), &mesh)))?;
+        let none = Compound::default().write(sink)?;
+        let title = (self.name.as_str(), TRANSFORM_OBJECT);
+        let top = write_object(sink, &mut metadata, &none, Some((title, &transform)))?;
+
+        let version = sink.data(&[&0_i32.to_le_bytes()])?;
+        let library = sink.data(&[&LIBRARY.to_le_bytes()])?;
+        let told =
+            format!("_ai_AlembicVersion=Alembic 1.8.8;_ai_Application=cager;_ai_DCC_FPS={:?}", self.schedule.fps);
+        let told = sink.data(&[told.as_bytes()])?;
+        let times = sink.data(&[&self.schedule.table(frames)])?;
+        let metadata = sink.data(&[&metadata.table()])?;
+        let root = sink.group(&[version, library, top.group, told, times, metadata])?;
+        self.sink.close(root)
+    }
+}
+
+impl Schedule {
+    /// The times of what has none, and those of the frames: how many samples they are for, seconds after which they repeat, and those stored.
+    fn table(&self, frames: u32) -> Vec<u8> {
+        let seconds = |number: f64| number / self.fps;
+        let (cycle, stored) = match &self.numbers {
+            Numbers::Even { first, step } => (seconds(*step), vec![seconds(*first)]),
+            Numbers::Uneven(numbers) => (ACYCLIC, numbers.iter().map(|&number| seconds(number)).collect()),
+        };
+        let mut table = Vec::new();
+        for (samples, cycle, stored) in [(1, 1.0, vec![0.0]), (frames, cycle, stored)] {
+            table.extend(u32::to_le_bytes(samples));
+            table.extend(f64::to_le_bytes(cycle));
+            table.extend((stored.len() as u32).to_le_bytes());
+            table.extend(stored.iter().flat_map(|time| time.to_le_bytes()));
+        }
+        table
+    }
+}

@@ -1,0 +1,373 @@
+//! What users rely on when Alembic archives are read and written.
+
+mod support;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use cager_formats::{
+    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, create_frames, open_frames, open_frames_bytes,
+    open_selected_frames, read_model, read_prim_with_note,
+};
+use cager_geometry::mesh::Polygons;
+use support::archive::*;
+use support::{message, polygons, read};
+use tempfile::{TempDir, tempdir};
+
+/// Samples at 24 frames per second from frame 1 on.
+const EVEN: (f64, &[f64]) = (1.0 / 24.0, &[1.0 / 24.0]);
+/// What no cycle is written as.
+const ACYCLIC: f64 = f64::MAX / 32.0;
+const IDENTITY: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+
+fn open(bytes: &[u8], points: usize) -> Result<Box<dyn FrameReader + '_>, Error> {
+    open_frames_bytes(CacheFormat::Abc, Path::new("a.abc"), bytes, points)
+}
+
+fn all(reader: &mut dyn FrameReader) -> Vec<Vec<f64>> {
+    let (mut frames, mut frame) = (Vec::new(), Vec::new());
+    while reader.read_next(&mut frame).unwrap() {
+        frames.push(frame.clone());
+    }
+    assert_eq!(frames.len(), reader.frames());
+    frames
+}
+
+fn numbers(reader: &dyn FrameReader) -> Vec<f64> {
+    (0..reader.frames()).map(|frame| reader.number(frame)).collect()
+}
+
+/// So many frames of a triangle that rises.
+fn rising(frames: u8) -> Vec<Vec<f32>> {
+    (0..frames).map(|k| vec![0.0, f32::from(k), 0.0, 1.0, f32::from(k), 0.0, 0.0, f32::from(k), 1.0]).collect()
+}
+
+fn triangle(frames: u8) -> Node {
+    mesh("triangle", positions(&rising(frames)), &[&[2, 1, 0]])
+}
+
+fn wide(frames: &[Vec<f32>]) -> Vec<Vec<f64>> {
+    frames.iter().map(|frame| frame.iter().map(|&x| x.into()).collect()).collect()
+}
+
+fn saved(bytes: &[u8]) -> (TempDir, PathBuf) {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("a.abc");
+    fs::write(&path, bytes).unwrap();
+    (folder, path)
+}
+
+/// Writes frames and gives the file.
+fn written(frames: &[Vec<f32>], faces: &Polygons, options: &FrameOptions) -> (TempDir, PathBuf) {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("my walk.abc");
+    let mut writer = create_frames(&path, frames[0].len() / 3, frames.len(), faces, options).unwrap();
+    frames.iter().for_each(|frame| writer.write_frame(frame).unwrap());
+    writer.finish().unwrap();
+    (folder, path)
+}
+
+#[test]
+fn archives_come_back_as_they_were_written() {
+    let faces = polygons(&[&[0, 1, 2], &[3, 2, 1, 0], &[0, 1, 2, 3, 1]]);
+    let frames: Vec<Vec<f32>> =
+        (0..300_u16).map(|k| (0..12).map(|i| (f32::from(k) + 0.1) * i as f32).collect()).collect();
+    for (fps, first, step) in [(24.0, 0.0, 1.0), (25.0, 1001.0, 1.0), (30000.0 / 1001.0, -3.0, 1.0), (60.0, 10.0, 2.0)]
+    {
+        let told: Vec<f64> = (0..300).map(|k| first + step * f64::from(k)).collect();
+        let options = FrameOptions { fps, numbers: told.clone(), ..FrameOptions::default() };
+        let (_folder, path) = written(&frames, &faces, &options);
+        let mut reader = open_frames(&path, 4).unwrap();
+        assert_eq!((reader.frames(), reader.frame_rate()), (300, Some(fps)));
+        assert_eq!(numbers(&*reader), told);
+        assert!(reader.notes().is_empty() && !reader.numbers_are_times());
+        assert_eq!(all(&mut *reader), wide(&frames));
+        assert_eq!(reader.mesh().unwrap(), (path.as_path(), &faces));
+        let model = read_model(&path).unwrap();
+        assert_eq!((model.points.as_flattened(), model.faces), (&wide(&frames)[0][..], faces.clone()));
+    }
+}
+
+#[test]
+fn the_mesh_is_called_as_the_file_and_lies_below_a_transform() {
+    let (_folder, path) = written(&rising(1), &polygons(&[&[0, 1, 2]]), &FrameOptions::default());
+    for prim in ["/my_walk/my_walkShape", "my_walk", "my_walkShape", "/my_walk"] {
+        assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 3, "{prim}");
+    }
+}
+
+#[test]
+fn what_lies_far_away_keeps_its_place_exactly() {
+    let origin = [1e7 + 0.125, -3.5e6, 1.0 / 3.0];
+    let options = FrameOptions { origin: Some(origin), ..FrameOptions::default() };
+    let frames = vec![vec![0.1, 0.2, 0.3, -1e-6, 5.0, 7.0]];
+    let (_folder, path) = written(&frames, &Polygons::new(), &options);
+    let expected: Vec<f64> = wide(&frames)[0].iter().zip(origin.iter().cycle()).map(|(x, o)| x + o).collect();
+    assert_eq!(all(&mut *open_frames(&path, 2).unwrap()), [expected]);
+}
+
+#[test]
+fn frames_at_uneven_times_keep_their_numbers() {
+    let told = vec![1.0, 2.0, 5.0, 9.0];
+    let options = FrameOptions { fps: 25.0, numbers: told.clone(), ..FrameOptions::default() };
+    let (_folder, path) = written(&rising(4), &Polygons::new(), &options);
+    let reader = open_frames(&path, 3).unwrap();
+    assert_eq!((numbers(&*reader), reader.frame_rate(), reader.numbers_are_times()), (told, Some(25.0), true));
+    assert!(reader.notes()[0].contains("its times are not evenly spaced"));
+}
+
+#[test]
+fn a_file_that_is_not_finished_is_not_there() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("a.abc");
+    let faces = polygons(&[&[0, 1, 2]]);
+    let mut writer = create_frames(&path, 3, 2, &faces, &FrameOptions::default()).unwrap();
+    writer.write_frame(&[0.0; 9]).unwrap();
+    assert!(matches!(writer.write_frame(&[f32::NAN; 9]), Err(Error::NonFinite { frame: 1, point: 0, .. })));
+    assert!(matches!(writer.finish(), Err(Error::FrameCount { announced: 2, written: 1, .. })));
+    let error = message(create_frames(&path, 2, 2, &faces, &FrameOptions::default()));
+    assert!(error.contains("face 0: the face names vertex 2, but there are 2 vertices"), "{error}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn double_precision_and_subdivision_surfaces_are_read() {
+    let mut node = triangle(1);
+    node.metadata = SUBDIVISION;
+    node.properties[0] = array("P", (F64, 3), 1, &[vec![0.1, 0.2, 0.3], vec![1.0 / 3.0, 1e300, 0.0]], f64::to_le_bytes);
+    node.properties[1].samples = vec![vec![]];
+    node.properties[2].samples = vec![vec![]];
+    let bytes = archive("", &[EVEN], &[node]);
+    assert_eq!(all(&mut *open(&bytes, 1).unwrap()), [vec![0.1, 0.2, 0.3], vec![1.0 / 3.0, 1e300, 0.0]]);
+}
+
+#[test]
+fn faces_are_turned_counterclockwise_and_edges_left_out() {
+    let faces: &[&[i32]] = &[&[2, 1, 0], &[0, 1], &[0, 1, 2, 1], &[]];
+    let (_folder, path) = saved(&archive("", &[EVEN], &[mesh("m", positions(&rising(1)), faces)]));
+    let (model, note) = read_prim_with_note(&path, None).unwrap();
+    assert_eq!(model.faces, polygons(&[&[0, 1, 2], &[1, 2, 1, 0]]));
+    assert!(note.unwrap().contains("left out 2 faces"));
+    let mirror = transform("mirror", &[0x00], 0, &[vec![-1.0, 1.0, 1.0]], vec![triangle(1)]);
+    assert_eq!(read("a.abc", archive("", &[EVEN], &[mirror])).unwrap().faces, polygons(&[&[2, 1, 0]]));
+}
+
+#[test]
+fn transforms_above_a_mesh_move_it_even_where_they_are_animated() {
+    // The outer one is animated at half the rate of the points, so that it is interpolated; the inner one turns y to z.
+    let turn = |child| transform("turn", &[0x40], 0, &[vec![90.0]], vec![child]);
+    let slow = (1.0 / 12.0, &[1.0 / 24.0][..]);
+    let moved = |child| {
+        transform(
+            "move",
+            &[0x10, 0x00],
+            2,
+            &[vec![0.0, 0.0, 0.0, 2.0, 2.0, 2.0], vec![10.0, 0.0, 0.0, 2.0, 2.0, 2.0]],
+            vec![child],
+        )
+    };
+    let bytes = archive("", &[EVEN, slow], &[moved(turn(triangle(3)))]);
+    let frames = all(&mut *open(&bytes, 3).unwrap());
+    let rounded: Vec<Vec<f64>> = frames.iter().map(|frame| frame.iter().map(|x| x.round()).collect()).collect();
+    assert_eq!(rounded[0], [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, -2.0, 0.0]);
+    assert_eq!(rounded[1], [5.0, 0.0, 2.0, 7.0, 0.0, 2.0, 5.0, -2.0, 2.0]);
+    assert_eq!(rounded[2], [10.0, 0.0, 4.0, 12.0, 0.0, 4.0, 10.0, -2.0, 4.0]);
+
+    // A still mesh is animated by what is above it; what does not inherit ends the chain.
+    let ride = transform("ride", &[0x10], 1, &[vec![0.0, 0.0, 1.0], vec![0.0, 0.0, 2.0]], vec![triangle(1)]);
+    let mut stand = ride.clone();
+    stand.properties[2].samples = vec![vec![0]];
+    for (node, lift) in [(ride, 2.0), (stand, 0.0)] {
+        let bytes = archive("", &[EVEN], &[transform("lift", &[0x30], 0, &[matrix(lift)], vec![node])]);
+        let mut reader = open(&bytes, 3).unwrap();
+        assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(24.0), vec![1.0, 2.0]));
+        let heights: Vec<[f64; 2]> = all(&mut *reader).iter().map(|frame| [frame[1], frame[2]]).collect();
+        assert_eq!(heights, [[lift, 1.0], [lift, 2.0]]);
+    }
+}
+
+fn matrix(lift: f64) -> Vec<f64> {
+    let mut matrix = IDENTITY.to_vec();
+    matrix[13] = lift;
+    matrix
+}
+
+#[test]
+fn frame_numbers_follow_the_times_of_samples() {
+    let read = |information: &str, times: (f64, &[f64]), frames: u8| {
+        let bytes = archive(information, &[times], &[triangle(frames)]);
+        let reader = open(&bytes, 3).unwrap();
+        (reader.frame_rate(), numbers(&*reader))
+    };
+    assert_eq!(read("", (1.0 / 30.0, &[0.0]), 2), (Some(30.0), vec![0.0, 1.0]));
+    assert_eq!(read("_ai_DCC_FPS=24", (1.0 / 30.0, &[0.1]), 2), (Some(30.0), vec![3.0, 4.0]));
+    // Two samples a frame, and one for two frames.
+    assert_eq!(read("a=b;_ai_DCC_FPS=24.0", (1.0 / 48.0, &[1.0 / 24.0]), 3), (Some(24.0), vec![1.0, 1.5, 2.0]));
+    assert_eq!(read("FramesPerTimeUnit=25", (0.08, &[0.04]), 3), (Some(25.0), vec![1.0, 3.0, 5.0]));
+    // A cycle of an open and a closed shutter; times of their own.
+    let (rate, found) = read("", (0.1, &[0.0, 0.025]), 4);
+    assert!(rate.is_some() && found.windows(2).all(|pair| pair[0] < pair[1]), "{rate:?} {found:?}");
+    assert_eq!(read("", (ACYCLIC, &[0.0, 0.5, 1.0, 2.5]), 4), (Some(2.0), vec![0.0, 1.0, 2.0, 5.0]));
+    assert_eq!(read("", (0.0, &[3.0]), 1), (None, vec![0.0]));
+    let bytes = archive("", &[(ACYCLIC, &[0.0, 1.0])], &[triangle(3)]);
+    assert!(message(open(&bytes, 3)).contains("it promises 3 frames, of which not all can be there"));
+    let bytes = archive("", &[(0.0, &[3.0])], &[triangle(3)]);
+    assert!(message(open(&bytes, 3)).contains("export it again with times in seconds"));
+}
+
+#[test]
+fn repeated_samples_are_frames() {
+    let mut node = triangle(3);
+    // Of seven samples the first two are the same, and the last three.
+    node.properties[0].changes = Some([7, 2, 3]);
+    let bytes = archive("", &[EVEN], &[node.clone()]);
+    let heights: Vec<f64> = all(&mut *open(&bytes, 3).unwrap()).iter().map(|frame| frame[1]).collect();
+    assert_eq!(heights, [0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
+    node.properties[0].changes = Some([1 << 30, 0, 0]);
+    assert!(message(open(&archive("", &[EVEN], &[node]), 3)).contains("it promises 1073741824 frames"));
+}
+
+#[test]
+fn one_of_several_meshes_is_chosen_by_path_or_name() {
+    let other = mesh("body", positions(&[vec![5.0; 6]]), &[]);
+    let mut same = triangle(1);
+    same.name = "body";
+    let place = |name, child| transform(name, &[0x10], 0, &[vec![0.0, 0.0, 0.0]], vec![child]);
+    let mut instance = triangle(1);
+    (instance.name, instance.metadata, instance.compound) = ("twin", "isInstance=1", "");
+    let source = array(".instanceSource", (TEXT, 1), 0, &[b"/coat/body".to_vec()], u8::to_le_bytes);
+    instance.properties = vec![Property { kind: 1, ..source }];
+    let (_folder, path) = saved(&archive("", &[EVEN], &[place("coat", same), place("skin", other), instance]));
+    let list = "/coat/body (3 points), /skin/body (2 points)";
+    let error = message(open_frames(&path, 3));
+    assert!(
+        error.contains(&format!("holds 3 meshes, {list} and /twin (an instance); choose one by its path with --prim")),
+        "{error}"
+    );
+    let take = |prim: &str, points| {
+        let selection = FrameSelection { prim: Some(prim.to_owned()), ..FrameSelection::default() };
+        open_selected_frames(&path, points, &selection).map(|mut reader| all(&mut *reader))
+    };
+    for prim in ["/skin/body", "skin/body/", "skin", "/skin"] {
+        assert_eq!(take(prim, 2).unwrap(), [vec![5.0; 6]], "{prim}");
+        assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 2, "{prim}");
+    }
+    assert!(message(take("body", 2)).contains("holds 2 meshes, /coat/body (3 points) and /skin/body (2 points)"));
+    assert!(message(take("hat", 2)).contains(&format!("holds no mesh hat, but {list} and /twin")));
+    assert!(message(take("twin", 3)).contains("/twin is an instance of /coat/body, which is not read; "));
+    assert!(matches!(take("/coat", 2), Err(Error::PointCount { expected: 2, found: 3, .. })));
+}
+
+#[test]
+fn topology_that_changes_names_the_frame() {
+    let mut frames = rising(3);
+    frames[2].extend([0.0; 3]);
+    let bytes = archive("", &[EVEN], &[mesh("m", positions(&frames), &[&[2, 1, 0]])]);
+    let (mut reader, mut frame) = (open(&bytes, 3).unwrap(), Vec::new());
+    assert!(reader.read_next(&mut frame).unwrap() && reader.read_next(&mut frame).unwrap());
+    let error = message(reader.read_next(&mut frame));
+    assert!(error.contains("frame 2: its topology changes: it has 4 points, and 3 in frame 0; "), "{error}");
+
+    let mut node = triangle(3);
+    let faces = [vec![2, 1, 0], vec![2, 1, 0], vec![1, 2, 0]];
+    node.properties[1] = array(".faceIndices", (I32, 1), 1, &faces, i32::to_le_bytes);
+    let bytes = archive("", &[EVEN], &[node]);
+    let mut reader = open(&bytes, 3).unwrap();
+    assert!(reader.read_next(&mut frame).unwrap() && reader.read_next(&mut frame).unwrap());
+    assert!(message(reader.read_next(&mut frame)).contains("frame 2: its topology changes: its faces are not those"));
+}
+
+#[test]
+fn what_cannot_be_read_says_why_and_what_to_do() {
+    let whole = archive("", &[EVEN], &[triangle(2)]);
+    let with = |at: usize, byte: u8| {
+        let mut bytes = whole.clone();
+        bytes[at] = byte;
+        message(open(&bytes, 3))
+    };
+    assert!(with(5, 0).contains("was never closed: the program that wrote it stopped before its end; export it again"));
+    assert!(with(7, 9).contains("is of version 9 of Ogawa"));
+    assert!(with(0, b'0').contains("does not begin as an Alembic archive does"));
+    assert!(with(15, 0x7f).contains("an offset leads out of the file"));
+    let hdf5 = message(open(b"\x89HDF\r\n\x1a\n and so on", 3));
+    assert!(hdf5.contains("of the old kind, HDF5, which is not read; write it as Ogawa with abcconvert -toOgawa"));
+    assert!(message(open(&support::npy_f4(), 3)).contains("is not a .abc file but a file of the kind .npy"));
+    assert!(message(read("a.abc", b"Ogawa")).contains("does not begin as"));
+    let none = archive("", &[EVEN], &[transform("x", &[0x10], 0, &[vec![0.0; 3]], vec![])]);
+    assert!(message(open(&none, 3)).contains("holds no polygon mesh; export the mesh itself as Alembic"));
+    assert!(matches!(open(&whole, 4), Err(Error::PointCount { expected: 4, found: 3, .. })));
+
+    let of = |change: &dyn Fn(&mut Node)| {
+        let mut node = triangle(2);
+        change(&mut node);
+        message(open(&archive("", &[EVEN], &[node]), 3))
+    };
+    assert!(of(&|node| drop(node.properties.remove(0))).contains("has a mesh without samples of P"));
+    assert!(of(&|node| node.properties[0].extent = 2).contains("positions that are not three numbers"));
+    assert!(of(&|node| node.properties[0].samples[0].truncate(11)).contains("end within a point"));
+    assert!(of(&|node| node.properties[0].samples[0].clear()).contains("a mesh without points in its first frame"));
+    assert!(of(&|node| node.properties[1].samples[0][0] = 3).contains("face 0: the face names vertex 3"));
+    assert!(of(&|node| node.properties[2].samples[0][3] = 1).contains("face 0 has more corners than are there"));
+    assert!(of(&|node| node.properties[0].sampling = 2).contains("times that are not there"));
+
+    let mut bad = rising(2);
+    bad[1][4] = f32::INFINITY;
+    let bytes = archive("", &[EVEN], &[mesh("m", positions(&bad), &[])]);
+    let (mut reader, mut frame) = (open(&bytes, 3).unwrap(), Vec::new());
+    assert!(reader.read_next(&mut frame).unwrap());
+    assert!(matches!(reader.read_next(&mut frame), Err(Error::NonFinite { frame: 1, point: 1, .. })));
+    let lost = transform("x", &[0x10], 0, &[vec![f64::NAN; 3]], vec![triangle(1)]);
+    assert!(message(open(&archive("", &[EVEN], &[lost]), 3)).contains("has a transform that is NaN or infinite"));
+}
+
+#[test]
+fn objects_that_contain_themselves_are_refused() {
+    let whole = archive("", &[EVEN], &[triangle(1)]);
+    // Wherever an offset may stand, each of the groups and the blocks in turn.
+    for at in 16..whole.len() - 8 {
+        for target in (16..whole.len() as u64).step_by(37).flat_map(|target| [target, target | DATA]) {
+            let mut bytes = whole.clone();
+            bytes[at..at + 8].copy_from_slice(&target.to_le_bytes());
+            let Ok(mut reader) = open(&bytes, 3) else { continue };
+            let mut frame = Vec::new();
+            if reader.read_next(&mut frame).is_ok() {
+                assert_eq!(frame.len(), 9);
+            }
+        }
+    }
+}
+
+/// `make alembic` installs it.
+#[test]
+fn the_library_of_alembic_reads_what_is_written() {
+    let python = std::env::var("CAGER_ALEMBIC_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let found = Command::new(&python).args(["-c", "import imath, alembic3d"]).output();
+    if !found.is_ok_and(|found| found.status.success()) {
+        eprintln!("skipped: {python} has no alembic3d; `make alembic` installs it and runs this test");
+        return;
+    }
+    let faces = polygons(&[&[0, 1, 2], &[2, 1, 0, 3]]);
+    let frames: Vec<Vec<f32>> =
+        (0..300_u16).map(|k| (0..12).map(|i| (f32::from(k) + 0.1) * i as f32).collect()).collect();
+    let uneven = FrameOptions { fps: 25.0, numbers: vec![1.0, 2.0, 5.0, 9.0], ..FrameOptions::default() };
+    let far = FrameOptions { origin: Some([1e7 + 0.125, -3.5e6, 1.0 / 3.0]), ..FrameOptions::default() };
+    for (options, count) in [(FrameOptions::default(), 300), (uneven, 4), (far, 1)] {
+        let (_folder, path) = written(&frames[..count], &faces, &options);
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/read_alembic.py");
+        let done = Command::new(&python).arg(script).arg(&path).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let text = String::from_utf8(done.stdout).unwrap();
+        let mut lines = text.lines();
+        assert_eq!((lines.next(), lines.next()), (Some("3 4"), Some("2 1 0 3 0 1 2")));
+        let mut reader = open_frames(&path, 4).unwrap();
+        let own = all(&mut *reader);
+        assert_eq!(lines.clone().count(), count);
+        for (frame, line) in lines.enumerate() {
+            let values: Vec<f64> = line.split(' ').map(|word| word.parse().unwrap()).collect();
+            let time = options.numbers.get(frame).copied().unwrap_or(frame as f64) / options.fps;
+            assert!((values[0] - time).abs() < 1e-12, "frame {frame} at {} s", values[0]);
+            assert_eq!(values[1..], own[frame], "frame {frame}");
+        }
+    }
+}
