@@ -70,6 +70,10 @@ pub(crate) enum Command {
     Serve(Box<ServeFlags>),
     Health(HealthArgs),
     Demo(DemoArgs),
+    /// List the file formats of meshes and captures: whether they are written as well as read, and what they say of units and times.
+    ///
+    /// Example: cager formats
+    Formats,
     Completions(CompletionsArgs),
     Man(ManArgs),
 }

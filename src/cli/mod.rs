@@ -17,6 +17,7 @@ mod encode;
 mod encode_remote;
 mod encode_summary;
 mod explore;
+mod formats;
 mod global_args;
 mod health;
 mod inspect;
@@ -75,6 +76,7 @@ pub fn run() -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),
         Command::Health(args) => health::run(&args),
+        Command::Formats => formats::run(),
         Command::Completions(args) => {
             let mut script = Vec::new();
             clap_complete::generate(args.shell, &mut Cli::command(), "cager", &mut script);

@@ -41,19 +41,27 @@ fn a_misspelt_option_gets_a_suggestion() {
 #[test]
 fn help_of_every_command_shows_an_example() {
     let dir = Dir::new();
-    for command in ["encode", "decode", "inspect", "transfer", "explore", "cage", "demo", "completions"] {
+    for command in ["encode", "decode", "inspect", "transfer", "explore", "cage", "demo", "formats", "completions"] {
         let help = dir.cager(&format!("{command} --help")).succeeds().stdout;
         assert!(help.contains(&format!("Example: cager {command}")), "{help}");
         assert!(dir.cager("--help").succeeds().stdout.contains(&format!("  {command} ")));
     }
     let encode = dir.cager("encode --help").succeeds().stdout;
-    for format in [".obj", ".ply", ".off", ".stl", ".glb", ".npy", ".pc2", ".mdd", "folder", "glob"] {
+    for format in [".obj", ".ply", ".off", ".stl", ".glb", ".npy", ".pc2", ".mdd", ".abc", "folder", "glob"] {
         assert!(encode.contains(format), "{format} is missing in {encode}");
     }
     let decode = dir.cager("decode --help").succeeds().stdout;
-    for format in [".npy", ".pc2", ".mdd", "folder"] {
+    for format in [".npy", ".pc2", ".mdd", ".abc", "folder"] {
         assert!(decode.contains(format), "{format} is missing in {decode}");
     }
+}
+
+#[test]
+fn formats_are_listed_with_what_they_are_for() {
+    let list = Dir::new().cager("formats").succeeds().stdout;
+    let line = |extension: &str| list.lines().find(|line| line.starts_with(extension)).expect(extension);
+    assert!(line(".abc").contains("read, written  all frames") && line(".abc").contains("frame rate, times"), "{list}");
+    assert!(line(".glb").contains("metres, Y up") && !line(".glb").contains("written"), "{list}");
 }
 
 #[test]

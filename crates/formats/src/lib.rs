@@ -8,6 +8,7 @@ pub mod atomic;
 pub mod biovision;
 mod error;
 pub mod frames;
+mod listing;
 mod matrix;
 pub mod mesh;
 mod natural;
@@ -21,6 +22,7 @@ pub use frames::{
     frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames, open_frames_bytes,
     open_frames_in, open_selected_frames,
 };
+pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{
     MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_with_note, read_prim_with_note,

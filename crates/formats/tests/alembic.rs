@@ -205,6 +205,7 @@ fn frame_numbers_follow_the_times_of_samples() {
     // Two samples a frame, and one for two frames.
     assert_eq!(read("a=b;_ai_DCC_FPS=24.0", (1.0 / 48.0, &[1.0 / 24.0]), 3), (Some(24.0), vec![1.0, 1.5, 2.0]));
     assert_eq!(read("FramesPerTimeUnit=25", (0.08, &[0.04]), 3), (Some(25.0), vec![1.0, 3.0, 5.0]));
+    assert_eq!(read("FramesPerTimeUnit=30", (1.0 / 30.0, &[0.0, 1.0 / 60.0]), 3), (Some(30.0), vec![0.0, 0.5, 1.0]));
     // A cycle of an open and a closed shutter; times of their own.
     let (rate, found) = read("", (0.1, &[0.0, 0.025]), 4);
     assert!(rate.is_some() && found.windows(2).all(|pair| pair[0] < pair[1]), "{rate:?} {found:?}");

@@ -45,10 +45,9 @@ impl Sampling {
 
     /// Seconds between samples, where that is the same for all, and the time of the first.
     pub(super) fn even(&self) -> Option<(f64, f64)> {
-        match self.stored[..] {
-            [start] if !self.is_acyclic() => Some((self.cycle, start)),
-            _ => None,
-        }
+        let (step, start) = (self.cycle / self.stored.len() as f64, self.stored[0]);
+        let is_even = |(k, time): (usize, &f64)| (time - start - step * k as f64).abs() <= NEAR * step.abs();
+        (!self.is_acyclic() && self.stored.iter().enumerate().all(is_even)).then_some((step, start))
     }
 
     /// Whether so many samples have a time.
@@ -74,12 +73,11 @@ impl Sampling {
             if self.time(middle) <= time { low = middle } else { high = middle - 1 }
         }
         let (before, after) = (self.time(low), self.time((low + 1).min(last)));
-        let share = (time - before) / (after - before);
-        match share {
-            _ if !(after > before) || share < NEAR => (low, 0.0),
-            _ if share > 1.0 - NEAR => (low + 1, 0.0),
-            _ => (low, share),
+        let share = if after > before { (time - before) / (after - before) } else { 0.0 };
+        if share > 1.0 - NEAR {
+            return (low + usize::from(low < last), 0.0);
         }
+        (low, if share > NEAR { share } else { 0.0 })
     }
 }
 

@@ -72,7 +72,7 @@ pub trait FrameReader: Send {
         Vec::new()
     }
 
-    /// The file that the last frame was read from and the faces in it, where each frame is a mesh in a file of its own.
+    /// The file that the last frame was read from and the faces in it, where it has any.
     fn mesh(&self) -> Option<(&Path, &Polygons)> {
         None
     }

@@ -1,0 +1,53 @@
+//! Every file format of meshes and captures, for people who choose one.
+
+/// What can be done with files of a format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Listed {
+    /// The file name extension, without the dot.
+    pub extension: &'static str,
+    /// What it is called.
+    pub name: &'static str,
+    /// Whether files are written; all are read.
+    pub written: bool,
+    /// Whether one file holds all frames of a capture.
+    pub animated: bool,
+    /// What files say of units, axes and times.
+    pub says: &'static str,
+}
+
+/// All formats: those of one mesh first.
+pub const FORMATS: &[Listed] = &[
+    still("obj", "Wavefront OBJ", true),
+    still("ply", "Polygon File Format", true),
+    still("off", "Object File Format", true),
+    still("stl", "Stereolithography", true),
+    Listed { says: "metres, Y up", ..still("glb", "binary glTF", false) },
+    animated("npy", "NumPy array", true, "nothing"),
+    animated("npz", "NumPy archive", false, "frame rate"),
+    animated("pc2", "point cache of 3ds Max and Blender", true, "frame numbers"),
+    animated("mdd", "point cache of LightWave", true, "times"),
+    animated("abc", "Alembic (Ogawa)", true, "frame rate, times"),
+];
+
+const fn still(extension: &'static str, name: &'static str, written: bool) -> Listed {
+    Listed { extension, name, written, animated: false, says: "nothing" }
+}
+
+const fn animated(extension: &'static str, name: &'static str, written: bool, says: &'static str) -> Listed {
+    Listed { extension, name, written, animated: true, says }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{CacheFormat, MeshFormat};
+
+    #[test]
+    fn every_format_that_is_read_is_listed() {
+        let listed = |animated: bool| FORMATS.iter().filter(move |f| f.animated == animated).map(|f| f.extension);
+        let meshes = MeshFormat::STILL.map(MeshFormat::extension);
+        assert_eq!(listed(false).collect::<Vec<_>>(), meshes);
+        let caches: Vec<_> = listed(true).filter(|&extension| extension != "npz").collect();
+        assert_eq!(caches, CacheFormat::ALL.map(CacheFormat::extension));
+    }
+}

@@ -1,0 +1,19 @@
+//! `cager formats`.
+
+use super::print;
+use anyhow::Result;
+use cager_formats::{FORMATS, Listed};
+
+pub(super) fn run() -> Result<()> {
+    let row = |[format, name, files, holds, says]: [&str; 5]| {
+        format!("{format:<7} {name:<35} {files:<14} {holds:<17} {says}\n")
+    };
+    let mut text = row(["format", "name", "files are", "a file holds", "it says"]);
+    for Listed { extension, name, written, animated, says } in FORMATS {
+        let files = if *written { "read, written" } else { "read" };
+        let holds = if *animated { "all frames" } else { "one mesh or frame" };
+        text += &row([&format!(".{extension}"), name, files, holds, says]);
+    }
+    text += "\nLengths of files that say no unit are taken as they are; --up turns the axes of a capture.\n";
+    print(&text)
+}
