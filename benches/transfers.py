@@ -128,7 +128,7 @@ class Pair:
         try:
             shapes, prepare, seconds = make()
         except Refused as refused:
-            self.rows.append([name, f"refused: {refused}", *[""] * (7 if self.truth is not None else 5)])
+            self.rows.append([name, f"refused: {reason(refused)}", *[""] * (7 if self.truth is not None else 5)])
             print(*self.rows[-1], flush=True)
             return
         row = [name]
@@ -296,7 +296,7 @@ def between(folder):
                     took.append(time.perf_counter() - clock)
                 row += [f"{100 * error / size:.3f}", f"{took[0]:.2f}", f"{1000 * (took[1] - took[0]) / 100:.1f}"]
             except Refused as refused:
-                row += [f"refused: {refused}", "", ""]
+                row += [f"refused: {reason(refused)}", "", ""]
         rows.append(row)
         print(*row, sep="; ", flush=True)
     return rows
@@ -308,6 +308,11 @@ def update(name, text):
         page = file.read()
     with open(PAGE, "w", encoding="utf-8") as file:
         file.write(write(page, name, text))
+
+
+def reason(refused):
+    """What the program says last, without the warnings before it."""
+    return str(refused).split("cager: ")[-1].strip()
 
 
 def main():

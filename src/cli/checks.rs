@@ -91,6 +91,14 @@ impl From<&TimingArgs> for Timing {
     }
 }
 
+impl CheckArgs {
+    /// Refuses to choose a mesh of an archive that is sent to a service, which takes it as it is.
+    pub(super) fn refuse_prim(&self) -> Result<()> {
+        let Some(prim) = &self.prim else { return Ok(()) };
+        bail!("--prim {prim}: a service takes archives with one mesh; export this mesh alone, or leave --server out");
+    }
+}
+
 /// The files of a capture for a rest pose of so many points; `no_frames` are the files of the rest pose and the cage.
 pub(super) fn checked_files<'a>(
     args: &CheckArgs,
