@@ -61,9 +61,10 @@ pub(crate) fn request_of_files<'a>(
     files: impl IntoIterator<Item = (&'a str, &'a str, blake3::Hash)>,
     options: &impl Serialize,
 ) -> Option<Idempotency> {
+    let key = key?;
     let files: Vec<_> = files.into_iter().map(|(part, name, digest)| (part, extension(name), digest)).collect();
     let sent = files.iter().flat_map(|(part, name, digest)| [part.as_bytes(), name.as_bytes(), digest.as_bytes()]);
-    request(key, sent, options)
+    request(Some(key), sent, options)
 }
 
 /// The part of a file's name that says something about its content, in lower case.

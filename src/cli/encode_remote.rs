@@ -167,13 +167,13 @@ fn with_origin(encoded: Encoded, origin: Point, output: &Target) -> Result<Encod
     Ok(Encoded { report, container })
 }
 
-/// What the container is to meet, as a session is asked for it.
 /// What a service calls what is written there.
 pub(super) fn session_name(output: &Path) -> Option<String> {
     let name = output.file_stem().filter(|&name| name != "-")?;
     Some(name.to_string_lossy().chars().take(200).collect())
 }
 
+/// What the container is to meet, as a session is asked for it.
 pub(super) fn coding_options(goal: Option<Goal>, exact_rest: bool) -> SessionOptions {
     let options = SessionOptions { exact_rest, ..SessionOptions::default() };
     match goal {

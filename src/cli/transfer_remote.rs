@@ -37,7 +37,9 @@ pub(super) fn run(
         _ => args.source.as_ref().map(file).transpose()?.map_or(TransferSource::Session, TransferSource::Container),
     };
     let [cage, pairs] = [&args.cage, &args.pairs].map(|path| path.as_ref().map(file).transpose());
-    let new = NewTransfer { cage: cage?, pairs: pairs?, options, ..NewTransfer::new(sent, mesh_file(&args.target)?) };
+    // Whatever it is called here.
+    let pairs = pairs?.map(|pairs| MeshFile::new("pairs.txt", pairs.bytes));
+    let new = NewTransfer { cage: cage?, pairs, options, ..NewTransfer::new(sent, mesh_file(&args.target)?) };
     let mut outputs = vec![("capture.cager", &mut container)];
     outputs.extend(report.as_mut().map(|file| ("report", file)));
     let token = args.service.token();
@@ -103,7 +105,7 @@ fn array(frames: &mut dyn FrameReader) -> Result<Vec<u8>> {
     let first = frames.number(0);
     if let Some(frame) = (1..count).find(|&frame| frames.number(frame) != first + frame as f64) {
         bail!(
-            "--server: frame {} follows frame {}, and a service counts frames one by one; give the first number as --start, or move them here",
+            "--server: frame {} follows frame {}, and a service counts frames one by one; number the files so, or leave --server out",
             frames.number(frame),
             frames.number(frame - 1)
         );

@@ -66,7 +66,7 @@ async fn recover(
             client.download_recovered(&id, name, out).await?;
         }
     }
-    client.delete_recovery(&id).await?;
+    clean_up(&client, async |client| client.delete_recovery(&id).await).await;
     match ended.problem {
         Some(problem) => Err(RemoteError::Failed(problem.detail)),
         None => Ok(ended),

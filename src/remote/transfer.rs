@@ -53,7 +53,7 @@ async fn transfer(
     for (name, out) in job.outputs {
         client.download_transferred(&id, name, out).await?;
     }
-    client.delete_transfer(&id).await?;
+    clean_up(&client, async |client| client.delete_transfer(&id).await).await;
     Ok(ended)
 }
 

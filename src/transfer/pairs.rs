@@ -2,10 +2,13 @@
 
 use cager_explore::transfer::VertexPair;
 
+/// Most pairs: each takes a row of coordinates.
+const MAX_PAIRS: usize = 10_000;
+
 /// A vertex of the source and one of the target on each line, counted from 0; `#` begins a comment. There are so many points in source and target.
 ///
 /// # Errors
-/// What cannot be read, with its line, or no pairs at all.
+/// What cannot be read, with its line, no pairs at all, or too many.
 pub(crate) fn read_pairs(text: &str, [source_points, target_points]: [usize; 2]) -> Result<Vec<VertexPair>, String> {
     let mut pairs = Vec::new();
     for (k, line) in text.lines().enumerate() {
@@ -32,6 +35,9 @@ pub(crate) fn read_pairs(text: &str, [source_points, target_points]: [usize; 2])
             }
             Ok(vertex)
         };
+        if pairs.len() == MAX_PAIRS {
+            return Err(format!("line {line}: there are more than {MAX_PAIRS} pairs; a few dozen suffice"));
+        }
         pairs.push(VertexPair {
             source: vertex(source, "source", source_points)?,
             target: vertex(target, "target", target_points)?,

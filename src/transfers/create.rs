@@ -242,7 +242,7 @@ fn frames_of(
 /// # Errors
 /// What cannot be read, with its line.
 pub(super) fn pairs_of(file: &NamedFile, points: [usize; 2]) -> Result<Vec<VertexPair>, ApiError> {
-    let pairs = str::from_utf8(&file.bytes).map_err(|error| error.to_string());
+    let pairs = str::from_utf8(&file.bytes).map_err(|_| "is no text; send lines of two numbers".to_owned());
     let pairs = pairs.and_then(|text| read_pairs(text, points));
     pairs.map_err(|error| geometry(format!("pairs: {}: {error}", file.name)))
 }

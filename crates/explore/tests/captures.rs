@@ -211,7 +211,8 @@ fn a_gallop_goes_onto_a_cat_and_a_lion() {
                 shapes.iter().zip(under).for_each(|(pose, under)| quality.push(pose, &under));
                 let jitter = quality.summary().jitter.unwrap();
                 eprintln!("  jitter over that of the points under it: {jitter:.2}");
-                assert!(row.folded <= 0.15 && row.stretched <= 5.0 && row.jitter <= 1.4, "{name}");
+                let stretched = if name == "cat" { 3.0 } else { 5.0 };
+                assert!(row.folded <= 0.15 && row.stretched <= stretched && jitter <= 1.2, "{name}");
             }
         }
     }

@@ -26,7 +26,7 @@ async fn files_and_options_that_cannot_be_used_are_refused_at_once() {
         (whole().part("cage", file("cage.obj", cloud)), 422, "invalid-geometry", "cage.obj: has no faces"),
         (whole().part("pairs", file("p.txt", b"1 1\n2\n")), 422, "invalid-geometry", "pairs: p.txt: line 2: a pair is"),
         (whole().part("pairs", file("p.txt", b"1 99999")), 422, "invalid-geometry", "no vertex 99999 in the target"),
-        (whole().part("pairs", file("p.txt", b"\xff")), 422, "invalid-geometry", "p.txt: invalid utf-8"),
+        (whole().part("pairs", file("p.txt", b"\xff")), 422, "invalid-geometry", "p.txt: is no text"),
         (
             whole().part("pairs", file("p.txt", b"1 1")).part("options", text(&json!({"method": "public"}))),
             422,
