@@ -94,6 +94,12 @@ impl DecodeError {
             cause => Self::Container { path, cause },
         }
     }
+
+    /// The message without the path that it begins with: the one of a service is its own.
+    pub(crate) fn without(&self, path: &Path) -> String {
+        let message = self.to_string();
+        message.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&message).to_owned()
+    }
 }
 
 /// An opened container.
@@ -278,18 +284,17 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
-    /// Of a container. `keeps` tells whether coordinates of so many bytes may be kept; otherwise they are computed for each reading.
+    /// Of a container. Coordinates are kept, unless there are more of them than a quarter of the free memory holds: those are computed for each reading.
     ///
     /// # Errors
     /// As [`decode`].
-    pub(crate) fn open(path: &Path, keeps: impl FnOnce(u64) -> bool) -> Result<Self, DecodeError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, DecodeError> {
         let mut container = open(path)?;
         container.limit_coordinates(free_bytes());
         let memory = Memory::half_of_free();
-        let batches = container.frames().div_ceil(BATCH);
-        let model = bind(&mut container, path, None, None, |points, columns| {
-            memory.keeps(points, columns, batches) && keeps(4 * (points * columns) as u64)
-        })?;
+        // Any number of frames may be read at a time, down to one.
+        let most = container.frames();
+        let model = bind(&mut container, path, None, None, |points, columns| memory.keeps(points, columns, most))?;
         Ok(Self { container, model, path: path.to_owned() })
     }
 

@@ -35,6 +35,9 @@ const MAX_CONCURRENT_COMPLETIONS: u64 = 2;
 /// Groups of frames coded or decoded at a time, at most: each takes up to half a gigabyte.
 const MAX_CONCURRENT_CODINGS: usize = 4;
 
+/// Memory for the coordinates of all who read completed transfers, in bytes, beyond which they wait for each other; those of one reader alone may be larger.
+const DECODING_BYTES: u64 = 512 << 20;
+
 /// Step in which the memory permit of an upload grows, in bytes; small, so that hundreds of small models fit.
 const UPLOAD_PIECE: u64 = 64 << 10;
 
@@ -85,6 +88,8 @@ pub struct Service {
     pub(crate) upload_memory: Arc<Budget>,
     /// Memory for downloads being sent, in bytes.
     pub(crate) download_memory: Arc<Budget>,
+    /// Memory for the coordinates of those who read completed transfers, in bytes.
+    pub(crate) decoding_memory: Arc<Budget>,
     /// Disk space for cages that wait to be decoded, in bytes.
     pub(crate) spool_space: Arc<Budget>,
     stop: CancellationToken,
@@ -195,6 +200,7 @@ impl Service {
             frame_memory: config.budget(config.frame_bytes),
             upload_memory: config.budget(config.upload_bytes),
             download_memory: config.budget(config.download_bytes),
+            decoding_memory: config.budget(DECODING_BYTES),
             spool_space: config.budget(config.spool_bytes),
             stop: stop.clone(),
             resumed: AtomicBool::new(false),

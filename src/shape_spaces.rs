@@ -292,9 +292,10 @@ impl Wanted<'_> {
     /// A container that cannot be read, frames that it does not have, and no memory.
     pub(crate) fn of_container(&self, path: &Path) -> Result<Poses, ApiError> {
         self.check_cage()?;
-        let fail = |cause| unreadable(&DecodeError::container(path, cause));
+        let refuse = |error: DecodeError| unreadable(path, &error);
+        let fail = |cause| refuse(DecodeError::container(path, cause));
         let frames = &self.options.frames;
-        let mut container = decode::open(path).map_err(|error| unreadable(&error))?;
+        let mut container = decode::open(path).map_err(refuse)?;
         let there = container.frames();
         if let Some(frame) = frames.iter().find(|&&frame| frame as usize >= there) {
             let detail = format!("frames: {frame} is none of the {there} frames, which count from 0");
@@ -322,10 +323,10 @@ impl Wanted<'_> {
             None => None,
         };
         drop(container);
-        let mut positions = Positions::open(path, |_| true).map_err(|error| unreadable(&error))?;
+        let mut positions = Positions::open(path).map_err(refuse)?;
         let mut poses = Vec::with_capacity(frames.len());
         for &frame in frames {
-            let found = positions.read(&[frame as usize]).map_err(|error| unreadable(&error))?.concat();
+            let found = positions.read(&[frame as usize]).map_err(refuse)?.concat();
             poses.push(found.as_chunks::<3>().0.iter().map(|point| point.map(f64::from)).collect());
         }
         Ok(Poses { model, cage, poses, origin, memory })
@@ -377,8 +378,8 @@ fn vertices_of(cage: Option<&Cage>) -> Option<u64> {
     cage.map(|cage| cage.vertices().len() as u64)
 }
 
-/// The response for a container that cannot be read. What the machine refuses is no fault of the container.
-fn unreadable(error: &DecodeError) -> ApiError {
+/// The response for a container that cannot be read, without its path. What the machine refuses is no fault of the container.
+fn unreadable(path: &Path, error: &DecodeError) -> ApiError {
     match error {
         DecodeError::Memory { .. } | DecodeError::Container { cause: container::Error::Memory { .. }, .. } => {
             ApiError::internal(error)
@@ -386,8 +387,7 @@ fn unreadable(error: &DecodeError) -> ApiError {
         DecodeError::Formats(cager_formats::Error::Io { cause, .. }) if cause.kind() != ErrorKind::UnexpectedEof => {
             ApiError::internal(error)
         }
-        DecodeError::Container { cause, .. } => geometry(format!("source: {cause}")),
-        other => geometry(format!("source: {other}")),
+        error => geometry(format!("source: {}", error.without(path))),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::admission::Held;
 use crate::auth::Tenant;
-use crate::jobs::{Job, Phase, Piece, Work};
+use crate::jobs::{Frames, Job, Phase, Piece, Work};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::tasks::blocking;
@@ -52,9 +52,6 @@ impl FramesOfJob {
     }
 }
 
-/// Reads frames from a number on, at most so many; blocks.
-pub(super) type Read<W> = Box<dyn FnMut(&Job<W>, u32, u32) -> io::Result<Piece> + Send>;
-
 /// The frames of a job as `read` gives them, at most `piece` at a time.
 ///
 /// # Errors
@@ -65,7 +62,7 @@ pub(super) fn stream<W: Work>(
     job: Arc<Job<W>>,
     (query, there): (FramesOfJob, u32),
     (piece, piece_bytes): (u32, u64),
-    read: Read<W>,
+    read: Box<dyn Frames<W>>,
 ) -> Result<Response, ApiError> {
     let place = service.stream(tenant)?;
     let mut room = service.download_memory.nothing(&tenant.name);
@@ -81,7 +78,8 @@ pub(super) fn stream<W: Work>(
         (None, true) => None,
         (None, false) => Some(first + there),
     };
-    let following = Following { service, job, read: Some(read), next: first, end, piece, _held: [place, room] };
+    let following =
+        Following { service, job, read: Some(read), next: first, end, piece, decoding: None, held: [place, room] };
     let stream = futures_util::stream::unfold(Some(following), |following| async move {
         let mut following = following?;
         match following.piece().await {
@@ -98,12 +96,15 @@ struct Following<W: Work> {
     service: Arc<Service>,
     job: Arc<Job<W>>,
     /// Elsewhere while it reads.
-    read: Option<Read<W>>,
+    read: Option<Box<dyn Frames<W>>>,
     next: u32,
     /// The frame after the last one, where that is known.
     end: Option<u32>,
     piece: u32,
-    _held: [Held; 2],
+    /// The memory of what decodes, once that is there.
+    decoding: Option<Arc<Held>>,
+    /// The place among streams, and memory for a piece.
+    held: [Held; 2],
 }
 
 impl<W: Work> Following<W> {
@@ -117,9 +118,14 @@ impl<W: Work> Following<W> {
                 return Ok(None);
             }
             let Some(mut read) = self.read.take() else { return Ok(None) };
+            let decodes = read.decodes(&self.job);
+            let place = match decodes {
+                Some(bytes) => Some(self.place(bytes).await?),
+                None => None,
+            };
             let (job, next) = (Arc::clone(&self.job), self.next);
             let (read, piece) = blocking(move || {
-                let piece = read(&job, next, left);
+                let piece = read.read(&job, next, left, place.is_some());
                 (read, piece)
             })
             .await
@@ -138,6 +144,26 @@ impl<W: Work> Following<W> {
                 () = self.job.deleted().cancelled() => return Ok(None),
                 () = self.service.stopping().cancelled() => return Err(io::Error::other("the service is stopping")),
             }
+        }
+    }
+
+    /// A place among those that decode, and the memory that this reader keeps from its first one on. Both are waited for here and not on a thread that may
+    /// block: of those there are few, and a client that hangs up leaves the queue.
+    async fn place(&mut self, bytes: u64) -> io::Result<(Held, Arc<Held>)> {
+        let Self { service, job, decoding, held: [_, room], .. } = self;
+        let tenant = room.tenant();
+        let taken = async {
+            let memory = match decoding.take() {
+                Some(memory) => memory,
+                None => Arc::new(service.decoding_memory.take(tenant, bytes).await),
+            };
+            *decoding = Some(Arc::clone(&memory));
+            (service.coding.take(tenant, 1).await, memory)
+        };
+        tokio::select! {
+            taken = taken => Ok(taken),
+            () = job.deleted().cancelled() => Err(io::Error::other("the job was deleted")),
+            () = service.stopping().cancelled() => Err(io::Error::other("the service is stopping")),
         }
     }
 }

@@ -9,7 +9,7 @@ mod results;
 pub(crate) use create::new_job;
 pub(crate) use life::Ended;
 pub(crate) use registry::Jobs;
-pub(crate) use results::{Piece, ResultsError, Stoppable};
+pub(crate) use results::{Frames, Piece, ResultsError, Stoppable};
 
 use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};

@@ -1,5 +1,6 @@
 //! Frames that a job encodes, and why its results cannot be made.
 
+use super::{Job, Work};
 use crate::encode::EncodeError;
 use crate::problem::{self, ApiError};
 use crate::store::StoreError;
@@ -61,6 +62,26 @@ impl FrameReader for Stoppable<'_> {
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
         Ok(!(self.stopped)() && self.frames.read_next(out)?)
+    }
+}
+
+/// What reads a job's frames for one client.
+pub(crate) trait Frames<W: Work>: Send {
+    /// Where frames are to be decoded, the bytes of memory that this takes until the client has them all. They are read in a place among those that decode then.
+    fn decodes(&self, _job: &Job<W>) -> Option<u64> {
+        None
+    }
+
+    /// Frames from `first` on, at most `most`, and none yet where they would have to be decoded without a place (`may_decode`). Blocks.
+    ///
+    /// # Errors
+    /// The job failed or is deleted, or its files cannot be read.
+    fn read(&mut self, job: &Job<W>, first: u32, most: u32, may_decode: bool) -> io::Result<Piece>;
+}
+
+impl<W: Work, F: FnMut(&Job<W>, u32, u32) -> io::Result<Piece> + Send> Frames<W> for F {
+    fn read(&mut self, job: &Job<W>, first: u32, most: u32, _: bool) -> io::Result<Piece> {
+        self(job, first, most)
     }
 }
 

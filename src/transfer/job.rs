@@ -2,6 +2,7 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
+use cager_explore::TransferError;
 use cager_explore::alignment::AlignBy;
 use cager_explore::public_cage::PublicCage;
 use cager_explore::transfer::{Pose, VertexPair};
@@ -57,4 +58,11 @@ pub struct TransferJob<'a> {
     pub stopped: &'a (dyn Fn() -> bool + Sync),
     /// A folder for frames on their way.
     pub scratch: &'a Path,
+}
+
+impl TransferJob<'_> {
+    /// Goes on unless it is to stop.
+    pub(super) fn go_on(&self) -> Result<(), TransferError> {
+        if (self.stopped)() { Err(TransferError::Stopped) } else { Ok(()) }
+    }
 }

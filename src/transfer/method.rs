@@ -141,11 +141,16 @@ fn fitted(job: &TransferJob<'_>) -> Result<Mover, TransferFailed> {
 }
 
 fn around(whose: &'static str, model: &Model, stopped: &dyn Fn() -> bool) -> Result<Cage, TransferFailed> {
-    let go_on = &mut || if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let vertices = CAGE_VERTICES.min(model.points.len() / 2).max(4);
     let options = EncloseOptions { vertices, ..EncloseOptions::default() };
-    let mesh = enclose_watched(model, &options, go_on).map_err(|error| TransferFailed::Enclose { whose, error })?;
+    let mesh = enclose_watched(model, &options, &mut watch(stopped))
+        .map_err(|error| TransferFailed::Enclose { whose, error })?;
     Cage::new(mesh).map_err(|error| TransferFailed::Cage { whose, error })
+}
+
+/// Breaks once the transfer is to stop.
+fn watch(stopped: &dyn Fn() -> bool) -> impl FnMut() -> ControlFlow<()> {
+    move || if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 fn mean_value(whose: &'static str, cage: &Cage, points: &[Point]) -> Result<Mat<f64>, TransferError> {
@@ -160,7 +165,9 @@ fn public(job: &TransferJob<'_>, cage: Public, rigidity: Option<f64>) -> Result<
         (true, false) => Some(Detail::new(&target).map_err(TransferError::Target)?),
         (false, _) => None,
     };
+    job.go_on()?;
     let aligned = aligned(job, &rest, &target)?;
+    job.go_on()?;
     let similarity = aligned.similarity;
     let made;
     let cage = match (cage, &job.cage) {
@@ -172,11 +179,12 @@ fn public(job: &TransferJob<'_>, cage: Public, rigidity: Option<f64>) -> Result<
         (Public::Given, None) => return Err(TransferFailed::NoCage),
         (Public::Made(shape), _) => {
             let moved = TriMesh { vertices: similarity.apply_all(&rest.vertices), triangles: rest.triangles.clone() };
-            let mesh = shape.around(&moved, &target).map_err(TransferError::from)?;
+            let mesh = shape.around_watched(&moved, &target, &mut watch(job.stopped)).map_err(TransferError::from)?;
             made = Cage::new(mesh).map_err(|error| TransferFailed::Cage { whose: "source and the target", error })?;
             &made
         }
     };
+    job.go_on()?;
     let method = if let Some(rigidity) = rigidity {
         Method::Rigid(Box::new(RigidTransfer::new(&rest, &target, similarity, cage, job.system, rigidity)?))
     } else {

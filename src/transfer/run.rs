@@ -5,8 +5,8 @@ use super::job::TransferJob;
 use super::method::Mover;
 use super::report::{QualityReport, TransferReport};
 use crate::recover::RecoveredFrames;
+use cager_explore::MotionQuality;
 use cager_explore::placement::{Placement, lowest};
-use cager_explore::{MotionQuality, TransferError};
 use cager_formats::FrameReader;
 use cager_geometry::mesh::{Point, TriMesh};
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ pub fn transfer(mut job: TransferJob<'_>, progress: &dyn Fn(usize)) -> Result<Tr
         return Err(TransferFailed::NoFrames);
     }
     let clock = Instant::now();
-    go_on(&job)?;
+    job.go_on()?;
     let mover = Mover::new(&job)?;
     let prepared = clock.elapsed().as_secs_f64();
 
@@ -61,10 +61,6 @@ pub fn transfer(mut job: TransferJob<'_>, progress: &dyn Fn(usize)) -> Result<Tr
     let seconds = &mut report.seconds;
     (seconds.prepare, seconds.frames, seconds.measure) = (prepared, moved, clock.elapsed().as_secs_f64());
     Ok(Transferred { frames, report, warnings })
-}
-
-fn go_on(job: &TransferJob<'_>) -> Result<(), TransferFailed> {
-    if (job.stopped)() { Err(TransferError::Stopped.into()) } else { Ok(()) }
 }
 
 /// What files of frames on their way are made of.
@@ -112,7 +108,7 @@ fn move_frames(
         if batch.is_empty() {
             break;
         }
-        go_on(job)?;
+        job.go_on()?;
         let both = |(k, frame): (usize, &Vec<Point>)| {
             let shape = mover.pose(first + k, frame)?;
             let below = up.map(|_| mover.under(first + k, frame)).transpose()?;

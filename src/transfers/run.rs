@@ -24,7 +24,6 @@ use cager_explore::TransferError;
 use cager_formats::{FrameReader, Target};
 use cager_geometry::mesh::Model;
 use cager_proto::transfer_messages::TransferStage;
-use std::fmt::Display;
 use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -211,14 +210,10 @@ impl Source {
     /// Of a container, whose frames are decoded into a folder.
     fn of_container(path: &Path, scratch: &Path) -> Result<Self, ApiError> {
         let unreadable = |error: DecodeError| {
-            let refuse = |error: &dyn Display| ApiError::new(problem::INVALID_GEOMETRY, format!("source: {error}"));
-            match &error {
-                DecodeError::Formats(_) | DecodeError::Memory { .. } => ApiError::internal(&error),
-                // Without the path, which is the service's own.
-                DecodeError::Container { cause, .. } => refuse(cause),
-                DecodeError::Cage { cause, .. } => refuse(cause),
-                error => refuse(error),
+            if let DecodeError::Formats(_) | DecodeError::Memory { .. } = error {
+                return ApiError::internal(&error);
             }
+            ApiError::new(problem::INVALID_GEOMETRY, format!("source: {}", error.without(path)))
         };
         let MotionFile { rest, cage, numbers, frame_rate } = MotionFile::open(path).map_err(unreadable)?;
         let frames = decoded(path, rest.points.len(), scratch).map_err(unreadable)?;

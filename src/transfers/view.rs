@@ -1,9 +1,8 @@
 //! Transfers as the service tells of them.
 
-use super::TransferJob;
-use crate::admission::Held;
+use super::{Transfer, TransferJob};
 use crate::decode::Positions;
-use crate::jobs::{Phase, Piece};
+use crate::jobs::{Frames, Phase, Piece};
 use crate::service::Service;
 use crate::store::Kind;
 use cager_proto::messages::JobState;
@@ -13,10 +12,6 @@ use std::io;
 use std::ops::Range;
 use std::os::unix::fs::FileExt as _;
 use std::sync::Arc;
-use tokio::runtime::Handle;
-
-/// Part of a tenant's share of the memory for downloads that the coordinates for one reader may take.
-const PARTS: u64 = 4;
 
 impl TransferJob {
     /// The transfer as returned by the API.
@@ -69,8 +64,8 @@ impl TransferJob {
 enum Positioned {
     /// As they are moved.
     Live(Arc<File>),
-    /// What a decoder gets back, with the permit for the coordinates that it keeps.
-    Decoded { positions: Box<Positions>, _memory: Option<Held> },
+    /// What a decoder gets back.
+    Decoded(Box<Positions>),
 }
 
 /// Positions of a transfer for one reader, who gets all from one place: as they are moved where it runs, else decoded.
@@ -84,11 +79,35 @@ impl TransferFrames {
         Self { service, from: None }
     }
 
-    /// Positions from frame `first` on, at most `most`, n × 12 bytes each. Call on a thread that may block, within a tokio runtime.
-    ///
-    /// # Errors
-    /// The transfer failed or is deleted, its files cannot be read, or the service stops.
-    pub(crate) fn read(&mut self, job: &TransferJob, first: u32, most: u32) -> io::Result<Piece> {
+    /// Positions of these frames from the container, on the threads that decode.
+    fn decoded(&mut self, job: &TransferJob, frames: Range<u32>) -> io::Result<Vec<f32>> {
+        let Self { service, from } = self;
+        let frames: Vec<usize> = frames.map(|frame| frame as usize).collect();
+        service.coders.install(|| {
+            if from.is_none() {
+                let path =
+                    service.store.job_file(Kind::Transfer, job.id(), "capture.cager").map_err(io::Error::other)?;
+                *from = Some(Positioned::Decoded(Box::new(Positions::open(&path).map_err(io::Error::other)?)));
+            }
+            let Some(Positioned::Decoded(positions)) = from else { return Ok(Vec::new()) };
+            Ok(positions.read(&frames).map_err(io::Error::other)?.concat())
+        })
+    }
+}
+
+impl Frames<Transfer> for TransferFrames {
+    /// The coordinates are kept, so that they are computed once.
+    fn decodes(&self, job: &TransferJob) -> Option<u64> {
+        match (job.phase(), &self.from) {
+            (Phase::Completed(found), None | Some(Positioned::Decoded(_))) => {
+                Some(4 * u64::from(job.meta.points) * u64::from(found.cage_vertices))
+            }
+            _ => None,
+        }
+    }
+
+    /// n × 12 bytes each.
+    fn read(&mut self, job: &TransferJob, first: u32, most: u32, may_decode: bool) -> io::Result<Piece> {
         let (phase, live) = (job.phase(), job.status().progress.live.clone());
         if let Phase::Failed(_) = phase {
             return Err(io::Error::other("the transfer failed"));
@@ -98,44 +117,16 @@ impl TransferFrames {
         let is_last = first >= job.meta.frames;
         let numbers: Vec<f32> = match &self.from {
             _ if frames == 0 => Vec::new(),
-            None if !phase.is_final() => return Ok(Piece { is_last, ..Piece::default() }),
             Some(Positioned::Live(file)) => {
                 let stride = 24 * u64::from(job.meta.points);
                 let mut bytes = vec![0; (stride * u64::from(frames)) as usize];
                 file.read_exact_at(&mut bytes, stride * u64::from(first))?;
                 bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x) as f32).collect()
             }
+            // The end of the transfer wakes who waits for its frames.
+            _ if !may_decode => return Ok(Piece { is_last, ..Piece::default() }),
             _ => self.decoded(job, first..first + frames)?,
         };
         Ok(Piece { bytes: numbers.iter().flat_map(|x| x.to_le_bytes()).collect(), frames, is_last })
-    }
-
-    /// Positions of these frames from the container, on the threads that decode, in a place among what they do.
-    fn decoded(&mut self, job: &TransferJob, frames: Range<u32>) -> io::Result<Vec<f32>> {
-        let Self { service, from } = self;
-        let _place = Handle::current().block_on(async {
-            tokio::select! {
-                place = service.coding.take(&job.meta.tenant, 1) => Ok(place),
-                () = job.deleted().cancelled() => Err(io::Error::other("the transfer was deleted")),
-                () = service.stopping().cancelled() => Err(io::Error::other("the service is stopping")),
-            }
-        })?;
-        let frames: Vec<usize> = frames.map(|frame| frame as usize).collect();
-        service.coders.install(|| {
-            if from.is_none() {
-                let path =
-                    service.store.job_file(Kind::Transfer, job.id(), "capture.cager").map_err(io::Error::other)?;
-                let (memory, mut held) = (&service.download_memory, None);
-                // Without room for them, coordinates are computed anew for each piece.
-                let keeps = |bytes: u64| {
-                    held = memory.try_take(&job.meta.tenant, bytes).ok().filter(|_| bytes <= memory.most() / PARTS);
-                    held.is_some()
-                };
-                let positions = Positions::open(&path, keeps).map_err(io::Error::other)?;
-                *from = Some(Positioned::Decoded { positions: Box::new(positions), _memory: held });
-            }
-            let Some(Positioned::Decoded { positions, .. }) = from else { return Ok(Vec::new()) };
-            Ok(positions.read(&frames).map_err(io::Error::other)?.concat())
-        })
     }
 }

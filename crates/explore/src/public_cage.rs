@@ -1,7 +1,8 @@
 //! Public cages: one cage around source and target together, in the target's space (the second paper, §3.2).
 
-use cager_cages::{BoundingShape, EncloseError, EncloseOptions, bounding_shape, enclose};
+use cager_cages::{BoundingShape, EncloseError, EncloseOptions, bounding_shape, enclose_watched};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
+use std::ops::ControlFlow;
 
 /// The shape of a public cage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,19 @@ impl PublicCage {
     /// # Errors
     /// Models without extent or with coordinates that are not finite, and too few vertices.
     pub fn around(self, source: &TriMesh, target: &TriMesh) -> Result<TriMesh, EncloseError> {
+        self.around_watched(source, target, &mut || ControlFlow::Continue(()))
+    }
+
+    /// [`Self::around`], given up once `watch` breaks, which is called while an offset surface is made, and not for other shapes.
+    ///
+    /// # Errors
+    /// As [`Self::around`].
+    pub fn around_watched(
+        self,
+        source: &TriMesh,
+        target: &TriMesh,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<TriMesh, EncloseError> {
         let models = [model(source), model(target)];
         let bounding = |shape, vertices| bounding_shape(&[&models[0], &models[1]], shape, vertices);
         match self {
@@ -32,7 +46,7 @@ impl PublicCage {
             Self::Sphere(vertices) => bounding(BoundingShape::Sphere, vertices),
             Self::Hull(vertices) => bounding(BoundingShape::Hull, vertices),
             Self::Offset(vertices) => {
-                enclose(&joined(source, target), &EncloseOptions { vertices, ..Default::default() })
+                enclose_watched(&joined(source, target), &EncloseOptions { vertices, ..Default::default() }, watch)
             }
         }
     }

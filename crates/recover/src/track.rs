@@ -38,7 +38,7 @@ pub struct Tracker<'t> {
     searched: Option<usize>,
 }
 
-/// Of all points, every so manieth says which start is better.
+/// One point in so many says which start is better.
 const STARTS_JUDGED_BY: usize = 4;
 /// Frames before that say what scores are usual just now: they change with the pose.
 const RECENT: usize = 9;

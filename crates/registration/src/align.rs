@@ -57,9 +57,11 @@ const LAST_POINTS: usize = 2000;
 /// Iterations of each start, and of the few that are best then.
 const FIRST_ITERATIONS: usize = 12;
 const LAST_ITERATIONS: usize = 40;
-/// Iterations after which those are given up that score above so many times the best.
+/// Iterations after which those have to wait that score above so many times the best. Once the others are done, those of them end as well that score below so
+/// many times the best then: they may still come close to it.
 const JUDGED_ITERATIONS: usize = 8;
-const HOPELESS: f64 = 1.3;
+const DOUBTFUL: f64 = 1.3;
+const HOPELESS: f64 = 2.0;
 /// Starts that are gone on with.
 const MAX_CONTINUED: usize = 4;
 /// What a normal counts beside distances, of the target's size.
@@ -103,11 +105,15 @@ pub fn alignments(moved: &Observation, fixed: &Observation, options: &AlignOptio
     let go_on = |placed: Placed, iterations: usize| fine.iterate(placed, up, options.scale, iterations);
     let starts = kept.into_par_iter().map(|placed| fine.start(placed.rotation, placed.scale));
     let begun: Vec<Placed> = starts.map(|start| go_on(start, JUDGED_ITERATIONS)).collect();
-    let most = HOPELESS * begun.iter().map(|placed| placed.score).fold(f64::INFINITY, f64::min);
-    let mut done: Vec<Placed> = begun
-        .into_par_iter()
-        .map(|placed| if placed.score > most { placed } else { go_on(placed, LAST_ITERATIONS - JUDGED_ITERATIONS) })
-        .collect();
+    let best = |all: &[Placed]| all.iter().map(|placed| placed.score).fold(f64::INFINITY, f64::min);
+    let end = |placed: Placed| go_on(placed, LAST_ITERATIONS - JUDGED_ITERATIONS);
+    let most = DOUBTFUL * best(&begun);
+    let (waiting, hopeful): (Vec<Placed>, Vec<Placed>) = begun.into_iter().partition(|placed| placed.score > most);
+    let mut done: Vec<Placed> = hopeful.into_par_iter().map(end).collect();
+    let most = HOPELESS * best(&done);
+    let (hopeless, waiting): (Vec<Placed>, Vec<Placed>) = waiting.into_iter().partition(|placed| placed.score >= most);
+    done.par_extend(waiting.into_par_iter().map(end));
+    done.extend(hopeless);
     done.sort_by(|a, b| a.score.total_cmp(&b.score));
     let mut distinct: Vec<Placed> = Vec::new();
     for placed in done {

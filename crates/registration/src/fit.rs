@@ -82,7 +82,7 @@ impl Template {
         self.fit_beside(target, start, start, options)
     }
 
-    /// [`Self::fit`], whose matches are looked for near the last ones.
+    /// [`Self::fit`], whose matches are looked for near the last ones, unless these are of a surface of another number of points.
     pub fn fit_from(
         &self,
         target: &Target,
@@ -168,6 +168,7 @@ impl Template {
         (most, turn): (usize, usize),
         known: &mut KnownMatches,
     ) -> Distances {
+        known.keep_if_of(self.samples.len(), target.points.len());
         let (positions, normals) = self.samples_in(cage);
         let unit = 1.0 / (self.diagonal * self.diagonal);
         let share = unit / positions.len() as f64;
@@ -213,7 +214,7 @@ impl Template {
     /// The Cholesky factor of a Hessian in which every sample's is the mean of all in every direction.
     fn preconditioner(&self, distances: &Distances, held: Held<'_>) -> Option<Mat<f64>> {
         let scale = distances.trace() * self.diagonal * self.diagonal / 3.0;
-        let mut sum = faer::Scale(scale) * &self.gram + faer::Scale(held.rigidity) * &self.rigidity_hessian;
+        let mut sum = faer::Scale(scale) * &self.gram + faer::Scale(held.rigidity) * self.rigidity.hessian();
         if let Some(anchors) = held.anchors {
             sum += anchors.hessian(self.diagonal);
         }

@@ -57,6 +57,13 @@ impl KnownMatches {
     pub(crate) fn none(samples: usize, points: usize) -> Self {
         Self { there: vec![None; samples], back: vec![None; points] }
     }
+
+    /// Forgets them where they are of other numbers of samples and observed points.
+    pub(crate) fn keep_if_of(&mut self, samples: usize, points: usize) {
+        if (self.there.len(), self.back.len()) != (samples, points) {
+            *self = Self::none(samples, points);
+        }
+    }
 }
 
 /// A point with its normal in six dimensions.
@@ -69,4 +76,18 @@ pub(crate) fn join(point: Point, normal: Point, normal_length: f64) -> [f64; 6] 
 pub(crate) fn match_weight(cosine: f64, offset: DVec3, reach: f64) -> f64 {
     const MIN_COSINE: f64 = 0.2;
     if cosine > MIN_COSINE { cosine / (1.0 + offset.length_squared() / (reach * reach)).powi(2) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn matches_with_a_surface_of_other_points_are_forgotten() {
+        let mut known = KnownMatches { there: vec![Some(7); 2], back: vec![Some(1); 9] };
+        known.keep_if_of(2, 9);
+        assert_eq!((&known.there, &known.back), (&vec![Some(7); 2], &vec![Some(1); 9]));
+        known.keep_if_of(2, 5);
+        assert_eq!((known.there, known.back), (vec![None; 2], vec![None; 5]));
+    }
 }

@@ -16,8 +16,9 @@ use crate::sparse_rows::{SparseRows, matrix, points};
 
 /// Nodes and the edges between them.
 pub(crate) struct Rigidity {
+    /// `½ Δ` of the energy, m × m, its lower triangle: its Hessian where rotations are held.
+    hessian: Mat<f64>,
     /// Coordinates of the nodes of the model, and the identity for the cage's vertices, k × m.
-    coordinates: Mat<f64>,
     dense: DenseRows,
     sparse: SparseRows,
     /// The first edge of each node, and their number.
@@ -44,7 +45,7 @@ impl Rigidity {
     /// the model, and the model's `diagonal`.
     pub(crate) fn new(
         rest: &[DVec3],
-        coordinates: Mat<f64>,
+        coordinates: MatRef<'_, f64>,
         [model_edges, cage_edges]: [&[[u32; 2]]; 2],
         cage_weight: f64,
         diagonal: f64,
@@ -65,9 +66,10 @@ impl Rigidity {
             *sum += edges.len() as u32;
             Some(*sum)
         }));
-        let sparse = SparseRows::new(coordinates.as_ref(), threshold);
-        let dense = DenseRows::new(coordinates.as_ref());
-        Self { coordinates, dense, sparse, first, edges: by_node.into_iter().flatten().collect() }
+        let sparse = SparseRows::new(coordinates, threshold);
+        let dense = DenseRows::new(coordinates);
+        let hessian = hessian(coordinates, &by_node);
+        Self { hessian, dense, sparse, first, edges: by_node.into_iter().flatten().collect() }
     }
 
     fn edges(&self, node: usize) -> &[Edge] {
@@ -97,18 +99,9 @@ impl Rigidity {
         (0..self.first.len() - 1).into_par_iter().with_min_len(64).map(what).collect()
     }
 
-    /// `½ Δ` of the energy, m × m: its Hessian where rotations are held.
-    pub(crate) fn hessian(&self) -> Mat<f64> {
-        let m = self.coordinates.ncols();
-        let once: Vec<(usize, &Edge)> = (0..self.first.len() - 1)
-            .flat_map(|a| self.edges(a).iter().map(move |edge| (a, edge)))
-            .filter(|(a, edge)| *a < edge.to as usize)
-            .collect();
-        let differences = Mat::from_fn(once.len(), m, |e, j| {
-            let (a, edge) = once[e];
-            (2.0 * edge.weight).sqrt() * (self.coordinates[(edge.to as usize, j)] - self.coordinates[(a, j)])
-        });
-        gram(differences.as_ref(), BLOCK_ROWS)
+    /// `½ Δ` of the energy, m × m, its lower triangle: its Hessian where rotations are held.
+    pub(crate) fn hessian(&self) -> &Mat<f64> {
+        &self.hessian
     }
 
     /// Where the nodes are in a cage, m × 3.
@@ -145,6 +138,21 @@ impl Rigidity {
         });
         self.sparse.transposed_times(&forces)
     }
+}
+
+/// [`Rigidity::hessian`], from coordinates, k × m, and the edges of each node.
+fn hessian(coordinates: MatRef<'_, f64>, by_node: &[Vec<Edge>]) -> Mat<f64> {
+    let once: Vec<(usize, &Edge)> = by_node
+        .iter()
+        .enumerate()
+        .flat_map(|(a, edges)| edges.iter().map(move |edge| (a, edge)))
+        .filter(|(a, edge)| *a < edge.to as usize)
+        .collect();
+    let differences = Mat::from_fn(once.len(), coordinates.ncols(), |e, j| {
+        let (a, edge) = once[e];
+        (2.0 * edge.weight).sqrt() * (coordinates[(edge.to as usize, j)] - coordinates[(a, j)])
+    });
+    gram(differences.as_ref(), BLOCK_ROWS)
 }
 
 /// The edges between nodes of a mesh whose cells touch: a cell is what is nearer to its node than to others, along the mesh. Parts of

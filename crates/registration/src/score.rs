@@ -11,7 +11,7 @@ use crate::template::{Template, plain};
 
 /// Distances count no more than this in a score, as a share of the diagonal.
 const MAX_SCORED: f64 = 0.05;
-/// Of the observed points, every so manieth is scored.
+/// One observed point in so many is scored.
 const SCORED_EVERY: usize = 5;
 
 impl Template {
@@ -21,8 +21,11 @@ impl Template {
         self.score_from(target, cage, 1, &mut self.unmatched(target))
     }
 
-    /// [`Self::score`] of every so manieth point alone, whose matches are looked for near the last ones.
+    /// [`Self::score`] of one point in so many (0 counts as 1), whose matches are looked for near the last ones, unless these are of a surface of another
+    /// number of points.
     pub fn score_from(&self, target: &Target, cage: &[Point], every: usize, known: &mut KnownMatches) -> f64 {
+        let every = every.max(1);
+        known.keep_if_of(self.samples.len(), target.points.len());
         let (positions, normals) = self.samples_in(matrix(&vectors(cage)).as_ref());
         let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);
         let scored = |offset: DVec3, own: DVec3, other: DVec3, d2: f64| {

@@ -67,8 +67,6 @@ pub struct Template {
     /// `ΦᵀΦ / (s d²)` of the samples, its lower triangle.
     pub(crate) gram: Mat<f64>,
     pub(crate) rigidity: Rigidity,
-    /// Half the Hessian of rigidity, its lower triangle.
-    pub(crate) rigidity_hessian: Mat<f64>,
 }
 
 /// A sample by the rows of its corners.
@@ -136,7 +134,6 @@ impl Template {
             sparse: SparseRows::new(coordinates.as_ref(), SPARSE_THRESHOLD),
             coordinates: DenseRows::new(coordinates.as_ref()),
             gram: scaled,
-            rigidity_hessian: rigidity.hessian(),
             rigidity,
         })
     }
@@ -165,7 +162,7 @@ fn rigidity(rest: &TriMesh, cage: &Cage, phi: MatRef<'_, f64>, diagonal: f64, op
     });
     let at_rest: Vec<DVec3> = nodes.iter().map(|&n| vertices[n as usize]).chain(vectors(cage.vertices())).collect();
     let edges = [&model_edges[..], &cage_edges[..]];
-    Rigidity::new(&at_rest, coordinates, edges, options.cage_weight, diagonal, SPARSE_THRESHOLD)
+    Rigidity::new(&at_rest, coordinates.as_ref(), edges, options.cage_weight, diagonal, SPARSE_THRESHOLD)
 }
 
 /// Vertices spread over a mesh, by position and normal.

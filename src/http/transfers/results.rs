@@ -5,7 +5,7 @@ use crate::http::job_frames::{FramesOfJob, stream};
 use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
 use crate::service::Service;
-use crate::transfers::{Transfer, TransferFrames, TransferJob};
+use crate::transfers::{Transfer, TransferFrames};
 use axum::extract::State;
 use axum::response::Response;
 use http::HeaderMap;
@@ -29,9 +29,8 @@ pub(crate) async fn frames(
     let there = query.there(&job, job.progress().moved)?;
     let frame_bytes = 12 * u64::from(job.meta.points);
     let piece = (PIECE_BYTES / frame_bytes).clamp(1, PIECE_FRAMES);
-    let mut frames = TransferFrames::new(Arc::clone(&service));
-    let read = Box::new(move |job: &TransferJob, next: u32, most: u32| frames.read(job, next, most));
-    stream(service, &tenant, job, (query, there), (piece as u32, piece * frame_bytes), read)
+    let frames = Box::new(TransferFrames::new(Arc::clone(&service)));
+    stream(service, &tenant, job, (query, there), (piece as u32, piece * frame_bytes), frames)
 }
 
 /// The container of a completed transfer, byte for byte what `cager transfer` writes for the same files and options.
