@@ -38,7 +38,8 @@ pub(crate) struct CaptureArgs {
 /// What is accepted of a capture.
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
-    /// The mesh to take of Alembic archives (rest pose and capture) with several: its path, such as /walk/body, or its name.
+    /// The mesh to take of Alembic archives (rest pose and capture) with several: its path, such as /walk/body, or its name. An archive's only mesh is taken
+    /// whatever it is called.
     #[arg(long, value_name = "PATH")]
     pub(super) prim: Option<String>,
 
@@ -88,14 +89,6 @@ fn frame_number(text: &str) -> Result<f64, String> {
 impl From<&TimingArgs> for Timing {
     fn from(args: &TimingArgs) -> Self {
         Self { fps: args.fps, start: args.start }
-    }
-}
-
-impl CheckArgs {
-    /// Refuses to choose a mesh of an archive that is sent to a service, which takes it as it is.
-    pub(super) fn refuse_prim(&self) -> Result<()> {
-        let Some(prim) = &self.prim else { return Ok(()) };
-        bail!("--prim {prim}: a service takes archives with one mesh; export this mesh alone, or leave --server out");
     }
 }
 

@@ -31,9 +31,6 @@ use std::time::{Duration, Instant};
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
     let targets = Targets::new(args)?;
-    if args.server.is_some() {
-        args.capture.checks.refuse_prim()?;
-    }
     let mut rest = read_prim(&args.rest, args.capture.checks.prim.as_deref())?;
     let no_frames = [&args.rest].into_iter().chain(&args.cage);
     let mut files = capture_files(&args.capture, &args.frames, &mut rest, no_frames);

@@ -44,6 +44,7 @@ mod transfer_remote;
 mod transfer_source;
 
 use args::{Cli, Command};
+use cager_formats::CacheFormat;
 use cager_geometry::mesh::Model;
 use clap::{CommandFactory, Parser};
 pub(crate) use global_args::{is_quiet, is_verbose, tell};
@@ -139,6 +140,11 @@ fn read_prim(path: &Path, prim: Option<&str>) -> Result<Model, cager_formats::Er
     let (model, note) = cager_formats::read_prim_with_note(path, prim)?;
     warn(note.as_slice());
     Ok(model)
+}
+
+/// Whether a file is an Alembic archive, by its name.
+fn is_alembic(path: &Path) -> bool {
+    CacheFormat::from_path(path) == Some(CacheFormat::Abc)
 }
 
 fn warn(warnings: &[String]) {

@@ -35,9 +35,6 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let output = outputs.binary(&args.output, "walk.cager")?;
     let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
     let method = args.method()?;
-    if args.service.server.is_some() {
-        args.checks.refuse_prim()?;
-    }
     let (align, matrix) = args.alignment()?;
     let align = words::align(align, matrix).unwrap_or(AlignBy::Surfaces);
     let mut target = read_model(&args.target)?;

@@ -4,14 +4,14 @@ use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::motion_args::TransferMotionArgs;
 use super::transfer_source::MotionSource;
-use super::{grouped, human_bytes, plain, progress, tell, warn};
+use super::{grouped, human_bytes, is_alembic, plain, progress, tell, warn};
 use crate::coding::Goal;
 use crate::remote::{RemoteTransfer, mesh_file, transfer_remotely};
 use anyhow::{Result, bail};
 use cager_client::messages::SessionOptions;
 use cager_client::transfer_messages::{TransferOptions, TransferStage};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
-use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
+use cager_formats::{AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_prim_with_note};
 use cager_geometry::mesh::Model;
 use std::path::{Path, PathBuf};
 
@@ -32,14 +32,17 @@ pub(super) fn run(
         (Some(mut frames), Some(rest)) => {
             options.frame_rate = frames.frame_rate();
             options.start = Some(frames.number(0));
-            TransferSource::Files([mesh_file(rest)?, MeshFile::new("frames.npy", array(frames.as_mut())?)])
+            TransferSource::Files([
+                model_file(rest, args.checks.prim.as_deref())?,
+                MeshFile::new("frames.npy", array(frames.as_mut())?),
+            ])
         }
         _ => args.source.as_ref().map(file).transpose()?.map_or(TransferSource::Session, TransferSource::Container),
     };
     let [cage, pairs] = [&args.cage, &args.pairs].map(|path| path.as_ref().map(file).transpose());
     // Whatever it is called here.
     let pairs = pairs?.map(|pairs| MeshFile::new("pairs.txt", pairs.bytes));
-    let new = NewTransfer { cage: cage?, pairs, options, ..NewTransfer::new(sent, mesh_file(&args.target)?) };
+    let new = NewTransfer { cage: cage?, pairs, options, ..NewTransfer::new(sent, model_file(&args.target, None)?) };
     let mut outputs = vec![("capture.cager", &mut container)];
     outputs.extend(report.as_mut().map(|file| ("report", file)));
     let token = args.service.token();
@@ -69,6 +72,16 @@ pub(super) fn run(
         human_bytes(bytes),
         plain(address),
     ))
+}
+
+/// A model for a service, which would get all meshes and all frames of an archive: of those, the mesh alone that `prim` names.
+fn model_file(path: &Path, prim: Option<&str>) -> Result<MeshFile> {
+    if !is_alembic(path) {
+        return Ok(mesh_file(path)?);
+    }
+    let (model, _) = read_prim_with_note(path, prim)?;
+    let name = path.with_extension("obj");
+    Ok(MeshFile::new(name.file_name().unwrap_or_default().to_string_lossy(), obj_bytes(&model)))
 }
 
 fn options(args: &TransferMotionArgs, goal: Option<Goal>) -> Result<TransferOptions> {

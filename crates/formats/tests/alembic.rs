@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cager_formats::{
-    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, create_frames, open_frames, open_frames_bytes,
-    open_selected_frames, read_model, read_prim_with_note,
+    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, create_frames, frame_files, mesh_sequence,
+    open_frames, open_frames_bytes, open_selected_frames, read_model, read_prim_with_note,
 };
 use cager_geometry::mesh::Polygons;
 use support::archive::*;
@@ -226,7 +226,153 @@ fn repeated_samples_are_frames() {
     let heights: Vec<f64> = all(&mut *open(&bytes, 3).unwrap()).iter().map(|frame| frame[1]).collect();
     assert_eq!(heights, [0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
     node.properties[0].changes = Some([1 << 30, 0, 0]);
-    assert!(message(open(&archive("", &[EVEN], &[node]), 3)).contains("it promises 1073741824 frames"));
+    assert!(message(open(&archive("", &[EVEN], &[node]), 3)).contains("promises 1073741824 frames"));
+}
+
+#[test]
+fn frames_that_the_archive_does_not_hold_are_bounded() {
+    // So many frames of a triangle, of which some are stored, the last one from then on.
+    let held = |frames: u32, stored: u32| {
+        let of = |k: u32| vec![0.0, k as f32, 0.0, 1.0, k as f32, 0.0, 0.0, k as f32, 1.0];
+        let mut node = mesh("m", positions(&(0..stored).map(of).collect::<Vec<_>>()), &[&[2, 1, 0]]);
+        node.properties[0].changes = Some([frames, 1, stored - 1]);
+        archive("", &[EVEN], &[node])
+    };
+    let bytes = held(1 << 14, 3);
+    assert_eq!(all(&mut *open(&bytes, 3).unwrap()).last().unwrap()[1], 2.0);
+    let error = message(open(&held((1 << 14) + 1, 3), 3));
+    assert!(error.contains("promises 16385 frames, of which it holds fewer than half; export 16384 frames"), "{error}");
+    let mut empty = mesh("m", positions(&[vec![]]), &[]);
+    empty.properties[0].changes = Some([u32::MAX, 0, 0]);
+    // Of times that would take memory for every frame.
+    let bytes = archive("", &[(1.0, &[0.0, 0.7])], &[empty]);
+    assert!(message(open(&bytes, 3)).contains("has a mesh without points in its first frame"));
+    let bytes = held(20_000, 12_000);
+    assert_eq!(all(&mut *open(&bytes, 3).unwrap()).last().unwrap()[1], 11_999.0);
+}
+
+#[test]
+fn faces_that_are_stored_twice_are_compared_once() {
+    // Long tables, which differ in edges alone, so that the faces are the same.
+    let faces = |edge: [i32; 2]| [vec![2, 1, 0], edge.repeat(1000)].concat();
+    let counts = [vec![3], vec![2; 1000]].concat();
+    let of = |kinds: &[[i32; 2]]| {
+        let mut node = triangle(255);
+        let indices: Vec<Vec<i32>> = kinds.iter().cycle().take(255).map(|&edge| faces(edge)).collect();
+        node.properties[1] = array(".faceIndices", (I32, 1), 1, &indices, i32::to_le_bytes);
+        node.properties[2] = array(".faceCounts", (I32, 1), 0, std::slice::from_ref(&counts), i32::to_le_bytes);
+        archive("", &[EVEN], &[node])
+    };
+    assert_eq!(all(&mut *open(&of(&[[0, 1], [1, 2]]), 3).unwrap()).len(), 255);
+    let bytes = of(&[[0, 1], [1, 2], [2, 0]]);
+    let (mut reader, mut frame) = (open(&bytes, 3).unwrap(), Vec::new());
+    let failed = (0..255).find_map(|_| reader.read_next(&mut frame).err()).expect("tables are not read again for ever");
+    assert!(failed.to_string().contains("its tables overlap"), "{failed}");
+}
+
+#[test]
+fn a_transform_tells_the_frames_of_equal_positions() {
+    let mut still = triangle(1);
+    still.properties[0].changes = Some([2, 0, 0]);
+    let lifts: Vec<Vec<f64>> = (0..10).map(|k| vec![0.0, f64::from(k), 0.0]).collect();
+    let bytes = archive("", &[EVEN], &[transform("lift", &[0x10], 1, &lifts, vec![still])]);
+    let heights: Vec<f64> = all(&mut *open(&bytes, 3).unwrap()).iter().map(|frame| frame[1]).collect();
+    assert_eq!(heights, (0..10).map(f64::from).collect::<Vec<_>>());
+}
+
+#[test]
+fn faces_are_wound_by_the_first_transform_that_has_a_volume() {
+    // Scaled to nothing at first, mirrored then.
+    let scales = [vec![0.0; 3], vec![-1.0, 1.0, 1.0], vec![-2.0, 1.0, 1.0]];
+    let bytes = archive("", &[EVEN], &[transform("appears", &[0x00], 1, &scales, vec![triangle(3)])]);
+    assert_eq!(open(&bytes, 3).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
+}
+
+#[test]
+fn tables_longer_than_any_program_writes_are_refused() {
+    let with = |property: usize, sample: Vec<u8>| {
+        let mut node = transform("x", &[0x10], 0, &[vec![0.0; 3]], vec![triangle(1)]);
+        node.properties[property].samples = vec![sample];
+        message(open(&archive("", &[EVEN], &[node]), 3))
+    };
+    assert!(with(0, vec![0x10; 257]).contains(".ops has 257 bytes where 256 are the most"));
+    assert!(with(1, vec![0; 8 * 16 * 256 + 8]).contains(".vals has 32776 bytes where 32768 are the most"));
+    assert!(with(2, vec![1; 2]).contains(".inherits has 2 bytes where 1 are the most"));
+    let edges = vec![&[0, 1][..]; 300_000];
+    let error = message(open(&archive("", &[EVEN], &[mesh("m", positions(&rising(1)), &edges)]), 3));
+    assert!(error.contains("it has more faces than 3 points can have"), "{error}");
+    // Operations that are done for every frame.
+    let many = |children| transform("turns", &[0x40; 256], 1, &[vec![0.0; 256], vec![1.0; 256]], children);
+    let chain = |links: usize| (0..links).fold(triangle(1), |inner, _| many(vec![inner]));
+    let error = message(open(&archive("", &[EVEN], &[chain(17)]), 3));
+    assert!(error.contains("the transforms above a mesh have more operations than any program writes"), "{error}");
+    assert!(open(&archive("", &[EVEN], &[chain(16)]), 3).is_ok());
+}
+
+#[test]
+fn objects_that_nest_too_deep_are_refused() {
+    let nested = |depth: usize| {
+        (1..depth).fold(triangle(1), |inner, _| transform("x", &[0x10], 0, &[vec![1.0, 0.0, 0.0]], vec![inner]))
+    };
+    let bytes = archive("", &[EVEN], &[nested(256)]);
+    assert_eq!(all(&mut *open(&bytes, 3).unwrap())[0][0], 255.0);
+    assert!(
+        message(open(&archive("", &[EVEN], &[nested(257)]), 3))
+            .contains("nests deeper than 256; export the mesh alone")
+    );
+}
+
+#[test]
+fn the_only_mesh_is_taken_whatever_it_is_called() {
+    // As of a rest pose beside a capture of several meshes.
+    let (_folder, path) = saved(&archive("", &[EVEN], &[triangle(1)]));
+    for prim in ["body", "/walk/body"] {
+        assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 3, "{prim}");
+    }
+}
+
+#[test]
+fn messages_tell_long_paths_apart() {
+    let long: &'static str = "a_name_that_is_as_long_as_programs_make_them_of_the_names_of_all_that_is_above";
+    let twins = ["left", "right"].map(|name| {
+        let mut node = triangle(1);
+        node.name = name;
+        node
+    });
+    let error =
+        message(open(&archive("", &[EVEN], &[transform(long, &[0x10], 0, &[vec![0.0; 3]], twins.to_vec())]), 3));
+    assert!(error.contains(&format!("/{long}/left (3 points) and /{long}/right (3 points)")), "{error}");
+}
+
+#[test]
+fn archives_beside_other_captures_are_no_captures() {
+    let folder = tempdir().unwrap();
+    let put = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        path
+    };
+    let without = |no_frames: &[PathBuf]| {
+        let selection = FrameSelection { no_frames: no_frames.to_vec(), ..FrameSelection::default() };
+        open_selected_frames(folder.path(), 3, &selection).map(|reader| reader.frames())
+    };
+    let scene = put("scene.abc", &archive("", &[EVEN], &[triangle(3)]));
+    assert_eq!((without(&[]).unwrap(), without(std::slice::from_ref(&scene)).unwrap()), (3, 3));
+    let rest = put("rest.abc", &archive("", &[EVEN], &[triangle(1)]));
+    assert!(message(without(&[])).contains("has 2 captures; name one of them"));
+    assert_eq!(without(&[rest]).unwrap(), 3);
+    let mut array = b"\x93NUMPY\x01\0\x76\0".to_vec();
+    let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 3), }";
+    array.extend(format!("{header:<117}\n").bytes().chain([0; 72]));
+    let array = put("frames.npy", &array);
+    assert_eq!(without(&[]).unwrap(), 2);
+    assert_eq!(frame_files(folder.path()), [array]);
+}
+
+#[test]
+fn a_capture_is_no_sequence_of_surfaces() {
+    let (_folder, path) = saved(&archive("", &[EVEN], &[triangle(3)]));
+    assert!(message(mesh_sequence(&path, &[])).contains("encode it with cager encode; for surfaces give a folder"));
 }
 
 #[test]
@@ -255,7 +401,9 @@ fn one_of_several_meshes_is_chosen_by_path_or_name() {
         assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 2, "{prim}");
     }
     assert!(message(take("body", 2)).contains("holds 2 meshes, /coat/body (3 points) and /skin/body (2 points)"));
-    assert!(message(take("hat", 2)).contains(&format!("holds no mesh hat, but {list} and /twin")));
+    for prim in ["hat", "/hat/body", "/body", "ody", "/coat/body/body"] {
+        assert!(message(take(prim, 2)).contains(&format!("holds no mesh {prim}, but {list} and /twin")), "{prim}");
+    }
     assert!(message(take("twin", 3)).contains("/twin is an instance of /coat/body, which is not read; "));
     assert!(matches!(take("/coat", 2), Err(Error::PointCount { expected: 2, found: 3, .. })));
 }
@@ -324,17 +472,24 @@ fn what_cannot_be_read_says_why_and_what_to_do() {
 
 #[test]
 fn objects_that_contain_themselves_are_refused() {
-    let whole = archive("", &[EVEN], &[triangle(1)]);
-    // Wherever an offset may stand, each of the groups and the blocks in turn.
-    for at in 16..whole.len() - 8 {
-        for target in (16..whole.len() as u64).step_by(37).flat_map(|target| [target, target | DATA]) {
+    let place = |name, child| transform(name, &[0x10], 0, &[vec![0.0; 3]], vec![child]);
+    let whole = archive("", &[EVEN], &[place("outer", place("inner", triangle(1)))]);
+    let number = |at: usize| u64::from_le_bytes(whole[at..at + 8].try_into().unwrap());
+    // Where a group has the offset of one of its children, and that offset; the first child of an object are its properties.
+    let slot = |group: u64, child: usize| group as usize + 8 + 8 * child;
+    let child = |group: u64| number(slot(group, 1));
+    let top = number(slot(number(8), 2));
+    let (outer, inner) = (child(top), child(child(top)));
+    let objects = [top, outer, inner, child(inner)];
+    assert!(objects.iter().all(|&group| group & DATA == 0) && open(&whole, 3).is_ok());
+    for (depth, &group) in objects[..3].iter().enumerate() {
+        // Itself, and each that it lies below.
+        for target in &objects[..=depth] {
             let mut bytes = whole.clone();
+            let at = slot(group, 1);
             bytes[at..at + 8].copy_from_slice(&target.to_le_bytes());
-            let Ok(mut reader) = open(&bytes, 3) else { continue };
-            let mut frame = Vec::new();
-            if reader.read_next(&mut frame).is_ok() {
-                assert_eq!(frame.len(), 9);
-            }
+            let error = message(open(&bytes, 3));
+            assert!(error.contains("its tables overlap") || error.contains("nests deeper than 256"), "{error}");
         }
     }
 }

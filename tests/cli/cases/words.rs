@@ -35,14 +35,10 @@ fn alembic_archives_go_in_and_out() {
     dir.cager("decode walk.cager -o out.abc").succeeds();
     dir.cager("decode walk.cager -o out.npy").succeeds();
     assert_eq!(read_frames(&dir.path("out.abc"), points), read_frames(&dir.path("out.npy"), points));
-    dir.cager("encode --rest out.abc --cage cage.obj --frames out.abc --prim outShape -o again.cager").succeeds();
+    // The only mesh, whatever it is called.
+    dir.cager("encode --rest out.abc --cage cage.obj --frames out.abc --prim hat -o again.cager").succeeds();
     dir.cager("decode again.cager -o again.abc").succeeds();
     let line = "encode --rest rest.obj --cage cage.obj --frames";
-    refused(
-        &dir,
-        &format!("{line} out.abc --prim hat -o no.cager"),
-        &["holds no mesh hat, but /out/outShape (", "--prim"],
-    );
     refused(&dir, &format!("{line} walk.abc -o no.cager"), &["walk.abc", "export it again"]);
 }
 

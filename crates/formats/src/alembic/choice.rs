@@ -11,14 +11,22 @@ use crate::error::Fault;
 
 /// Meshes that a message lists, and characters of the name of each.
 const LISTED: usize = 6;
-const SHOWN: usize = 48;
+const SHOWN: usize = 200;
+/// Bytes of the path of what an instance is of.
+const LONGEST_PATH: usize = 4096;
 
-/// The mesh that `prim` names by its path, by its own name or by one of what it lies below; without one the only mesh.
+/// The mesh that `prim` names by its path, by its own name or by one of what it lies below; the only mesh whatever `prim` is, since that is given for
+/// the rest pose and the capture alike, which may call it differently.
 pub(super) fn choose<R: Read + Seek>(archive: &mut Archive<R>, prim: Option<&str>) -> Result<usize, Failure> {
     let is_candidate = |k: &usize| matches!(archive.objects[*k].kind, Kind::Mesh | Kind::Instance);
     let all: Vec<usize> = (0..archive.objects.len()).filter(is_candidate).collect();
     if all.is_empty() {
         return Err(Fault::unsupported("holds no polygon mesh; export the mesh itself as Alembic").into());
+    }
+    if let &[only] = all.as_slice()
+        && archive.objects[only].kind == Kind::Mesh
+    {
+        return Ok(only);
     }
     let found = prim.map_or_else(|| all.clone(), |prim| named(archive, &all, prim));
     match (found.as_slice(), prim) {
@@ -26,7 +34,7 @@ pub(super) fn choose<R: Read + Seek>(archive: &mut Archive<R>, prim: Option<&str
         (&[only], _) => {
             let (path, source) = (shown(&archive.path(only)), source(archive, only)?);
             let what = format!(
-                "{path} is an instance of {source}, which is not read; make instances real where it is exported, or take {source} with --prim"
+                "{path} is an instance of {source}, which is not read; make instances real where it is exported, or export {source} alone"
             );
             Err(Fault::unsupported(what).into())
         }
@@ -37,7 +45,7 @@ pub(super) fn choose<R: Read + Seek>(archive: &mut Archive<R>, prim: Option<&str
         }
         (several, _) => {
             let what = format!(
-                "holds {} meshes, {}; choose one by its path with --prim",
+                "holds {} meshes, {}; choose one by its path with --prim, where the command has it, or export the one mesh alone",
                 several.len(),
                 list(archive, several)
             );
@@ -49,10 +57,18 @@ pub(super) fn choose<R: Read + Seek>(archive: &mut Archive<R>, prim: Option<&str
 /// The candidates that a path or a name picks.
 fn named<R: Read + Seek>(archive: &Archive<R>, all: &[usize], prim: &str) -> Vec<usize> {
     if prim.contains('/') {
-        let (path, inside) = (format!("/{}", prim.trim_matches('/')), format!("/{}/", prim.trim_matches('/')));
-        let exactly: Vec<usize> = all.iter().copied().filter(|&k| archive.path(k) == path).collect();
-        let below = || all.iter().copied().filter(|&k| archive.path(k).starts_with(&inside)).collect();
-        return if exactly.is_empty() { below() } else { exactly };
+        let names = || prim.trim_matches('/').rsplit('/').map(str::as_bytes);
+        let depth = names().count();
+        // Name by name, as paths may be far longer than what the archive holds of them.
+        let begins = |k: usize| {
+            let above = archive.objects[k].depth.checked_sub(depth);
+            above.is_some_and(|above| {
+                archive.ancestry(k).skip(above).map(|k| archive.objects[k].name.as_slice()).eq(names())
+            })
+        };
+        let below: Vec<usize> = all.iter().copied().filter(|&k| begins(k)).collect();
+        let exactly: Vec<usize> = below.iter().copied().filter(|&k| archive.objects[k].depth == depth).collect();
+        return if exactly.is_empty() { below } else { exactly };
     }
     let is_called = |k: usize| archive.objects[k].name == prim.as_bytes();
     let exactly: Vec<usize> = all.iter().copied().filter(|&k| is_called(k)).collect();
@@ -86,7 +102,7 @@ fn source<R: Read + Seek>(archive: &mut Archive<R>, instance: usize) -> Result<S
     let Some(told) = find(&properties, ".instanceSource", PropertyKind::Scalar) else {
         return Ok("another object".to_owned());
     };
-    let bytes = told.table(&mut archive.container, 0)?;
+    let bytes = told.table(&mut archive.container, 0, LONGEST_PATH)?;
     Ok(shown(String::from_utf8_lossy(&bytes).trim_end_matches('\0')))
 }
 

@@ -11,14 +11,15 @@ use super::objects::Archive;
 use super::ogawa::{Block, Failure, damaged};
 use super::properties::Property;
 use super::timing::timing;
-use super::transform::{Chain, Matrix, Moment, apply, mirrors};
+use super::transform::{Chain, Matrix, Moment, apply, determinant};
 use crate::error::{Error, Fault};
 use crate::frames::{FrameReader, Times, widen};
 
 /// Bytes read at once: few calls, and still within the fast caches.
 const BLOCK: usize = 1 << 17;
-/// Frames beyond those that the archive has room for: repetitions take none.
-const MOST_REPEATED: u64 = 1 << 14;
+/// Frames that an archive may have however few of them it holds: repetitions take no room, nor do the points of what a transform moves. Of more it
+/// holds every other one.
+const MOST_REPEATED: usize = 1 << 14;
 
 /// Opens the frames of a mesh in an archive of `length` bytes; `prim` chooses one of several.
 pub(crate) fn open_frames<'a>(
@@ -57,8 +58,10 @@ struct MeshFrames<R> {
     chain: Chain,
     /// Whether the transforms turn the inside out.
     mirrored: bool,
-    /// Those of the first frame, with which all others are compared.
+    /// Those of the first frame, with which all others are compared; where the last ones are stored that were equal.
     faces: Faces,
+    /// Where those are stored that were equal before these.
+    equal: [Block; 2],
     /// Index of the times of the frames.
     sampling: usize,
     times: Times,
@@ -76,27 +79,41 @@ impl<R: Read + Seek> MeshFrames<R> {
         let mesh = Mesh::open(&mut archive, object)?;
         let chain = Chain::of(&mut archive, object)?;
         // What moves tells the frames: the points, or else a transform.
-        let moving = Some(&mesh.positions).filter(|positions| positions.samples > 1);
+        let moving = Some(&mesh.positions).filter(|positions| !positions.is_constant());
         let driver = moving.or_else(|| chain.animated()).unwrap_or(&mesh.positions);
         let (frames, sampling) = (driver.samples, driver.sampling);
-        let most = archive.container.length() / 8 + MOST_REPEATED;
-        if frames as u64 > most || !archive.samplings[sampling].covers(frames) {
+        if !archive.samplings[sampling].covers(frames) {
             return Err(damaged(&format!("it promises {frames} frames, of which not all can be there")).into());
         }
-        let times = timing(&archive.samplings[sampling], frames, archive.frame_rate, sampling == 0)?;
-        let (points, _) = mesh.points(&mut archive.container, 0)?;
+        let (points, first) = mesh.points(&mut archive.container, 0)?;
         let points = usize::try_from(points).unwrap_or(usize::MAX);
         if points == 0 {
             return Err(
                 Fault::invalid("has a mesh without points in its first frame; export it with its points").into()
             );
         }
-        let first = Moment { sample: 0, sampling, seconds: archive.samplings[sampling].time(0) };
-        let matrix = chain.matrix(&mut archive.container, &archive.samplings, first)?;
-        let mirrored = matrix.as_ref().is_some_and(mirrors);
-        let faces = mesh.faces(&mut archive.container, [0, 0], points, mirrored)?;
-        let (path, block) = (path.to_owned(), Vec::new());
-        Ok(Self { path, archive, mesh, chain, mirrored, faces, sampling, times, points, frames, next: 0, block })
+        if frames > MOST_REPEATED && first.length.saturating_mul(frames as u64) / 2 > archive.container.length() {
+            let what = format!(
+                "promises {frames} frames, of which it holds fewer than half; export {MOST_REPEATED} frames at the most, or all of them as positions"
+            );
+            return Err(Fault::unsupported(what).into());
+        }
+        let times = timing(&archive.samplings[sampling], frames, archive.frame_rate, sampling == 0)?;
+        let Archive { container, samplings, .. } = &mut archive;
+        let moment = |sample| Moment { sample, sampling, seconds: samplings[sampling].time(sample) };
+        let mut mirrored = false;
+        // What is not there yet is often scaled to nothing.
+        for frame in 0..frames.min(MOST_REPEATED) {
+            let scale = chain.matrix(container, samplings, moment(frame))?.as_ref().map_or(1.0, determinant);
+            mirrored = scale < 0.0;
+            if scale != 0.0 {
+                break;
+            }
+        }
+        let samples = [&mesh.indices, &mesh.counts].map(|faces| moment(0).of(faces, samplings).0);
+        let faces = mesh.faces(container, samples, points, mirrored)?;
+        let (path, block, equal) = (path.to_owned(), Vec::new(), faces.blocks);
+        Ok(Self { path, archive, mesh, chain, mirrored, faces, equal, sampling, times, points, frames, next: 0, block })
     }
 
     fn moment(&self, frame: usize) -> Moment {
@@ -128,14 +145,14 @@ impl<R: Read + Seek> MeshFrames<R> {
         let container = &mut self.archive.container;
         let blocks =
             [self.mesh.indices.sample(container, samples[0])?, self.mesh.counts.sample(container, samples[1])?];
-        if blocks == self.faces.blocks {
+        if blocks == self.faces.blocks || blocks == self.equal {
             return Ok(());
         }
         let other = self.mesh.faces(container, samples, self.points, self.mirrored)?;
         if other.polygons != self.faces.polygons {
             return Err(changed("its faces are not those of frame 0").into());
         }
-        self.faces.blocks = other.blocks;
+        self.equal = std::mem::replace(&mut self.faces.blocks, other.blocks);
         Ok(())
     }
 

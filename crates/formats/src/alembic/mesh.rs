@@ -11,6 +11,10 @@ use crate::error::Fault;
 use crate::frames::Scalar;
 use crate::mesh::check_face;
 
+/// Bytes of corners that a point has at the most, and those that a mesh may have however few its points are.
+const CORNERS_OF_POINT: u64 = 4 * 64;
+const MOST_OF_FEW: u64 = 1 << 20;
+
 pub(super) struct Mesh {
     pub(super) positions: Property,
     /// Corners of all faces, back to back.
@@ -79,7 +83,11 @@ impl Mesh {
         as_stored: bool,
     ) -> Result<Faces, Failure> {
         let blocks = [self.indices.sample(container, indices)?, self.counts.sample(container, counts)?];
-        let (indices, counts) = (self.indices.table(container, indices)?, self.counts.table(container, counts)?);
+        let most = MOST_OF_FEW.max(CORNERS_OF_POINT.saturating_mul(points as u64));
+        if blocks.iter().any(|block| block.length > most) {
+            return Err(damaged(&format!("it has more faces than {points} points can have")).into());
+        }
+        let (indices, counts) = (container.table(blocks[0])?, container.table(blocks[1])?);
         let mut corners = indices.as_chunks().0;
         let mut faces = Faces { polygons: Polygons::new(), left_out: 0, blocks };
         let mut face = Vec::new();

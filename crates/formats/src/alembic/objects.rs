@@ -7,6 +7,9 @@ use super::ogawa::{Container, DATA, Failure, damaged};
 use super::sampling::Sampling;
 use crate::error::Fault;
 
+/// Objects of an archive, and how deep they nest; programs write far fewer.
+const MOST_OBJECTS: usize = 1 << 20;
+const DEEPEST: usize = 256;
 /// Bytes at the end of the headers of a group's objects that tell its contents apart from others.
 const HASHES: usize = 32;
 /// In place of an index of metadata that is told beside it.
@@ -45,6 +48,8 @@ pub(super) struct Object {
     pub(super) kind: Kind,
     /// Index of the object that it lies below; none for those at the top.
     pub(super) parent: Option<usize>,
+    /// How many names its path has.
+    pub(super) depth: usize,
     /// Offset of its group.
     pub(super) group: u64,
 }
@@ -72,12 +77,16 @@ impl<R: Read + Seek> Archive<R> {
         let kinds = kinds(&metadata)?;
         let mut objects = Vec::new();
         // Objects that are yet to be entered, the next one last.
-        let mut waiting = children_of(&mut container, (top, None), &kinds)?;
+        let mut waiting = children_of(&mut container, (top, None, 1), &kinds)?;
         while let Some(object) = waiting.pop() {
             if object.group & DATA == 0 {
-                waiting.extend(children_of(&mut container, (object.group, Some(objects.len())), &kinds)?);
+                let place = (object.group, Some(objects.len()), object.depth + 1);
+                waiting.extend(children_of(&mut container, place, &kinds)?);
             }
             objects.push(object);
+            if objects.len() + waiting.len() > MOST_OBJECTS {
+                return Err(too_many().into());
+            }
         }
         // What follows reads the properties of some objects, some of them twice.
         container.allow(4);
@@ -98,17 +107,28 @@ impl<R: Read + Seek> Archive<R> {
     }
 }
 
+fn too_many() -> Fault {
+    Fault::unsupported(format!("has more than {MOST_OBJECTS} objects; export the mesh alone"))
+}
+
 /// The objects that a group has, the last one first.
 fn children_of<R: Read + Seek>(
     container: &mut Container<R>,
-    (group, parent): (u64, Option<usize>),
+    (group, parent, depth): (u64, Option<usize>, usize),
     kinds: &[Kind],
 ) -> Result<Vec<Object>, Failure> {
     let children = container.children(group)?;
     // The first are its own properties, the last are the headers of the others.
     let [_, groups @ .., headers] = children.as_slice() else { return Ok(Vec::new()) };
-    if headers & DATA == 0 {
+    if headers & DATA == 0 || groups.is_empty() {
         return Ok(Vec::new());
+    }
+    if depth > DEEPEST {
+        let what = format!("nests deeper than {DEEPEST}; export the mesh alone, without what it lies below");
+        return Err(Fault::unsupported(what).into());
+    }
+    if groups.len() > MOST_OBJECTS {
+        return Err(too_many().into());
     }
     let headers = container.contents(*headers)?;
     let mut fields = Fields(&headers[..headers.len().saturating_sub(HASHES)]);
@@ -123,7 +143,7 @@ fn children_of<R: Read + Seek>(
             }
             index => *kinds.get(index).ok_or_else(|| damaged("an object has metadata that are not there"))?,
         };
-        objects.push(Object { name, kind, parent, group });
+        objects.push(Object { name, kind, parent, depth, group });
     }
     objects.reverse();
     Ok(objects)

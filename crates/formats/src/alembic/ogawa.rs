@@ -167,7 +167,8 @@ impl<R: Read + Seek> Container<R> {
         Ok(u64::from_le_bytes(bytes))
     }
 
-    fn table(&mut self, block: Block) -> Result<Vec<u8>, Failure> {
+    /// The bytes of a table.
+    pub(super) fn table(&mut self, block: Block) -> Result<Vec<u8>, Failure> {
         // The number before the bytes counts too, so that empty tables are not free.
         let overlap = || damaged("its tables overlap");
         self.allowance = self.allowance.checked_sub(block.length.saturating_add(8)).ok_or_else(overlap)?;

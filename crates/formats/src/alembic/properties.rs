@@ -69,14 +69,18 @@ impl Property {
         Ok(Block { start: start + digest, length: length - digest })
     }
 
-    /// The bytes of a sample that is small.
+    /// The bytes of a sample that is small: `most` at the most. They cost nothing, as some are read for every frame.
     pub(super) fn table<R: Read + Seek>(
         &self,
         container: &mut Container<R>,
         sample: usize,
+        most: usize,
     ) -> Result<Vec<u8>, Failure> {
         let block = self.sample(container, sample)?;
-        // As much as the file has at the most.
+        if block.length > most as u64 {
+            let name = String::from_utf8_lossy(&self.name);
+            return Err(damaged(&format!("{name} has {} bytes where {most} are the most", block.length)).into());
+        }
         let mut bytes = vec![0; block.length as usize];
         container.read(block.start, &mut bytes)?;
         Ok(bytes)

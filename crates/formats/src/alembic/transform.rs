@@ -15,6 +15,8 @@ const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0,
 
 /// Programs write a handful.
 const MOST_OPERATIONS: usize = 256;
+/// Operations of all animated transforms above a mesh, which are done for every frame.
+const MOST_ANIMATED: usize = 1 << 12;
 
 /// The transforms above an object.
 pub(super) struct Chain {
@@ -65,6 +67,10 @@ impl Chain {
                 break;
             }
         }
+        let moving = links.iter().filter(|link: &&Link| link.fixed.is_none());
+        if moving.map(|link| link.operations.len()).sum::<usize>() > MOST_ANIMATED {
+            return Err(damaged("the transforms above a mesh have more operations than any program writes").into());
+        }
         Ok(Self { links })
     }
 
@@ -106,10 +112,7 @@ fn link<R: Read + Seek>(container: &mut Container<R>, properties: &[Property]) -
     if operations.number != U8 || values.number != F64 || values.samples == 0 || operations.samples == 0 {
         return Err(damaged("a transform has no numbers, or of an unknown type").into());
     }
-    let operations = operations.table(container, 0)?;
-    if operations.len() > MOST_OPERATIONS {
-        return Err(damaged("a transform has more operations than any program writes").into());
-    }
+    let operations = operations.table(container, 0, MOST_OPERATIONS)?;
     let mut link = Link { operations, values: values.clone(), fixed: None };
     let first = link.at(container, (0, 0.0))?;
     if values.is_constant() {
@@ -127,7 +130,7 @@ fn inherits<R: Read + Seek>(container: &mut Container<R>, properties: &[Property
         let what = "has a transform that is moved by what is above it in some frames only; bake it into the points";
         return Err(Fault::unsupported(what).into());
     }
-    Ok(told.table(container, 0)?.first() != Some(&0))
+    Ok(told.table(container, 0, 1)?.first() != Some(&0))
 }
 
 impl Link {
@@ -138,7 +141,7 @@ impl Link {
         (sample, share): (usize, f64),
     ) -> Result<Matrix, Failure> {
         let mut read = |sample| -> Result<Vec<f64>, Failure> {
-            let bytes = self.values.table(container, sample)?;
+            let bytes = self.values.table(container, sample, 8 * 16 * MOST_OPERATIONS)?;
             Ok(bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
         };
         let mut values = read(sample)?;
@@ -206,11 +209,11 @@ pub(super) fn apply(m: &Matrix, points: &mut [f64]) {
     }
 }
 
-/// Whether a matrix turns the inside out.
-pub(super) fn mirrors(m: &Matrix) -> bool {
+/// By how much a matrix makes volumes larger; less than 0 where it turns the inside out.
+pub(super) fn determinant(m: &Matrix) -> f64 {
     let [a, b, c] = [m[0], m[1], m[2]];
     let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
-    a[0] * minor(1, 2) - a[1] * minor(0, 2) + a[2] * minor(0, 1) < 0.0
+    a[0] * minor(1, 2) - a[1] * minor(0, 2) + a[2] * minor(0, 1)
 }
 
 #[cfg(test)]
@@ -239,6 +242,6 @@ mod tests {
     fn transforms_that_cannot_be_are_refused() {
         assert!(matrix(&[0x70], &[0.0; 16]).is_err());
         assert!(matrix(&[0x30], &[0.0; 15]).is_err());
-        assert!(mirrors(&matrix(&[0x00], &[-1.0, 1.0, 1.0]).unwrap()) && !mirrors(&IDENTITY));
+        assert!(determinant(&matrix(&[0x00], &[-1.0, 1.0, 1.0]).unwrap()) < 0.0 && determinant(&IDENTITY) > 0.0);
     }
 }

@@ -57,7 +57,7 @@ pub fn frame_files(source: impl AsRef<Path>) -> Vec<PathBuf> {
     };
     let (meshes, others): (Vec<_>, Vec<_>) =
         found.unwrap_or_default().into_iter().partition(|path| MeshFormat::guess(path).is_some());
-    if meshes.is_empty() { others.into_iter().filter(|path| single::is_cache(path)).collect() } else { meshes }
+    if meshes.is_empty() { captures(&others) } else { meshes }
 }
 
 /// Mesh files that are frames of a sequence, in its order.
@@ -144,20 +144,29 @@ fn open_files(
     selection: &FrameSelection,
 ) -> Result<Box<dyn FrameReader>, Error> {
     let (meshes, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|path| MeshFormat::guess(path).is_some());
-    let caches: Vec<PathBuf> = others.iter().filter(|path| single::is_cache(path)).cloned().collect();
+    let caches = captures(&others);
     let (frames, notes) = without(meshes, &selection.no_frames, caches.is_empty());
     if !frames.is_empty() {
         one_format(&frames).map_err(|fault| fault.at(source))?;
         return open_sequence(source, frames, notes, expected_points, selection);
     }
+    let (caches, notes) = without(caches, &selection.no_frames, true);
     match caches.as_slice() {
         [] => Err(no_frames_in(source, &others)),
         [cache] => single::open_cache(cache, expected_points, selection.prim.as_deref()),
         several if several.iter().all(|path| single::is_array(path)) => {
-            open_sequence(source, caches, Vec::new(), expected_points, selection)
+            open_sequence(source, caches, notes, expected_points, selection)
         }
         several => Err(Fault::invalid(format!("has {} captures; name one of them", several.len())).at(source)),
     }
+}
+
+/// Captures among files; Alembic archives where there is nothing else, as the scene often lies beside what was exported from it.
+fn captures(files: &[PathBuf]) -> Vec<PathBuf> {
+    let all = files.iter().filter(|path| single::is_cache(path)).cloned();
+    let (archives, others): (Vec<_>, Vec<_>) =
+        all.partition(|path| CacheFormat::from_path(path) == Some(CacheFormat::Abc));
+    if others.is_empty() { archives } else { others }
 }
 
 fn open_sequence(
@@ -218,6 +227,10 @@ fn one_format(files: &[PathBuf]) -> Result<(), Fault> {
 fn no_frames_in(source: &Path, others: &[PathBuf]) -> Error {
     if let Some((file, way_out)) = others.iter().find_map(|file| Some((file, single::way_out(file)?))) {
         return Fault::unsupported(way_out).at(file);
+    }
+    if let Some(capture) = others.iter().find(|path| single::is_cache(path)) {
+        let what = "is a capture whose points correspond already, so encode it with cager encode; for surfaces give a folder or pattern of mesh files";
+        return Fault::unsupported(what).at(capture);
     }
     let folders = fs::read_dir(source).into_iter().flatten().flatten().map(|entry| entry.path());
     let inner = folders.filter(|path| path.is_dir()).take(32).find_map(|folder| {

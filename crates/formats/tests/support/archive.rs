@@ -2,6 +2,8 @@
 
 #![allow(dead_code, unreachable_pub)]
 
+use std::collections::BTreeMap;
+
 pub const DATA: u64 = 1 << 63;
 pub const MESH: &str = "schema=AbcGeom_PolyMesh_v1";
 pub const SUBDIVISION: &str = "schema=AbcGeom_SubD_v1";
@@ -162,10 +164,11 @@ impl Out {
     fn compound(&mut self, properties: &[Property]) -> u64 {
         let (mut children, mut headers) = (Vec::new(), Vec::new());
         for property in properties {
-            let mut samples = Vec::new();
+            // As programs do, what is the same is written once.
+            let (mut samples, mut written) = (Vec::new(), BTreeMap::new());
             for sample in &property.samples {
                 let digest = if sample.is_empty() { &[][..] } else { &[7; 16] };
-                samples.push(self.data(&[digest, sample].concat()));
+                samples.push(*written.entry(sample).or_insert_with(|| self.data(&[digest, sample].concat())));
                 if property.kind == 2 {
                     samples.push(DATA);
                 }
