@@ -59,7 +59,7 @@ pub struct PersonFit<'a> {
 pub(super) struct Rounds {
     /// How many, at the most.
     pub(super) count: usize,
-    /// Every so manieth sample is matched.
+    /// One sample in so many is matched.
     pub(super) thin: usize,
     /// Distance at which a match counts half, in units, in the first and in the last.
     pub(super) reach: [f64; 2],
@@ -163,7 +163,7 @@ impl<'a> PersonFit<'a> {
         Observed { observation, tree, chosen }
     }
 
-    /// The template and an observation, every so manieth point of both.
+    /// The template and an observation, one point in so many of both.
     pub(super) fn matching<'o>(&'o self, observed: &'o Observed<'o>, thin: usize) -> Matching<'o> {
         let thin = if self.options.method == Method::Robust { thin } else { 1 };
         Matching { model: self.model, options: &self.options, observed, thin }

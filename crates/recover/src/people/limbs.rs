@@ -17,7 +17,7 @@ pub(super) const LIMBS: [([usize; 4], usize); 4] =
     [([5, 6, 7, 8], 2), ([9, 10, 11, 12], 0), ([13, 14, 15, 16], 2), ([17, 18, 19, 20], 0)];
 /// Examples that are tried at the most.
 const EXAMPLES: usize = 120;
-/// Every so manieth sample and chosen point is looked at.
+/// One sample and chosen point in so many is looked at.
 const THIN: usize = 3;
 /// A limb is put elsewhere where it then lies better by this factor.
 const BETTER: f64 = 0.97;

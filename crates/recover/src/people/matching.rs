@@ -55,7 +55,7 @@ pub(super) struct Matching<'a> {
     pub(super) model: &'a PersonModel,
     pub(super) options: &'a FitOptions,
     pub(super) observed: &'a Observed<'a>,
-    /// Every so manieth sample and chosen point is matched.
+    /// One sample and chosen point in so many is matched.
     pub(super) thin: usize,
 }
 

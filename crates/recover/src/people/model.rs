@@ -142,7 +142,7 @@ impl PersonModel {
         self.parts[sample]
     }
 
-    /// Every so manieth sample under a cage.
+    /// One sample in so many under a cage.
     pub(super) fn sampled(&self, vertices: &[Point], thin: usize) -> Sampled {
         if thin == 1 {
             return positioned(&tall_product(self.samples.transpose(), self.values(vertices).as_ref()));

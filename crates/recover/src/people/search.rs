@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 const HEADINGS: usize = 8;
 /// Examples that are tried at the most.
 const EXAMPLES: usize = 96;
-/// Every so manieth sample and chosen point is looked at.
+/// One sample and chosen point in so many is looked at.
 const THIN: usize = 20;
 
 /// Placements and latent numbers of the best starts, best first.
