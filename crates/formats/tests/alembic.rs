@@ -323,6 +323,19 @@ fn objects_that_nest_too_deep_are_refused() {
 }
 
 #[test]
+fn more_objects_than_programs_write_are_refused() {
+    let mut bytes = archive("", &[EVEN], &[triangle(1)]);
+    // In place of the top another group, after all else: of no properties, empty objects and no headers.
+    let (at, root) = (bytes.len() as u64, u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize);
+    bytes[root + 24..root + 32].copy_from_slice(&at.to_le_bytes());
+    let objects = (1 << 20) + 1;
+    bytes.extend((objects as u64 + 2).to_le_bytes());
+    bytes.resize(bytes.len() + 8 * (objects + 1), 0);
+    bytes.extend(DATA.to_le_bytes());
+    assert!(message(open(&bytes, 3)).contains("has more than 1048576 objects; export the mesh alone"));
+}
+
+#[test]
 fn the_only_mesh_is_taken_whatever_it_is_called() {
     // As of a rest pose beside a capture of several meshes.
     let (_folder, path) = saved(&archive("", &[EVEN], &[triangle(1)]));
