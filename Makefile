@@ -10,13 +10,14 @@ DENY := target/deny/bin/cargo-deny
 
 BLENDER := target/blender/bin/python
 ALEMBIC := target/alembic/bin/python
+USD := target/usd/bin/python
 
 LINT := target/lint-deploy
 
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -87,6 +88,14 @@ alembic: $(ALEMBIC) ## written archives through the Alembic library; installs al
 $(ALEMBIC): Makefile
 	$(PYTHON) -m venv target/alembic
 	target/alembic/bin/pip install --quiet alembic3d==1.8.12.1
+	@touch $@
+
+usd: $(USD) ## written files of USD through OpenUSD itself; installs usd-core
+	CAGER_USD_PYTHON=$(abspath $(USD)) $(CARGO) test --locked -p cager-formats --test usd library -- --nocapture
+
+$(USD): Makefile
+	$(PYTHON) -m venv target/usd
+	target/usd/bin/pip install --quiet usd-core==26.11
 	@touch $@
 
 soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when

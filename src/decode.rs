@@ -339,7 +339,7 @@ pub(crate) fn frame_options(
     let numbers = (0..range.count()).filter_map(|place| numbers.get(range.frame(place)).copied()).collect();
     let origin = container.header().origin;
     let rounding = if origin.is_some() { LOST * diagonal(&container.rest()?.points) } else { 0.0 };
-    Ok(FrameOptions { fps, numbers, origin, rounding })
+    Ok(FrameOptions { fps, numbers, origin, rounding, units: None })
 }
 
 /// Decodes frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.

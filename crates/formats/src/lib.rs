@@ -12,8 +12,11 @@ mod listing;
 mod matrix;
 pub mod mesh;
 mod natural;
+mod scene;
 mod signature;
 mod text;
+mod units;
+mod usd;
 
 pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
 pub use error::{Action, Error};
@@ -26,6 +29,7 @@ pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{
     MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_with_note, read_prim_with_note,
-    write_model,
+    read_prim_with_units, write_model,
 };
 pub use signature::Signature;
+pub use units::{Units, Up};

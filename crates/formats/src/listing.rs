@@ -27,6 +27,9 @@ pub const FORMATS: &[Listed] = &[
     animated("pc2", "point cache of 3ds Max and Blender", true, "frame numbers"),
     animated("mdd", "point cache of LightWave", true, "times"),
     animated("abc", "Alembic (Ogawa)", true, "frame rate, times"),
+    animated("usdc", "Universal Scene Description, binary", true, "unit, up axis, frame rate, times"),
+    animated("usdz", "the same as a package", true, "unit, up axis, frame rate, times"),
+    animated("usd", "the same of either kind", true, "unit, up axis, frame rate, times"),
 ];
 
 const fn still(extension: &'static str, name: &'static str, written: bool) -> Listed {

@@ -21,6 +21,10 @@ pub enum Signature {
     Pc2,
     /// Alembic in the Ogawa container.
     Abc,
+    /// Universal Scene Description in binary.
+    Usdc,
+    /// Universal Scene Description as text.
+    Usda,
     /// Wavefront OBJ.
     Obj,
     /// Polygon File Format.
@@ -60,8 +64,8 @@ const BEGINNINGS: &[(&[u8], Signature)] = &[
     (b"\x89CGR\r\n\x1a\n", Signature::Cager),
     (b"Ogawa", Signature::Abc),
     (b"\x89HDF\r\n\x1a\n", Signature::Scene("HDF5")),
-    (b"PXR-USDC", Signature::Scene("USD")),
-    (b"#usda", Signature::Scene("USD")),
+    (b"PXR-USDC", Signature::Usdc),
+    (b"#usda", Signature::Usda),
     (b"Kaydara FBX Binary", Signature::Scene("FBX")),
     (b"; FBX", Signature::Scene("FBX")),
     (b"BLENDER", Signature::Scene("Blender")),
@@ -145,9 +149,11 @@ impl Signature {
     fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Npy => &["npy"],
-            Self::Zip => &["npz", "zip"],
+            Self::Zip => &["npz", "usdz", "zip"],
             Self::Pc2 => &["pc2"],
             Self::Abc => &["abc"],
+            Self::Usdc => &["usdc", "usd"],
+            Self::Usda => &["usda", "usd"],
             Self::Obj => &["obj"],
             Self::Ply => &["ply"],
             Self::Off => &["off"],

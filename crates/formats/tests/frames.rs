@@ -432,7 +432,7 @@ fn outputs_that_make_no_sense_are_refused() {
             .map(drop)
     };
     let none = Polygons::new();
-    let error = message(create("a.usd", 1, 1, &none, 24.0));
+    let error = message(create("a.fbx", 1, 1, &none, 24.0));
     assert!(error.ends_with("in / for a folder of .obj files, or of one frame in .obj .ply .off .stl"), "{error}");
     assert!(matches!(create("a.npy", 0, 1, &none, 24.0), Err(Error::Invalid { .. })));
     assert!(matches!(create("a.npy", 1, 0, &none, 24.0), Err(Error::Invalid { .. })));

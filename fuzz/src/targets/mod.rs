@@ -8,6 +8,7 @@ mod meshes;
 mod settings;
 mod skeletons;
 mod store;
+mod usd;
 
 use crate::Target;
 
@@ -24,6 +25,8 @@ pub const TARGETS: &[Target] = &[
     frames::PC2,
     frames::MDD,
     alembic::ABC,
+    usd::USDC,
+    usd::USDZ,
     frames::NPZ,
     container::CONTAINER,
     bodies::RECORD,

@@ -2,18 +2,12 @@
 
 use std::io::{Read, Seek};
 
-use cager_geometry::mesh::Polygons;
-
 use super::objects::Archive;
-use super::ogawa::{Block, Container, Failure, damaged};
+use super::ogawa::{Block, Container, damaged};
 use super::properties::{F32, F64, I32, Kind, Property, U32, find};
 use crate::error::Fault;
 use crate::frames::Scalar;
-use crate::mesh::check_face;
-
-/// Bytes of corners that a point has at the most, and those that a mesh may have however few its points are.
-const CORNERS_OF_POINT: u64 = 4 * 64;
-const MOST_OF_FEW: u64 = 1 << 20;
+use crate::scene::{Faces, Failure, most_corners};
 
 pub(super) struct Mesh {
     pub(super) positions: Property,
@@ -23,17 +17,6 @@ pub(super) struct Mesh {
     pub(super) counts: Property,
     /// How positions are stored.
     pub(super) scalar: Scalar,
-}
-
-/// Faces of a mesh.
-#[derive(Debug)]
-pub(super) struct Faces {
-    /// Those of three corners and more.
-    pub(super) polygons: Polygons,
-    /// How many there are beside them of fewer than three corners.
-    pub(super) left_out: usize,
-    /// Where they are stored.
-    pub(super) blocks: [Block; 2],
 }
 
 impl Mesh {
@@ -74,39 +57,21 @@ impl Mesh {
         Ok((block.length / size, block))
     }
 
-    /// The faces at samples of their corners and of the numbers of them, as they are stored or turned around.
+    /// The faces at samples of their corners and of the numbers of them, as they are stored or turned around, and where they are stored.
     pub(super) fn faces<R: Read + Seek>(
         &self,
         container: &mut Container<R>,
         [indices, counts]: [usize; 2],
         points: usize,
         as_stored: bool,
-    ) -> Result<Faces, Failure> {
+    ) -> Result<(Faces, [Block; 2]), Failure> {
         let blocks = [self.indices.sample(container, indices)?, self.counts.sample(container, counts)?];
-        let most = MOST_OF_FEW.max(CORNERS_OF_POINT.saturating_mul(points as u64));
-        if blocks.iter().any(|block| block.length > most) {
+        if blocks.iter().any(|block| block.length / 4 > most_corners(points)) {
             return Err(damaged(&format!("it has more faces than {points} points can have")).into());
         }
-        let (indices, counts) = (container.table(blocks[0])?, container.table(blocks[1])?);
-        let mut corners = indices.as_chunks().0;
-        let mut faces = Faces { polygons: Polygons::new(), left_out: 0, blocks };
-        let mut face = Vec::new();
-        for (k, count) in counts.as_chunks().0.iter().enumerate() {
-            let taken = corners.split_at_checked(u32::from_le_bytes(*count) as usize);
-            let (taken, rest) = taken.ok_or_else(|| damaged(&format!("face {k} has more corners than are there")))?;
-            corners = rest;
-            face.clear();
-            face.extend(taken.iter().map(|index| u32::from_le_bytes(*index)));
-            if !as_stored {
-                face.reverse();
-            }
-            check_face(&face, points, || format!("face {k}"))?;
-            if face.len() < 3 {
-                faces.left_out += 1;
-            } else {
-                faces.polygons.push(&face);
-            }
-        }
-        Ok(faces)
+        let tables = [container.table(blocks[0])?, container.table(blocks[1])?];
+        let [corners, counts] =
+            tables.each_ref().map(|table| table.as_chunks().0.iter().map(|b| u32::from_le_bytes(*b)));
+        Ok((Faces::of(counts, corners, points, !as_stored)?, blocks))
     }
 }

@@ -3,9 +3,10 @@
 use std::io::{Read, Seek};
 
 use super::fields::Fields;
-use super::ogawa::{Container, DATA, Failure, damaged};
+use super::ogawa::{Container, DATA, damaged};
 use super::sampling::Sampling;
 use crate::error::Fault;
+use crate::scene::Failure;
 
 /// Objects of an archive, and how deep they nest; programs write far fewer.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -91,19 +92,6 @@ impl<R: Read + Seek> Archive<R> {
         // What follows reads the properties of some objects, some of them twice.
         container.allow(4);
         Ok(Self { container, samplings, frame_rate, objects })
-    }
-
-    /// The object and what it lies below, from the inside to the outside.
-    pub(super) fn ancestry(&self, object: usize) -> impl Iterator<Item = usize> {
-        std::iter::successors(Some(object), |&k| self.objects[k].parent)
-    }
-
-    /// The names from the top to an object, each after a `/`.
-    pub(super) fn path(&self, object: usize) -> String {
-        let mut names: Vec<_> = self.ancestry(object).map(|k| String::from_utf8_lossy(&self.objects[k].name)).collect();
-        names.push("".into());
-        names.reverse();
-        names.join("/")
     }
 }
 

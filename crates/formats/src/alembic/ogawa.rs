@@ -1,10 +1,11 @@
 //! The Ogawa container: blocks of data, and groups of the offsets of their children; all little-endian. Every offset and size is compared with the
 //! length of the file before it is followed.
 
-use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::io::{Read, Seek, SeekFrom};
 
-use crate::error::{Error, Fault};
+use crate::error::Fault;
+use crate::frames::{Scalar, read_values};
+use crate::scene::Failure;
 use crate::signature::Signature;
 
 /// Set in the offset of a block of data, clear in that of a group.
@@ -17,34 +18,6 @@ pub(super) const VERSION: [u8; 2] = [0, 1];
 pub(super) const HEADER: usize = 16;
 /// Bytes at the beginning of every sample that tell its contents apart from others.
 pub(super) const DIGEST: u64 = 16;
-
-/// Why an archive could not be read: its bytes, or the disk.
-#[derive(Debug)]
-pub(super) enum Failure {
-    Io(io::Error),
-    Fault(Fault),
-}
-
-impl From<io::Error> for Failure {
-    fn from(cause: io::Error) -> Self {
-        Self::Io(cause)
-    }
-}
-
-impl From<Fault> for Failure {
-    fn from(fault: Fault) -> Self {
-        Self::Fault(fault)
-    }
-}
-
-impl Failure {
-    pub(super) fn at(self, path: &Path) -> Error {
-        match self {
-            Self::Io(cause) => Error::read(path, cause),
-            Self::Fault(fault) => fault.at(path),
-        }
-    }
-}
 
 /// The fault of whatever only damage explains.
 pub(super) fn damaged(what: &str) -> Fault {
@@ -107,6 +80,17 @@ impl<R: Read + Seek> Container<R> {
     pub(super) fn read(&mut self, start: u64, out: &mut [u8]) -> Result<(), Failure> {
         self.source.seek(SeekFrom::Start(start))?;
         Ok(self.source.read_exact(out)?)
+    }
+
+    /// Reads values that are known to be there; gives whether all are finite.
+    pub(super) fn read_values(
+        &mut self,
+        start: u64,
+        scalar: Scalar,
+        block: &mut Vec<u8>,
+        out: &mut [f64],
+    ) -> Result<bool, Failure> {
+        Ok(read_values(&mut self.source, start, scalar, block, out)?)
     }
 
     /// The children of a group that is a table, not the samples of a property.

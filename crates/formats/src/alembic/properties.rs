@@ -4,7 +4,8 @@ use std::io::{Read, Seek};
 
 use super::fields::Fields;
 use super::objects::{Archive, INLINE};
-use super::ogawa::{Block, Container, DATA, DIGEST, Failure, damaged};
+use super::ogawa::{Block, Container, DATA, DIGEST, damaged};
+use crate::scene::Failure;
 
 /// Types of numbers, as headers tell them.
 pub(super) const BOOL: u8 = 0;

@@ -1,17 +1,13 @@
-//! Transforms above a mesh, still or animated: a stack of operations, of which each has some numbers. Points are rows, so that a matrix stands behind
-//! what it moves.
+//! Transforms above a mesh, still or animated: a stack of operations, of which each has some numbers.
 
 use std::io::{Read, Seek};
 
 use super::objects::{Archive, Kind as ObjectKind};
-use super::ogawa::{Container, Failure, damaged};
+use super::ogawa::{Container, damaged};
 use super::properties::{BOOL, F64, Kind, Property, U8, find};
 use super::sampling::Sampling;
 use crate::error::Fault;
-
-pub(super) type Matrix = [[f64; 4]; 4];
-
-const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+use crate::scene::{Failure, IDENTITY, Matrix, Objects, multiply, rotation};
 
 /// Programs write a handful.
 const MOST_OPERATIONS: usize = 256;
@@ -180,49 +176,14 @@ fn matrix(operations: &[u8], mut values: &[f64]) -> Result<Matrix, Fault> {
     Ok(product)
 }
 
-fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
-}
-
-/// Of rows, about an axis; the identity where there is none.
-fn rotation(axis: [f64; 3], degrees: f64) -> Matrix {
-    let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length == 0.0 {
-        return IDENTITY;
-    }
-    let [x, y, z] = axis.map(|value| value / length);
-    let (s, c) = degrees.to_radians().sin_cos();
-    let t = 1.0 - c;
-    [
-        [c + t * x * x, t * x * y + s * z, t * x * z - s * y, 0.0],
-        [t * x * y - s * z, c + t * y * y, t * y * z + s * x, 0.0],
-        [t * x * z + s * y, t * y * z - s * x, c + t * z * z, 0.0],
-        [0.0, 0.0, 0.0, 1.0],
-    ]
-}
-
-/// Moves points, `x y z x y z …`.
-pub(super) fn apply(m: &Matrix, points: &mut [f64]) {
-    for point in points.as_chunks_mut::<3>().0 {
-        let [x, y, z] = *point;
-        *point = std::array::from_fn(|k| x * m[0][k] + y * m[1][k] + z * m[2][k] + m[3][k]);
-    }
-}
-
-/// By how much a matrix makes volumes larger; less than 0 where it turns the inside out.
-pub(super) fn determinant(m: &Matrix) -> f64 {
-    let [a, b, c] = [m[0], m[1], m[2]];
-    let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
-    a[0] * minor(1, 2) - a[1] * minor(0, 2) + a[2] * minor(0, 1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{determinant, placed};
 
     fn moved(operations: &[u8], values: &[f64], point: [f64; 3]) -> [f64; 3] {
         let mut point = point.to_vec();
-        apply(&matrix(operations, values).unwrap(), &mut point);
+        placed(Some(&matrix(operations, values).unwrap()), &mut point, true);
         [point[0], point[1], point[2]].map(|x| (1e9 * x).round() / 1e9)
     }
 

@@ -3,17 +3,16 @@
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use super::block::read_values;
 use super::fortran::Transposed;
 use super::layout::{LONGEST_HEADER, Layout, Order};
 use super::times::Times;
-use super::widen::{Scalar, widen};
+use super::widen::Scalar;
 use super::{CacheFormat, FrameReader, mdd, npy, pc2};
 use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
-
-/// Bytes read at once: few calls, and still within the fast caches.
-const BLOCK: usize = 1 << 17;
+use crate::usd;
 
 /// Opens a cache: reads the header and compares its promise with `length`, the bytes there are, and with the points that are expected. `prim` is the
 /// mesh of an archive of several.
@@ -36,6 +35,9 @@ pub(super) fn open<'a>(
         CacheFormat::Npy => npy::layout(&head, expected_points as u64, place),
         CacheFormat::Pc2 => pc2::layout(&head),
         CacheFormat::Mdd => mdd::layout(&head),
+        CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usd => {
+            return usd::open_frames(path, source, length, expected_points, prim);
+        }
         CacheFormat::Abc => return alembic::open_frames(path, source, length, expected_points, prim),
     };
     let mut layout = layout.map_err(|fault| fault.at(path))?;
@@ -106,17 +108,9 @@ impl<R: Read + Seek> CacheReader<R> {
         let size = self.scalar.size();
         // Every value is overwritten below.
         out.resize(self.order.values() * self.points, 0.0);
-        self.block.resize(BLOCK.min(out.len() * size), 0);
         // Fits, as the end of the last frame is the size of the file.
         let offset = self.start + (self.next * out.len() * size) as u64;
-        self.source.seek(SeekFrom::Start(offset))?;
-        let mut finite = true;
-        for values in out.chunks_mut(BLOCK / size) {
-            let bytes = &mut self.block[..values.len() * size];
-            self.source.read_exact(bytes)?;
-            finite &= widen(self.scalar, bytes, values);
-        }
-        Ok(finite)
+        read_values(&mut self.source, offset, self.scalar, &mut self.block, out)
     }
 
     /// Brings the stored frame into the order of points.

@@ -1,5 +1,6 @@
 //! The frames of captures, one after another, so that memory does not grow with their number.
 
+mod block;
 mod cache;
 mod cut;
 mod files;
@@ -31,7 +32,9 @@ use std::path::Path;
 use cager_geometry::mesh::Polygons;
 
 use crate::error::Error;
+use crate::units::Units;
 
+pub(crate) use block::read_values;
 pub use numbers::missing_frames;
 pub use range::FrameRange;
 pub use selection::FrameSelection;
@@ -40,7 +43,7 @@ pub use source::{
     open_selected_frames,
 };
 pub(crate) use times::Times;
-pub(crate) use widen::{Scalar, widen};
+pub(crate) use widen::{Scalar, half_precision};
 pub use write::{FrameOptions, FrameWriter, create_frames, frames_path};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
@@ -70,6 +73,11 @@ pub trait FrameReader: Send {
     /// What the user should know of how the source is read.
     fn notes(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// What the coordinates mean, where the source tells; they are given as they are stored.
+    fn units(&self) -> Option<Units> {
+        None
     }
 
     /// The file that the last frame was read from and the faces in it, where it has any.
@@ -105,11 +113,22 @@ pub enum CacheFormat {
     Mdd,
     /// Alembic in the Ogawa container: one polygon mesh, with the transforms above it.
     Abc,
+    /// Universal Scene Description in binary: one polygon mesh, with the transforms above it.
+    Usdc,
+    /// The same as a package: a zip archive whose first file it is.
+    Usdz,
+    /// Universal Scene Description of any kind; written in binary.
+    Usd,
 }
 
 impl CacheFormat {
     /// All formats.
-    pub const ALL: [Self; 4] = [Self::Npy, Self::Pc2, Self::Mdd, Self::Abc];
+    pub const ALL: [Self; 7] = [Self::Npy, Self::Pc2, Self::Mdd, Self::Abc, Self::Usdc, Self::Usdz, Self::Usd];
+
+    /// Whether a file has a whole scene, of which the frames of one mesh are taken.
+    pub fn is_scene(self) -> bool {
+        matches!(self, Self::Abc | Self::Usdc | Self::Usdz | Self::Usd)
+    }
 
     /// The file name extension, without the dot.
     pub fn extension(self) -> &'static str {
@@ -118,6 +137,9 @@ impl CacheFormat {
             Self::Pc2 => "pc2",
             Self::Mdd => "mdd",
             Self::Abc => "abc",
+            Self::Usdc => "usdc",
+            Self::Usdz => "usdz",
+            Self::Usd => "usd",
         }
     }
 

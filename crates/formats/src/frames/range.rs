@@ -8,6 +8,7 @@ use cager_geometry::mesh::Polygons;
 
 use super::FrameReader;
 use crate::error::{Error, Fault};
+use crate::units::Units;
 
 /// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of their source. Written
 /// `A-B` or `A-BxSTEP`.
@@ -152,6 +153,10 @@ impl FrameReader for RangeReader {
 
     fn notes(&self) -> Vec<String> {
         self.reader.notes()
+    }
+
+    fn units(&self) -> Option<Units> {
+        self.reader.units()
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {

@@ -11,7 +11,7 @@ pub struct FrameSelection {
     pub range: Option<FrameRange>,
     /// The rest pose, the cage: files that are left out where they lie among the frames, unless they are called as frames are.
     pub no_frames: Vec<PathBuf>,
-    /// The mesh of an Alembic archive that has several, by its path or name.
+    /// The mesh of a scene (Alembic, USD) that has several, by its path or name.
     pub prim: Option<String>,
     /// Whether files of several sequences are taken one after another, in natural order, instead of refused.
     pub join_sequences: bool,

@@ -45,7 +45,7 @@ pub(super) fn unknown(path: &Path) -> Error {
     let what = match way_out(path) {
         Some(way_out) => way_out,
         None => format!(
-            "is not a capture that is read; give .npy .pc2 .mdd .abc .npz, or {} files in a folder",
+            "is not a capture that is read; give .npy .pc2 .mdd .abc .usdc .usdz .npz, or {} files in a folder",
             extensions(&MeshFormat::STILL)
         ),
     };
@@ -56,7 +56,11 @@ pub(super) fn unknown(path: &Path) -> Error {
 pub(super) fn way_out(path: &Path) -> Option<String> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     let kind = match extension.as_str() {
-        "usd" | "usda" | "usdc" | "usdz" => "Universal Scene Description",
+        "usda" => {
+            return Some(
+                "is text of USD, which is not read; write it as binary with usdcat in.usda -o out.usdc".to_owned(),
+            );
+        }
         "fbx" => "an FBX scene",
         "dae" => "a Collada scene",
         "gltf" => "glTF in separate files",

@@ -14,7 +14,7 @@ use crate::mesh::{MeshFormat, extensions};
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2`, `.mdd` or `.abc` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
+/// `source` is a `.npy`, `.pc2`, `.mdd`, `.abc` or `.usd` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
 /// one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
 /// `10.obj` and `1.5.obj` before `2.obj`; other files, and in a folder hidden ones, are passed over. In a pattern every part of the path may be a glob
 /// or have `%04d` or `####` in place of a number; what is there by that name is no pattern.
@@ -161,12 +161,12 @@ fn open_files(
     }
 }
 
-/// Captures among files; Alembic archives where there is nothing else, as the scene often lies beside what was exported from it.
+/// Captures among files; scenes where there is nothing else, as the scene often lies beside what was exported from it.
 fn captures(files: &[PathBuf]) -> Vec<PathBuf> {
     let all = files.iter().filter(|path| single::is_cache(path)).cloned();
-    let (archives, others): (Vec<_>, Vec<_>) =
-        all.partition(|path| CacheFormat::from_path(path) == Some(CacheFormat::Abc));
-    if others.is_empty() { archives } else { others }
+    let (scenes, others): (Vec<_>, Vec<_>) =
+        all.partition(|path| CacheFormat::from_path(path).is_some_and(CacheFormat::is_scene));
+    if others.is_empty() { scenes } else { others }
 }
 
 fn open_sequence(

@@ -19,6 +19,8 @@ use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
 use crate::text::{Lines, quoted};
+use crate::units::Units;
+use crate::usd;
 
 pub(crate) use parsed::Contents;
 use parsed::Parsed;
@@ -41,11 +43,18 @@ pub enum MeshFormat {
     Glb,
     /// Alembic in the Ogawa container: the first frame of its mesh.
     Abc,
+    /// Universal Scene Description in binary: its mesh without a time, or in its first frame.
+    Usdc,
+    /// The same as a package.
+    Usdz,
+    /// Universal Scene Description of any kind.
+    Usd,
 }
 
 impl MeshFormat {
     /// All formats.
-    pub const ALL: [Self; 6] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb, Self::Abc];
+    pub const ALL: [Self; 9] =
+        [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb, Self::Abc, Self::Usdc, Self::Usdz, Self::Usd];
 
     /// Formats of one mesh that stands still, of which each file of a folder may be a frame.
     pub(crate) const STILL: [Self; 5] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb];
@@ -59,6 +68,9 @@ impl MeshFormat {
             Self::Stl => "stl",
             Self::Glb => "glb",
             Self::Abc => "abc",
+            Self::Usdc => "usdc",
+            Self::Usdz => "usdz",
+            Self::Usd => "usd",
         }
     }
 
@@ -74,6 +86,9 @@ impl MeshFormat {
             Some(found) if found.eq_ignore_ascii_case("gltf") => {
                 "glTF in separate files is not read; export it as binary .glb".to_owned()
             }
+            Some(found) if found.eq_ignore_ascii_case("usda") => {
+                "text of USD is not read; write it as binary with usdcat in.usda -o out.usdc".to_owned()
+            }
             Some(found) => format!(
                 ".{} is not a mesh format that is read; convert it to one of {}",
                 found.display(),
@@ -82,6 +97,11 @@ impl MeshFormat {
             None => format!("has no file name extension; give it one of {}", extensions(&Self::ALL)),
         };
         Err(Fault::unsupported(found).at(path))
+    }
+
+    /// Whether a file has a whole scene, of which one mesh is taken.
+    fn is_scene(self) -> bool {
+        !Self::STILL.contains(&self)
     }
 
     /// The format of a file of one mesh that stands still, by its name.
@@ -117,16 +137,24 @@ pub fn read_model_with_note(path: &Path) -> Result<(Model, Option<String>), Erro
     read_prim_with_note(path, None)
 }
 
-/// As [`read_model_with_note`], of an Alembic archive the mesh that `prim` names by its path or name, where it has several.
+/// As [`read_model_with_note`], of a scene (Alembic, USD) the mesh that `prim` names by its path or name, where it has several.
 ///
 /// # Errors
 /// As [`read_model`]; no such mesh, or several of that name.
 pub fn read_prim_with_note(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>), Error> {
-    let Parsed { model, left_out } = parse_file(path, prim)?;
+    read_prim_with_units(path, prim).map(|(model, note, _)| (model, note))
+}
+
+/// As [`read_prim_with_note`], with the unit and the upward axis of the points, where the file says them.
+///
+/// # Errors
+/// As [`read_prim_with_note`].
+pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>, Option<Units>), Error> {
+    let Parsed { model, left_out, units } = parse_file(path, prim)?;
     let faces = if left_out == 1 { "face" } else { "faces" };
     let note =
         format!("{}: left out {left_out} {faces} of fewer than three corners, which have no area", path.display());
-    Ok((model, (left_out > 0).then_some(note)))
+    Ok((model, (left_out > 0).then_some(note), units))
 }
 
 /// Reads a model from the bytes of a file; `name` is the path in error messages.
@@ -170,25 +198,32 @@ fn read_named(path: &Path) -> Result<(MeshFormat, Vec<u8>), Error> {
 }
 
 fn parse_file(path: &Path, prim: Option<&str>) -> Result<Parsed, Error> {
-    if MeshFormat::from_path(path)? == MeshFormat::Abc {
+    let format = MeshFormat::from_path(path)?;
+    if format.is_scene() {
         // Of which all but the first frame is left where it is.
         let read = |cause| Error::read(path, cause);
         let file = File::open(path).map_err(read)?;
         let length = file.metadata().map_err(read)?.len();
-        return read_archive(path, file, length, prim);
+        return read_scene(format, path, file, length, prim);
     }
     let (format, bytes) = read_named(path)?;
     read_bytes(format, path, &bytes, Contents::PointsAndFaces)
 }
 
-fn read_archive(
+fn read_scene(
+    format: MeshFormat,
     name: &Path,
     source: impl Read + Seek + Send,
     length: u64,
     prim: Option<&str>,
 ) -> Result<Parsed, Error> {
-    let (model, left_out) = alembic::read_model(name, source, length, prim)?;
-    Ok(Parsed { model, left_out })
+    let (model, left_out, units) = if format == MeshFormat::Abc {
+        let (model, left_out) = alembic::read_model(name, source, length, prim)?;
+        (model, left_out, None)
+    } else {
+        usd::read_model(name, source, length, prim)?
+    };
+    Ok(Parsed { model, left_out, units })
 }
 
 fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Parsed, Error> {
@@ -201,7 +236,7 @@ fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents)
             MeshFormat::Off => off::read(bytes, contents),
             MeshFormat::Stl => stl::read(bytes).map(Parsed::from),
             MeshFormat::Glb => glb::read(bytes).map(Parsed::from),
-            MeshFormat::Abc => return read_archive(name, Cursor::new(bytes), bytes.len() as u64, None),
+            scene => return read_scene(scene, name, Cursor::new(bytes), bytes.len() as u64, None),
         }
     };
     parsed

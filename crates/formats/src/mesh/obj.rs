@@ -73,7 +73,7 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
         model.normals.clear();
     }
     model.colors = colors.finish(model.points.len(), Scale::Unsaid);
-    Ok(Parsed { model, left_out })
+    Ok(Parsed { left_out, ..model.into() })
 }
 
 /// A line and those that continue it after a backslash.

@@ -21,7 +21,7 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
         model.points.push(point);
     }
     if contents == Contents::Points {
-        return Ok(Parsed { model, left_out });
+        return Ok(Parsed { left_out, ..model.into() });
     }
     let mut face = Vec::new();
     for k in 0..faces {
@@ -37,7 +37,7 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
             left_out += 1;
         }
     }
-    Ok(Parsed { model, left_out })
+    Ok(Parsed { left_out, ..model.into() })
 }
 
 /// The lines that say something, without comments.

@@ -1,6 +1,7 @@
 //! What a file of a mesh gave.
 
 use crate::error::Fault;
+use crate::units::Units;
 use cager_geometry::mesh::Model;
 
 /// How much of a file is wanted.
@@ -15,6 +16,7 @@ pub(super) struct Parsed {
     pub(super) model: Model,
     /// Faces of fewer than three corners, which are edges and points.
     pub(super) left_out: usize,
+    pub(super) units: Option<Units>,
 }
 
 impl Parsed {
@@ -29,7 +31,7 @@ impl Parsed {
 
 impl From<Model> for Parsed {
     fn from(model: Model) -> Self {
-        Self { model, left_out: 0 }
+        Self { model, left_out: 0, units: None }
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use cager_geometry::mesh::Point;
 
 use crate::error::{Error, Fault};
+use crate::units::Units;
 
 /// The frames of an output, one after another; dropped before [`FrameWriter::finish`] they leave nothing.
 pub trait FrameWriter: Send {
@@ -26,14 +27,16 @@ pub trait FrameWriter: Send {
 /// What some formats store beside the positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
-    /// Frames per second, for the times in `.mdd` and `.abc`: 24 by default.
+    /// Frames per second, for the times in `.mdd`, `.abc` and `.usdc`: 24 by default.
     pub fps: f64,
-    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd` and `.abc`; 0, 1, 2, … where the list is empty.
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.abc` and `.usdc`; 0, 1, 2, … where the list is empty.
     pub numbers: Vec<f64>,
     /// What is added to all positions, which are then written in double precision by the formats that have it.
     pub origin: Option<Point>,
     /// What rounding may lose where an origin is added; formats of single precision that lose more are refused.
     pub rounding: f64,
+    /// What the positions mean, for the formats that say it; metres and Y up where nothing is told.
+    pub units: Option<Units>,
 }
 
 impl FrameOptions {
@@ -51,7 +54,7 @@ impl FrameOptions {
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { fps: 24.0, numbers: Vec::new(), origin: None, rounding: 0.0 }
+        Self { fps: 24.0, numbers: Vec::new(), origin: None, rounding: 0.0, units: None }
     }
 }
 

@@ -1,0 +1,109 @@
+//! All frames in a scene: an Alembic archive, or a file of USD.
+
+use std::path::Path;
+
+use cager_geometry::mesh::Polygons;
+
+use super::super::CacheFormat;
+use super::output::{Announced, FrameOptions, FrameWriter};
+use crate::alembic::{self, Numbers, Schedule};
+use crate::atomic::{AtomicFile, Target};
+use crate::error::{Error, Fault};
+use crate::mesh::check_face;
+use crate::units::{Units, Up};
+use crate::usd::{self, Scene};
+
+/// Where files say the unit and nobody told it.
+const USUAL: Units = Units { up: Up::Y, metres_per_unit: 1.0 };
+/// Bytes that a package may have.
+const LONGEST_PACKAGE: usize = 0xf000_0000;
+
+pub(super) struct SceneWriter {
+    announced: Announced,
+    mesh: Mesh,
+}
+
+enum Mesh {
+    Alembic(alembic::MeshWriter<AtomicFile>),
+    Usd(usd::MeshWriter<AtomicFile>),
+}
+
+impl SceneWriter {
+    pub(super) fn create(
+        announced: Announced,
+        target: &Target,
+        format: CacheFormat,
+        faces: &Polygons,
+        options: &FrameOptions,
+    ) -> Result<Self, Error> {
+        let path = &announced.path;
+        check(&announced, format, faces).map_err(|fault| fault.at(path))?;
+        let (name, write) = (name(path), |cause| Error::write(path, cause));
+        let file = AtomicFile::create(target)?;
+        if format != CacheFormat::Abc {
+            let scene = Scene {
+                name,
+                fps: options.fps,
+                codes: (0..announced.frames).map(|frame| options.number(frame)).collect(),
+                units: options.units.unwrap_or(USUAL),
+                origin: options.origin,
+                is_packed: format == CacheFormat::Usdz,
+            };
+            let mesh = usd::MeshWriter::new(file, faces, scene).map_err(write)?;
+            return Ok(Self { announced, mesh: Mesh::Usd(mesh) });
+        }
+        let numbers = match options.even_step() {
+            Some(step) => Numbers::Even { first: options.number(0), step },
+            None => Numbers::Uneven(options.numbers.clone()),
+        };
+        let schedule = Schedule { fps: options.fps, numbers };
+        let mesh = alembic::MeshWriter::new(file, &name, faces, schedule, options.origin).map_err(write)?;
+        Ok(Self { announced, mesh: Mesh::Alembic(mesh) })
+    }
+}
+
+fn check(announced: &Announced, format: CacheFormat, faces: &Polygons) -> Result<(), Fault> {
+    let most = i32::MAX as usize;
+    if announced.points > most || announced.frames > most || faces.indices().len() > most {
+        let what = format!("cannot count more than {most} frames, points or corners; write .npy instead");
+        return Err(Fault::unsupported(what));
+    }
+    let bytes = announced.frames.saturating_mul(12 * announced.points + 64).saturating_add(8 * faces.indices().len());
+    if format == CacheFormat::Usdz && bytes > LONGEST_PACKAGE {
+        return Err(Fault::unsupported(
+            "cannot hold more than 4 GiB, as packages have no room for more; write .usdc instead",
+        ));
+    }
+    faces.iter().enumerate().try_for_each(|(k, face)| check_face(face, announced.points, || format!("face {k}")))
+}
+
+/// The name of the mesh: that of the file, with `_` for what names in Maya cannot have.
+fn name(path: &Path) -> String {
+    const MOST: usize = 64;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let plain = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(MOST);
+    let name: String = plain.collect();
+    if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("mesh_{name}") }
+}
+
+impl FrameWriter for SceneWriter {
+    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
+        self.announced.admit(positions)?;
+        let written = match &mut self.mesh {
+            Mesh::Alembic(mesh) => mesh.write_frame(positions),
+            Mesh::Usd(mesh) => mesh.write_frame(positions),
+        };
+        written.map_err(|cause| Error::write(&self.announced.path, cause))?;
+        self.announced.written += 1;
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), Error> {
+        self.announced.check_complete()?;
+        let finished = match self.mesh {
+            Mesh::Alembic(mesh) => mesh.finish(),
+            Mesh::Usd(mesh) => mesh.finish(),
+        };
+        finished.map_err(|cause| Error::write(&self.announced.path, cause))?.commit()
+    }
+}

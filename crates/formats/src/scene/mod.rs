@@ -1,0 +1,13 @@
+//! What readers of scenes share, whatever the format: one mesh of several is chosen, transforms above it are applied, and its frames are read one by one.
+
+mod choice;
+mod faces;
+mod failure;
+mod matrix;
+mod reader;
+
+pub(crate) use choice::{Objects, choose, named, shown, shown_path};
+pub(crate) use faces::{Faces, most_corners, topology_changes};
+pub(crate) use failure::Failure;
+pub(crate) use matrix::{IDENTITY, Matrix, determinant, inverse, multiply, rotation};
+pub(crate) use reader::{Animation, MOST_REPEATED, check_held, open, placed};

@@ -1,0 +1,333 @@
+//! Binary layers, which OpenUSD calls crate files: values are read when they are asked for.
+
+mod file;
+mod pack;
+mod paths;
+mod sections;
+
+use std::io::{Read, Seek};
+
+use super::layer::{Attribute, DEEPEST, Layer, Points, Prim, Stage, Value, damaged};
+use crate::error::Fault;
+use crate::frames::{Scalar, half_precision};
+use crate::scene::Failure;
+pub(super) use file::MAGIC;
+use file::{File, Rep};
+use pack::integers;
+use sections::{Sections, Spec};
+
+/// Types of values.
+pub(super) mod kind {
+    pub(crate) const INT: u8 = 3;
+    pub(crate) const HALF: u8 = 7;
+    pub(crate) const FLOAT: u8 = 8;
+    pub(crate) const DOUBLE: u8 = 9;
+    pub(crate) const TOKEN: u8 = 11;
+    pub(crate) const MATRIX4D: u8 = 15;
+    pub(crate) const QUATD: u8 = 16;
+    pub(crate) const QUATF: u8 = 17;
+    pub(crate) const QUATH: u8 = 18;
+    pub(crate) const VEC3D: u8 = 23;
+    pub(crate) const VEC3F: u8 = 24;
+    pub(crate) const VEC3H: u8 = 25;
+    pub(crate) const TOKENS: u8 = 41;
+    pub(crate) const SPECIFIER: u8 = 42;
+    pub(crate) const VARIABILITY: u8 = 44;
+    pub(crate) const TIME_SAMPLES: u8 = 46;
+    pub(crate) const DOUBLES: u8 = 48;
+    pub(crate) const BLOCKED: u8 = 51;
+}
+
+/// Kinds of specs.
+pub(super) const ATTRIBUTE: u32 = 1;
+pub(super) const PRIM: u32 = 6;
+pub(super) const ROOT: u32 = 7;
+
+/// Versions 0.4.0 to 0.13.0 of the format are read: before them tables were not packed.
+const VERSIONS: std::ops::RangeInclusive<u8> = 4..=13;
+
+/// Fields that say what a prim is composed of.
+const COMPOSED: [(&str, &str); 7] = [
+    ("references", "references"),
+    ("payload", "payloads"),
+    ("inheritPaths", "inherited prims"),
+    ("specializes", "specialized prims"),
+    ("variantSetNames", "variants"),
+    ("clips", "value clips"),
+    ("clipSets", "value clips"),
+];
+
+pub(super) struct Binary<R> {
+    file: File<R>,
+    sections: Sections,
+    stage: Stage,
+    prims: Vec<Prim>,
+    /// Attributes: the paths that they lie below, ascending, and the index of each among the specs.
+    attributes: Vec<(u32, u32)>,
+}
+
+impl<R: Read + Seek> Binary<R> {
+    /// Opens a layer of `length` bytes, which begins as one does.
+    pub(super) fn open(source: R, length: u64) -> Result<Self, Failure> {
+        let mut file = File::new(source, length, 0);
+        let [major, minor, patch] = file.array(MAGIC.len() as u64)?;
+        if major != 0 || !VERSIONS.contains(&minor) {
+            let what = format!(
+                "is of version {major}.{minor}.{patch} of USD's binary format, where 0.{}.0 to 0.{}.0 are read; write it again with usdcat in.usd -o out.usdc",
+                VERSIONS.start(),
+                VERSIONS.end()
+            );
+            return Err(Fault::unsupported(what).into());
+        }
+        file.version = minor;
+        let contents = file.number(16)?;
+        let sections = Sections::read(&mut file, contents)?;
+        let mut layer = Self { file, sections, stage: Stage::default(), prims: Vec::new(), attributes: Vec::new() };
+        let specs = &layer.sections.specs;
+        for (index, spec) in specs.iter().enumerate().filter(|(_, spec)| spec.kind == ATTRIBUTE) {
+            layer.attributes.push((layer.sections.paths[spec.path as usize].parent, index as u32));
+        }
+        layer.attributes.sort_unstable();
+        layer.list_prims()?;
+        layer.read_stage()?;
+        Ok(layer)
+    }
+
+    fn list_prims(&mut self) -> Result<(), Failure> {
+        let sections = &self.sections;
+        let mut places = vec![u32::MAX; sections.paths.len()];
+        for (index, &spec) in sections.specs.iter().enumerate().filter(|(_, spec)| spec.kind == PRIM) {
+            let path = sections.paths[spec.path as usize];
+            places[spec.path as usize] = self.prims.len() as u32;
+            let (spec_index, name, depth) = (index as u32, path.name, path.depth);
+            let mut prim =
+                Prim { parent: None, depth, spec: spec_index, name, is_mesh: false, is_there: false, composed: None };
+            let mut is_active = true;
+            for field in sections.fields(spec) {
+                let (name, value) = field?;
+                match name {
+                    b"typeName" => prim.is_mesh = sections.token(u32::from_le_bytes(value.inlined())) == b"Mesh",
+                    b"specifier" => prim.is_there = value.inlined() == [0; 4],
+                    b"active" => is_active = value.inlined()[0] != 0,
+                    _ => {
+                        let told = COMPOSED.iter().find(|(field, _)| field.as_bytes() == name);
+                        prim.composed = told.map(|(_, words)| *words).or(prim.composed);
+                    }
+                }
+            }
+            prim.is_there &= is_active && depth <= DEEPEST;
+            self.prims.push(prim);
+        }
+        for prim in &mut self.prims {
+            let path = sections.paths[sections.specs[prim.spec as usize].path as usize];
+            let parent = places[path.parent as usize];
+            // What lies below a variant is there in that variant alone.
+            prim.is_there &= prim.depth == 1 || parent != u32::MAX;
+            prim.parent = Some(parent).filter(|&parent| prim.depth > 1 && parent != u32::MAX);
+        }
+        Ok(())
+    }
+
+    fn read_stage(&mut self) -> Result<(), Failure> {
+        let Some(&root) = self.sections.specs.iter().find(|spec| spec.kind == ROOT) else { return Ok(()) };
+        if let Some(list) = self.sections.field(root, "subLayers")?
+            && self.file.number(list.offset())? > 0
+        {
+            return Err(super::composed("the layer", "sublayers").into());
+        }
+        let mut number = |name: &str| -> Result<Option<f64>, Failure> {
+            let Some(value) = self.sections.field(root, name)? else { return Ok(None) };
+            Ok(numbers(&mut self.file, value)?.first().copied())
+        };
+        self.stage = Stage {
+            up_is_z: None,
+            metres_per_unit: number("metersPerUnit")?,
+            time_codes_per_second: number("timeCodesPerSecond")?,
+            frames_per_second: number("framesPerSecond")?,
+            start: number("startTimeCode")?,
+            end: number("endTimeCode")?,
+        };
+        let up = self.sections.field(root, "upAxis")?;
+        self.stage.up_is_z = up.map(|up| self.sections.token(u32::from_le_bytes(up.inlined())) == b"Z");
+        Ok(())
+    }
+
+    /// A table whose place is told at `at`, counted from there: behind the place, its value.
+    fn told(&mut self, at: u64) -> Result<u64, Failure> {
+        let place = at.checked_add(self.file.number(at)?);
+        Ok(place.ok_or_else(|| damaged("an offset leads out of the file"))?)
+    }
+
+    fn samples(&mut self, value: Rep, attribute: &mut Attribute) -> Result<(), Failure> {
+        let at = self.told(value.offset())?;
+        let times = Rep(self.file.number(at)?);
+        if value.kind() != kind::TIME_SAMPLES || times.kind() != kind::DOUBLES {
+            return Err(damaged("its time samples are none").into());
+        }
+        let count = self.file.number(times.offset())?;
+        let values = self.told(at + 8)?;
+        if self.file.number(values)? != count {
+            return Err(damaged("it has other times than values").into());
+        }
+        let bytes = self.file.bytes(times.offset() + 8, count, 8)?;
+        attribute.times = bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+        let bytes = self.file.bytes(values + 8, count, 8)?;
+        attribute.values = bytes.as_chunks().0.iter().map(|bytes| Value(u64::from_le_bytes(*bytes))).collect();
+        if !attribute.times.is_sorted() || attribute.times.iter().any(|time| !time.is_finite()) {
+            return Err(damaged("it has times that do not ascend").into());
+        }
+        Ok(())
+    }
+
+    fn find(&self, prim: u32, name: &str) -> Option<Spec> {
+        let path = self.sections.specs[self.prims[prim as usize].spec as usize].path;
+        let first = self.attributes.partition_point(|&(above, _)| above < path);
+        let below = self.attributes[first..].iter().take_while(|&&(above, _)| above == path);
+        let mut specs = below.map(|&(_, spec)| self.sections.specs[spec as usize]);
+        specs.find(|spec| self.sections.token(self.sections.paths[spec.path as usize].name) == name.as_bytes())
+    }
+}
+
+impl<R: Read + Seek + Send> Layer for Binary<R> {
+    fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    fn prims(&self) -> &[Prim] {
+        &self.prims
+    }
+
+    fn name(&self, prim: &Prim) -> &[u8] {
+        self.sections.token(prim.name)
+    }
+
+    fn attribute(&mut self, prim: u32, name: &str) -> Result<Attribute, Failure> {
+        let mut attribute = Attribute::default();
+        let Some(spec) = self.find(prim, name) else { return Ok(attribute) };
+        let field = |name| self.sections.field(spec, name);
+        let (default, samples, spline) = (field("default")?, field("timeSamples")?, field("spline")?);
+        if spline.is_some() {
+            let what = format!("has {name} animated by a spline, which is not read; bake it into time samples");
+            return Err(Fault::unsupported(what).into());
+        }
+        attribute.default = default.filter(|value| value.kind() != kind::BLOCKED).map(|value| Value(value.0));
+        if let Some(samples) = samples {
+            self.samples(samples, &mut attribute)?;
+        }
+        Ok(attribute)
+    }
+
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
+        numbers(&mut self.file, Rep(value.0))
+    }
+
+    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure> {
+        let rep = Rep(value.0);
+        let text = |index: u32| String::from_utf8_lossy(self.sections.token(index)).into_owned();
+        if rep.kind() == kind::TOKEN && rep.is_inlined() && !rep.is_array() {
+            return Ok(vec![text(u32::from_le_bytes(rep.inlined()))]);
+        }
+        let (start, count) = match rep.kind() {
+            kind::TOKENS => (rep.offset() + 8, self.file.number(rep.offset())?),
+            kind::TOKEN if rep.is_array() => self.file.elements(rep)?,
+            _ => return Err(damaged("it has another value where a list of names belongs").into()),
+        };
+        if count > most as u64 {
+            return Err(damaged(&format!("it has a list of {count} names where {most} are the most")).into());
+        }
+        let bytes = self.file.bytes(start, count, 4)?;
+        let mut names = Vec::new();
+        for index in bytes.as_chunks().0 {
+            let index = u32::from_le_bytes(*index);
+            self.file.allowance.take(self.sections.token(index).len() as u64, 1)?;
+            names.push(String::from_utf8_lossy(self.sections.token(index)).into_owned());
+        }
+        Ok(names)
+    }
+
+    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {
+        let rep = Rep(value.0);
+        if rep.kind() != kind::INT || !rep.is_array() {
+            return Err(damaged("it has another value where a list of whole numbers belongs").into());
+        }
+        let (start, count) = self.file.elements(rep)?;
+        if count > most {
+            return Err(damaged(&format!("it has {count} numbers of faces where {most} are the most")).into());
+        }
+        if !rep.is_packed() || count == 0 {
+            let bytes = self.file.bytes(start, count, 4)?;
+            return Ok(bytes.as_chunks().0.iter().map(|bytes| i32::from_le_bytes(*bytes)).collect());
+        }
+        let length = self.file.number(start)?;
+        let packed = self.file.bytes(start + 8, length, 1)?;
+        Ok(integers(&packed, count as usize)?)
+    }
+
+    fn points(&mut self, value: Value) -> Result<Points, Failure> {
+        let rep = Rep(value.0);
+        let scalar = match (rep.kind(), rep.is_array()) {
+            (kind::VEC3D, true) => Scalar::F64Little,
+            (kind::VEC3F, true) => Scalar::F32Little,
+            (kind::VEC3H, true) => Scalar::F16Little,
+            (kind::BLOCKED, _) => {
+                let what = "has a time at which its points are blocked; export it with its points at all times";
+                return Err(Fault::unsupported(what).into());
+            }
+            _ => {
+                let what = "has points that are not three numbers each; export it again";
+                return Err(Fault::unsupported(what).into());
+            }
+        };
+        let (start, count) = self.file.elements(rep)?;
+        self.file.check(start, count, 3 * scalar.size() as u64)?;
+        let count = usize::try_from(count).map_err(|_| damaged("it has more points than memory"))?;
+        Ok(Points { start, count, scalar })
+    }
+
+    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure> {
+        self.file.read_values(points.start, points.scalar, out)
+    }
+}
+
+/// The numbers of one value.
+fn numbers<R: Read + Seek>(file: &mut File<R>, rep: Rep) -> Result<Vec<f64>, Failure> {
+    let small = rep.inlined();
+    let at = rep.offset();
+    let bytes = |small: &[u8]| small.iter().map(|&b| f64::from(b as i8)).collect::<Vec<_>>();
+    Ok(match (rep.kind(), rep.is_inlined()) {
+        _ if rep.is_array() => return Err(damaged("it has an array where one value belongs").into()),
+        (kind::INT, true) => vec![i32::from_le_bytes(small).into()],
+        (kind::HALF, true) => vec![half_precision(u16::from_le_bytes([small[0], small[1]]))],
+        (kind::FLOAT | kind::DOUBLE, true) => vec![f32::from_le_bytes(small).into()],
+        (kind::VEC3D | kind::VEC3F | kind::VEC3H, true) => bytes(&small[..3]),
+        (kind::MATRIX4D, true) => {
+            let mut matrix = vec![0.0; 16];
+            bytes(&small).iter().enumerate().for_each(|(k, &x)| matrix[5 * k] = x);
+            matrix
+        }
+        (kind::DOUBLE, false) => doubles(&file.array::<8>(at)?),
+        (kind::VEC3D, false) => doubles(&file.array::<24>(at)?),
+        (kind::QUATD, false) => doubles(&file.array::<32>(at)?),
+        (kind::MATRIX4D, false) => doubles(&file.array::<128>(at)?),
+        (kind::VEC3F, false) => singles(&file.array::<12>(at)?),
+        (kind::QUATF, false) => singles(&file.array::<16>(at)?),
+        (kind::VEC3H, false) => halves(&file.array::<6>(at)?),
+        (kind::QUATH, false) => halves(&file.array::<8>(at)?),
+        (kind::BLOCKED, _) => {
+            return Err(Fault::unsupported("has a value that is blocked at a time; export it again").into());
+        }
+        (kind, _) => return Err(damaged(&format!("it has a value of type {kind} where numbers belong")).into()),
+    })
+}
+
+fn doubles(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+}
+
+fn singles(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes).into()).collect()
+}
+
+fn halves(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks().0.iter().map(|bytes| half_precision(u16::from_le_bytes(*bytes))).collect()
+}

@@ -1,0 +1,100 @@
+//! How tables are packed: by LZ4, whole numbers before that by their differences.
+
+use lz4_flex::block::decompress_into;
+
+use crate::error::Fault;
+use crate::usd::layer::damaged;
+
+/// What is left of a section.
+pub(super) struct Fields<'a>(pub(super) &'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub(super) fn take(&mut self, length: usize) -> Result<&'a [u8], Fault> {
+        let (taken, rest) = self.0.split_at_checked(length).ok_or_else(|| damaged("a table ends too early"))?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(self.take(N)?);
+        Ok(bytes)
+    }
+
+    /// A number of eight bytes.
+    pub(super) fn number(&mut self) -> Result<u64, Fault> {
+        Ok(u64::from_le_bytes(self.array()?))
+    }
+
+    /// Bytes behind how many they are.
+    fn sized(&mut self) -> Result<&'a [u8], Fault> {
+        let length = self.number()?;
+        self.take(usize::try_from(length).unwrap_or(usize::MAX))
+    }
+}
+
+/// Bytes that may still be unpacked, so that a small file takes little memory.
+pub(super) struct Allowance(pub(super) u64);
+
+impl Allowance {
+    /// So many elements of `size` bytes.
+    pub(super) fn take(&mut self, count: u64, size: u64) -> Result<usize, Fault> {
+        let most = || damaged("its tables unpack to more than such a file holds");
+        self.0 = count.checked_mul(size).and_then(|bytes| self.0.checked_sub(bytes)).ok_or_else(most)?;
+        usize::try_from(count).map_err(|_| most())
+    }
+
+    /// Bytes of LZ4 behind how many they are, which become at most `most` bytes.
+    pub(super) fn bytes(&mut self, fields: &mut Fields<'_>, most: u64) -> Result<Vec<u8>, Fault> {
+        let packed = fields.sized()?;
+        unpack(packed, self.take(most, 1)?)
+    }
+
+    /// So many whole numbers.
+    pub(super) fn integers(&mut self, fields: &mut Fields<'_>, count: u64) -> Result<Vec<i32>, Fault> {
+        let packed = fields.sized()?;
+        integers(packed, self.take(count, 9)?)
+    }
+}
+
+/// Unpacks LZ4, which may be in several pieces.
+fn unpack(packed: &[u8], most: usize) -> Result<Vec<u8>, Fault> {
+    let mut fields = Fields(packed);
+    let [pieces] = fields.array()?;
+    let (mut out, mut length) = (vec![0; most], 0);
+    for _ in 0..pieces.max(1) {
+        let piece = match pieces {
+            0 => std::mem::take(&mut fields.0),
+            _ => {
+                let size = u32::from_le_bytes(fields.array()?);
+                fields.take(size as usize)?
+            }
+        };
+        length += decompress_into(piece, &mut out[length..]).map_err(|_| damaged("a table cannot be unpacked"))?;
+    }
+    out.truncate(length);
+    Ok(out)
+}
+
+/// So many whole numbers from their differences.
+pub(super) fn integers(packed: &[u8], count: usize) -> Result<Vec<i32>, Fault> {
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    // The usual difference, two bits for each number, and the differences that are others.
+    let bytes = unpack(packed, 4 + count.div_ceil(4) + 4 * count)?;
+    let mut fields = Fields(&bytes);
+    let usual = i32::from_le_bytes(fields.array()?);
+    let codes = fields.take(count.div_ceil(4))?;
+    let (mut number, mut out) = (0_i32, Vec::with_capacity(count));
+    for k in 0..count {
+        number = number.wrapping_add(match codes[k / 4] >> (2 * (k % 4)) & 3 {
+            0 => usual,
+            1 => i8::from_le_bytes(fields.array()?).into(),
+            2 => i16::from_le_bytes(fields.array()?).into(),
+            _ => i32::from_le_bytes(fields.array()?),
+        });
+        out.push(number);
+    }
+    Ok(out)
+}

@@ -1,0 +1,95 @@
+//! Universal Scene Description: one polygon mesh that moves, read frame by frame and written frame by frame.
+//!
+//! One layer is read, binary, as text, or the first in a package; what it is composed of beside itself is refused. Positions are given as the layer has
+//! them, moved by the transforms above the mesh, together with the unit and the upward axis that the layer says.
+
+mod binary;
+mod choice;
+mod layer;
+mod mesh;
+mod package;
+mod timing;
+mod transform;
+mod write;
+
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use cager_geometry::mesh::Model;
+
+use crate::error::{Error, Fault};
+use crate::frames::FrameReader;
+use crate::scene::{self, Animation, Failure};
+use crate::signature::Signature;
+use crate::units::Units;
+use binary::Binary;
+use layer::Layer;
+use mesh::MeshFrames;
+pub(crate) use write::{MeshWriter, Scene};
+
+/// Opens the frames of a mesh in a file of `length` bytes; `prim` chooses one of several.
+pub(crate) fn open_frames<'a>(
+    path: &Path,
+    source: impl Read + Seek + Send + 'a,
+    length: u64,
+    expected_points: usize,
+    prim: Option<&str>,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let open = || MeshFrames::open(open_layer(source, length)?, prim, false);
+    scene::open(path, open().map_err(|failure: Failure| failure.at(path))?, expected_points)
+}
+
+/// A mesh as it is without a time, or else in its first frame, how many of its faces were left out, and its units.
+pub(crate) fn read_model(
+    path: &Path,
+    source: impl Read + Seek + Send,
+    length: u64,
+    prim: Option<&str>,
+) -> Result<(Model, usize, Option<Units>), Error> {
+    let open = || MeshFrames::open(open_layer(source, length)?, prim, true);
+    let mesh = open().map_err(|failure: Failure| failure.at(path))?;
+    let (points, left_out, units, mut values) = (mesh.points(), mesh.left_out(), mesh.units(), Vec::new());
+    let mut reader = scene::open(path, mesh, points)?;
+    reader.read_next(&mut values)?;
+    let faces = reader.mesh().map(|(_, faces)| faces.clone()).unwrap_or_default();
+    Ok((Model { points: values.as_chunks().0.to_vec(), faces, ..Model::default() }, left_out, units))
+}
+
+/// The layer that a file is, or the first one in a package, whatever its name.
+fn open_layer<'a>(mut source: impl Read + Seek + Send + 'a, length: u64) -> Result<Box<dyn Layer + 'a>, Failure> {
+    let mut head = Vec::new();
+    source.rewind()?;
+    source.by_ref().take(1024).read_to_end(&mut head)?;
+    if !head.starts_with(package::MAGIC) {
+        return open_plain(source, length, &head);
+    }
+    let mut source = package::first(source, length)?;
+    head.clear();
+    source.by_ref().take(1024).read_to_end(&mut head)?;
+    let length = source.length();
+    open_plain(source, length, &head)
+}
+
+fn open_plain<'a>(
+    source: impl Read + Seek + Send + 'a,
+    length: u64,
+    head: &[u8],
+) -> Result<Box<dyn Layer + 'a>, Failure> {
+    if head.starts_with(binary::MAGIC) {
+        return Ok(Box::new(Binary::open(source, length)?));
+    }
+    if head.starts_with(b"#usda") {
+        let what = "is text of USD, which is not read; write it as binary with usdcat in.usda -o out.usdc";
+        return Err(Fault::unsupported(what).into());
+    }
+    let other = Signature::other_than("usdc", head);
+    let none = "does not begin as a file of USD does; export it again";
+    Err(Fault::damaged(other.unwrap_or_else(|| none.to_owned())).into())
+}
+
+/// The fault of what is composed of other prims or files.
+fn composed(what: &str, of: &str) -> Fault {
+    Fault::unsupported(format!(
+        "{what} has {of}, which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc"
+    ))
+}

@@ -1,0 +1,72 @@
+//! Packages, `.usdz`: zip archives whose files are stored as they are, and whose first is the layer.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use zip::{CompressionMethod, ZipArchive};
+
+use super::layer::damaged;
+use crate::error::Fault;
+use crate::scene::Failure;
+
+/// What a package begins with.
+pub(super) const MAGIC: &[u8; 4] = b"PK\x03\x04";
+
+/// A file in a package.
+pub(super) struct Inside<R> {
+    source: R,
+    start: u64,
+    length: u64,
+    at: u64,
+}
+
+/// The first file of a package of `length` bytes.
+pub(super) fn first<R: Read + Seek>(source: R, length: u64) -> Result<Inside<R>, Failure> {
+    let wrong = |_| damaged("its list of files cannot be read");
+    let mut archive = ZipArchive::new(source).map_err(wrong)?;
+    let (mut start, mut size) = (0, 0);
+    for index in 0..archive.len().min(1) {
+        let file = archive.by_index_raw(index).map_err(wrong)?;
+        if file.compression() != CompressionMethod::Stored || file.encrypted() {
+            let what = "is a package whose files are compressed or encrypted; pack it again with usdzip";
+            return Err(Fault::unsupported(what).into());
+        }
+        (start, size) = (file.data_start().unwrap_or(u64::MAX), file.size());
+    }
+    if start.checked_add(size).is_none_or(|end| end > length) {
+        return Err(damaged("an offset leads out of the package").into());
+    }
+    let mut inside = Inside { source: archive.into_inner(), start, length: size, at: 0 };
+    inside.rewind()?;
+    Ok(inside)
+}
+
+impl<R> Inside<R> {
+    pub(super) fn length(&self) -> u64 {
+        self.length
+    }
+}
+
+impl<R: Read> Read for Inside<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let left = usize::try_from(self.length.saturating_sub(self.at)).unwrap_or(usize::MAX);
+        let most = out.len().min(left);
+        let read = self.source.read(&mut out[..most])?;
+        self.at += read as u64;
+        Ok(read)
+    }
+}
+
+impl<R: Seek> Seek for Inside<R> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let at = match to {
+            SeekFrom::Start(at) => Some(at),
+            SeekFrom::End(offset) => self.length.checked_add_signed(offset),
+            SeekFrom::Current(offset) => self.at.checked_add_signed(offset),
+        };
+        let place = at.and_then(|at| Some((at, self.start.checked_add(at)?)));
+        let (at, place) = place.ok_or(io::ErrorKind::InvalidInput)?;
+        self.source.seek(SeekFrom::Start(place))?;
+        self.at = at;
+        Ok(at)
+    }
+}

@@ -1,0 +1,146 @@
+//! Tables of a layer: names, fields, paths and what they lead to, all packed.
+
+use std::collections::HashMap;
+use std::io::{self, Seek, Write};
+
+use super::sink::Sink;
+
+/// A field of a prim or a property: its name and its value.
+pub(super) type Field<'a> = (&'a str, u64);
+
+/// Where the path after one lies in the tree.
+#[derive(Clone, Copy)]
+pub(super) enum Next {
+    /// Below it; it has no sibling.
+    Child = -1,
+    /// Beside it.
+    Sibling = 0,
+    /// Neither.
+    None = -2,
+}
+
+#[derive(Default)]
+pub(super) struct Tables {
+    tokens: Vec<String>,
+    known: HashMap<String, u32>,
+    fields: Vec<(i32, u64)>,
+    sets: Vec<i32>,
+    /// Last names, negative for properties, and where the next path is.
+    paths: Vec<(i32, i32)>,
+    /// Paths, first fields and kinds.
+    specs: Vec<[i32; 3]>,
+}
+
+impl Tables {
+    /// The index of a name.
+    pub(super) fn token(&mut self, text: &str) -> u32 {
+        if let Some(&known) = self.known.get(text) {
+            return known;
+        }
+        let index = self.tokens.len() as u32;
+        self.tokens.push(text.to_owned());
+        self.known.insert(text.to_owned(), index);
+        index
+    }
+
+    /// Appends a prim or a property, after what it lies below.
+    pub(super) fn spec(&mut self, kind: u32, name: &str, next: Next, fields: &[Field<'_>]) {
+        let (token, path) = (self.token(name) as i32, self.paths.len() as i32);
+        self.paths.push((if kind == crate::usd::binary::ATTRIBUTE { -token } else { token }, next as i32));
+        self.specs.push([path, self.sets.len() as i32, kind as i32]);
+        for &(name, value) in fields {
+            let token = self.token(name) as i32;
+            self.sets.push(self.fields.len() as i32);
+            self.fields.push((token, value));
+        }
+        self.sets.push(-1);
+    }
+
+    /// Writes all; gives where the list of sections is.
+    pub(super) fn write<W: Write + Seek>(&self, sink: &mut Sink<W>) -> io::Result<u64> {
+        let text: Vec<u8> = self.tokens.iter().flat_map(|token| token.bytes().chain([0])).collect();
+        let column = |numbers: &mut dyn Iterator<Item = i32>| sized(&integers(&numbers.collect::<Vec<_>>()));
+        let count = |count: usize| (count as u64).to_le_bytes();
+        let values: Vec<u8> = self.fields.iter().flat_map(|(_, value)| value.to_le_bytes()).collect();
+        let paths = self.paths.len();
+        let sections = [
+            ("TOKENS", [&count(self.tokens.len())[..], &count(text.len()), &sized(&packed(&text))].concat()),
+            ("STRINGS", count(0).to_vec()),
+            (
+                "FIELDS",
+                [
+                    &count(self.fields.len())[..],
+                    &column(&mut self.fields.iter().map(|field| field.0)),
+                    &sized(&packed(&values)),
+                ]
+                .concat(),
+            ),
+            ("FIELDSETS", [&count(self.sets.len())[..], &column(&mut self.sets.iter().copied())].concat()),
+            (
+                "PATHS",
+                [
+                    &count(paths)[..],
+                    &count(paths),
+                    &column(&mut (0..paths as i32)),
+                    &column(&mut self.paths.iter().map(|path| path.0)),
+                    &column(&mut self.paths.iter().map(|path| path.1)),
+                ]
+                .concat(),
+            ),
+            (
+                "SPECS",
+                [&count(self.specs.len())[..]]
+                    .into_iter()
+                    .map(<[u8]>::to_vec)
+                    .chain((0..3).map(|k| column(&mut self.specs.iter().map(|spec| spec[k]))))
+                    .collect::<Vec<_>>()
+                    .concat(),
+            ),
+        ];
+        let mut list = count(sections.len()).to_vec();
+        for (name, bytes) in sections {
+            let at = sink.put(&bytes)?;
+            let mut entry = [0; 16];
+            entry[..name.len()].copy_from_slice(name.as_bytes());
+            list.extend(entry);
+            list.extend([at.to_le_bytes(), count(bytes.len())].concat());
+        }
+        sink.put(&list)
+    }
+}
+
+/// Bytes behind how many they are.
+fn sized(bytes: &[u8]) -> Vec<u8> {
+    [&(bytes.len() as u64).to_le_bytes()[..], bytes].concat()
+}
+
+/// Packed by LZ4, in one piece.
+fn packed(bytes: &[u8]) -> Vec<u8> {
+    let mut out = vec![0];
+    out.extend(lz4_flex::block::compress(bytes));
+    out
+}
+
+/// Whole numbers by their differences, and these by how many bytes they need.
+pub(super) fn integers(numbers: &[i32]) -> Vec<u8> {
+    let differences = || {
+        let before = std::iter::once(0).chain(numbers.iter().copied());
+        numbers.iter().zip(before).map(|(&number, before)| number.wrapping_sub(before))
+    };
+    let mut times = HashMap::new();
+    differences().for_each(|difference| *times.entry(difference).or_insert(0_usize) += 1);
+    let usual = times.into_iter().max_by_key(|&(difference, times)| (times, difference)).map_or(0, |(usual, _)| usual);
+    let (mut codes, mut rest) = (vec![0; numbers.len().div_ceil(4)], Vec::new());
+    for (k, difference) in differences().enumerate() {
+        let bytes = difference.to_le_bytes();
+        let code = match difference {
+            _ if difference == usual => 0,
+            -0x80..=0x7f => 1,
+            -0x8000..=0x7fff => 2,
+            _ => 3,
+        };
+        rest.extend(&bytes[..[0, 1, 2, 4][code]]);
+        codes[k / 4] |= (code as u8) << (2 * (k % 4));
+    }
+    packed(&[&usual.to_le_bytes()[..], &codes, &rest].concat())
+}
