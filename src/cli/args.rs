@@ -84,7 +84,7 @@ pub(crate) enum Command {
 /// Example: cager encode --rest rest.obj --frames 'walk/*.obj' -o walk.cager
 #[derive(Args)]
 pub(crate) struct EncodeArgs {
-    /// Model in its rest pose: .obj .ply .off .stl .glb .abc; a point cloud will do.
+    /// Model in its rest pose: .obj .ply .off .stl .glb .abc .usdc; a point cloud will do.
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
@@ -97,7 +97,7 @@ pub(crate) struct EncodeArgs {
 
     /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of
     /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd
-    /// or .abc.
+    /// .abc or .usdc.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
@@ -251,7 +251,7 @@ pub(crate) struct DecodeArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Where to write: .npy, .pc2, .mdd, .abc, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
+    /// Where to write: .npy, .pc2, .mdd, .abc, .usdc, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
     /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), of one frame (--frame) .obj, .ply, .off or .stl, or - for .npy on
     /// standard output.
     #[arg(short, long, value_name = "OUT")]
@@ -303,7 +303,7 @@ pub(crate) struct InspectArgs {
 /// coordinates, and 10 seconds with --coordinates mvc. Example: cager compare --rest rest.obj --cage cage.obj --frames walk.npy -o walk.html
 #[derive(Args)]
 pub(crate) struct CompareArgs {
-    /// Model in its rest pose: .obj .ply .off .stl .glb .abc; a point cloud will do.
+    /// Model in its rest pose: .obj .ply .off .stl .glb .abc .usdc; a point cloud will do.
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
@@ -311,7 +311,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: PathBuf,
 
-    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd or .abc.
+    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd, .abc or .usdc.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 

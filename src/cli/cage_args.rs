@@ -16,11 +16,11 @@ use std::path::PathBuf;
 #[derive(Args, Debug)]
 #[command(group(ArgGroup::new("work").args(["check", "repair", "improve", "general"])))]
 pub(crate) struct CageArgs {
-    /// Model in its rest pose: .obj .ply .off .stl .glb .abc; a point cloud will do. More than once with --general: one cage around all.
+    /// Model in its rest pose: .obj .ply .off .stl .glb .abc .usdc; a point cloud will do. More than once with --general: one cage around all.
     #[arg(long, value_name = "REST", required = true)]
     pub(crate) rest: Vec<PathBuf>,
 
-    /// Capture to design the cage from, as for encode: a folder or quoted glob of mesh files, .npy, .pc2, .mdd or .abc.
+    /// Capture to design the cage from, as for encode: a folder or quoted glob of mesh files, .npy, .pc2, .mdd, .abc or .usdc.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: Option<PathBuf>,
 

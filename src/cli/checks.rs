@@ -38,7 +38,7 @@ pub(crate) struct CaptureArgs {
 /// What is accepted of a capture.
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
-    /// The mesh to take of Alembic archives (rest pose and capture) with several: its path, such as /walk/body, or its name. An archive's only mesh is taken
+    /// The mesh to take of Alembic archives and USD files (rest pose and capture) with several: its path, such as /walk/body, or its name. An only mesh is taken
     /// whatever it is called.
     #[arg(long, value_name = "PATH")]
     pub(super) prim: Option<String>,

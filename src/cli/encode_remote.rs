@@ -4,7 +4,7 @@ use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
 use super::encode::{Targets, checked_options, design_options, finish, sized_design};
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
-use super::{interrupt, is_alembic, plain, progress, tell, warn};
+use super::{interrupt, is_scene, plain, progress, tell, warn};
 use crate::coding::Goal;
 use crate::encode::Encoded;
 use crate::frames::CaptureFiles;
@@ -97,7 +97,7 @@ pub(super) fn run(
         address,
         token: token.as_deref(),
         // A service reads a rest pose as it is, with the doubles along seams, and where it is; of an archive it would get all meshes and all frames.
-        rest: if args.capture.weld || files.origin.is_some() || is_alembic(&args.rest) {
+        rest: if args.capture.weld || files.origin.is_some() || is_scene(&args.rest) {
             MeshFile::new("rest.obj", obj_bytes(rest))
         } else {
             mesh_file(&args.rest)?

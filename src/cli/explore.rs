@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 /// Example: cager explore stand.obj sit.obj --steps 24 -o between.npy
 #[derive(Args)]
 pub(crate) struct ExploreArgs {
-    /// Poses, two or more: .obj .ply .off .stl .glb .abc, the first one with faces, or IN.cager@FRAME.
+    /// Poses, two or more: .obj .ply .off .stl .glb .abc .usdc, the first one with faces, or IN.cager@FRAME.
     #[arg(value_name = "POSE", required = true, num_args = 2..)]
     poses: Vec<PathBuf>,
 
@@ -47,7 +47,7 @@ pub(crate) struct ExploreArgs {
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = weight)]
     weights: Option<Vec<f64>>,
 
-    /// Where to write: .npy .pc2 .mdd .abc, a folder (OUT/) of .obj files, or for one shape .obj .ply .off .stl.
+    /// Where to write: .npy .pc2 .mdd .abc .usdc, a folder (OUT/) of .obj files, or for one shape .obj .ply .off .stl.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
 

@@ -135,16 +135,16 @@ fn read_model(path: &Path) -> Result<Model, cager_formats::Error> {
     read_prim(path, None)
 }
 
-/// As [`read_model`], of an Alembic archive the mesh that `prim` names.
+/// As [`read_model`], of a scene the mesh that `prim` names.
 fn read_prim(path: &Path, prim: Option<&str>) -> Result<Model, cager_formats::Error> {
     let (model, note) = cager_formats::read_prim_with_note(path, prim)?;
     warn(note.as_slice());
     Ok(model)
 }
 
-/// Whether a file is an Alembic archive, by its name.
-fn is_alembic(path: &Path) -> bool {
-    CacheFormat::from_path(path) == Some(CacheFormat::Abc)
+/// Whether a file is a scene that may have several meshes, by its name.
+fn is_scene(path: &Path) -> bool {
+    CacheFormat::from_path(path).is_some_and(CacheFormat::is_scene)
 }
 
 fn warn(warnings: &[String]) {

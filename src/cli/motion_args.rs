@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Example: cager transfer --source-rest man.obj --source-frames walk.npy --target woman.obj -o walk.cager
 #[derive(Args)]
 pub(crate) struct TransferMotionArgs {
-    /// Source in its rest pose, with faces: .obj .ply .off .stl .glb .abc.
+    /// Source in its rest pose, with faces: .obj .ply .off .stl .glb .abc .usdc.
     #[arg(long, value_name = "S0", required_unless_present = "source")]
     pub(super) source_rest: Option<PathBuf>,
 

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Example: cager recover --template scan_0001.ply --frames 'scan_*.ply' -o dance.cager
 #[derive(Args)]
 pub(crate) struct RecoverArgs {
-    /// Mesh that is to move: .obj .ply .off .stl .glb .abc, with faces; one of the frames will do. Where the topology changes for good, go on with another one from
+    /// Mesh that is to move: .obj .ply .off .stl .glb .abc .usdc, with faces; one of the frames will do. Where the topology changes for good, go on with another one from
     /// that frame: --template first.obj --template 120:second.obj. Then out-1.cager, out-2.cager and a list of them, out.stretches.json, are written.
     #[arg(long, value_name = "[FRAME:]TEMPLATE", required = true, value_parser = OsStringValueParser::new().map(KeyTemplate::from))]
     pub(super) template: Vec<KeyTemplate>,

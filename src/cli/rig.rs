@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Example: cager rig body.obj -o rig.json
 #[derive(Args, Debug)]
 pub(crate) struct RigArgs {
-    /// Mesh of a person: .obj .ply .off .stl .glb .abc, with faces.
+    /// Mesh of a person: .obj .ply .off .stl .glb .abc .usdc, with faces.
     #[arg(value_name = "TEMPLATE")]
     template: PathBuf,
 

@@ -4,7 +4,7 @@ use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::motion_args::TransferMotionArgs;
 use super::transfer_source::MotionSource;
-use super::{grouped, human_bytes, is_alembic, plain, progress, tell, warn};
+use super::{grouped, human_bytes, is_scene, plain, progress, tell, warn};
 use crate::coding::Goal;
 use crate::remote::{RemoteTransfer, mesh_file, transfer_remotely};
 use anyhow::{Result, bail};
@@ -76,7 +76,7 @@ pub(super) fn run(
 
 /// A model for a service, which would get all meshes and all frames of an archive: of those, the mesh alone that `prim` names.
 fn model_file(path: &Path, prim: Option<&str>) -> Result<MeshFile> {
-    if !is_alembic(path) {
+    if !is_scene(path) {
         return Ok(mesh_file(path)?);
     }
     let (model, _) = read_prim_with_note(path, prim)?;

@@ -48,7 +48,7 @@ pub(crate) struct JobId {
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct NewRecoveryForm {
-    /// Mesh that is to move, with faces, a file whose name ends in .obj, .ply, .off, .stl, .glb or .abc.
+    /// Mesh that is to move, with faces, a file whose name ends in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = String, format = Binary)]
     template: Vec<u8>,
     /// Closed cage around it, a file of one of the same formats; one is made where it is left out.
@@ -69,7 +69,7 @@ pub(crate) struct NewRecoveryForm {
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct SurfacesForm {
-    /// Meshes or point clouds, each a part of its own, files whose names end in .obj, .ply, .off, .stl, .glb or .abc.
+    /// Meshes or point clouds, each a part of its own, files whose names end in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = Vec<String>, format = Binary)]
     frame: Vec<Vec<u8>>,
 }
@@ -78,10 +78,10 @@ pub(crate) struct SurfacesForm {
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct NewTransferForm {
-    /// Source in its rest pose, with faces, a file whose name ends in .obj, .ply, .off, .stl, .glb or .abc.
+    /// Source in its rest pose, with faces, a file whose name ends in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = String, format = Binary, required = false)]
     source_rest: Vec<u8>,
-    /// Its frames, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd or .abc (one mesh); else raw little-endian f32,
+    /// Its frames, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd, .abc or .usdc (one mesh); else raw little-endian f32,
     /// frame after frame, whose number `options.frames` says.
     #[schema(value_type = String, format = Binary, required = false)]
     source_frames: Vec<u8>,
@@ -107,7 +107,7 @@ pub(crate) struct NewTransferForm {
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct NewShapeSpaceForm {
-    /// Poses, each a part of its own, files whose names end in .obj, .ply, .off, .stl, .glb or .abc.
+    /// Poses, each a part of its own, files whose names end in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = Vec<String>, format = Binary, required = false)]
     pose: Vec<Vec<u8>>,
     /// A container, of whose frames `options.frames` are the poses, in place of these.
@@ -125,10 +125,10 @@ pub(crate) struct NewShapeSpaceForm {
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct NewCageForm {
-    /// Model in its rest pose, a file whose name ends in .obj, .ply, .off, .stl, .glb or .abc.
+    /// Model in its rest pose, a file whose name ends in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = String, format = Binary)]
     rest: Vec<u8>,
-    /// Frames of its motion, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd or .abc (one mesh); else
+    /// Frames of its motion, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd, .abc or .usdc (one mesh); else
     /// raw little-endian f32, frame after frame, whose number `options.frames` says.
     #[schema(value_type = String, format = Binary)]
     frames: Vec<u8>,
@@ -141,7 +141,7 @@ pub(crate) struct NewCageForm {
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct OtherModelForm {
-    /// Model that lies in the rest cage, a file whose name ends in .obj, .ply, .off, .stl, .glb or .abc. It comes first.
+    /// Model that lies in the rest cage, a file whose name ends in .obj, .ply, .off, .stl, .glb, .abc or .usdc. It comes first.
     #[schema(value_type = String, format = Binary)]
     model: Vec<u8>,
     /// m × 3 little-endian f32 for each cage, cage after cage.
@@ -153,7 +153,7 @@ pub(crate) struct OtherModelForm {
 #[derive(ToSchema)]
 #[allow(dead_code, reason = "it only describes")]
 pub(crate) struct NewSessionForm {
-    /// Model in its rest pose, a file whose name ends in .obj, .ply, .off, .stl, .glb or .abc.
+    /// Model in its rest pose, a file whose name ends in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = String, format = Binary)]
     rest: Vec<u8>,
     /// Closed cage around it, a file of one of the same formats. Where it is left out, `options.cage` says where it comes from.
