@@ -397,6 +397,34 @@ fn frames_as_obj_files_come_back_in_order_and_with_their_faces() {
 }
 
 #[test]
+fn a_folder_goes_on_with_another_mesh_and_a_file_of_all_frames_does_not() {
+    let folder = tempdir().unwrap();
+    let options = FrameOptions { numbers: vec![4.0, 7.0], ..Default::default() };
+    let there = FrameOptions { origin: Some([100.0, 0.0, 0.0]), ..Default::default() };
+    let second = polygons(&[&[0, 1, 2], &[1, 3, 2]]);
+    for (name, extension) in [("mesh", "obj"), ("mesh/*.ply", "ply")] {
+        let mut writer = create_frames(folder.path().join(name), 3, 2, &polygons(&[&[0, 1, 2]]), &options).unwrap();
+        writer.write_frame(&[0.5; 9]).unwrap();
+        assert!(message(writer.change_mesh(3, &second, &there)).contains("vertex 3"));
+        writer.change_mesh(4, &second, &there).unwrap();
+        writer.write_frame(&[0.5; 12]).unwrap();
+        writer.finish().unwrap();
+        let read = |number| read_model(&folder.path().join(format!("mesh/frame_{number:04}.{extension}"))).unwrap();
+        assert_eq!((read(4).points, read(4).faces), (vec![[0.5; 3]; 3], polygons(&[&[0, 1, 2]])));
+        assert_eq!((read(7).points, read(7).faces), (vec![[100.5, 0.5, 0.5]; 4], second.clone()));
+        fs::remove_dir_all(folder.path().join("mesh")).unwrap();
+    }
+    for name in ["a.npy", "a.pc2", "a.mdd", "a.abc"] {
+        let path = folder.path().join(name);
+        let mut writer = create_frames(&path, 3, 2, &polygons(&[&[0, 1, 2]]), &options).unwrap();
+        let error = message(writer.change_mesh(4, &second, &there));
+        assert!(error.contains(name) && error.contains("one mesh"), "{error}");
+        drop(writer);
+        assert!(!path.exists(), "{name}");
+    }
+}
+
+#[test]
 fn an_output_that_is_not_finished_leaves_nothing() {
     let folder = tempdir().unwrap();
     for name in ["a.npy", "a.pc2", "a.mdd", "frames"] {

@@ -40,6 +40,14 @@ impl FrameRange {
         self.first + place * self.step
     }
 
+    /// Those of these that are among `frames` frames from `start` on, counted from there.
+    pub fn part(&self, start: usize, frames: usize) -> Option<Self> {
+        let skipped = start.saturating_sub(self.first).div_ceil(self.step);
+        let first = self.first + skipped * self.step;
+        let last = self.last.min((start + frames).checked_sub(1)?);
+        (first <= last).then(|| Self { first: first - start, last: last - start, step: self.step })
+    }
+
     /// Whether there are all of these among `frames` frames of `source`.
     ///
     /// # Errors
@@ -181,6 +189,22 @@ impl FrameReader for RangeReader {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_range_has_a_part_in_each_stretch_of_frames() {
+        let range: FrameRange = "3-17x4".parse().unwrap();
+        let taken = |part: Option<FrameRange>| {
+            part.map(|part| (0..part.count()).map(|place| part.frame(place)).collect::<Vec<_>>()).unwrap_or_default()
+        };
+        for cuts in [[0, 8, 20], [0, 3, 18], [0, 4, 6], [0, 0, 20], [0, 15, 16]] {
+            let mut all = Vec::new();
+            for (start, end) in [(cuts[0], cuts[1]), (cuts[1], cuts[2]), (cuts[2], 30)] {
+                all.extend(taken(range.part(start, end - start)).iter().map(|frame| start + frame));
+            }
+            assert_eq!(all, [3, 7, 11, 15], "{cuts:?}");
+        }
+        assert_eq!(taken(range.part(4, 3)), Vec::<usize>::new());
+    }
 
     #[test]
     fn ranges_are_read_as_they_are_written() {

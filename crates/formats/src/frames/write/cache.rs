@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use cager_geometry::mesh::Point;
+use cager_geometry::mesh::{Point, Polygons};
 
 use super::super::CacheFormat;
 use super::super::{mdd, npy, pc2};
@@ -90,6 +90,10 @@ impl FrameWriter for CacheWriter {
         self.file.write_all(&self.bytes).map_err(|cause| Error::write(&self.announced.path, cause))?;
         self.announced.written += 1;
         Ok(())
+    }
+
+    fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
+        Err(self.announced.one_mesh())
     }
 
     fn finish(self: Box<Self>) -> Result<(), Error> {

@@ -61,6 +61,14 @@ impl FrameMesh {
         Ok(Self { form: Form::Other(format, model), origin: options.origin })
     }
 
+    /// What it is written as.
+    pub(super) fn format(&self) -> MeshFormat {
+        match self.form {
+            Form::Obj(_) => MeshFormat::Obj,
+            Form::Other(format, _) => format,
+        }
+    }
+
     /// Writes the mesh of a frame.
     pub(super) fn write(&mut self, out: &mut impl Write, positions: &[f32], path: &Path) -> Result<(), Error> {
         self.write_points(out, positions).map_err(|cause| Error::write(path, cause))

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cager_geometry::mesh::Point;
+use cager_geometry::mesh::{Point, Polygons};
 
 use crate::error::{Error, Fault};
 use crate::units::Units;
@@ -15,6 +15,12 @@ pub trait FrameWriter: Send {
     /// [`Error::PointCount`] for another number of coordinates, [`Error::NonFinite`], [`Error::FrameCount`] for more
     /// frames than announced, [`Error::Io`].
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error>;
+
+    /// Goes on with frames of another mesh: the number of its points, its faces, and of the options its origin and what rounding may lose.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where the output is no folder of mesh files, [`Error::Invalid`] for no points and faces without their points.
+    fn change_mesh(&mut self, points: usize, faces: &Polygons, options: &FrameOptions) -> Result<(), Error>;
 
     /// Makes the frames durable and gives the output its name.
     ///
@@ -122,6 +128,17 @@ impl Announced {
             Some(culprit) => Err(Error::NonFinite { path: path(), frame, point: culprit / 3 }),
             None => Ok(()),
         }
+    }
+
+    /// Why a file of all frames cannot go on with another mesh.
+    pub(super) fn one_mesh(&self) -> Error {
+        let folder = self.path.with_extension("");
+        let folder = if folder == Path::new("-") { Path::new("frames") } else { &folder };
+        let what = format!(
+            "holds one mesh in all frames, and these have several; name a folder for mesh files, such as {}, or write the frames of each mesh to a file of their own",
+            folder.join("").display()
+        );
+        Fault::unsupported(what).at(&self.path)
     }
 
     pub(super) fn check_complete(&self) -> Result<(), Error> {

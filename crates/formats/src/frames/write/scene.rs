@@ -98,6 +98,10 @@ impl FrameWriter for SceneWriter {
         Ok(())
     }
 
+    fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
+        Err(self.announced.one_mesh())
+    }
+
     fn finish(self: Box<Self>) -> Result<(), Error> {
         self.announced.check_complete()?;
         let finished = match self.mesh {

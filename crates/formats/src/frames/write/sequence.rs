@@ -47,6 +47,13 @@ impl FrameWriter for SequenceWriter {
         Ok(())
     }
 
+    fn change_mesh(&mut self, points: usize, faces: &Polygons, options: &FrameOptions) -> Result<(), Error> {
+        self.announced.points = points;
+        self.announced.check(&self.options).map_err(|fault| fault.at(&self.announced.path))?;
+        self.mesh = FrameMesh::new(self.mesh.format(), &self.announced, faces, options)?;
+        Ok(())
+    }
+
     fn finish(self: Box<Self>) -> Result<(), Error> {
         self.announced.check_complete()?;
         self.folder.commit()

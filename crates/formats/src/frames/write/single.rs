@@ -50,6 +50,10 @@ impl FrameWriter for SingleWriter {
         Ok(())
     }
 
+    fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
+        Err(self.announced.one_mesh())
+    }
+
     fn finish(self: Box<Self>) -> Result<(), Error> {
         self.announced.check_complete()?;
         self.file.commit()
