@@ -63,22 +63,30 @@ fn read_points<V: Values>(
     // Three scalars take at least three bytes.
     let most = (values.remaining() / 3) as u64;
     model.points.reserve_exact(element.count.min(most) as usize);
+    if normal_columns.is_some() {
+        model.normals.reserve_exact(element.count.min(most) as usize);
+    }
+    let role = |column| {
+        let axis = |columns: [usize; 3]| columns.iter().position(|&c| c == column);
+        axis(columns)
+            .map(Role::Coordinate)
+            .or(normal_columns.and_then(axis).map(Role::Normal))
+            .or(color_columns.and_then(|columns| channel_of(columns, column)))
+    };
+    let roles: Vec<_> = element.properties.iter().enumerate().map(|(k, property)| (property.kind, role(k))).collect();
     for k in 0..element.count {
         let (mut point, mut color, mut normal) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-        for (column, property) in element.properties.iter().enumerate() {
-            let value = match property.kind {
+        for &(kind, ref role) in &roles {
+            let value = match kind {
                 Kind::Scalar(scalar) => values.next(scalar),
                 Kind::List { count, item } => skip_list(values, count, item).map(|()| 0.0),
             };
             let value = value.map_err(|fault| fault.inside(element, k))?;
-            if let Some(axis) = columns.iter().position(|&c| c == column) {
-                point[axis] = value;
-            }
-            if let Some(axis) = normal_columns.and_then(|columns| columns.iter().position(|&c| c == column)) {
-                normal[axis] = value;
-            }
-            if let Some((channel, most)) = color_columns.and_then(|columns| channel_of(columns, column)) {
-                color[channel] = (value / most) as f32;
+            match *role {
+                Some(Role::Coordinate(axis)) => point[axis] = value,
+                Some(Role::Normal(axis)) => normal[axis] = value,
+                Some(Role::Channel(channel, most)) => color[channel] = (value / most) as f32,
+                None => {}
             }
         }
         if !point.iter().all(|x| x.is_finite()) {
@@ -100,10 +108,17 @@ fn read_points<V: Values>(
     Ok(())
 }
 
-/// Which channel a column has, and the value of its full light.
-fn channel_of(columns: [(usize, f64); 3], column: usize) -> Option<(usize, f64)> {
+/// What a column of the vertices holds, of three each.
+enum Role {
+    Coordinate(usize),
+    Normal(usize),
+    /// And the value of full light.
+    Channel(usize, f64),
+}
+
+fn channel_of(columns: [(usize, f64); 3], column: usize) -> Option<Role> {
     let channel = columns.iter().position(|&(c, _)| c == column)?;
-    Some((channel, columns[channel].1))
+    Some(Role::Channel(channel, columns[channel].1))
 }
 
 /// Calls `each` with the number of every item of an element and its list of vertices.
