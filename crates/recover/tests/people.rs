@@ -1,19 +1,20 @@
 //! People recovered from observed surfaces, against vertex-exact truth; figures in percent of the height.
 
 mod common;
+#[path = "common/joints.rs"]
+mod joints;
 #[path = "common/observe.rs"]
 mod observe;
 
 use cager_core::cage::Cage;
-use cager_geometry::linalg::svd::svd;
 use cager_geometry::mesh::Point;
-use cager_geometry::vector::{add, distance, mean, sub};
+use cager_geometry::vector::distance;
 use cager_recover::joints::{CagedJoints, MarkedJoints};
 use cager_recover::manifold::{Examples, Kind, Manifold};
 use cager_recover::people::{FitOptions, Method, PersonFit, PersonModel, track};
 use cager_recover::rig::{PlacementOptions, Rig, place};
-use common::{Capture, capture, data, npy, there};
-use faer::Mat;
+use common::{Capture, capture, there};
+use joints::{LIMBS, TrueJoints};
 use observe::{errors, poses, seen};
 use std::time::Instant;
 
@@ -92,11 +93,8 @@ fn a_man_is_recovered_with_joints_by_the_poses_of_another_person() {
     let fit = PersonFit { model: &model, manifold: &manifold, options };
     let (mean, _, cages) =
         recovered("anny man, PCA 20 of another person's dance, noise 0.5 %", &fit, &man, &frames, 0.005);
-    let (shape, values) = npy(&data().join("anny-man-02_02/joints.npy"));
-    let truth = |f: usize, j: usize| [0, 1, 2].map(|k| f64::from(values[(f * shape[1] + j) * 3 + k]));
-    // Heads of the limbs' bones: hips, knees, ankles, shoulders, elbows, wrists.
-    let marked = [2, 3, 4, 27, 28, 29, 10, 11, 12, 20, 21, 22];
-    let positions: Vec<Point> = marked.iter().map(|&j| at_rest(&man, &frames, |f| truth(f, j))).collect();
+    let (truth, marked) = (TrueJoints::of("anny-man-02_02"), LIMBS);
+    let positions: Vec<Point> = marked.iter().map(|&j| truth.at_rest(&man, &frames, j)).collect();
     let parents = (0..marked.len()).map(|k| (k > 0).then_some(0)).collect();
     let names = marked.iter().map(|j| format!("joint {j}")).collect();
     let joints = CagedJoints::new(
@@ -112,9 +110,9 @@ fn a_man_is_recovered_with_joints_by_the_poses_of_another_person() {
         let found = joints.positions(cage);
         for ((found_heights, true_heights), k) in heights.iter_mut().zip([2, 5]) {
             found_heights.push(found[k][2]);
-            true_heights.push(truth(f, marked[k])[2]);
+            true_heights.push(truth.at(f, marked[k])[2]);
         }
-        sum += marked.iter().zip(&found).map(|(&j, p)| distance(*p, truth(f, j))).sum::<f64>();
+        sum += marked.iter().zip(&found).map(|(&j, p)| distance(*p, truth.at(f, j))).sum::<f64>();
     }
     let joint_error = 100.0 * sum / (frames.len() * marked.len()) as f64 / man.height;
     let gait = heights.map(|(found, truth)| correlation(&found, &truth));
@@ -177,35 +175,4 @@ fn people_are_found_in_single_frames_whatever_their_heading() {
     let good = all.iter().filter(|&&error| error < 1.5).count();
     eprintln!("{good} of {} single frames below 1.5 %: {all:.2?}", all.len());
     assert!(20 * good >= 19 * all.len(), "{all:?}");
-}
-
-/// A joint in the rest pose: taken back by the rigid motions of the vertices around it.
-fn at_rest(capture: &Capture, frames: &[usize], joint: impl Fn(usize) -> Point) -> Point {
-    let mut order: Vec<usize> = (0..capture.rest.vertices.len()).collect();
-    let first = joint(frames[0]);
-    order.sort_by(|&a, &b| {
-        distance(capture.frames[frames[0]][a], first).total_cmp(&distance(capture.frames[frames[0]][b], first))
-    });
-    let rest: Vec<Point> = order[..150].iter().map(|&v| capture.rest.vertices[v]).collect();
-    let all: Vec<Point> = frames
-        .iter()
-        .map(|&f| {
-            let now: Vec<Point> = order[..150].iter().map(|&v| capture.frames[f][v]).collect();
-            let (from, to) = (mean(&now), mean(&rest));
-            let moment = Mat::from_fn(3, 3, |i, j| {
-                rest.iter().zip(&now).map(|(r, n)| (r[i] - to[i]) * (n[j] - from[j])).sum::<f64>()
-            });
-            let found = svd(moment.as_ref()).unwrap();
-            let sign = (found.u.determinant() * found.v.determinant()).signum();
-            let d = [1.0, 1.0, sign];
-            let p = sub(joint(f), from);
-            let turned = [0, 1, 2].map(|i| {
-                (0..3)
-                    .map(|j| (0..3).map(|k| found.u[(i, k)] * d[k] * found.v[(j, k)]).sum::<f64>() * p[j])
-                    .sum::<f64>()
-            });
-            add(turned, to)
-        })
-        .collect();
-    mean(&all)
 }

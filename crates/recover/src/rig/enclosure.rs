@@ -76,7 +76,7 @@ impl Rig {
 }
 
 /// Extent of a template along an axis.
-fn extent(up: Point, template: &TriMesh) -> f64 {
+pub(super) fn extent(up: Point, template: &TriMesh) -> f64 {
     let along = template.vertices.iter().map(|&p| dot(p, up));
     let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
     (high - low).max(f64::MIN_POSITIVE)

@@ -1,5 +1,6 @@
 //! Oriented-quads rigs (Duveau et al. 2012, §3): 21 rigid quads at the joints of a person, whose 84 corners and two vertices at the crotch are a cage.
 
+mod correction;
 mod deformation;
 mod enclosure;
 mod error;
@@ -9,6 +10,7 @@ mod placement;
 mod sections;
 mod topology;
 
+pub use correction::{Corrected, correct};
 pub use deformation::{Deformed, Placement, QUAD_UNKNOWNS, deform};
 pub use enclosure::{Enclosure, enclose};
 pub use error::RigError;
