@@ -2,15 +2,19 @@
 
 use super::outputs::{OutputArgs, Outputs};
 use super::{grouped, human_bytes, progress, read_model, tell, warn};
+use crate::decode::{self, Positions};
 use crate::mismatch::Up;
 use crate::recover::{manifold_of, rig_of};
 use anyhow::{Context, Result, bail};
 use cager_formats::biovision::{Clip, read_bvh};
 use cager_formats::{AtomicFile, Target};
-use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::vector::add;
 use cager_recover::manifold::{Examples, Kind, Manifold};
 use cager_recover::poses::{Naming, SkeletonPoses};
-use cager_recover::rig::{CAGE_FACES, CAGE_VERTICES, PlacementOptions, Rig, place};
+use cager_recover::rig::{
+    CAGE_FACES, CAGE_VERTICES, Corrected, PlacedRig, PlacementOptions, QUAD_NAMES, Rig, correct, place,
+};
 use clap::{Args, ValueEnum};
 use std::fs;
 use std::io::Write;
@@ -18,7 +22,8 @@ use std::path::{Path, PathBuf};
 
 /// Place a rig of oriented quads in a person: the cage that `recover --rig` poses.
 ///
-/// The person should stand upright in a T- or A-pose. The rig is a JSON file that may be corrected by hand: 21 quads with the joints that they turn about.
+/// The person should stand upright in a T- or A-pose. The rig is a JSON file that may be corrected by hand: 21 quads with the joints that they turn about. After a
+/// first recovery, --motion puts joints where the parts of the body turn about them.
 /// Example: cager rig body.obj -o rig.json
 #[derive(Args, Debug)]
 pub(crate) struct RigArgs {
@@ -44,6 +49,14 @@ pub(crate) struct RigArgs {
     /// Distance between the person and the cage, where there is room, as a fraction of the height.
     #[arg(long, value_name = "F", default_value_t = 0.003, value_parser = margin, allow_negative_numbers = true)]
     margin: f64,
+
+    /// Correct joints by how this template moves: a .cager file of it, as a first `recover` writes it. Learn the manifold anew for the corrected rig.
+    #[arg(long, value_name = "FIRST.cager")]
+    motion: Option<PathBuf>,
+
+    /// With --motion, the rig to correct [default: one that is placed as without].
+    #[arg(long, value_name = "RIG.json", requires = "motion", hide_default_value = true)]
+    rig: Option<PathBuf>,
 }
 
 /// Learn which poses are usual from motion capture: the manifold of `recover --manifold`.
@@ -103,12 +116,34 @@ fn margin(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &RigArgs) -> Result<()> {
-    let mut outputs = Outputs::new(args.outputs, [&args.template])?;
+    let inputs = [&args.template].into_iter().chain(&args.motion).chain(&args.rig);
+    let mut outputs = Outputs::new(args.outputs, inputs)?;
     let output = outputs.text(&args.output)?;
     let template = read_model(&args.template)?;
-    let up = if args.up == Up::Z { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
-    let options = PlacementOptions { up, forward: args.forward, margin: args.margin };
-    let placed = place(&TriMesh::from(&template), &options).with_context(|| args.template.display().to_string())?;
+    let mesh = TriMesh::from(&template);
+    let mut placed = match &args.rig {
+        Some(path) => {
+            let rig = read_rig(path)?;
+            PlacedRig { enclosure: rig.enclosure(&mesh), rig }
+        }
+        None => {
+            let up = if args.up == Up::Z { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
+            let options = PlacementOptions { up, forward: args.forward, margin: args.margin };
+            place(&mesh, &options).with_context(|| args.template.display().to_string())?
+        }
+    };
+    let mut moved = String::new();
+    if let Some(path) = &args.motion {
+        let Corrected { placed: corrected, shifts } =
+            correct(&placed.rig, &mesh, &frames_of(path, &args.template, &template)?, args.margin);
+        placed = corrected;
+        let named = QUAD_NAMES.iter().zip(shifts).filter(|(_, shift)| *shift >= TOLD);
+        let told: Vec<String> = named.map(|(name, shift)| format!("{name} by {:.1} %", 100.0 * shift)).collect();
+        moved = match told[..] {
+            [] => "; no joint moved".to_owned(),
+            _ => format!("; joints moved, of the height: {}", told.join(", ")),
+        };
+    }
     let outside = placed.enclosure.outside.len();
     if outside > 0 {
         warn(&[format!(
@@ -124,8 +159,46 @@ pub(super) fn run(args: &RigArgs) -> Result<()> {
         &output,
         args.outputs,
         text.as_bytes(),
-        &format!("{CAGE_VERTICES} vertices and {CAGE_FACES} triangles in 21 quads"),
+        &format!("{CAGE_VERTICES} vertices and {CAGE_FACES} triangles in 21 quads{moved}"),
     )
+}
+
+/// Shifts of joints that are told, as shares of the height.
+const TOLD: f64 = 0.001;
+/// Frames that joints are corrected by at the most, and coordinates of them.
+const MAX_FRAMES: usize = 300;
+const MAX_COORDINATES: usize = 30_000_000;
+
+/// Some frames of a container, spread evenly, whose points are those of a template.
+fn frames_of(path: &Path, template_path: &Path, template: &Model) -> Result<Vec<Vec<Point>>> {
+    let container = decode::open(path)?;
+    let (frames, points) = (container.frames(), container.header().points);
+    let origin = container.header().origin.unwrap_or_default();
+    drop(container);
+    if points != template.points.len() as u64 {
+        bail!(
+            "{}: has {} points, and {} has {}; give a recovery of this template",
+            path.display(),
+            grouped(points),
+            template_path.display(),
+            grouped(template.points.len())
+        );
+    }
+    let most = (MAX_COORDINATES / (3 * template.points.len())).clamp(2, MAX_FRAMES);
+    let some: Vec<usize> = (0..frames).step_by(frames.div_ceil(most).max(1)).collect();
+    let mut positions = Positions::open(path)?;
+    let bar = progress::frames("decoding", some.len());
+    let mut all = Vec::with_capacity(some.len());
+    for &frame in &some {
+        let found = positions.read(&[frame])?;
+        all.extend(found.iter().map(|frame| {
+            let at = |p: &[f32; 3]| add(p.map(f64::from), origin);
+            frame.as_chunks().0.iter().map(at).collect::<Vec<Point>>()
+        }));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(all)
 }
 
 pub(super) fn learn(args: &ManifoldArgs) -> Result<()> {

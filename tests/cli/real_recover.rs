@@ -77,6 +77,17 @@ fn a_walk_that_is_followed_by_a_rig_has_its_gait_in_report_and_picture() {
         (svg.matches("<polyline").count(), svg.contains(">seconds</text>"), svg.contains("NaN")),
         (4, true, false)
     );
+    // What was recovered tells where its joints are.
+    let said = dir.cager("rig rest.obj --rig rig.json --motion out.cager -o corrected.json").succeeds();
+    assert!(said.stdout.contains("joints moved") && said.stdout.contains("knee by"), "{}", said.stdout);
+    let joint = |rig: &str, quad: usize| dir.json(rig)["quads"][quad]["joint"].clone();
+    assert!(joint("rig.json", 10) != joint("corrected.json", 10) && joint("rig.json", 0) == joint("corrected.json", 0));
+    dir.model("less.obj", &Model { points: rest.points[1..].to_vec(), ..Model::default() });
+    refused(
+        &dir,
+        "rig less.obj --rig rig.json --motion out.cager -o none.json",
+        &["out.cager", "less.obj", "this template"],
+    );
 }
 
 fn mean(errors: &[f64]) -> f64 {
