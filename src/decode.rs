@@ -1,5 +1,9 @@
 //! Decodes containers to positions.
 
+mod joined;
+
+pub use joined::{Joining, decode_joined};
+
 use crate::edited::EditedCages;
 use crate::memory::{Memory, free_bytes};
 use crate::origin::{LOST, move_to};
@@ -9,7 +13,7 @@ use cager_core::coordinates;
 use cager_core::coordinates::{Coordinates, CoordinatesError, DEFINITION, ElementPlan};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_bytes, reject_far_points};
-use cager_formats::{Action, FrameOptions, FrameRange, Signature, Target, create_frames};
+use cager_formats::{Action, FrameOptions, FrameRange, FrameWriter, Signature, Target, create_frames};
 use cager_geometry::mesh::{Model, Point, diagonal};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
@@ -174,6 +178,13 @@ pub enum Layer {
     /// Everything that is there.
     #[default]
     All,
+}
+
+impl Decoding<'_> {
+    /// Whether it is the file's own model and cages, which alone the residual is of.
+    fn own(&self) -> bool {
+        self.model.is_none() && self.cages.is_none()
+    }
 }
 
 /// Result of [`decode`].
@@ -342,6 +353,107 @@ pub(crate) fn frame_options(
     Ok(FrameOptions { fps, numbers, origin, rounding, units: None })
 }
 
+/// How many frames of so many points are decoded at a time.
+fn batch(memory: Memory, points: usize) -> usize {
+    memory.frames(12 * points, BATCH)
+}
+
+/// A container with the frames that are to be decoded of it.
+struct Chosen<'a> {
+    container: Container,
+    path: &'a Path,
+    what: Decoding<'a>,
+    /// Their places in the container, or among the edited cages.
+    wanted: Vec<usize>,
+    options: FrameOptions,
+    damaged: Vec<usize>,
+    numbers_lost: bool,
+}
+
+impl<'a> Chosen<'a> {
+    fn open(path: &'a Path, what: Decoding<'a>) -> Result<Self, DecodeError> {
+        let fail = |cause| DecodeError::container(path, cause);
+        let Decoding { ref cages, range, timing, salvage, .. } = what;
+        let mut container = if salvage { open_cut(path) } else { open(path) }?;
+        container.limit_coordinates(free_bytes());
+        let there = cages.as_ref().map_or(container.frames(), EditedCages::frames);
+        range.map_or(Ok(()), |range| range.check(there, path))?;
+        let taken = range.unwrap_or(FrameRange::all(there));
+        let mut wanted: Vec<usize> =
+            if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };
+        let mut options = frame_options(&mut container, there, taken, timing, salvage).map_err(fail)?;
+        let numbers_lost = salvage && container.frame_numbers().is_err();
+        let mut damaged = Vec::new();
+        if salvage && cages.is_none() {
+            damaged = wanted.clone();
+            damaged.retain(|&frame| !container.is_intact(frame, what.own() && what.layer == Layer::All));
+            let mut at = wanted.iter();
+            options.numbers.retain(|_| at.next().is_none_or(|frame| !damaged.contains(frame)));
+            wanted.retain(|frame| !damaged.contains(frame));
+        } else {
+            // Decoding does not need it, but a damaged file is refused wherever the damage is.
+            container.report().map_err(fail)?;
+        }
+        Ok(Self { container, path, what, wanted, options, damaged, numbers_lost })
+    }
+
+    fn memory(&self) -> Memory {
+        self.what.memory.unwrap_or_else(Memory::half_of_free)
+    }
+
+    fn bind(&mut self) -> Result<BoundModel, DecodeError> {
+        let Decoding { model, dry_run, layer, salvage, .. } = self.what;
+        let (memory, frames) = (self.memory(), self.wanted.len());
+        let keeps = |points, columns| memory.keeps(points, columns, frames.div_ceil(batch(memory, points)));
+        let known = match self.wanted.first() {
+            Some(&frame) if self.what.own() && layer == Layer::All && !dry_run && !salvage => {
+                self.container.read_ahead(frame).map_err(|cause| DecodeError::container(self.path, cause))?
+            }
+            _ => None,
+        };
+        bind(&mut self.container, self.path, model, known, keeps)
+    }
+
+    /// Writes the frames; `progress` is told the number of those done. A dry run reads them only.
+    fn write(
+        &mut self,
+        BoundModel { rest, decoder, .. }: &BoundModel,
+        writer: &mut dyn FrameWriter,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<(), DecodeError> {
+        let fail = |cause| DecodeError::container(self.path, cause);
+        let residual = self.what.own() && self.what.layer == Layer::All;
+        let (frames, batch) = (self.wanted.len(), batch(self.memory(), rest.points.len()));
+        // Both keep their allocations from batch to batch.
+        let mut cages = vec![Vec::new(); batch];
+        let mut positions = vec![Vec::new(); batch];
+        let mut first = 0;
+        while first < frames {
+            let count = batch.min(frames - first);
+            let wanted = &self.wanted[first..first + count];
+            for (&frame, cage) in wanted.iter().zip(&mut cages) {
+                match &mut self.what.cages {
+                    Some(edited) => edited.read_frame(frame, cage)?,
+                    None => self.container.read_frame(frame, cage).map_err(fail)?,
+                }
+            }
+            if !self.what.dry_run {
+                let views: Vec<&[f32]> = cages[..count].iter().map(Vec::as_slice).collect();
+                decoder.decode(&views, &mut positions[..count]);
+                if residual {
+                    self.container.add_residual(wanted, &mut positions[..count]).map_err(fail)?;
+                }
+                for frame in &positions[..count] {
+                    writer.write_frame(frame)?;
+                }
+            }
+            first += count;
+            progress(first);
+        }
+        Ok(())
+    }
+}
+
 /// Decodes frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.
 ///
 /// # Errors
@@ -352,71 +464,15 @@ pub fn decode(
     what: Decoding<'_>,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Decoded, DecodeError> {
-    let fail = |cause| DecodeError::container(input, cause);
-    let Decoding { model, cages: mut edited, range, timing, dry_run, memory, layer, salvage } = what;
-    let mut container = if salvage { open_cut(input) } else { open(input) }?;
-    container.limit_coordinates(free_bytes());
-    // The residual is of the file's own model and cages.
-    let own = model.is_none() && edited.is_none();
-    let memory = memory.unwrap_or_else(Memory::half_of_free);
-    let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
-    range.map_or(Ok(()), |range| range.check(there, input))?;
-    let taken = range.unwrap_or(FrameRange::all(there));
-    let mut wanted: Vec<usize> =
-        if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };
-    let mut options = frame_options(&mut container, there, taken, timing, salvage).map_err(fail)?;
-    let numbers_lost = salvage && container.frame_numbers().is_err();
-    let mut damaged = Vec::new();
-    if salvage && edited.is_none() {
-        damaged = wanted.clone();
-        damaged.retain(|&frame| !container.is_intact(frame, own && layer == Layer::All));
-        let mut at = wanted.iter();
-        options.numbers.retain(|_| at.next().is_none_or(|frame| !damaged.contains(frame)));
-        wanted.retain(|frame| !damaged.contains(frame));
-    } else {
-        // Decoding does not need it, but a damaged file is refused wherever the damage is.
-        container.report().map_err(fail)?;
-    }
-    let frames = wanted.len();
-    let batch = |points: usize| memory.frames(12 * points, BATCH);
-    let keeps = |points: usize, columns: usize| memory.keeps(points, columns, frames.div_ceil(batch(points)));
-    let known = match wanted.first() {
-        Some(&frame) if own && layer == Layer::All && !dry_run && !salvage => {
-            container.read_ahead(frame).map_err(fail)?
-        }
-        _ => None,
-    };
-    let BoundModel { rest, decoder, outside } = bind(&mut container, input, model, known, keeps)?;
-    let batch = batch(rest.points.len());
-    let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
-    // Both keep their allocations from batch to batch.
-    let mut cages = vec![Vec::new(); batch];
-    let mut positions = vec![Vec::new(); batch];
-    let mut first = 0;
-    while first < frames {
-        let count = batch.min(frames - first);
-        for (k, cage) in cages[..count].iter_mut().enumerate() {
-            let frame = wanted[first + k];
-            match &mut edited {
-                Some(edited) => edited.read_frame(frame, cage)?,
-                None => container.read_frame(frame, cage).map_err(fail)?,
-            }
-        }
-        if !dry_run {
-            let views: Vec<&[f32]> = cages[..count].iter().map(Vec::as_slice).collect();
-            decoder.decode(&views, &mut positions[..count]);
-            if own && layer == Layer::All {
-                container.add_residual(&wanted[first..first + count], &mut positions[..count]).map_err(fail)?;
-            }
-            for frame in &positions[..count] {
-                writer.write_frame(frame)?;
-            }
-        }
-        first += count;
-        progress(first);
-    }
+    let dry_run = what.dry_run;
+    let mut chosen = Chosen::open(input, what)?;
+    let bound = chosen.bind()?;
+    let (points, frames) = (bound.rest.points.len(), chosen.wanted.len());
+    let mut writer = create_frames(output, points, frames, &bound.rest.faces, &chosen.options)?;
+    chosen.write(&bound, &mut *writer, progress)?;
     if !dry_run {
         writer.finish()?;
     }
-    Ok(Decoded { points: rest.points.len(), frames, outside, damaged, numbers_lost })
+    let Chosen { damaged, numbers_lost, .. } = chosen;
+    Ok(Decoded { points, frames, outside: bound.outside, damaged, numbers_lost })
 }

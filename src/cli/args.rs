@@ -247,7 +247,7 @@ pub(crate) struct SolverArgs {
 /// Example: cager decode walk.cager -o walk.pc2
 #[derive(Args, Debug)]
 pub(crate) struct DecodeArgs {
-    /// File to read.
+    /// File to read, or a list of them that recover wrote, which is decoded as one sequence.
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 

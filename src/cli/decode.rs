@@ -3,17 +3,21 @@
 use super::args::DecodeArgs;
 use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
+use super::stretches::StretchList;
 use super::{grouped, progress, read_model, tell, warn};
 use crate::cage_export::write_cages;
-use crate::decode::{self, Decoding};
+use crate::decode::{self, Decoding, Joining};
 use crate::edited::EditedCages;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use cager_formats::{FrameRange, Target};
 use std::path::Path;
 use std::time::Instant;
 
 pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let clock = Instant::now();
+    if let Some(list) = StretchList::read(&args.input)? {
+        return joined(args, &list, clock);
+    }
     let transfer = &args.transfer;
     let dry_run = args.outputs.dry_run;
     let inputs = [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()];
@@ -86,6 +90,50 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         grouped(found.points),
         clock.elapsed().as_secs_f64()
     ))
+}
+
+/// Decodes the files of a list as one sequence.
+fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
+    let transfer = &args.transfer;
+    for (given, option, why) in [
+        (transfer.cages, "--cages", "each file of a list has a cage of its own"),
+        (transfer.with_cages.is_some(), "--with-cages", "each file of a list has a cage of its own"),
+        (transfer.model.is_some(), "--model", "each file of a list has a cage of its own"),
+        (args.salvage, "--salvage", "what a list says holds for whole files"),
+    ] {
+        if given {
+            bail!("{option}: {why}; decode the files of {} one by one", args.input.display());
+        }
+    }
+    let files = list.stretches.iter().map(|stretch| args.input.with_file_name(&stretch.file)).collect::<Vec<_>>();
+    let output = Outputs::new(args.outputs, files.iter().chain([&args.input]))?.frames(&args.output)?;
+    drop(list.containers(&args.input)?);
+    let there: usize = list.stretches.iter().map(|stretch| stretch.frames).sum();
+    if there == 0 {
+        bail!("{}: its files hold no frames; recover them again", args.input.display());
+    }
+    let range = transfer.range(there, &args.input)?.unwrap_or(FrameRange::all(there));
+    let mut start = 0;
+    let mut parts = Vec::new();
+    for (stretch, path) in list.stretches.iter().zip(files) {
+        parts.extend(range.part(start, stretch.frames).map(|part| (path, part)));
+        start += stretch.frames;
+    }
+    let what = Joining {
+        fps: args.timing.fps,
+        shift: args.timing.start.map_or(0.0, |start| start - list.stretches[0].first_frame),
+        dry_run: args.outputs.dry_run,
+        memory: args.memory,
+        layer: args.layer,
+    };
+    let bar = progress::PreparationBar::new("decoding", range.count());
+    let result = decode::decode_joined(&parts, &output, what, &mut |done| bar.done(done));
+    bar.finish();
+    let told = format!("{} frames of {} files", grouped(result?), grouped(parts.len()));
+    if what.dry_run {
+        return tell_dry_run(&output, &told, &[]);
+    }
+    tell(&format!("{}: {told} in {:.3} s\n", output.path().display(), clock.elapsed().as_secs_f64()))
 }
 
 fn outside(path: &Path, outside: usize, points: usize) -> String {

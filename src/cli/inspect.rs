@@ -2,10 +2,10 @@
 
 use super::args::InspectArgs;
 use super::encode_summary::errors;
-use super::stretches::{Stretch, StretchList};
+use super::stretches::StretchList;
 use super::{grouped, human_bytes, plain, print, warn};
 use crate::decode::{self, Container, DecodeError};
-use anyhow::{Result, bail};
+use anyhow::Result;
 use cager_formats::missing_frames;
 use cager_proto::report::Report;
 use serde::Serialize;
@@ -14,24 +14,15 @@ use std::path::Path;
 
 pub(super) fn run(args: &InspectArgs) -> Result<()> {
     let Some(list) = StretchList::read(&args.input)? else {
-        let found = Inspected::of(&args.input)?;
+        let found = Inspected::of(&args.input, decode::open(&args.input)?)?;
         if args.json {
             return print(&format!("{}\n", serde_json::to_string_pretty(&found)?));
         }
         return found.tell(&args.input);
     };
     let mut all = Vec::new();
-    for Stretch { file, first_frame, frames, .. } in &list.stretches {
-        let path = args.input.with_file_name(file);
-        let found = Inspected::of(&path)?;
-        let (first, count) = (found.report.frame_numbers.first().copied().unwrap_or(0.0), found.report.frames);
-        if (first, count) != (*first_frame, *frames) {
-            bail!(
-                "{}: has {frames} frames of {} from {first_frame} on, but that has {count} from {first} on; recover them again",
-                args.input.display(),
-                path.display()
-            );
-        }
+    for (path, container) in list.containers(&args.input)? {
+        let found = Inspected::of(&path, container)?;
         all.push((path, found));
     }
     if args.json {
@@ -50,8 +41,7 @@ struct Inspected {
 }
 
 impl Inspected {
-    fn of(path: &Path) -> Result<Self> {
-        let mut container = decode::open(path)?;
+    fn of(path: &Path, mut container: Container) -> Result<Self> {
         let fail = |cause| DecodeError::container(path, cause);
         container.verify().map_err(fail)?;
         let report = container.report().map_err(fail)?;

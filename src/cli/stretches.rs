@@ -1,5 +1,6 @@
 //! Stretches of frames that have a template each: how they are told and cut, what their files are called, and the list of them.
 
+use crate::decode::{self, Container, DecodeError};
 use anyhow::{Context, Result, bail};
 use cager_formats::MeshSequence;
 use serde::{Deserialize, Serialize};
@@ -106,6 +107,35 @@ impl StretchList {
         Ok(text)
     }
 
+    /// Opens the containers of a list that was read from this file, and compares them with what it says of them.
+    pub(super) fn containers(&self, list: &Path) -> Result<Vec<(PathBuf, Container)>> {
+        let mut found: Vec<(PathBuf, Container)> = Vec::with_capacity(self.stretches.len());
+        let mut last = f64::NEG_INFINITY;
+        for Stretch { file, first_frame, frames, .. } in &self.stretches {
+            let path = list.with_file_name(file);
+            let (named, shown) = (list.display(), path.display());
+            if !path.exists() {
+                bail!("{named}: lists {shown}, which is not there; put it beside the list, or recover it again");
+            }
+            let mut container = decode::open(&path)?;
+            let numbers = container.frame_numbers().map_err(|cause| DecodeError::container(&path, cause))?;
+            let (first, count) = (numbers.first().copied().unwrap_or(0.0), container.frames());
+            if (first, count) != (*first_frame, *frames) {
+                bail!(
+                    "{named}: has {frames} frames of {shown} from {first_frame} on, but that has {count} from {first} on; recover them again"
+                );
+            }
+            if first <= last {
+                bail!(
+                    "{named}: {shown} begins with frame {first}, and what is listed before it ends with frame {last}; list files in the order of their frames, each frame once"
+                );
+            }
+            last = numbers.last().copied().unwrap_or(count.saturating_sub(1) as f64);
+            found.push((path, container));
+        }
+        Ok(found)
+    }
+
     /// Reads a list; none where the name is not that of one.
     pub(super) fn read(path: &Path) -> Result<Option<Self>> {
         if path.extension().is_none_or(|extension| extension != "json") {
@@ -119,6 +149,9 @@ impl StretchList {
                 named(),
                 list.version
             );
+        }
+        if list.stretches.is_empty() {
+            bail!("{}: lists no files; recover them again", named());
         }
         Ok(Some(list))
     }

@@ -293,9 +293,56 @@ fn where_the_topology_changes_a_second_template_goes_on_and_a_report_says_where_
     assert_eq!(numbers(0).chain(numbers(1)).collect::<Vec<_>>(), (5..19).map(f64::from).collect::<Vec<_>>());
     assert_eq!(shown[1]["frame_rate"].as_f64(), Some(25.0));
 
+    decoded_as_one(&dir);
+
     let two = two.replace("two.cager", "three.cager");
     refused(&dir, &two.replace("12:", "40:"), &["second.obj", "numbered 5 to 18"]);
     refused(&dir, &two.replace("12:", ""), &["FRAME:second.obj"]);
     refused(&dir, &two.replace("three.cager", "-"), &["standard output"]);
     refused(&dir, &format!("{two} --cage rest.obj"), &["2 templates and 1 cages"]);
+}
+
+/// A list is decoded to mesh files whose numbers go on, each with the faces of its stretch.
+fn decoded_as_one(dir: &Dir) {
+    let said = dir.cager("decode two.stretches.json -o whole/").succeeds();
+    assert!(said.stdout.contains("14 frames of 2 files"), "{}", said.stdout);
+    let names: Vec<String> = (5..19).map(|number| format!("frame_{number:04}.obj")).collect();
+    assert_eq!(dir.names("whole"), names);
+    for (k, frames) in [(1, 5..12), (2, 12..19)] {
+        dir.cager(&format!("decode two-{k}.cager -o alone-{k}/")).succeeds();
+        for number in frames {
+            let read =
+                |folder: &str| std::fs::read(dir.path(&format!("{folder}/frame_{number:04}.obj"))).expect("file");
+            assert!(read("whole") == read(&format!("alone-{k}")), "{number}");
+        }
+    }
+    dir.cager("decode two.stretches.json -o some/a.####.ply --range 5-13x3 --start 105").succeeds();
+    assert_eq!(dir.names("some"), ["a.0110.ply", "a.0113.ply", "a.0116.ply"]);
+    dir.cager("decode two.stretches.json -o one.stl --frame 9").succeeds();
+    dir.cager("decode two.stretches.json -o begin.npy --range 0-6").succeeds();
+    assert!(dir.path("one.stl").exists() && dir.path("begin.npy").exists());
+    let dry = dir.cager("decode two.stretches.json -o none/ --dry-run").succeeds();
+    assert!(dry.stdout.contains("would be written: 14 frames of 2 files"), "{}", dry.stdout);
+
+    refused(dir, "decode two.stretches.json -o whole.npy", &["whole.npy", "one mesh", "folder"]);
+    refused(dir, "decode two.stretches.json -o whole.abc", &["whole.abc", "one mesh"]);
+    refused(dir, "decode two.stretches.json -o none/ --frame 14", &["frames 0 to 13"]);
+    refused(dir, "decode two.stretches.json -o none/ --model rest.obj", &["--model", "one by one"]);
+    refused(dir, "decode two.stretches.json -o none/ --cages", &["--cages", "one by one"]);
+    let list = std::fs::read_to_string(dir.path("two.stretches.json")).expect("list");
+    let wrong = |of: &str, by: &str| dir.write("wrong.stretches.json", list.replace(of, by));
+    for (of, by, words) in [
+        ("two-2.cager", "gone.cager", ["gone.cager", "not there"]),
+        ("\"frames\": 7", "\"frames\": 8", ["has 8 frames of", "that has 7"]),
+        ("two-1.cager", "two-2.cager", ["from 5 on", "from 12 on"]),
+    ] {
+        wrong(of, by);
+        refused(dir, "decode wrong.stretches.json -o none/", &words);
+    }
+    let twice = list.replace("two-1.cager", "two-2.cager").replace("5.0", "12.0");
+    dir.write("wrong.stretches.json", twice);
+    refused(dir, "decode wrong.stretches.json -o none/", &["begins with frame 12", "ends with frame 18"]);
+    dir.write("wrong.stretches.json", r#"{"version": 1, "stretches": []}"#);
+    refused(dir, "inspect wrong.stretches.json", &["lists no files"]);
+    assert!(!dir.path("none").exists() && !dir.path("whole.npy").exists());
 }

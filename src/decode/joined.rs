@@ -1,0 +1,72 @@
+//! Decodes containers that play one after the other to one sequence.
+
+use super::{Chosen, DecodeError, Decoding, Layer};
+use crate::memory::Memory;
+use crate::timing::Timing;
+use cager_formats::{FrameOptions, FrameRange, Target, create_frames};
+use cager_geometry::mesh::Model;
+use std::path::PathBuf;
+
+/// What to decode of several containers that play one after the other.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Joining {
+    /// Frame rate, where it is given.
+    pub fps: Option<f64>,
+    /// Added to the numbers of all frames.
+    pub shift: f64,
+    /// Whether to read and validate only.
+    pub dry_run: bool,
+    /// Memory limit; by default half of the free memory.
+    pub memory: Option<Memory>,
+    /// How much of the files is decoded.
+    pub layer: Layer,
+}
+
+/// Decodes ranges of frames of containers, at least one, into one `output`, whose files have the mesh of their container each. Formats of one mesh are refused
+/// before anything is decoded, unless all have the same. `progress` is told the number of frames done, which is returned.
+///
+/// # Errors
+/// See [`DecodeError`].
+pub fn decode_joined(
+    inputs: &[(PathBuf, FrameRange)],
+    output: impl Into<Target>,
+    what: Joining,
+    progress: &mut dyn FnMut(usize),
+) -> Result<usize, DecodeError> {
+    let Joining { fps, shift, dry_run, memory, layer } = what;
+    let timing = Timing { fps, start: None };
+    let mut all = Vec::with_capacity(inputs.len());
+    for (path, range) in inputs {
+        let what = Decoding { range: Some(*range), timing, dry_run, memory, layer, ..Decoding::default() };
+        let mut chosen = Chosen::open(path, what)?;
+        let rest = chosen.container.rest().map_err(|cause| DecodeError::container(path, cause))?;
+        all.push((chosen, rest));
+    }
+    let numbers = all.iter().flat_map(|(chosen, _)| &chosen.options.numbers).map(|number| number + shift).collect();
+    let frames = all.iter().map(|(chosen, _)| chosen.wanted.len()).sum();
+    let (first, rest) = &all[0];
+    let options = FrameOptions { numbers, ..first.options.clone() };
+    let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
+    let same = |a: &(Chosen<'_>, Model), b: &(Chosen<'_>, Model)| {
+        (a.1.points.len(), &a.1.faces, a.0.options.origin) == (b.1.points.len(), &b.1.faces, b.0.options.origin)
+    };
+    let changes: Vec<bool> = (0..all.len()).map(|k| !same(&all[k.saturating_sub(1)], &all[k])).collect();
+    // Each mesh is tried before the work.
+    for k in (0..all.len()).filter(|&k| changes[k]).chain(changes.contains(&true).then_some(0)) {
+        let (chosen, rest) = &all[k];
+        writer.change_mesh(rest.points.len(), &rest.faces, &chosen.options)?;
+    }
+    let mut done = 0;
+    for ((chosen, rest), changes) in all.iter_mut().zip(changes) {
+        if changes {
+            writer.change_mesh(rest.points.len(), &rest.faces, &chosen.options)?;
+        }
+        let bound = chosen.bind()?;
+        chosen.write(&bound, &mut *writer, &mut |count| progress(done + count))?;
+        done += chosen.wanted.len();
+    }
+    if !dry_run {
+        writer.finish()?;
+    }
+    Ok(frames)
+}
