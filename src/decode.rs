@@ -1,8 +1,6 @@
 //! Decodes containers to positions.
 
-mod joined;
-
-pub use joined::{Joining, decode_joined};
+pub mod joined;
 
 use crate::edited::EditedCages;
 use crate::memory::{Memory, free_bytes};

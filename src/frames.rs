@@ -5,7 +5,7 @@ use crate::belonging::{Belonging, Pass};
 use crate::mismatch::Up;
 use crate::origin::{move_to, own_origin};
 use crate::timing::Timing;
-use cager_formats::{Error, FrameReader, FrameSelection, Units, missing_frames, open_selected_frames};
+use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
 use cager_geometry::mesh::Model;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -127,10 +127,6 @@ impl FrameReader for Adapted {
 
     fn frame_rate(&self) -> Option<f64> {
         self.frame_rate
-    }
-
-    fn units(&self) -> Option<Units> {
-        self.inner.units()
     }
 
     fn number(&self, frame: usize) -> f64 {

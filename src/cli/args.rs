@@ -96,7 +96,7 @@ pub(crate) struct EncodeArgs {
     pub(crate) design: DesignArgs,
 
     /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of
-    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd
+    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd,
     /// .abc or .usdc.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,

@@ -6,7 +6,8 @@ use super::outputs::Outputs;
 use super::stretches::StretchList;
 use super::{grouped, progress, read_model, tell, warn};
 use crate::cage_export::write_cages;
-use crate::decode::{self, Decoding, Joining};
+use crate::decode::joined::{Joining, decode_joined};
+use crate::decode::{self, Decoding};
 use crate::edited::EditedCages;
 use anyhow::{Result, bail};
 use cager_formats::{FrameRange, Target};
@@ -127,7 +128,7 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
         layer: args.layer,
     };
     let bar = progress::PreparationBar::new("decoding", range.count());
-    let result = decode::decode_joined(&parts, &output, what, &mut |done| bar.done(done));
+    let result = decode_joined(&parts, &output, what, &mut |done| bar.done(done));
     bar.finish();
     let told = format!("{} frames of {} files", grouped(result?), grouped(parts.len()));
     if what.dry_run {

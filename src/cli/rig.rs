@@ -2,14 +2,14 @@
 
 use super::outputs::{OutputArgs, Outputs};
 use super::{grouped, human_bytes, progress, read_model, tell, warn};
-use crate::decode::{self, Positions};
+use crate::decode::{self, DecodeError, Positions};
 use crate::mismatch::Up;
 use crate::recover::{manifold_of, rig_of};
 use anyhow::{Context, Result, bail};
 use cager_formats::biovision::{Clip, read_bvh};
 use cager_formats::{AtomicFile, Target};
-use cager_geometry::mesh::{Model, Point, TriMesh};
-use cager_geometry::vector::add;
+use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
+use cager_geometry::vector::{add, distance};
 use cager_recover::manifold::{Examples, Kind, Manifold};
 use cager_recover::poses::{Naming, SkeletonPoses};
 use cager_recover::rig::{
@@ -39,11 +39,11 @@ pub(crate) struct RigArgs {
     outputs: OutputArgs,
 
     /// Axis that points up.
-    #[arg(long = "up", id = "rig_up", value_name = "AXIS", value_parser = super::checks::up, default_value = "y")]
+    #[arg(long = "up", id = "rig_up", value_name = "AXIS", value_parser = super::checks::up, default_value = "y", conflicts_with = "rig")]
     up: Up,
 
     /// Axis that the person looks along: x, -x, y, -y, z or -z [default: as the feet tell].
-    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true, hide_default_value = true)]
+    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true, hide_default_value = true, conflicts_with = "rig")]
     forward: Option<Point>,
 
     /// Distance between the person and the cage, where there is room, as a fraction of the height.
@@ -165,15 +165,18 @@ pub(super) fn run(args: &RigArgs) -> Result<()> {
 
 /// Shifts of joints that are told, as shares of the height.
 const TOLD: f64 = 0.001;
+/// Share of the diagonal by which points of a template may be stored elsewhere.
+const NEAR: f64 = 1e-4;
 /// Frames that joints are corrected by at the most, and coordinates of them.
 const MAX_FRAMES: usize = 300;
 const MAX_COORDINATES: usize = 30_000_000;
 
 /// Some frames of a container, spread evenly, whose points are those of a template.
 fn frames_of(path: &Path, template_path: &Path, template: &Model) -> Result<Vec<Vec<Point>>> {
-    let container = decode::open(path)?;
+    let mut container = decode::open(path)?;
     let (frames, points) = (container.frames(), container.header().points);
     let origin = container.header().origin.unwrap_or_default();
+    let rest = container.rest().map_err(|cause| DecodeError::container(path, cause))?;
     drop(container);
     if points != template.points.len() as u64 {
         bail!(
@@ -182,6 +185,15 @@ fn frames_of(path: &Path, template_path: &Path, template: &Model) -> Result<Vec<
             grouped(points),
             template_path.display(),
             grouped(template.points.len())
+        );
+    }
+    let near = NEAR * diagonal(&template.points);
+    let other = rest.points.iter().zip(&template.points).position(|(a, b)| distance(add(*a, origin), *b) > near);
+    if let Some(point) = other {
+        bail!(
+            "{}: its rest pose is not {}: point {point} is elsewhere; give the template that this was recovered with, in its units and place",
+            path.display(),
+            template_path.display()
         );
     }
     let most = (MAX_COORDINATES / (3 * template.points.len())).clamp(2, MAX_FRAMES);

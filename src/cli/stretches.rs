@@ -125,6 +125,10 @@ impl StretchList {
                     "{named}: has {frames} frames of {shown} from {first_frame} on, but that has {count} from {first} on; recover them again"
                 );
             }
+            let rate = container.header().frame_rate;
+            if found.first().is_some_and(|(_, first)| first.header().frame_rate != rate) {
+                bail!("{named}: {shown} has another frame rate than the files before it; recover them again");
+            }
             if first <= last {
                 bail!(
                     "{named}: {shown} begins with frame {first}, and what is listed before it ends with frame {last}; list files in the order of their frames, each frame once"
@@ -142,7 +146,9 @@ impl StretchList {
             return Ok(None);
         }
         let named = || path.display().to_string();
-        let list: Self = serde_json::from_slice(&std::fs::read(path).with_context(named)?).with_context(named)?;
+        let list: Self = serde_json::from_slice(&std::fs::read(path).with_context(named)?).with_context(|| {
+            format!("{}: is no list of stretches; give the .stretches.json that recover wrote", named())
+        })?;
         if list.version != 1 {
             bail!(
                 "{}: is a list of version {}, and this program reads version 1; use a newer cager",

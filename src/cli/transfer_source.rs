@@ -9,7 +9,7 @@ use crate::timing::Timing;
 use crate::transfer::{MotionFile, decoded};
 use anyhow::{Result, bail};
 use cager_core::cage::Cage;
-use cager_formats::{Error, FrameReader, Units};
+use cager_formats::{Error, FrameReader};
 use cager_geometry::mesh::Model;
 use std::path::{Path, PathBuf};
 
@@ -96,10 +96,6 @@ impl FrameReader for Timed {
 
     fn frame_rate(&self) -> Option<f64> {
         self.frame_rate
-    }
-
-    fn units(&self) -> Option<Units> {
-        self.frames.units()
     }
 
     fn number(&self, frame: usize) -> f64 {

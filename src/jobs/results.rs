@@ -4,7 +4,7 @@ use super::{Job, Work};
 use crate::encode::EncodeError;
 use crate::problem::{self, ApiError};
 use crate::store::StoreError;
-use cager_formats::{Error, FrameReader, Units};
+use cager_formats::{Error, FrameReader};
 use std::io;
 
 /// Why results cannot be made.
@@ -53,10 +53,6 @@ impl FrameReader for Stoppable<'_> {
 
     fn frame_rate(&self) -> Option<f64> {
         self.timing.0.or(self.frames.frame_rate())
-    }
-
-    fn units(&self) -> Option<Units> {
-        self.frames.units()
     }
 
     fn number(&self, frame: usize) -> f64 {

@@ -29,7 +29,7 @@ pub const FORMATS: &[Listed] = &[
     animated("abc", "Alembic (Ogawa)", true, "frame rate, times"),
     animated("usdc", "Universal Scene Description, binary", true, "unit, up axis, frame rate, times"),
     animated("usdz", "the same as a package", true, "unit, up axis, frame rate, times"),
-    animated("usd", "the same of either kind", true, "unit, up axis, frame rate, times"),
+    animated("usd", "the same, binary", true, "unit, up axis, frame rate, times"),
 ];
 
 const fn still(extension: &'static str, name: &'static str, written: bool) -> Listed {

@@ -43,8 +43,8 @@ impl FrameRange {
     /// Those of these that are among `frames` frames from `start` on, counted from there.
     pub fn part(&self, start: usize, frames: usize) -> Option<Self> {
         let skipped = start.saturating_sub(self.first).div_ceil(self.step);
-        let first = self.first + skipped * self.step;
-        let last = self.last.min((start + frames).checked_sub(1)?);
+        let first = skipped.checked_mul(self.step).and_then(|steps| self.first.checked_add(steps))?;
+        let last = self.last.min(start.checked_add(frames)?.checked_sub(1)?);
         (first <= last).then(|| Self { first: first - start, last: last - start, step: self.step })
     }
 

@@ -1,7 +1,6 @@
 //! Which mesh of a layer is meant.
 
-use super::composed;
-use super::layer::{Layer, Prim};
+use super::layer::{Layer, Prim, composed};
 use crate::error::Fault;
 use crate::scene::{Failure, Objects, choose as choose_object, named, shown_path};
 

@@ -116,3 +116,10 @@ pub(super) trait Layer: Send {
 pub(super) fn damaged(what: &str) -> Fault {
     Fault::damaged(format!("{what}, so the file is damaged; copy or export it again"))
 }
+
+/// The fault of what is composed of other prims or files.
+pub(super) fn composed(what: &str, of: &str) -> Fault {
+    Fault::unsupported(format!(
+        "{what} has {of}, which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc"
+    ))
+}

@@ -11,6 +11,8 @@ use crate::frames::Times;
 use crate::scene::{Animation, Faces, Failure, MOST_REPEATED, determinant, most_corners, placed, topology_changes};
 use crate::units::{Units, Up};
 
+/// What is written where nobody says it.
+const USUAL: Units = Units { up: Up::Y, metres_per_unit: 1.0 };
 /// The unit of layers that do not say theirs: a centimetre.
 const USUAL_UNIT: f64 = 0.01;
 
@@ -39,13 +41,17 @@ impl<'a> MeshFrames<'a> {
         let mut attribute = |name| layer.attribute(mesh, name);
         let positions = attribute("points")?;
         let parts = [attribute("faceVertexCounts")?, attribute("faceVertexIndices")?];
-        let (orientation, joints) = (attribute("orientation")?, attribute("primvars:skel:jointIndices")?);
-        if !is_still && !joints.is_empty() && positions.times.is_empty() {
-            let what =
-                "has a mesh that a skeleton moves, which is not read; export it with its points baked, or as Alembic";
-            return Err(Fault::unsupported(what).into());
+        let orientation = attribute("orientation")?;
+        let mover = [("primvars:skel:jointIndices", "a skeleton moves"), ("skel:blendShapes", "blend shapes move")];
+        for (name, mover) in mover {
+            if !is_still && positions.times.is_empty() && !attribute(name)?.is_empty() {
+                let what = format!(
+                    "has a mesh that {mover}, which is not read; export it with its points baked, or as Alembic"
+                );
+                return Err(Fault::unsupported(what).into());
+            }
         }
-        let chain = Chain::of(&mut layer, mesh)?;
+        let chain = Chain::of(&mut layer, mesh, is_still)?;
         let samples = positions.times.iter().copied().chain(chain.times()).collect();
         let grid = Grid::of(layer.stage(), samples)?;
         let is_left = match orientation.still() {
@@ -62,6 +68,14 @@ impl<'a> MeshFrames<'a> {
         if opened.points == 0 {
             let what = "has a mesh without points in its first frame; export it with its points";
             return Err(Fault::invalid(what).into());
+        }
+        if let Some(Units { up, metres_per_unit }) = opened.units().filter(|units| !is_still && *units != USUAL) {
+            let up = if up == Up::Z { 'Z' } else { 'Y' };
+            let told = format!(
+                "it says {metres_per_unit} metres a unit and {up} up; coordinates are taken as they are, and USD that is decoded says metres and Y up"
+            );
+            let note = &mut opened.grid.times.note;
+            *note = Some(note.take().map_or(told.clone(), |note| format!("{note}; {told}")));
         }
         opened.turned ^= opened.is_mirrored()?;
         let places = opened.places(0);
@@ -156,9 +170,9 @@ impl Animation for MeshFrames<'_> {
         // Every value is overwritten below.
         out.resize(3 * self.points, 0.0);
         let mut finite = self.layer.read(points, out)?;
-        let following = self.layer.points(next)?;
+        let following = if share > 0.0 { Some(self.layer.points(next)?) } else { None };
         // Where the number of points changes, those before hold.
-        if share > 0.0 && following.count == self.points {
+        if let Some(following) = following.filter(|following| following.count == self.points) {
             self.next.resize(out.len(), 0.0);
             finite &= self.layer.read(following, &mut self.next)?;
             out.iter_mut().zip(&self.next).for_each(|(value, next)| *value += share * (next - *value));

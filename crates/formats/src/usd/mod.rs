@@ -86,10 +86,3 @@ fn open_plain<'a>(
     let none = "does not begin as a file of USD does; export it again";
     Err(Fault::damaged(other.unwrap_or_else(|| none.to_owned())).into())
 }
-
-/// The fault of what is composed of other prims or files.
-fn composed(what: &str, of: &str) -> Fault {
-    Fault::unsupported(format!(
-        "{what} has {of}, which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc"
-    ))
-}

@@ -54,7 +54,7 @@ impl Grid {
                 return Self::even(rate / step, (start, distance, samples.len()), step, samples.len());
             }
             let seconds: Vec<f64> = samples.iter().map(|code| code / rate).collect();
-            let times = Times::of(&seconds, Some(rate))?;
+            let times = Times::of(&seconds, Some(rate / step))?;
             return Ok(Self { times, frames: samples.len(), codes: samples, first: 0.0, step: 1.0 });
         }
         // What does not change before or after is not always stored.
@@ -114,6 +114,7 @@ mod tests {
             grid(&fine, &[20.0, 40.0, 80.0]),
             (Some(30.0), vec![20.0, 40.0, 60.0, 80.0], vec![1.0, 2.0, 3.0, 4.0])
         );
+        assert_eq!(grid(&fine, &[20.0, 50.0, 85.0]), (Some(30.0), vec![20.0, 50.0, 85.0], vec![1.0, 2.5, 4.25]));
     }
 
     #[test]

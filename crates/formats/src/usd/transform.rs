@@ -101,8 +101,8 @@ impl Kind {
 }
 
 impl Chain {
-    /// The transforms above a mesh and of the mesh itself, up to one that does not inherit what is above it.
-    pub(super) fn of<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32) -> Result<Self, Failure> {
+    /// The transforms above a mesh and of the mesh itself, up to one that does not inherit what is above it; of a still one those without a time.
+    pub(super) fn of<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32, is_still: bool) -> Result<Self, Failure> {
         let (mut links, mut count) = (Vec::new(), 0);
         for prim in layer.ancestry(mesh as usize).collect::<Vec<_>>() {
             let prim = prim as u32;
@@ -119,7 +119,9 @@ impl Chain {
             }
             let mut link = Link { operations, fixed: None };
             if link.operations.iter().all(|operation| operation.values.times.len() < 2) {
-                link.fixed = Some(link.at(layer.as_mut(), None)?);
+                // A single sample holds at all times, whatever the default.
+                let time = (!is_still).then_some(0.0);
+                link.fixed = Some(link.at(layer.as_mut(), time)?);
             }
             links.extend(Some(link).filter(|link| link.fixed != Some(IDENTITY)));
             if reset.is_some() {

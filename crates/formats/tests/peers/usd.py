@@ -98,6 +98,16 @@ def make(folder):
     put(stage, "/a/b/mesh")
     save(stage)
 
+    # A single sample holds at all times, whatever the default says.
+    stage = begin("single", (1, 2))
+    place = UsdGeom.Xform.Define(stage, "/a").AddTranslateOp()
+    place.Set((0, 0, 0))
+    place.Set((5, 0, 0), 1)
+    points = put(stage, "/a/mesh").GetPointsAttr()
+    for code in (1, 2):
+        points.Set([(code, 2, 3), (4, 5, 7), (-1, 0.5, 2)], code)
+    save(stage)
+
     stage = begin("several")
     for path in ("/coat/body", "/skin/body", "/hat"):
         put(stage, path)

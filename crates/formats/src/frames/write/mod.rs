@@ -36,7 +36,7 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 
 /// Begins an output of `frames` frames of `points` points each.
 ///
-/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz` with `faces`. Without an extension, with
+/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd` with `faces`. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
 /// A folder with nothing but such files is replaced as a whole where the target may be. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes

@@ -7,7 +7,7 @@ mod sections;
 
 use std::io::{Read, Seek};
 
-use super::layer::{Attribute, DEEPEST, Layer, Points, Prim, Stage, Value, damaged};
+use super::layer::{Attribute, DEEPEST, Layer, Points, Prim, Stage, Value, composed, damaged};
 use crate::error::Fault;
 use crate::frames::{Scalar, half_precision};
 use crate::scene::Failure;
@@ -133,7 +133,7 @@ impl<R: Read + Seek> Binary<R> {
         if let Some(list) = self.sections.field(root, "subLayers")?
             && self.file.number(list.offset())? > 0
         {
-            return Err(super::composed("the layer", "sublayers").into());
+            return Err(composed("the layer", "sublayers").into());
         }
         let mut number = |name: &str| -> Result<Option<f64>, Failure> {
             let Some(value) = self.sections.field(root, name)? else { return Ok(None) };
@@ -260,7 +260,7 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
         }
         let length = self.file.number(start)?;
         let packed = self.file.bytes(start + 8, length, 1)?;
-        Ok(integers(&packed, count as usize)?)
+        Ok(integers(&packed, self.file.allowance.take(count, 4)?)?)
     }
 
     fn points(&mut self, value: Value) -> Result<Points, Failure> {

@@ -61,7 +61,8 @@ impl Allowance {
 fn unpack(packed: &[u8], most: usize) -> Result<Vec<u8>, Fault> {
     let mut fields = Fields(packed);
     let [pieces] = fields.array()?;
-    let (mut out, mut length) = (vec![0; most], 0);
+    // No byte of LZ4 becomes more than 255.
+    let (mut out, mut length) = (vec![0; most.min(packed.len().saturating_mul(255))], 0);
     for _ in 0..pieces.max(1) {
         let piece = match pieces {
             0 => std::mem::take(&mut fields.0),

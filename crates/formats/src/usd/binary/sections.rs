@@ -15,6 +15,9 @@ const UNPACKED_ALWAYS: u64 = 1 << 16;
 /// Sections of a file, of which these are read.
 const MOST_SECTIONS: u64 = 64;
 
+/// Fields of a prim or an attribute; programs write some thirty.
+const MOST_FIELDS: usize = 256;
+
 /// Something with fields: a prim or a property.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spec {
@@ -119,7 +122,11 @@ impl Sections {
     /// The fields of a spec: their names and their values.
     pub(super) fn fields(&self, spec: Spec) -> impl Iterator<Item = Result<(&[u8], Rep), Fault>> {
         let set = self.sets.get(spec.set as usize..).unwrap_or_default().iter();
-        set.map_while(|&index| usize::try_from(index).ok()).map(|index| {
+        set.map_while(|&index| usize::try_from(index).ok()).enumerate().map(|(k, index)| {
+            // Many may have the same set.
+            if k >= MOST_FIELDS {
+                return Err(damaged("it describes a prim by more fields than any program writes"));
+            }
             let &(name, value) = self.fields.get(index).ok_or_else(|| damaged("a field is missing"))?;
             Ok((self.token(name), value))
         })
