@@ -70,6 +70,8 @@ short! {
     pc2 "pc2" 240_000;
     mdd "mdd" 240_000;
     abc "abc" 60_000;
+    usdc "usdc" 60_000;
+    usdz "usdz" 30_000;
     npz "npz" 6_000;
     container "container" 30_000;
     record "record" 360_000;

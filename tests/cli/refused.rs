@@ -189,7 +189,7 @@ fn frames_that_are_not_there_are_refused() {
         ("nowhere", "check the path"),
         ("nowhere.npy", "check the path"),
         ("mixed", "mixes"),
-        ("walk.fbx", "export the animated mesh as Alembic or a point cache, .abc, .pc2 or .mdd"),
+        ("walk.fbx", "export the animated mesh as Alembic, USD or a point cache, .abc, .usdc, .pc2 or .mdd"),
         ("walk.mp4", ".npy .pc2 .mdd"),
         ("[.obj", "pattern"),
     ] {
