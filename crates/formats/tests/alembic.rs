@@ -12,7 +12,7 @@ use cager_formats::{
 };
 use cager_geometry::mesh::Polygons;
 use support::archive::*;
-use support::{message, polygons, read};
+use support::{all, message, numbers, polygons, read, wide};
 use tempfile::{TempDir, tempdir};
 
 /// Samples at 24 frames per second from frame 1 on.
@@ -25,19 +25,6 @@ fn open(bytes: &[u8], points: usize) -> Result<Box<dyn FrameReader + '_>, Error>
     open_frames_bytes(CacheFormat::Abc, Path::new("a.abc"), bytes, points)
 }
 
-fn all(reader: &mut dyn FrameReader) -> Vec<Vec<f64>> {
-    let (mut frames, mut frame) = (Vec::new(), Vec::new());
-    while reader.read_next(&mut frame).unwrap() {
-        frames.push(frame.clone());
-    }
-    assert_eq!(frames.len(), reader.frames());
-    frames
-}
-
-fn numbers(reader: &dyn FrameReader) -> Vec<f64> {
-    (0..reader.frames()).map(|frame| reader.number(frame)).collect()
-}
-
 /// So many frames of a triangle that rises.
 fn rising(frames: u8) -> Vec<Vec<f32>> {
     (0..frames).map(|k| vec![0.0, f32::from(k), 0.0, 1.0, f32::from(k), 0.0, 0.0, f32::from(k), 1.0]).collect()
@@ -45,10 +32,6 @@ fn rising(frames: u8) -> Vec<Vec<f32>> {
 
 fn triangle(frames: u8) -> Node {
     mesh("triangle", positions(&rising(frames)), &[&[2, 1, 0]])
-}
-
-fn wide(frames: &[Vec<f32>]) -> Vec<Vec<f64>> {
-    frames.iter().map(|frame| frame.iter().map(|&x| x.into()).collect()).collect()
 }
 
 fn saved(bytes: &[u8]) -> (TempDir, PathBuf) {

@@ -11,30 +11,13 @@ use cager_formats::{
     open_frames_bytes, open_selected_frames, read_model, read_model_bytes, read_prim_with_units,
 };
 use cager_geometry::mesh::Polygons;
-use support::{message, polygons};
+use support::{all, message, numbers, polygons, wide};
 use tempfile::{TempDir, tempdir};
 
 const CENTIMETRES: Units = Units { up: Up::Z, metres_per_unit: 0.01 };
 
 fn open(bytes: &[u8], points: usize) -> Result<Box<dyn FrameReader + '_>, Error> {
     open_frames_bytes(CacheFormat::Usd, Path::new("a.usd"), bytes, points)
-}
-
-fn all(reader: &mut dyn FrameReader) -> Vec<Vec<f64>> {
-    let (mut frames, mut frame) = (Vec::new(), Vec::new());
-    while reader.read_next(&mut frame).unwrap() {
-        frames.push(frame.clone());
-    }
-    assert_eq!(frames.len(), reader.frames());
-    frames
-}
-
-fn numbers(reader: &dyn FrameReader) -> Vec<f64> {
-    (0..reader.frames()).map(|frame| reader.number(frame)).collect()
-}
-
-fn wide(frames: &[Vec<f32>]) -> Vec<Vec<f64>> {
-    frames.iter().map(|frame| frame.iter().map(|&x| x.into()).collect()).collect()
 }
 
 /// So many frames of four points.

@@ -5,6 +5,7 @@ mod bodies;
 mod container;
 mod frames;
 mod meshes;
+mod scenes;
 mod settings;
 mod skeletons;
 mod store;

@@ -7,7 +7,7 @@ use crate::scene::check_held;
 
 /// Time codes per second where a layer does not say them.
 const USUAL: f64 = 24.0;
-/// Time codes beyond this are none.
+/// The largest time code that is taken.
 const FARTHEST: f64 = 1e9;
 
 /// When frames are.

@@ -6,7 +6,7 @@ pub mod archive;
 
 use std::path::Path;
 
-use cager_formats::{Error, MeshFormat, read_model_bytes};
+use cager_formats::{Error, FrameReader, MeshFormat, read_model_bytes};
 use cager_geometry::mesh::{Model, Polygons};
 
 pub const POINTS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0, -2.25]];
@@ -223,4 +223,22 @@ pub fn caches() -> Vec<(&'static str, Vec<u8>)> {
 /// Those that are a header and all coordinates.
 pub fn plain_caches() -> Vec<(&'static str, Vec<u8>)> {
     vec![("a.npy", npy_f4()), ("a.pc2", pc2()), ("a.mdd", mdd())]
+}
+
+/// All frames of a reader, which has as many as it says.
+pub fn all(reader: &mut dyn FrameReader) -> Vec<Vec<f64>> {
+    let (mut frames, mut frame) = (Vec::new(), Vec::new());
+    while reader.read_next(&mut frame).unwrap() {
+        frames.push(frame.clone());
+    }
+    assert_eq!(frames.len(), reader.frames());
+    frames
+}
+
+pub fn numbers(reader: &dyn FrameReader) -> Vec<f64> {
+    (0..reader.frames()).map(|frame| reader.number(frame)).collect()
+}
+
+pub fn wide(frames: &[Vec<f32>]) -> Vec<Vec<f64>> {
+    frames.iter().map(|frame| frame.iter().map(|&x| x.into()).collect()).collect()
 }

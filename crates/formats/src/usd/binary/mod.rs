@@ -162,7 +162,7 @@ impl<R: Read + Seek> Binary<R> {
         let at = self.told(value.offset())?;
         let times = Rep(self.file.number(at)?);
         if value.kind() != kind::TIME_SAMPLES || times.kind() != kind::DOUBLES {
-            return Err(damaged("its time samples are none").into());
+            return Err(damaged("its time samples are of another type").into());
         }
         let count = self.file.number(times.offset())?;
         let values = self.told(at + 8)?;
