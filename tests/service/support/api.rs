@@ -29,7 +29,8 @@ impl Api {
     pub(crate) fn new(address: SocketAddr, token: Option<String>, http2: bool) -> Self {
         // The client library is built with TLS but without a choice of its cryptography; one call in a process is enough.
         let _ = rustls::crypto::ring::default_provider().install_default();
-        let builder = reqwest::Client::builder().timeout(2 * HANG);
+        // Some follow work from its beginning to its end, which takes a while on a busy machine.
+        let builder = reqwest::Client::builder().timeout(10 * HANG);
         let builder = if http2 { builder.http2_prior_knowledge() } else { builder.http1_only() };
         Self { base: format!("http://{address}"), token, http: builder.build().expect("a client") }
     }
