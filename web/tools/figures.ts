@@ -21,7 +21,7 @@ const WARM_UP_SECONDS = 20;
 const VIEWER = `document.querySelector('cager-viewer-page').shadowRoot.querySelector('cager-viewer')`;
 
 interface Opening {
-  /** Until the model is on the screen in its rest pose with its cage, and until the first decoded frame is. */
+  /** Until the model is on the screen in its rest pose, and until the first decoded frame is. */
   readonly restSeconds: number;
   readonly frameSeconds: number;
   readonly pageBytes: number;
@@ -69,7 +69,7 @@ try {
       `${kilobytes(first)}, ${(first / whole).toFixed(2)} × of both`,
       '1.5 ×',
     ],
-    ['time to the first picture: rest pose and cage, on loopback', seconds(({ restSeconds }) => restSeconds), '1.5 s'],
+    ['time to the first picture: the rest pose, on loopback', seconds(({ restSeconds }) => restSeconds), '1.5 s'],
     ['time to the first decoded frame, on loopback', seconds(({ frameSeconds }) => frameSeconds), '–'],
     [
       `playing ${FRAME_RATE} frames in a second`,

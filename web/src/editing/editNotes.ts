@@ -31,8 +31,7 @@ export function editNotes(part: StaticPart, keeping: Keeping) {
   ${
     isCoded
       ? html`<p class="muted">
-          The corrections that this file stores beside its cages belong to the cages as they were: an edited capture is
-          shown and exported without them.
+          Fine detail cannot follow edits and is left out of an edited capture, here and in exports.
         </p>`
       : nothing
   }`;

@@ -150,10 +150,10 @@ export class CageEditor extends EventTarget {
     const { model } = this;
     switch (command.kind) {
       case 'undo':
-        this.say(model.undo() ? 'Undone.' : 'There is nothing to undo.');
+        this.say(model.undo() ? 'Undone.' : 'Nothing to undo.');
         break;
       case 'redo':
-        this.say(model.redo() ? 'Done again.' : 'There is nothing to do again.');
+        this.say(model.redo() ? 'Redone.' : 'Nothing to redo.');
         break;
       case 'clear':
         this.select([]);

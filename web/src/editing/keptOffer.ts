@@ -65,8 +65,8 @@ export class KeptOffer extends LitElement {
     return html`
       <p role="status">${what} from ${when} ${edits.length === 1 ? 'is' : 'are'} still in this browser.</p>
       <div>
-        <button class="primary" @click=${() => this.dispatchEvent(new Event('takeup'))}>Take up again</button>
-        <button @click=${() => this.dispatchEvent(new Event('throwaway'))}>Throw away</button>
+        <button class="primary" @click=${() => this.dispatchEvent(new Event('takeup'))}>Restore</button>
+        <button @click=${() => this.dispatchEvent(new Event('throwaway'))}>Discard</button>
       </div>
     `;
   }

@@ -3,6 +3,7 @@ import {
   blended,
   cameraFromText,
   cameraText,
+  cornersOf,
   eyeOf,
   FIELD_OF_VIEW,
   framed,
@@ -48,7 +49,7 @@ describe('camera', () => {
   it('frames a box in wide and in narrow pictures, and no farther away than it must', () => {
     const box = { low: [1, -2, 3], high: [1.5, 2, 3.4] } as const;
     for (const aspect of [2, 1, 0.46]) {
-      const camera = framed({ ...HOME, azimuth: 0, elevation: 0 }, box, aspect);
+      const camera = framed({ ...HOME, azimuth: 0, elevation: 0 }, cornersOf(box), aspect);
       expect(camera.target).toEqual([1.25, 0, 3.2]);
       const nearest = camera.distance - 0.2;
       const needed = Math.max(2, 0.25 / aspect) / Math.tan(FIELD_OF_VIEW / 2);

@@ -44,19 +44,50 @@ export interface Box {
   readonly high: readonly [number, number, number];
 }
 
-/** Looks at a box so that it fits into the picture, whose width is `aspect` times its height, with some room around it. */
-export function framed(camera: CameraState, { low, high }: Box, aspect: number): CameraState {
-  const target = [0, 1, 2].map((k) => (low[k] + high[k]) / 2) as [number, number, number];
+/** Corners of a box, x y z each. */
+export function cornersOf({ low, high }: Box): Float64Array {
+  return Float64Array.from({ length: 24 }, (_, at) => (Math.floor(at / 3) & (1 << (at % 3)) ? high : low)[at % 3]);
+}
+
+/** Looks at points, x y z each, so that all of them fit into the picture, whose width is `aspect` times its height, with some room around them. */
+export function framed(camera: CameraState, points: ArrayLike<number>, aspect: number): CameraState {
   const { right, up, back } = axesOf(camera);
+  const axes = [right, up, back];
+  const [low, high] = [
+    [Infinity, Infinity, Infinity],
+    [-Infinity, -Infinity, -Infinity],
+  ];
+  const along = (at: number, axis: readonly number[]) =>
+    points[at] * axis[0] + points[at + 1] * axis[1] + points[at + 2] * axis[2];
+  for (let at = 0; at < points.length; at += 3) {
+    for (const [k, axis] of axes.entries()) {
+      low[k] = Math.min(low[k], along(at, axis));
+      high[k] = Math.max(high[k], along(at, axis));
+    }
+  }
+  if (points.length === 0) return camera;
+  const middle = low.map((value, k) => (value + high[k]) / 2);
   const slope = Math.tan(FIELD_OF_VIEW / 2) / ROOM;
   let distance = NEAREST;
-  for (let corner = 0; corner < 8; corner++) {
-    const offset = [0, 1, 2].map((k) => (corner & (1 << k) ? high[k] : low[k]) - target[k]);
-    const along = (axis: readonly number[]) => offset[0] * axis[0] + offset[1] * axis[1] + offset[2] * axis[2];
-    const across = Math.max(Math.abs(along(up)), Math.abs(along(right)) / aspect);
-    distance = Math.max(distance, across / slope + along(back));
+  for (let at = 0; at < points.length; at += 3) {
+    const [x, y, z] = axes.map((axis, k) => along(at, axis) - middle[k]);
+    distance = Math.max(distance, Math.max(Math.abs(y), Math.abs(x) / aspect) / slope + z);
   }
+  const target = moved(
+    [0, 0, 0],
+    axes.map((axis, k) => axis.map((value) => value * middle[k])),
+  );
   return { ...camera, target, distance: Math.min(FARTHEST, distance) };
+}
+
+/** The same camera beside a model that has moved. */
+export function shifted(camera: CameraState, by: readonly number[]): CameraState {
+  return { ...camera, target: moved(camera.target, [by]) };
+}
+
+function moved(from: readonly number[], steps: readonly (readonly number[])[]): [number, number, number] {
+  const at = (k: number) => steps.reduce((sum, step) => sum + step[k], from[k]);
+  return [at(0), at(1), at(2)];
 }
 
 /** Where the camera is. */

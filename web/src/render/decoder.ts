@@ -154,6 +154,13 @@ export class Decoder {
     this.positionPass = new Pass(positionShader(compact ? 'integers' : 'floats'), this.positionUniforms);
   }
 
+  /** What the columns of Φ multiply for the rows of a frame, x y z each. */
+  valuesOf(rows: Float32Array): Float64Array {
+    const values = new Float64Array(this.values.length);
+    this.fillColumns(rows, values);
+    return values;
+  }
+
   /** Converts a point of the capture, in its unit, to the unit of the textures; all three axes in place. */
   place(positions: Float32Array) {
     for (let k = 0; k < positions.length; k++) positions[k] = (positions[k] - this.centre[k % 3]) / this.diagonal;
@@ -183,8 +190,7 @@ export class Decoder {
   ): Texture | null {
     if (!this.ready) return null;
     this.motionTarget ??= target(this.bands, FloatType);
-    const earlier = new Float64Array(this.values.length);
-    this.fillColumns(rowsBefore, earlier);
+    const earlier = this.valuesOf(rowsBefore);
     this.fillColumns(rowsAfter, this.values);
     for (let k = 0; k < earlier.length; k++) this.values[k] -= earlier[k];
     this.multiplyBy([0, 0, 0]);

@@ -27,6 +27,7 @@ export type Side = 'decoded' | 'original' | 'both';
 
 /** CSS pixels of the canvas that something lies above. */
 export interface Covered {
+  readonly top: number;
   readonly right: number;
   readonly bottom: number;
 }

@@ -4,11 +4,10 @@ import type { Surface } from '../observed/surface';
 import { Backdrop } from './backdrop';
 import { boxOf } from './box';
 import { CageView } from './cageView';
-import { aim, FIELD_OF_VIEW, type Box, type CameraState } from './camera';
+import { aim, cornersOf, FIELD_OF_VIEW, type CameraState } from './camera';
 import { Decoder, type Pose } from './decoder';
 import type { Covered, Layers, Side, StageColors } from './drawn';
 import { Ground } from './ground';
-import { GroundLevel } from './groundLevel';
 import { ModelView } from './modelView';
 import { ObservedView } from './observedView';
 import { drawSide } from './sides';
@@ -17,6 +16,8 @@ import { createRenderer, isSoftwareRendered } from './webgl';
 
 /** Pictures that may show the same shadow where they must come fast. */
 const SHADOW_EVERY = 6;
+/** How far the ground is below the lowest point, in diagonals: what lies on it does not flicker. */
+const CLEARANCE = 0.002;
 
 /** Turns the model's axes to the scene's, whose y is up. */
 const UPRIGHT = { y: new Matrix4(), z: new Matrix4().makeRotationX(-Math.PI / 2) } as const;
@@ -58,7 +59,7 @@ export class Stage {
   /** Whether a change of its size has emptied the canvas, which had a picture. */
   wasEmptied = false;
   private up: 'y' | 'z' = 'y';
-  private readonly groundLevel = new GroundLevel();
+  private lowest = { y: Infinity, z: Infinity };
 
   /** Throws one sentence for a person where the browser or the device cannot draw this. */
   constructor(
@@ -108,14 +109,9 @@ export class Stage {
     this.setPose(this.pose);
   }
 
-  /** Takes note of frames that have come: the ground is below all of them. Rows are those of frames one after another, `rowsPerFrame` each. */
-  include(cages: Float32Array, rowsPerFrame: number) {
-    const { diagonal, centre } = this.decoder;
-    for (let first = 0; first < cages.length; first += 3 * rowsPerFrame) {
-      for (let k = first; k < first + this.cageVertices.length; k += 3) {
-        this.groundLevel.include((cages[k + 1] - centre[1]) / diagonal, (cages[k + 2] - centre[2]) / diagonal);
-      }
-    }
+  /** Has the ground lie below the lowest places of all frames along the model's y and z axis, in diagonals. */
+  layGround(y: number, z: number) {
+    this.lowest = { y, z };
     this.lowerGround();
   }
 
@@ -127,8 +123,7 @@ export class Stage {
     this.model.points.visible = hasModel && (layers.points || (layers.model && !this.hasFaces));
     this.model.handles.visible = hasModel && layers.handles;
     this.model.showColors(layers.colors);
-    // Until the model moves, the cage says that it will.
-    this.cage.group.visible = layers.cage || !this.decoder.ready;
+    this.cage.group.visible = layers.cage;
     this.ground.mesh.visible = layers.ground;
   }
 
@@ -235,7 +230,7 @@ export class Stage {
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered: the rest shows what the camera looks at. */
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
     this.pictureIsOld = true;
-    this.camera.setViewOffset(width, height, covered.right / 2, covered.bottom / 2, width, height);
+    this.camera.setViewOffset(width, height, covered.right / 2, (covered.bottom - covered.top) / 2, width, height);
     const size = `${width} ${height} ${pixelRatio}`;
     // Even an unchanged size would empty the canvas and make all its buffers anew.
     if (size === this.size) return;
@@ -273,12 +268,29 @@ export class Stage {
     drawSide(this.renderer, side, this.split, drawDecoded, () => this.drawOriginal());
   }
 
-  /** A box around the model as it is now, or around the cage before there is one. */
-  bounds(): Box {
-    if (!this.pose || !this.decoder.ready) return boxOf(this.cageVertices, this.upright.matrix);
-    const positions = this.decoder.readPositions();
-    this.decoder.place(positions);
-    return boxOf(positions, this.upright.matrix);
+  /** Points, x y z each, in diagonals and in the model's axes, as they are in the scene. */
+  inScene(points: Float64Array | readonly number[]): Float64Array {
+    const turned = Float64Array.from(points);
+    const point = new Vector3();
+    for (let k = 0; k < turned.length; k += 3)
+      point.fromArray(turned, k).applyMatrix4(this.upright.matrix).toArray(turned, k);
+    return turned;
+  }
+
+  /** Corners of a box around the model at rest. */
+  restCorners(): Float64Array {
+    const rest = Float32Array.from(this.capture.rest);
+    this.decoder.place(rest);
+    return cornersOf(boxOf(rest, this.upright.matrix));
+  }
+
+  /** Has the ground and its shadow go along with the model, whose middle is at this place of the scene. */
+  moveGround(middle: ArrayLike<number>) {
+    const { x, z } = this.ground.middle;
+    if (x === middle[0] && z === middle[2]) return;
+    this.ground.middle.x = middle[0];
+    this.ground.middle.z = middle[2];
+    this.shadowIsOld = this.pictureIsOld = true;
   }
 
   dispose() {
@@ -322,15 +334,14 @@ export class Stage {
   private putGroundBelow(positions: Float32Array) {
     const { low, high } = boxOf(positions, this.upright.matrix);
     if (!Number.isFinite(low[1])) return;
-    const level = this.groundLevel.see(low[1], boxOf(this.cageVertices, this.upright.matrix).low[1]);
-    this.ground.middle.set((low[0] + high[0]) / 2, level, (low[2] + high[2]) / 2);
+    this.ground.middle.set((low[0] + high[0]) / 2, low[1] - CLEARANCE, (low[2] + high[2]) / 2);
     this.shadowIsOld = this.pictureIsOld = true;
     this.lowerGround();
   }
 
   /** Keeps the ground below all frames that are known. */
   private lowerGround() {
-    const level = this.groundLevel.below(this.up);
+    const level = this.lowest[this.up] - CLEARANCE;
     if (level >= this.ground.middle.y) return;
     this.ground.middle.y = level;
     this.shadowIsOld = this.pictureIsOld = true;

@@ -31,11 +31,11 @@ const INSTEAD: Readonly<Record<string, string>> = {
 
 /** What to add to the service's detail. */
 const ADVICE: Readonly<Record<string, string>> = {
-  unauthorized: 'Sign in with an access token; whoever runs the service gives them out.',
+  unauthorized: 'Sign in with an access token; ask your administrator for one.',
   'quota-exceeded': 'Delete sessions that are no longer needed, or ask for more space.',
   'too-many-sessions': 'Delete sessions that are no longer needed.',
-  'storage-full': 'Whoever runs the service has to make room on its disk.',
-  'storage-failed': 'Whoever runs the service has to look at its disk.',
+  'storage-full': 'Ask your administrator to free space on its disk.',
+  'storage-failed': 'Ask your administrator to check its disk.',
   'frame-conflict': 'Upload into a new session.',
 };
 

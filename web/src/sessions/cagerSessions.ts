@@ -151,7 +151,7 @@ export class Sessions extends LitElement {
               }),
           )}
         </table>
-        ${rows.length === 0 ? html`<p class="nothing muted">No session is like that.</p>` : nothing}
+        ${rows.length === 0 ? html`<p class="nothing muted">No matching sessions</p>` : nothing}
       </div>
       ${
         matching > rows.length || !isWhole

@@ -8,6 +8,11 @@ export const cardsStyle = css`
     }
     thead {
       position: absolute;
+      display: block;
+      /* Its columns would make the page as wide as they are. */
+      width: 1px;
+      height: 1px;
+      overflow: hidden;
       clip-path: inset(50%);
     }
     table,

@@ -46,8 +46,8 @@ export function listNotices(
       trouble
         ? html`<div class="notice" role="alert">
             ${glyphs.alert}
-            <p>${sentenceOf(trouble.problem)} ${trouble.retryAt === null ? '' : 'The list goes on by itself.'}</p>
-            <button type="button" @click=${onRetry}>Try now</button>
+            <p>${sentenceOf(trouble.problem)} ${trouble.retryAt === null ? '' : 'Retrying automatically.'}</p>
+            <button type="button" @click=${onRetry}>Retry now</button>
           </div>`
         : nothing
     }

@@ -26,7 +26,6 @@ export const tableHead = html`
       <th role="columnheader" scope="col">Session</th>
       <th role="columnheader" scope="col">State</th>
       <th role="columnheader" scope="col">Progress</th>
-      <th role="columnheader" scope="col" class="number">Rate</th>
       <th
         role="columnheader"
         scope="col"
@@ -68,7 +67,6 @@ export function row(row: Row): TemplateResult {
         </td>
         <td role="cell">${state(session, row.rate)}</td>
         <td role="cell">${frames(session)}</td>
-        <td role="cell" class="number" data-label="Rate">${rate(session, row.rate)}</td>
         <td role="cell" class="number" data-label="Mean error">${figures ? text.fraction(figures.meanL2) : nothing}</td>
         <td role="cell" class="number" data-label="Worst error">${figures ? text.fraction(figures.worst) : nothing}</td>
         <td role="cell" class="number" data-label="Size">${sizes(session, figures)}</td>
@@ -107,7 +105,7 @@ function stateOf(session: Session, rate: number | null): [string, string] {
     case 'failed':
       return ['failed', 'Failed'];
     case 'ready':
-      return rate !== null && rate > 0 ? ['running', 'Running'] : ['waiting', 'Waiting'];
+      return rate !== null && rate > 0 ? ['running', `Running, ${text.perSecond(rate)}`] : ['waiting', 'Waiting'];
   }
 }
 
@@ -129,10 +127,6 @@ function frames(session: Session) {
     ${solved === known ? nothing : html`<progress aria-label="Frames solved" max=${known} value=${solved}></progress>`}
     ${remarks.length > 0 ? html`<div class="small">${remarks.join(' · ')}</div>` : nothing}
   `;
-}
-
-function rate(session: Session, rate: number | null) {
-  return session.state === 'ready' && rate !== null && rate > 0 ? text.perSecond(rate) : nothing;
 }
 
 function sizes(session: Session, figures: Figures | null) {
@@ -179,7 +173,7 @@ function remarks(session: Session) {
     html`<p class="problem ${look}">${glyphs.alert}<span>${sentence}</span></p>`;
   return html`
     <tr class="more" role="row">
-      <td role="cell" colspan="9">
+      <td role="cell" colspan="8">
         ${wrong ? line('', problemFrom(wrong).message) : nothing}
         ${
           warnings.length > 0

@@ -59,7 +59,7 @@ export class SignIn extends LitElement {
     return html`
       <form @submit=${this.#submit}>
         <h2>Sign in</h2>
-        <p class="muted">This service wants an access token. Whoever runs it gives tokens out.</p>
+        <p class="muted">This service needs an access token. Ask your administrator for one.</p>
         <div class="field">
           <label for="token">Access token</label>
           <input

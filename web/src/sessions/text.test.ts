@@ -20,7 +20,7 @@ test('figures_have_as_many_digits_as_people_need', () => {
     '2.0 GB',
   ]);
   expect([3.14159, 38.2, 1204].map(ratio)).toEqual(['3.1×', '38×', '1,204×']);
-  expect([0.42, 3.25, 1500].map(perSecond)).toEqual(['0.42/s', '3.3/s', '1,500/s']);
+  expect([0.42, 3.25, 1500].map(perSecond)).toEqual(['0.42 frames/s', '3.3 frames/s', '1,500 frames/s']);
 });
 
 test('times_are_told_in_the_units_that_matter', () => {

@@ -32,9 +32,9 @@ export function ratio(value: number): string {
   return `${value < 10 ? value.toFixed(1) : count(value)}×`;
 }
 
-/** `12 /s`, `0.4 /s`. */
+/** `12 frames/s`, `0.4 frames/s`. */
 export function perSecond(value: number): string {
-  return `${value < 10 ? decimal(value, 2) : count(value)}/s`;
+  return `${value < 10 ? decimal(value, 2) : count(value)} frames/s`;
 }
 
 /** A span of time in its two largest units or less: `45 s`, `3 min`, `2 h 5 min`, `4 days`. */

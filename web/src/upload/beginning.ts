@@ -39,9 +39,15 @@ export function jobOf(service: Service, plan: Plan, kept: KeptUpload): UploadJob
   return new UploadJob(service, plan, request, kept);
 }
 
-/** A name for a capture: the folder that was dropped, or the file of the frames, says best what it is. */
+/** What files and folders are called that say nothing of what is in them. */
+const SAYS_NOTHING =
+  /^(frames?|anim(ation)?s?|positions?|points|vertices|rest([-_ ]?pose)?|cage|mesh|model|capture)?[-_. ]*\d*$/i;
+
+/** A name for a capture: that of the folder that was dropped, of the file of the frames or of the rest pose, the first one that says something; else the date. */
 export function captureName(plan: Plan, dropped: readonly Dropped[], items: readonly Item[]): string {
   const path = dropped.find(({ path }) => path.includes('/'))?.path;
   const frames = items.find((item) => item.role === 'frames')?.files[0];
-  return path?.split('/')[0] ?? (frames ?? plan.rest).name.replace(/\.[^.]*$/, '');
+  const names = [path?.split('/')[0], ...[frames, plan.rest].map((file) => file?.name.replace(/\.[^.]*$/, ''))];
+  const date = new Date().toLocaleString('en-GB', { dateStyle: 'medium', timeStyle: 'short' });
+  return names.find((name) => name !== undefined && !SAYS_NOTHING.test(name)) ?? `Capture of ${date}`;
 }

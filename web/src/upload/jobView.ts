@@ -31,7 +31,7 @@ const TITLES: Readonly<Record<Stage, string>> = {
   completing: 'Writing the container',
   completed: 'Encoded',
   stopped: 'Stopped',
-  failed: 'This did not work',
+  failed: 'Upload failed',
 };
 
 /** An upload: how far it is, what its errors are, and what can be done about it. */
@@ -85,7 +85,7 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
         ${
           canWatch
             ? html`<a class="button primary" href="#/session/${encodeURIComponent(session.id)}"
-                >${glyphs.play} ${stage === 'completed' ? 'Look at it' : 'Watch it live'}</a
+                >${glyphs.play} ${stage === 'completed' ? 'Open in viewer' : 'Watch live'}</a
               >`
             : nothing
         }
@@ -101,13 +101,13 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
                   ${job.isAnew ? 'Start again' : stage === 'stopped' ? 'Go on' : 'Try again'}
                 </button>
                 <button type="button" @click=${actions.discard}>
-                  ${session ? 'Delete what was sent' : 'Put it away'}
+                  ${session ? 'Delete what was sent' : 'Dismiss'}
                 </button>`
             : nothing
         }
         ${stage === 'completed' ? html`<button type="button" @click=${actions.another}>Upload another capture</button>` : nothing}
       </div>
-      ${stage === 'sending' ? html`<p class="muted">You can look at it meanwhile; the upload goes on while this tab is open, and can be taken up again after that.</p>` : nothing}
+      ${stage === 'sending' ? html`<p class="muted">You can watch it meanwhile. The upload continues while this tab is open, and can be resumed later.</p>` : nothing}
     </section>
   `;
 }

@@ -89,10 +89,10 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
       <div class="field">
         <label for="accuracy">Accuracy</label>
         <select id="accuracy" aria-describedby="accuracy-hint" @change=${set('accuracy')}>
-          ${option('accuracy', 'cages', 'As the cage allows')}
-          ${option('accuracy', 'preview', 'Preview: small, cages alone')}
-          ${option('accuracy', 'standard', 'Standard: errors nobody sees')}
-          ${option('accuracy', 'master', 'Master: 0.01 % at most')} ${option('accuracy', 'bound', 'An error of my own')}
+          ${option('accuracy', 'cages', 'Cages only, no error limit')}
+          ${option('accuracy', 'preview', 'Preview: small, cages only')}
+          ${option('accuracy', 'standard', 'Standard: visually lossless')}
+          ${option('accuracy', 'master', 'Master: 0.01 % at most')} ${option('accuracy', 'bound', 'Custom limit')}
         </select>
         <span class="hint" id="accuracy-hint">
           ${isCoded ? 'Frames are coded in groups, and the container is small.' : 'Cages are kept exactly; details that they cannot follow are lost.'}
@@ -123,7 +123,7 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
           type="number"
           min="0.001"
           step="any"
-          placeholder="not said"
+          placeholder="auto"
           .value=${choices.frameRate}
           @input=${set('frameRate')}
         />
@@ -197,10 +197,9 @@ function cageFields(choices: Choices, set: Set, option: Option) {
     ${
       isDesigned
         ? html`<div class="field">
-            <label for="cage-goal">It has</label>
+            <label for="cage-goal">Target</label>
             <select id="cage-goal" @change=${set('cageGoal')}>
-              ${option('cageGoal', 'vertices', 'a number of vertices')}
-              ${option('cageGoal', 'error', 'as few vertices as an error allows')}
+              ${option('cageGoal', 'vertices', 'vertex count')} ${option('cageGoal', 'error', 'error')}
             </select>
           </div>`
         : ''

@@ -35,6 +35,7 @@ export function perform(action: Action, viewer: CagerViewer) {
     worst: () => goToWorst(player),
     frame: () => player.frameAll(),
     home: () => player.goHome(),
+    follow: () => (player.isFollowing = !player.isFollowing),
     turnLeft: () => turn(-TURN, 0),
     turnRight: () => turn(TURN, 0),
     turnUp: () => turn(0, TURN),

@@ -61,7 +61,8 @@ export class Beside implements Companion {
     if (player.controls.destination !== lead.controls.destination) player.controls.go(lead.controls.destination, true);
     if (player.layers !== lead.layers) player.layers = lead.layers;
     if (player.up !== lead.up) player.setUp(lead.up);
-    if (player.heatMap.kind !== lead.heatMap.kind) player.setHeat(lead.heatMap.kind);
+    const { kind, range } = lead.heatMap;
+    if (player.heatMap.kind !== kind || player.heatMap.range !== range) player.setHeat(kind, range);
     player.follow(lead, { ...this.transportAt(lead.transport), playing: false });
   }
 

@@ -227,7 +227,8 @@ export class CagerViewer extends CaptureElement {
         recordable: canRecord(),
       })}
       ${this.editing.panel(stem(this))} ${this.spectrum.panel(this.look)} ${this.poses.panel()}
-      ${this.figures ? figuresPanel(player) : nothing} ${legend(player, this.comparisonActs, this.panelShare > 0)}
+      ${this.figures ? figuresPanel(player, () => (this.figures = false)) : nothing}
+      ${legend(player, this.comparisonActs, this.panelShare > 0)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
       ${
         opening !== null
@@ -317,7 +318,7 @@ export class CagerViewer extends CaptureElement {
 
   private resize() {
     this.layout.apply(this.player, this.pair.player, this.coveredShare);
-    if (!this.link.cameraWasMoved) this.player?.goHome(true);
+    if (this.player?.isHome) this.player.goHome(true);
   }
 
   /** Does what a key asks for; a page that shows nothing else can hand it all key presses. */
@@ -327,7 +328,6 @@ export class CagerViewer extends CaptureElement {
     const action = this.player && actionOfKey(event);
     if (!action) return;
     event.preventDefault();
-    if (action.startsWith('turn') || action.startsWith('zoom')) this.link.cameraWasMoved = true;
     perform(action, this);
   };
 }

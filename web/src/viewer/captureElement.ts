@@ -61,7 +61,8 @@ export abstract class CaptureElement extends LitElement {
   set up(axis: 'y' | 'z') {
     this.link.up = axis;
     this.player?.setUp(axis);
-    this.player?.frameAll();
+    if (this.player?.isHome) this.player.goHome();
+    else this.player?.frameAll();
   }
 
   /** Positions of a frame as they are decoded for the picture, x y z of each point. */
@@ -172,10 +173,7 @@ export abstract class CaptureElement extends LitElement {
       this.announceReady(player);
     };
     player.onTick = () => this.tick();
-    player.controls.onGrab = () => {
-      this.link.cameraWasMoved = true;
-      this.canvas.focus();
-    };
+    player.controls.onGrab = () => this.canvas.focus();
     this.began(player);
     this.link.show(view, player, true);
     // It is the view of this capture, not of the next one.

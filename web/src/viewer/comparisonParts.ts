@@ -4,7 +4,7 @@ import type { Side } from '../render/drawn';
 import type { Dropped } from '../upload/classify';
 import { pickedFiles } from '../upload/drop';
 import { glyph } from './glyphs';
-import type { MeasuredFrame } from './heatMap';
+import type { HeatRange, MeasuredFrame } from './heatMap';
 import { pressLabel } from './messages';
 import type { Player } from './player';
 import { grouped, percent, threeDigits } from './text';
@@ -50,7 +50,7 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
         ${glyph('close')}
       </button>
     </div>
-    ${showsErrors ? errorFigures(player, measured) : nothing}
+    ${showsErrors ? [errorFigures(player, measured), surfaces ? nothing : rangeChoice(player)] : nothing}
     <div class="sides" role="group" aria-label="What is shown">
       ${sides.map(
         (side) =>
@@ -60,6 +60,21 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
       )}
     </div>
   `;
+}
+
+const RANGE_NAMES: Readonly<Record<HeatRange, string>> = { clip: 'Whole clip', frame: 'This frame' };
+
+/** Which points the warm end of the colours is of: 99 of 100 stay below it. */
+export function rangeChoice(player: Player) {
+  const { kind, range } = player.heatMap;
+  return html`<div class="sides two" role="group" aria-label="What 99 of 100 points stay below, over">
+    ${(Object.keys(RANGE_NAMES) as HeatRange[]).map(
+      (each) =>
+        html`<button aria-pressed=${String(each === range)} @click=${() => player.setHeat(kind, each)}>
+          ${RANGE_NAMES[each]}
+        </button>`,
+    )}
+  </div>`;
 }
 
 function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {

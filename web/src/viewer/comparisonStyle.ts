@@ -46,6 +46,10 @@ export const comparisonStyle = css`
     grid-template-columns: repeat(3, 1fr);
     gap: 2px;
   }
+  .sides.two {
+    grid-template-columns: repeat(2, 1fr);
+    margin: 6px 0;
+  }
   .sides button {
     min-height: 30px;
     padding: 0 4px;

@@ -1,9 +1,10 @@
 import { html, nothing } from 'lit';
+import { glyph } from './glyphs';
 import type { Player } from './player';
 import { bitrate, grouped, percent, SYSTEM_NAMES } from './text';
 
 /** Figures about the capture and the playing. */
-export function figuresPanel(player: Player) {
+export function figuresPanel(player: Player, close: () => void) {
   const { static: part, frames, frameBytes } = player.capture;
   const { decoder } = player.stage;
   const points = part.rest.length / 3;
@@ -17,7 +18,10 @@ export function figuresPanel(player: Player) {
   const { live = null, residuals = null } = player.capture;
   const connection = residuals?.bytesPerSecond ?? null;
   return html`<aside class="panel glass" aria-label="Figures">
-    <h2>Capture</h2>
+    <header>
+      <h2>Capture</h2>
+      <button class="quiet icon" title="Close" aria-label="Close the figures" @click=${close}>${glyph('close')}</button>
+    </header>
     <dl>
       ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
       ${row('Frames', grouped(frames))}
@@ -29,7 +33,7 @@ export function figuresPanel(player: Player) {
       ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
     </dl>
     <p class="muted">${SYSTEM_NAMES[part.system]}</p>
-    <h2>Bytes while it plays</h2>
+    <h2>Bandwidth</h2>
     <dl>
       ${fileRate === null ? nothing : row('Frames of this file', bitrate(fileRate))}
       ${row('Cages before compression', bitrate(cageRate))} ${row('All points, not compressed', bitrate(rawRate))}
@@ -57,9 +61,8 @@ export function figuresPanel(player: Player) {
     }
     <h2>This browser</h2>
     <dl>
-      ${row('Pictures per second', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
-      ${row('Frames passed over', grouped(player.playback.dropped))}
-      ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
+      ${row('FPS', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
+      ${row('Dropped frames', grouped(player.playback.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
       ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}
     </dl>
   </aside>`;

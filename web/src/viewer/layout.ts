@@ -6,6 +6,8 @@ const NARROW = 680;
 const FINEST_PIXEL_RATIO = 2;
 /** Two pictures stand side by side in a viewer that is wider than this part of its height, else one above the other. */
 const WIDE = 1.1;
+/** Between what floats and the border of the picture. */
+const GAP = 12;
 
 /** Fits pictures into the viewer: how large they are, and how much of them is covered by what floats above. */
 export class Layout {
@@ -31,19 +33,21 @@ export class Layout {
     this.deckHeight = this.measureDeck();
     this.panelShare = panelShare;
     this.beside = beside;
-    const tools = this.host.renderRoot.querySelector('.tools')?.clientWidth ?? 0;
-    // In a wide picture the tools stand beside the model anyway.
+    // In a wide picture tools and title stand beside the model anyway.
     const isNarrow = clientWidth < NARROW;
-    const right = isNarrow ? tools + 12 : 0;
+    const [tools, lead] = ['.tools', '.lead'].map((part) => this.host.renderRoot.querySelector(part));
+    const right = isNarrow ? (tools?.clientWidth ?? 0) + GAP : 0;
+    const top = isNarrow ? (lead?.clientHeight ?? 0) + GAP : 0;
     const bottom = this.deckHeight + (isNarrow ? Math.round(panelShare * clientHeight) : 0);
     this.host.style.setProperty('--covered-height', `${bottom}px`);
     const isWide = clientWidth > WIDE * clientHeight;
     this.host.setAttribute('pictures', beside === null ? 'one' : isWide ? 'columns' : 'rows');
-    if (beside === null) player?.resize(clientWidth, clientHeight, ratio, { right, bottom });
+    if (beside === null) player?.resize(clientWidth, clientHeight, ratio, { top, right, bottom });
     else {
       const width = isWide ? Math.floor(clientWidth / 2) : clientWidth;
       const height = isWide ? clientHeight : Math.floor((clientHeight - bottom) / 2);
-      for (const each of [player, beside]) each?.resize(width, height, ratio, { right, bottom: isWide ? bottom : 0 });
+      const covered = { top, right, bottom: isWide ? bottom : 0 };
+      for (const each of [player, beside]) each?.resize(width, height, ratio, covered);
     }
   }
 

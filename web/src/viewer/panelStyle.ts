@@ -19,8 +19,14 @@ const ownStyle = css`
     font-weight: 650;
     color: var(--cager-muted);
   }
-  .panel h2:first-child {
-    margin-top: 0;
+  .panel header {
+    display: flex;
+    align-items: center;
+    justify-content: space-between;
+    margin: -6px -8px 0 0;
+  }
+  .panel header h2 {
+    margin: 0;
   }
   .panel dl {
     display: grid;
@@ -141,7 +147,7 @@ const ownStyle = css`
   @container (max-width: 680px) {
     .panel {
       top: auto;
-      right: var(--cager-space-2);
+      right: calc(var(--cager-control) + 18px + var(--cager-space-2));
       left: var(--cager-space-2);
       bottom: calc(var(--deck-height, 120px) + 2 * var(--cager-space-3));
       width: auto;

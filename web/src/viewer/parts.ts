@@ -3,7 +3,8 @@ import type { FrameErrors } from '../capture';
 import { heatGradient } from '../render/colorMap';
 import type { FrameRange } from '../editing/cageEdit';
 import type { Layers } from '../render/drawn';
-import { comparisonPanel, type ComparisonActs } from './comparisonParts';
+import { comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
+import { numberAt, numberText } from './frameNumbers';
 import { glyph, type GlyphName } from './glyphs';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
@@ -75,7 +76,9 @@ export function toolbar(
     ${tool('spectrum', 'spectrum', 'Singular values and vectors', act, shown.spectrum)}
     ${tool('beside', 'beside', 'Compare with another capture', act, shown.beside)}
     <hr />
-    ${tool('frame', 'frame', 'Frame the model', act)} ${tool('picture', 'camera', 'Save a picture', act)}
+    ${tool('frame', 'frame', 'Frame all of the motion', act)}
+    ${tool('follow', 'follow', 'Follow the model', act, player.isFollowing)}
+    ${tool('picture', 'camera', 'Save a picture', act)}
     ${
       shown.recordable
         ? tool(
@@ -94,12 +97,15 @@ export function toolbar(
 
 /** Name and size of the capture. */
 export function titleBox(heading: string, { capture }: Player, isEdited: boolean) {
-  const { static: part, frames, tracking } = capture;
+  const { static: part, frames, tracking, frameNumbers } = capture;
+  // Frames are counted from 0 unless they have numbers of their own: the place beside the timeline is one of these.
+  const [first, last] = [0, Math.max(0, frames - 1)].map((frame) => numberText(numberAt(frameNumbers, frame)));
   const lost = tracking?.outcomes.filter((_, frame) => isLost(tracking, frame)).length ?? 0;
   return html`<div class="title glass">
     <h1 title=${heading}>${heading}</h1>
     <p class="figures">
-      ${grouped(part.rest.length / 3)} points, ${grouped(frames)} frames<span class="more"
+      ${grouped(part.rest.length / 3)} points, ${grouped(frames)}
+      frames${frames > 1 ? ` (${first}–${last})` : nothing}<span class="more"
         >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
       >${lost > 0 ? html`, <span class="lost">${grouped(lost)} lost</span>` : nothing}${isEdited ? ', edited' : nothing}
     </p>
@@ -145,7 +151,7 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
     >
       ${glyph(transport.playing ? 'pause' : 'play')}
     </button>
-    ${tool('previous', 'previous', 'One frame back', act)} ${tool('next', 'next', 'One frame on', act)}
+    ${tool('previous', 'previous', 'Previous frame', act)} ${tool('next', 'next', 'Next frame', act)}
     ${tool('loop', 'loop', 'Loop', act, transport.loop)}
     ${figures ? tool('worst', 'worst', 'Frame with the largest error', act) : nothing}
     <select
@@ -193,7 +199,10 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
       isMotion
         ? html`Movement from frame to frame
             <div class="bar" .style=${`background: ${heatGradient()}`}></div>
-            <div class="ends figures"><span>0</span><span>${percent(heatMap.largest)} of the diagonal</span></div>`
+            <div class="ends figures">
+              <span>0</span><span>${percent(heatMap.largest)} of the diagonal and more</span>
+            </div>
+            ${rangeChoice(player)}`
         : nothing
     }
     ${compares ? comparisonPanel(player, acts) : nothing}
@@ -227,8 +236,8 @@ export function helpSheet(close: () => void) {
       )}
     </div>
     <p class="muted">
-      Drag to turn, drag with the right button or two fingers to move, turn the wheel or pinch to come nearer.
-      Double-click to frame the model.
+      Drag to turn, drag with the right button or two fingers to move, turn the wheel or pinch to zoom. Double-click to
+      frame all of the motion.
     </p>
   </dialog>`;
 }

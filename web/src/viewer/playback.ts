@@ -1,6 +1,7 @@
-import type { Capture } from '../capture';
+import type { Capture, FrameBlock } from '../capture';
 import type { Original } from '../originals/original';
 import { FrameStore, type FrameEdit } from '../render/frameStore';
+import type { Motion } from '../render/motion';
 import type { Stage } from '../render/stage';
 import { Comparison } from './comparison';
 import { blendedRows, FrameFeed, type Blend } from './frameFeed';
@@ -28,6 +29,8 @@ export interface Companion {
 
 /** Whom a playback tells what has happened. */
 export interface PlaybackListener {
+  /** Frames have come. */
+  arrived(block: FrameBlock): void;
   /** Another picture is due. */
   wake(): void;
   /** What is drawn has changed where the place has not. */
@@ -69,14 +72,15 @@ export class Playback {
   constructor(
     private readonly capture: Capture,
     private readonly stage: Stage,
+    motion: Motion,
     private readonly listener: PlaybackListener,
   ) {
     this.store = new FrameStore(capture);
     this.store.onArrival = () => listener.wake();
     this.store.onReplaced = () => this.replaceFrames();
-    this.store.onBlock = ({ cages }) => stage.include(cages, capture.static.rowsPerFrame);
+    this.store.onBlock = (block) => listener.arrived(block);
     this.feed = new FrameFeed(capture, this.store, () => listener.wake());
-    this.heatMap = new HeatMap(capture, stage, this.store);
+    this.heatMap = new HeatMap(stage, this.store, motion);
     this.heatMap.onChange = () => {
       listener.changed();
       listener.wake();
@@ -177,7 +181,7 @@ export class Playback {
     const [offsets, next] = isWhole ? [null, null] : [here.offsets, there?.offsets ?? null];
     this.stage.setPose({ rows, before: offsets, after: next, mix });
     this.comparison.update(before);
-    this.heatMap.measure(before, original);
+    this.heatMap.measure(before, this.state.frames, original);
     if (this.isObserving && this.observing !== before) void this.observe(before);
   }
 
@@ -232,7 +236,7 @@ export class Playback {
     if (this.isClosed || !this.comparison.isOpen) return;
     this.buffering = false;
     this.comparison.close();
-    this.heatMap.show('none');
+    this.heatMap.show('none', this.heatMap.range);
     this.listener.refresh();
     this.listener.problem(sentence(error));
   }

@@ -1,16 +1,18 @@
-import type { Capture } from '../capture';
-import { framed, HOME, zoomed, type CameraState } from '../render/camera';
+import type { Capture, FrameBlock } from '../capture';
+import { framed, HOME, nearlySame, shifted, zoomed, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
 import type { Covered, Layers } from '../render/drawn';
 import type { FrameEdit } from '../render/frameStore';
+import { Motion } from '../render/motion';
 import { Stage } from '../render/stage';
 import { followBandwidth } from './bandwidth';
 import type { Comparison } from './comparison';
-import type { Heat, HeatMap } from './heatMap';
+import type { Heat, HeatMap, HeatRange } from './heatMap';
 import { isFetched, phiOf } from './phi';
 import { Playback, type Deformation } from './playback';
 import { Quality } from './quality';
 import { Resolution } from './resolution';
+import { surveyMotion } from './survey';
 import { sentence } from './text';
 import { advanced, type Transport } from './transport';
 import { USUAL_LAYERS } from './viewState';
@@ -23,6 +25,8 @@ export interface Progress {
 
 /** Longest step of the clock: a tab that was hidden goes on where it was. */
 const LONGEST_STEP = 0.1;
+/** Seconds before and after a frame over which the way of a camera that follows is smoothed. */
+const FOLLOW_SECONDS = 0.5;
 
 /** Plays one capture on a canvas: clock, frames, decoding and camera. The element around it shows the controls. */
 export class Player {
@@ -41,6 +45,12 @@ export class Player {
   readonly heatMap: HeatMap;
   /** The original frames, where they are at hand. */
   readonly comparison: Comparison;
+  private readonly motion: Motion;
+  /** The camera that frames the motion as it was known last, and whether it does so from the usual side. */
+  private fitted: CameraState | null = null;
+  private fitsFromHome = false;
+  private follows = false;
+  private isSurveyed = false;
   private readonly stop = new AbortController();
   private shownLayers = USUAL_LAYERS;
   private scheduled = 0;
@@ -66,7 +76,15 @@ export class Player {
     this.resolution = new Resolution(this.stage);
     this.controls = new CameraControls(canvas);
     this.controls.onMove = () => this.wake();
-    this.playback = new Playback(capture, this.stage, {
+    const { rowsPerFrame, cage, rest } = capture.static;
+    this.motion = new Motion(rowsPerFrame, cage.positions.length / 3, rest, this.stage.decoder);
+    this.motion.onGrowth = () => {
+      this.stage.layGround(...this.motion.lowest);
+      this.refit();
+      this.heatMap.grow();
+    };
+    this.playback = new Playback(capture, this.stage, this.motion, {
+      arrived: (block) => this.include(block),
       wake: () => this.wake(),
       refresh: () => this.refresh(),
       changed: () => this.onState(),
@@ -117,8 +135,8 @@ export class Player {
     this.refresh();
   }
 
-  setHeat(heat: Heat) {
-    this.heatMap.show(heat);
+  setHeat(heat: Heat, range: HeatRange = this.heatMap.range) {
+    this.heatMap.show(heat, range);
     this.refresh();
   }
 
@@ -136,24 +154,60 @@ export class Player {
     this.refresh();
   }
 
-  /** Shows all of the capture as it is now, from the side the camera is on or from the usual one. */
+  /** Frames the model in all frames that are known, from the side the camera is on; relative to its middle where the camera follows it. */
   frameAll(from: CameraState = this.controls.destination, atOnce = false) {
     const { clientWidth, clientHeight } = this.stage.canvas;
-    const { right, bottom } = this.resolution.covered;
-    const free = Math.max(1, clientHeight - bottom);
-    const fitting = framed(from, this.stage.bounds(), Math.max(1, clientWidth - right) / free);
-    this.controls.go(zoomed(fitting, clientHeight / free), atOnce);
+    const { top, right, bottom } = this.resolution.covered;
+    const free = Math.max(1, clientHeight - top - bottom);
+    const corners = this.motion.isEmpty
+      ? this.stage.restCorners()
+      : this.stage.inScene(this.motion.corners(this.follows ? this.followReach : null));
+    const fitting = framed(from, corners, Math.max(1, clientWidth - right) / free);
+    const camera = zoomed(fitting, clientHeight / free);
+    this.fitsFromHome = false;
+    if (this.fitted && this.controls.destination === this.fitted && nearlySame(camera, this.fitted)) return;
+    this.fitted = camera;
+    this.controls.go(camera, atOnce);
   }
 
-  /** Shows all of the capture from the usual side. */
+  /** Frames the motion from the usual side. */
   goHome(atOnce = false) {
     this.frameAll(HOME, atOnce);
+    this.fitsFromHome = true;
+  }
+
+  /** Whether the camera frames the motion from the usual side, as nobody has moved it. */
+  get isHome(): boolean {
+    return this.fitsFromHome && this.controls.destination === this.fitted;
+  }
+
+  /** Whether the camera goes along with the middle of the model. */
+  get isFollowing(): boolean {
+    return this.follows;
+  }
+
+  set isFollowing(follows: boolean) {
+    if (follows === this.follows) return;
+    const wasFitted = this.controls.destination === this.fitted;
+    const { isHome } = this;
+    const centre = this.centre();
+    this.follows = follows;
+    this.controls.go(shifted(this.controls.destination, follows ? centre.map((value) => -value) : centre), true);
+    if (wasFitted) this.frameAll(isHome ? HOME : undefined);
+    this.fitsFromHome = isHome;
+    this.refresh();
+  }
+
+  /** The camera of the picture: that of the controls, beside the model where it follows it. */
+  get camera(): CameraState {
+    const { camera } = this.controls;
+    return this.follows ? shifted(camera, this.centre()) : camera;
   }
 
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered. */
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
     this.resolution.resize(width, height, pixelRatio, covered, this.isMoving ? this.quality.moving : this.resting);
-    if (this.stage.wasEmptied) this.stage.draw(this.controls.camera);
+    if (this.stage.wasEmptied) this.stage.draw(this.camera);
     this.wake();
   }
 
@@ -179,7 +233,7 @@ export class Player {
   picture(): Promise<Blob> {
     this.resolution.share = 1;
     this.stage.renew();
-    this.stage.draw(this.controls.camera);
+    this.stage.draw(this.camera);
     return new Promise((resolve, reject) => {
       this.stage.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The picture could not be made.'))));
     });
@@ -199,13 +253,15 @@ export class Player {
       const doing = isFetched(this.capture) ? 'Fetching coordinates' : 'Computing coordinates';
       const onProgress = (fraction: number) => this.report({ doing, fraction });
       onProgress(0);
-      await this.stage.decoder.setPhi(await phiOf(this.capture, onProgress, signal));
+      const phi = await phiOf(this.capture, onProgress, signal);
+      await this.stage.decoder.setPhi(phi);
       signal.throwIfAborted();
-      this.stage.setLayers(this.shownLayers);
+      this.motion.setPhi(phi);
     } catch (error) {
       if (signal.aborted) return;
       // The cage can still be looked at.
       this.stage.hideModel();
+      this.motion.setPhi(null);
       this.layers = { ...this.shownLayers, cage: true };
       this.onProblem(sentence(error));
     }
@@ -261,7 +317,8 @@ export class Player {
     if (this.isMoving && wasMoving) this.quality.measure(sinceLast);
     // Pictures become fine again one picture after everything has come to rest.
     this.resolution.share = this.isMoving || wasMoving ? this.quality.moving : this.resting;
-    this.stage.draw(this.controls.camera, this.resolution.share < 1);
+    if (!this.motion.isEmpty) this.stage.moveGround(this.centre());
+    this.stage.draw(this.camera, this.resolution.share < 1);
     playback.companion?.show();
     this.onTick(position);
     if (waited !== playback.buffering) this.onState();
@@ -273,7 +330,31 @@ export class Player {
   follow(lead: Player, transport: Transport) {
     this.playback.follow(transport);
     this.resolution.share = lead.resolution.share;
-    this.stage.draw(lead.controls.camera, lead.resolution.share < 1);
+    if (!this.motion.isEmpty) this.stage.moveGround(this.centre());
+    this.stage.draw(lead.camera, lead.resolution.share < 1);
+  }
+
+  private get followReach(): number {
+    return FOLLOW_SECONDS * this.transport.rate;
+  }
+
+  /** The middle of the model at the place that is shown, in the scene. */
+  private centre(): number[] {
+    return [...this.stage.inScene(this.motion.centreAt(this.transport.position, this.followReach))];
+  }
+
+  private include(block: FrameBlock) {
+    this.motion.include(block);
+    if (this.isSurveyed) return;
+    this.isSurveyed = true;
+    void surveyMotion(this.capture, this.motion, () => this.playback.buffering, this.stop.signal);
+  }
+
+  /** Frames the motion as it is known by now, unless somebody has moved the camera. */
+  private refit() {
+    if (this.controls.destination !== this.fitted) return;
+    if (this.fitsFromHome) this.goHome(!this.isPrepared);
+    else this.frameAll(undefined, !this.isPrepared);
   }
 
   private regainContext() {
@@ -284,8 +365,6 @@ export class Player {
 
   private loseContext(event: Event) {
     event.preventDefault();
-    this.onProblem(
-      'The graphics processor was taken away from the page; the picture comes back as soon as it is free.',
-    );
+    this.onProblem('GPU context lost; recovering.');
   }
 }

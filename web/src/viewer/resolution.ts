@@ -5,7 +5,7 @@ import type { Stage } from '../render/stage';
 export class Resolution {
   /** Whether pictures stay as fine as they can be though something moves. */
   keepsFinest = false;
-  covered: Covered = { right: 0, bottom: 0 };
+  covered: Covered = { top: 0, right: 0, bottom: 0 };
   private size = { width: 1, height: 1, pixelRatio: 1 };
   private shown = 1;
 

@@ -14,6 +14,7 @@ export type Action =
   | 'worst'
   | 'frame'
   | 'home'
+  | 'follow'
   | 'turnLeft'
   | 'turnRight'
   | 'turnUp'
@@ -52,10 +53,10 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
     title: 'Play',
     entries: [
       { action: 'play', keys: [' ', 'k'], label: 'Play or pause' },
-      { action: 'previous', keys: ['ArrowLeft', ','], label: 'One frame back' },
-      { action: 'next', keys: ['ArrowRight', '.'], label: 'One frame on' },
+      { action: 'previous', keys: ['ArrowLeft', ','], label: 'Previous frame' },
+      { action: 'next', keys: ['ArrowRight', '.'], label: 'Next frame' },
       { action: 'back', keys: ['PageUp', 'j'], label: 'Ten frames back' },
-      { action: 'forth', keys: ['PageDown'], label: 'Ten frames on' },
+      { action: 'forth', keys: ['PageDown'], label: 'Ten frames forward' },
       { action: 'first', keys: ['Home'], label: 'First frame' },
       { action: 'last', keys: ['End'], label: 'Last frame' },
       { action: 'slower', keys: ['<', '['], label: 'Slower' },
@@ -68,14 +69,15 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
   {
     title: 'Look',
     entries: [
-      { action: 'frame', keys: ['f'], label: 'Frame the model' },
+      { action: 'frame', keys: ['f'], label: 'Frame all of the motion' },
+      { action: 'follow', keys: ['y'], label: 'Follow the model on or off' },
       { action: 'home', keys: ['0'], label: 'Look from the front again' },
       { action: 'turnLeft', keys: ['a'], label: 'Turn left' },
       { action: 'turnRight', keys: ['d'], label: 'Turn right' },
       { action: 'turnUp', keys: ['w'], label: 'Turn up' },
       { action: 'turnDown', keys: ['x'], label: 'Turn down' },
-      { action: 'zoomIn', keys: ['+', '='], label: 'Nearer' },
-      { action: 'zoomOut', keys: ['-'], label: 'Farther' },
+      { action: 'zoomIn', keys: ['+', '='], label: 'Zoom in' },
+      { action: 'zoomOut', keys: ['-'], label: 'Zoom out' },
       { action: 'up', keys: ['z'], label: 'Which axis is up: y or z' },
       { action: 'fullscreen', keys: ['Enter'], label: 'Full screen' },
     ],
@@ -99,7 +101,7 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'spectrum', keys: ['v'], label: 'Singular values and vectors of Φ' },
       { action: 'picture', keys: ['p'], label: 'Save a picture' },
       { action: 'turntable', keys: ['t'], label: 'Record a turntable video' },
-      { action: 'help', keys: ['?'], label: 'This sheet' },
+      { action: 'help', keys: ['?'], label: 'Keyboard shortcuts' },
     ],
   },
 ];

@@ -7,8 +7,6 @@ const REST_MILLISECONDS = 300;
 
 /** The view of a player as text, for links. */
 export class ViewLink {
-  /** Whether somebody moved the camera: else it is the usual one, and no link names it. */
-  cameraWasMoved = false;
   up: 'y' | 'z' = 'y';
   private timer = 0;
 
@@ -17,10 +15,10 @@ export class ViewLink {
 
   /** Goes to a view; one that names a frame stands there. */
   show(view: ViewState, player: Player, atOnce: boolean) {
-    this.cameraWasMoved = view.camera !== null;
     this.up = view.up;
     player.layers = view.layers;
     player.setUp(view.up);
+    player.isFollowing = view.follow;
     if (view.frame !== null) player.transport = { ...sought(player.transport, view.frame), playing: false };
     if (view.camera) player.controls.go(view.camera, atOnce);
     else player.goHome(atOnce);
@@ -40,8 +38,10 @@ export class ViewLink {
     const frame = Math.floor(position);
     return viewText({
       frame: playing || frame === 0 ? null : frame,
-      camera: this.cameraWasMoved ? player.controls.destination : null,
+      // The usual camera is that of the capture, which no link needs to name.
+      camera: player.isHome ? null : player.controls.destination,
       up: this.up,
+      follow: player.isFollowing,
       layers: player.layers,
     });
   }

@@ -8,16 +8,17 @@ describe('view in a link', () => {
       frame: 17,
       camera: { target: [0.1, 0.2, -0.3], azimuth: 0.5, elevation: -0.25, distance: 2.5 },
       up: 'z',
+      follow: true,
       layers: { ...USUAL_LAYERS, cage: true, ground: false, colors: false },
     } as const;
     const read = viewFromText(viewText(view));
-    expect(read).toMatchObject({ frame: 17, up: 'z', layers: view.layers });
+    expect(read).toMatchObject({ frame: 17, up: 'z', follow: true, layers: view.layers });
     expect(read.camera!.distance).toBe(2.5);
     expect(read.camera!.azimuth).toBeCloseTo(0.5, 2);
   });
 
   it('says nothing where everything is as usual', () => {
-    expect(viewText({ frame: null, camera: null, up: 'y', layers: USUAL_LAYERS })).toBe('');
+    expect(viewText({ frame: null, camera: null, up: 'y', follow: false, layers: USUAL_LAYERS })).toBe('');
   });
 
   it('passes over what is wrong', () => {
@@ -25,6 +26,7 @@ describe('view in a link', () => {
       frame: null,
       camera: null,
       up: 'y',
+      follow: false,
       layers: USUAL_LAYERS,
     });
     expect(viewFromText('frame=1e99').frame).toBeNull();

@@ -6,6 +6,8 @@ export interface ViewState {
   readonly frame: number | null;
   readonly camera: CameraState | null;
   readonly up: 'y' | 'z';
+  /** Whether the camera follows the model. */
+  readonly follow: boolean;
   readonly layers: Layers;
 }
 
@@ -30,7 +32,7 @@ const LETTERS: Readonly<Record<keyof Layers, string>> = {
 };
 const NAMES = Object.keys(LETTERS) as (keyof Layers)[];
 
-/** Reads `frame=12&camera=…&up=z&show=mcg`; what is missing or wrong is as usual. */
+/** Reads `frame=12&camera=…&up=z&follow=1&show=mcg`; what is missing or wrong is as usual. */
 export function viewFromText(text: string): ViewState {
   const parameters = new URLSearchParams(text);
   const frame = Number(parameters.get('frame') ?? NaN);
@@ -39,16 +41,18 @@ export function viewFromText(text: string): ViewState {
     frame: Number.isSafeInteger(frame) && frame >= 0 ? frame : null,
     camera: cameraFromText(parameters.get('camera')),
     up: parameters.get('up') === 'z' ? 'z' : 'y',
+    follow: parameters.get('follow') === '1',
     layers: show === null ? USUAL_LAYERS : layersOf((name) => show.includes(LETTERS[name])),
   };
 }
 
 /** Writes what {@link viewFromText} reads; what is as usual is left out. */
-export function viewText({ frame, camera, up, layers }: ViewState): string {
+export function viewText({ frame, camera, up, follow, layers }: ViewState): string {
   const parameters = new URLSearchParams();
   if (frame !== null) parameters.set('frame', String(frame));
   if (camera) parameters.set('camera', cameraText(camera));
   if (up === 'z') parameters.set('up', up);
+  if (follow) parameters.set('follow', '1');
   if (NAMES.some((name) => layers[name] !== USUAL_LAYERS[name])) {
     const shown = NAMES.filter((name) => layers[name]).map((name) => LETTERS[name]);
     parameters.set('show', shown.join(''));

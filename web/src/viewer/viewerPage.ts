@@ -71,7 +71,7 @@ export class ViewerPage extends LitElement {
   /** A session that is shown beside the capture. */
   @state() private beside: Capture | null = null;
   @state() private waiting = '';
-  @state() private failure: string | null = null;
+  @state() private failure: Error | null = null;
   @state() private wantsToken = false;
   @query('cager-viewer') private readonly viewer!: CagerViewer | null;
   @query('cager-compare-dialog') private readonly dialog!: CompareDialog | null;
@@ -151,14 +151,15 @@ export class ViewerPage extends LitElement {
   }
 
   private message() {
+    const isGone = this.failure instanceof ServiceProblem && this.failure.isGone;
     return html`<main class="message">
       ${
         this.failure === null
           ? html`<p role="status">${this.waiting || `Opening the ${this.kind}`}</p>`
-          : html`<p role="alert">${this.failure}</p>
-              <button class="primary" @click=${this.retry}>Try again</button>`
+          : html`<p role="alert">${this.failure.message}</p>`
       }
-      <a href="#/">All sessions</a>
+      ${isGone ? nothing : html`<button class="primary" ?hidden=${this.failure === null} @click=${this.retry}>Try again</button>`}
+      <a class=${isGone ? 'button primary' : ''} href="#/">All sessions</a>
     </main>`;
   }
 
@@ -258,7 +259,7 @@ export class ViewerPage extends LitElement {
       if (signal.aborted) return;
       const problem = problemBehind(error);
       this.wantsToken = problem instanceof ServiceProblem && problem.status === 401;
-      this.failure = problem.message;
+      this.failure = problem;
     }
   }
 }

@@ -290,7 +290,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     await page.waitForTimeout(600);
     await reload();
     await page.getByText(/2 edits from .* are still in this browser/).waitFor();
-    await page.getByRole('button', { name: 'Take up again' }).click();
+    await page.getByRole('button', { name: 'Restore' }).click();
     await page
       .getByRole('checkbox', { name: /^Vertex/ })
       .nth(1)
@@ -302,7 +302,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     expect(await readPositions(page, 12)).toEqual(edited);
     await page.waitForTimeout(600);
     await reload();
-    await page.getByRole('button', { name: 'Throw away' }).click();
+    await page.getByRole('button', { name: 'Discard' }).click();
     await page.waitForTimeout(300);
     await reload();
     await page.waitForTimeout(500);

@@ -45,6 +45,34 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     expect(pages.errors).toEqual([]);
   });
 
+  it('has colours that depend on the frame and not on what was watched before', async () => {
+    const page = await opened();
+    await inViewer(page, (viewer) => viewer.pause(), null);
+    await page.keyboard.press('Home');
+    await page.keyboard.press('h');
+    await page.getByRole('group', { name: /^What 99 of 100 points/ }).waitFor();
+    const largest = async (frame: number) => {
+      await inViewer(page, (viewer, wanted) => (viewer.frame = wanted), frame);
+      await page.waitForTimeout(300);
+      return inViewer(page, (viewer) => viewer.player!.heatMap.largest, null);
+    };
+    const clip = await largest(0);
+    expect(clip).toBeGreaterThan(0);
+    expect([await largest(1), await largest(0)]).toEqual([clip, clip]);
+    await page.getByRole('button', { name: 'This frame' }).click();
+    const ofFrames = [await largest(0), await largest(1)];
+    expect(ofFrames[0]).not.toBe(ofFrames[1]);
+    expect([await largest(0), await largest(1)]).toEqual(ofFrames);
+    await dropOnViewer(page, { 'walk.npy': (await movedOriginal()).bytes });
+    await page.getByText('Distance from the original').waitFor();
+    await page.getByRole('button', { name: 'Whole clip' }).click();
+    // Once frames of the whole clip have been measured.
+    await expect
+      .poll(async () => new Set([await largest(0), await largest(1), await largest(2), await largest(0)]).size)
+      .toBe(1);
+    expect(pages.errors).toEqual([]);
+  });
+
   it('shows original and decoded model with one camera, and the line between them moves by keyboard', async () => {
     const page = await opened();
     await dropOnViewer(page, { 'walk.npy': (await movedOriginal()).bytes });

@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { seriousFindings } from './harness/axe';
-import { openPage } from './harness/browser';
+import { openPage, PHONE } from './harness/browser';
 import { cager, missing } from './harness/programs';
 import { Site } from './harness/site';
 import { SphereCapture } from './harness/sphere';
@@ -58,6 +58,28 @@ describe.skipIf(missing)('the list of sessions', { timeout: 60_000 }, () => {
     await row(page, 'arriving').getByText('Completed').waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('a_phone_shows_the_list_and_all_buttons_of_a_row_without_scrolling_sideways', async () => {
+    await site.client().encode(capture, { name: 'a name that is longer than a phone is wide, twice over' }, 4);
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/`, [], PHONE);
+    const button = page.getByRole('button', { name: /^Delete a name that is longer/ });
+    await button.waitFor();
+    const width = await page.evaluate(() => document.querySelector('cager-sessions')!.scrollWidth);
+    expect(width).toBeLessThanOrEqual(390);
+    const { x, width: wide } = (await button.boundingBox())!;
+    expect(x + wide).toBeLessThanOrEqual(390);
+    expect(errors).toEqual([]);
+    await close();
+  });
+
+  test('a_session_that_is_gone_leads_to_the_list', async () => {
+    const { page, close } = await openPage(site.browser, `${site.page}#/session/0123456789abcdef`, ['404']);
+    await page.getByRole('alert').waitFor();
+    expect(await page.getByRole('button', { name: 'Try again' }).count()).toBe(0);
+    await page.getByRole('link', { name: 'All sessions' }).click();
+    await page.getByRole('heading', { name: 'Sessions', exact: true }).waitFor();
     await close();
   });
 

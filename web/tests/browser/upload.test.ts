@@ -111,7 +111,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     );
     await page.getByText(`1,200 frames of 2,562 points`).waitFor();
     await page.getByRole('button', { name: 'Encode' }).click();
-    await page.getByText('You can look at it meanwhile').waitFor();
+    await page.getByText('You can watch it meanwhile').waitFor();
     await site.service.kill();
     await page
       .getByRole('alert')
@@ -131,7 +131,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
     await drop(page, files, { name: 'wave.npy', times: 200 });
     await page.getByRole('button', { name: 'Encode' }).click();
-    await page.getByRole('link', { name: 'Watch it live' }).click();
+    await page.getByRole('link', { name: 'Watch live' }).click();
     const id = /#\/session\/([0-9a-f]+)/.exec(page.url())![1];
     await page.locator('cager-viewer').waitFor();
     await expect.poll(async () => (await site.client().session(id)).state, { timeout: 30_000 }).toBe('completed');
@@ -212,7 +212,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     await drop(page, files, { name: 'wave.npy', times: 200 });
     await page.getByLabel('Name').fill('to be deleted');
     await page.getByRole('button', { name: 'Encode' }).click();
-    const link = page.getByRole('link', { name: 'Watch it live' });
+    const link = page.getByRole('link', { name: 'Watch live' });
     await link.waitFor();
     const deleted = (await link.getAttribute('href'))!.replace('#/session/', '');
     await expect.poll(async () => (await site.client().session(deleted)).frames.solved).toBeGreaterThan(0);
@@ -240,11 +240,11 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
       { name: 'wave.npy', times: 300 },
     );
     await page.getByRole('button', { name: 'Encode' }).click();
-    await page.getByText('You can look at it meanwhile').waitFor();
+    await page.getByText('You can watch it meanwhile').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
     await page.getByRole('heading', { name: /Stopped/ }).waitFor();
     await page.getByRole('button', { name: 'Go on' }).click();
-    await page.getByText('You can look at it meanwhile').waitFor();
+    await page.getByText('You can watch it meanwhile').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
     const before = await sessions(site);
     await page.getByRole('button', { name: 'Delete what was sent' }).click();
@@ -283,7 +283,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
     await dropAll(page);
     await page.getByLabel('Name').fill('broken off');
     await page.getByRole('button', { name: 'Encode' }).click();
-    await page.getByText('You can look at it meanwhile').waitFor();
+    await page.getByText('You can watch it meanwhile').waitFor();
     const list = async () =>
       ((await (await site.client(TOKEN).call('')).json()) as { sessions: { id: string; name: string }[] }).sessions;
     const [{ id }] = await list();
@@ -365,7 +365,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
     const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
     await drop(page, files, { name: 'wave.npy', times: 400 });
     await page.getByRole('button', { name: 'Encode' }).click();
-    await page.getByText('You can look at it meanwhile').waitFor();
+    await page.getByText('You can watch it meanwhile').waitFor();
     const other = await page.context().newPage();
     await other.goto(`${site.page}#/upload`);
     await signIn(other);
@@ -485,7 +485,7 @@ async function drop(page: Page, files: Files, repeated?: { name: string; times: 
 
 /** Waits for the end of the upload; the session's identifier. */
 async function encoded(page: Page): Promise<string> {
-  const link = page.getByRole('link', { name: 'Look at it' });
+  const link = page.getByRole('link', { name: 'Open in viewer' });
   await link.waitFor({ timeout: 40_000 });
   return (await link.getAttribute('href'))!.replace('#/session/', '');
 }

@@ -14,7 +14,7 @@ export function summary({ capture, recommendation }: Comparison) {
       : `${grouped(capture.points)} points and ${grouped(capture.triangles)} triangles`;
   const bound = `${(100 * (recommendation.accurate - 1)).toFixed(0)} %`;
   return html`
-    <h1>Ways to invert this capture, compared</h1>
+    <h1>Encoding methods compared</h1>
     <p class="lead">
       <b>${capture.source}</b>: ${sampled} of ${model}; cage <b>${capture.cage}</b> of ${grouped(capture.cage_vertices)}
       vertices and ${grouped(capture.cage_faces)} faces. Lengths are percentages of the diagonal of the rest pose's
@@ -25,7 +25,7 @@ export function summary({ capture, recommendation }: Comparison) {
         recommendation.editing &&
         card(
           capture,
-          'For cages that people or programs work with',
+          'Best for editing',
           recommendation.editing,
           `The smoothest cages among the methods whose mean L2 is at most ${bound} above the lowest of the same coordinates: mean L2 ${percents(recommendation.editing.l2_mean, 3)} %, and ${smoothness(recommendation.editing)}.`,
         )

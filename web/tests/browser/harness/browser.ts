@@ -1,6 +1,6 @@
 /** A headless browser, and pages whose errors fail a test. */
 
-import { type Browser, type Page, chromium as launcher } from 'playwright-core';
+import { type Browser, type BrowserContextOptions, type Page, chromium as launcher } from 'playwright-core';
 import { chromium } from './programs';
 
 const FLAGS = [
@@ -36,13 +36,30 @@ export interface Watched {
   close(): Promise<void>;
 }
 
-/** @param expected parts of messages that this test provokes, such as a status that it wants to see handled */
-export async function openPage(browser: Browser, url: string, expected: readonly string[] = []): Promise<Watched> {
+/** A phone that is held upright, under a finger. */
+export const PHONE: BrowserContextOptions = {
+  viewport: { width: 390, height: 844 },
+  deviceScaleFactor: 2,
+  isMobile: true,
+  hasTouch: true,
+};
+
+/**
+ * @param expected parts of messages that this test provokes, such as a status that it wants to see handled
+ * @param device what the page is looked at with, such as {@link PHONE}
+ */
+export async function openPage(
+  browser: Browser,
+  url: string,
+  expected: readonly string[] = [],
+  device: BrowserContextOptions = {},
+): Promise<Watched> {
   // Half as many pixels in each direction: drawing them is most of what tests would wait for.
   const context = await browser.newContext({
     acceptDownloads: true,
     viewport: { width: 1280, height: 800 },
     deviceScaleFactor: 0.5,
+    ...device,
   });
   const page = await context.newPage();
   const errors: string[] = [];

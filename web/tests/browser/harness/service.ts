@@ -1,8 +1,8 @@
 /** A real `cager serve` with a data folder of the test. */
 
-import { type ChildProcess, spawn } from 'node:child_process';
+import { type ChildProcess, execFileSync, spawn } from 'node:child_process';
 import { once } from 'node:events';
-import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
+import { mkdtemp, rm, writeFile } from 'node:fs/promises';
 import { createHash } from 'node:crypto';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -82,14 +82,13 @@ export class TestService {
     await writeTokens(join(this.folder, TOKENS), tokens);
   }
 
-  /** Restarts it with a damaged log of this session, which has frames: the session is failed then. */
+  /** Restarts it with damaged frames of this session, which has some: the session is failed then. */
   async restartWithDamage(id: string): Promise<void> {
     await this.kill();
-    const log = join(this.folder, 'data', 'sessions', id, 'frames.log');
-    const bytes = await readFile(log);
-    // Behind the header, in the first frame.
-    bytes[4096 + 200] ^= 0xff;
-    await writeFile(log, bytes);
+    const damage =
+      'import sqlite3, sys; c = sqlite3.connect(sys.argv[1]); ' +
+      'c.execute("UPDATE frames SET spread = 7 WHERE record = (SELECT number FROM records WHERE id = ?)", [sys.argv[2]]); c.commit()';
+    execFileSync('python3', ['-c', damage, join(this.folder, 'data', 'catalog.db'), id]);
     await this.run();
   }
 

@@ -1,7 +1,7 @@
 /** What tests do with the viewer on the page of files. */
 
 import { readFile } from 'node:fs/promises';
-import type { Browser, Page } from 'playwright-core';
+import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll } from 'vitest';
 import type { CagerViewer } from '../../../src/viewer/cagerViewer';
 import type { ViewerPage } from '../../../src/viewer/viewerPage';
@@ -42,8 +42,12 @@ export class FilePages {
   }
 
   /** Opens the page and drops files on it, if there are any. */
-  async open(files: Readonly<Record<string, Uint8Array>> = {}, fragment = '#/file'): Promise<Page> {
-    this.watched = await openPage(this.browser, `${this.server.base}${fragment}`);
+  async open(
+    files: Readonly<Record<string, Uint8Array>> = {},
+    fragment = '#/file',
+    device?: BrowserContextOptions,
+  ): Promise<Page> {
+    this.watched = await openPage(this.browser, `${this.server.base}${fragment}`, [], device);
     const { page } = this.watched;
     if (Object.keys(files).length > 0) await dropOnViewer(page, files);
     else await page.locator('cager-viewer').waitFor({ state: 'attached' });
@@ -51,8 +55,12 @@ export class FilePages {
   }
 
   /** Opens the page, drops files on it and waits until the model can be seen. */
-  async show(files: Readonly<Record<string, Uint8Array>>, fragment?: string): Promise<Page> {
-    const page = await this.open(files, fragment);
+  async show(
+    files: Readonly<Record<string, Uint8Array>>,
+    fragment?: string,
+    device?: BrowserContextOptions,
+  ): Promise<Page> {
+    const page = await this.open(files, fragment, device);
     await whenShown(page);
     return page;
   }
