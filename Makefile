@@ -11,13 +11,15 @@ DENY := target/deny/bin/cargo-deny
 BLENDER := target/blender/bin/python
 ALEMBIC := target/alembic/bin/python
 USD := target/usd/bin/python
+GLTF := target/gltf/node_modules
+FARM := target/farm/bin/python
 
 LINT := target/lint-deploy
 
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd gltf farm soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -96,6 +98,22 @@ usd: $(USD) ## written files of USD through OpenUSD itself; installs usd-core
 $(USD): Makefile
 	$(PYTHON) -m venv target/usd
 	target/usd/bin/pip install --quiet usd-core==26.11
+	@touch $@
+
+gltf: $(GLTF) ## written files of glTF through the validator of Khronos and three.js; installs both, which need Node
+	CAGER_GLTF_NODE=$(abspath target/gltf) $(CARGO) test --locked -p cager-formats --test animations three -- --nocapture
+
+$(GLTF): Makefile
+	mkdir -p target/gltf
+	cd target/gltf && npm init --yes >/dev/null && npm install --silent --no-audit --no-fund gltf-validator@2.0.0-dev.3.10 three@0.187.0
+	@touch $@
+
+farm: $(FARM) ## jobs of render farms, their shots encoded; installs openjd-cli and opencue-pyoutline
+	CAGER_FARM_PYTHON=$(abspath $(FARM)) $(CARGO) test --locked --test cli farm -- --nocapture
+
+$(FARM): Makefile
+	$(PYTHON) -m venv target/farm
+	target/farm/bin/pip install --quiet openjd-cli==0.8.0 opencue-pyoutline==1.37.0 packaging
 	@touch $@
 
 soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when

@@ -11,7 +11,7 @@ use cager_core::coordinates;
 use cager_core::coordinates::{Coordinates, CoordinatesError, DEFINITION, ElementPlan};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, PrepareError, coordinates_bytes, reject_far_points};
-use cager_formats::{Action, FrameOptions, FrameRange, FrameWriter, Signature, Target, create_frames};
+use cager_formats::{Action, FrameOptions, FrameRange, FrameWriter, MorphOptions, Signature, Target, create_frames};
 use cager_geometry::mesh::{Model, Point, diagonal};
 use cager_proto::container::{self, ContainerReader};
 use std::fs::File;
@@ -166,6 +166,8 @@ pub struct Decoding<'a> {
     pub layer: Layer,
     /// Whether frames that are damaged, or missing from the end of a file that was cut, are left out instead of refused.
     pub salvage: bool,
+    /// How a `.glb` holds the frames.
+    pub morphs: MorphOptions,
 }
 
 /// How much of a coded file is decoded.
@@ -198,6 +200,8 @@ pub struct Decoded {
     pub damaged: Vec<usize>,
     /// Whether the numbers of the file's frames are damaged, so that they are counted from 0.
     pub numbers_lost: bool,
+    /// What the user should know of the output, such as what it loses.
+    pub notes: Vec<String>,
 }
 
 /// A model in its rest pose with its decoder, and the number of its points outside the rest cage.
@@ -348,7 +352,7 @@ pub(crate) fn frame_options(
     let numbers = (0..range.count()).filter_map(|place| numbers.get(range.frame(place)).copied()).collect();
     let origin = container.header().origin;
     let rounding = if origin.is_some() { LOST * diagonal(&container.rest()?.points) } else { 0.0 };
-    Ok(FrameOptions { fps, numbers, origin, rounding, units: None })
+    Ok(FrameOptions { fps, numbers, origin, rounding, units: None, morphs: MorphOptions::default() })
 }
 
 /// How many frames of so many points are decoded at a time.
@@ -466,11 +470,13 @@ pub fn decode(
     let mut chosen = Chosen::open(input, what)?;
     let bound = chosen.bind()?;
     let (points, frames) = (bound.rest.points.len(), chosen.wanted.len());
+    chosen.options.morphs = MorphOptions { diagonal: Some(diagonal(&bound.rest.points)), ..chosen.what.morphs };
     let mut writer = create_frames(output, points, frames, &bound.rest.faces, &chosen.options)?;
     chosen.write(&bound, &mut *writer, progress)?;
+    let notes = writer.notes();
     if !dry_run {
         writer.finish()?;
     }
     let Chosen { damaged, numbers_lost, .. } = chosen;
-    Ok(Decoded { points, frames, outside: bound.outside, damaged, numbers_lost })
+    Ok(Decoded { points, frames, outside: bound.outside, damaged, numbers_lost, notes })
 }

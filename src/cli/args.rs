@@ -4,6 +4,7 @@ use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
 use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
 use super::explore::ExploreArgs;
+use super::morph_args::MorphArgs;
 use super::motion_args::TransferMotionArgs;
 use super::names;
 use super::outputs::OutputArgs;
@@ -97,7 +98,7 @@ pub(crate) struct EncodeArgs {
 
     /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of
     /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd,
-    /// .abc or .usdc.
+    /// .abc, .usdc or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
@@ -251,7 +252,7 @@ pub(crate) struct DecodeArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Where to write: .npy, .pc2, .mdd, .abc, .usdc, or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
+    /// Where to write: .npy, .pc2, .mdd, .abc, .usdc, .glb (morph targets), or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
     /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), of one frame (--frame) .obj, .ply, .off or .stl, or - for .npy on
     /// standard output.
     #[arg(short, long, value_name = "OUT")]
@@ -275,6 +276,9 @@ pub(crate) struct DecodeArgs {
     /// Decode what can be of a file that is damaged or was cut: frames that cannot are left out and named.
     #[arg(long, conflicts_with_all = ["cages", "with_cages"])]
     pub(crate) salvage: bool,
+
+    #[command(flatten)]
+    pub(crate) morphs: MorphArgs,
 
     #[command(flatten)]
     pub(crate) transfer: TransferArgs,
@@ -311,7 +315,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: PathBuf,
 
-    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd, .abc or .usdc.
+    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd, .abc, .usdc or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 

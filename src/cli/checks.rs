@@ -38,10 +38,14 @@ pub(crate) struct CaptureArgs {
 /// What is accepted of a capture.
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
-    /// The mesh to take of Alembic archives and USD files (rest pose and capture) with several: its path, such as /walk/body, or its name. An only mesh is taken
-    /// whatever it is called.
+    /// The mesh to take of Alembic archives, USD files and glTF (rest pose and capture) with several: its path, such as /walk/body, or its name. An only mesh is taken
+    /// whatever it is called, and of glTF all meshes as one where nothing is said.
     #[arg(long, value_name = "PATH")]
     pub(super) prim: Option<String>,
+
+    /// Frames to take for each second of an animated .glb, which has keys instead of frames [default: those at its keys].
+    #[arg(long, value_name = "F", value_parser = rate, allow_negative_numbers = true, hide_default_value = true)]
+    pub(super) sample_rate: Option<f64>,
 
     /// Go on where numbers are missing from the names of the capture's files.
     #[arg(long)]
@@ -104,6 +108,7 @@ pub(super) fn checked_files<'a>(
     files.selection.no_frames = no_frames.into_iter().cloned().collect();
     files.selection.join_sequences = args.all_files;
     files.selection.prim.clone_from(&args.prim);
+    files.selection.rate = args.sample_rate;
     files
 }
 

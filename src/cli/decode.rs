@@ -4,7 +4,7 @@ use super::args::DecodeArgs;
 use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
 use super::stretches::StretchList;
-use super::{grouped, progress, read_model, tell, warn};
+use super::{grouped, plain, progress, read_model, tell, warn};
 use crate::cage_export::write_cages;
 use crate::decode::joined::{Joining, decode_joined};
 use crate::decode::{self, Decoding};
@@ -16,6 +16,7 @@ use std::time::Instant;
 
 pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let clock = Instant::now();
+    args.morphs.check(&args.output)?;
     if let Some(list) = StretchList::read(&args.input)? {
         return joined(args, &list, clock);
     }
@@ -62,6 +63,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         memory: args.memory,
         layer: args.layer,
         salvage: args.salvage,
+        morphs: args.morphs.options(),
     };
     let bar = progress::PreparationBar::new("decoding", taken);
     let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
@@ -84,6 +86,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     if dry_run {
         return tell_dry_run(&output, &size(found.frames, found.points, "points"), &[]);
     }
+    tell_notes(&found.notes)?;
     tell(&format!(
         "{}: {} frames of {} points in {:.3} s\n",
         output.path().display(),
@@ -126,15 +129,23 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
         dry_run: args.outputs.dry_run,
         memory: args.memory,
         layer: args.layer,
+        morphs: args.morphs.options(),
     };
     let bar = progress::PreparationBar::new("decoding", range.count());
     let result = decode_joined(&parts, &output, what, &mut |done| bar.done(done));
     bar.finish();
-    let told = format!("{} frames of {} files", grouped(result?), grouped(parts.len()));
+    let (frames, notes) = result?;
+    let told = format!("{} frames of {} files", grouped(frames), grouped(parts.len()));
     if what.dry_run {
         return tell_dry_run(&output, &told, &[]);
     }
+    tell_notes(&notes)?;
     tell(&format!("{}: {told} in {:.3} s\n", output.path().display(), clock.elapsed().as_secs_f64()))
+}
+
+/// What there is to know of an output, a line each.
+fn tell_notes(notes: &[String]) -> Result<()> {
+    notes.iter().try_for_each(|note| tell(&format!("{}\n", plain(note))))
 }
 
 fn outside(path: &Path, outside: usize, points: usize) -> String {

@@ -24,6 +24,7 @@ mod inspect;
 mod interrupt;
 mod local_service;
 mod manual;
+mod morph_args;
 mod motion_args;
 mod names;
 mod outputs;

@@ -74,9 +74,9 @@ pub(super) fn run(
     ))
 }
 
-/// A model for a service, which would get all meshes and all frames of an archive: of those, the mesh alone that `prim` names.
+/// A model for a service, which would get all meshes and all frames of a scene: of those, the mesh alone that `prim` names.
 fn model_file(path: &Path, prim: Option<&str>) -> Result<MeshFile> {
-    if !is_scene(path) {
+    if !is_scene(path) && prim.is_none() {
         return Ok(mesh_file(path)?);
     }
     let (model, _) = read_prim_with_note(path, prim)?;

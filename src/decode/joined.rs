@@ -3,8 +3,8 @@
 use super::{Chosen, DecodeError, Decoding, Layer};
 use crate::memory::Memory;
 use crate::timing::Timing;
-use cager_formats::{FrameOptions, FrameRange, Target, create_frames};
-use cager_geometry::mesh::Model;
+use cager_formats::{FrameOptions, FrameRange, MorphOptions, Target, create_frames};
+use cager_geometry::mesh::{Model, diagonal};
 use std::path::PathBuf;
 
 /// What to decode of several containers that play one after the other.
@@ -20,10 +20,13 @@ pub struct Joining {
     pub memory: Option<Memory>,
     /// How much of the files is decoded.
     pub layer: Layer,
+    /// How a `.glb` holds the frames.
+    pub morphs: MorphOptions,
 }
 
 /// Decodes ranges of frames of containers, at least one, into one `output`, whose files have the mesh of their container each. Formats of one mesh are refused
-/// before anything is decoded, unless all have the same. `progress` is told the number of frames done, which is returned.
+/// before anything is decoded, unless all have the same. `progress` is told the number of frames done, which is returned with
+/// what the user should know of the output.
 ///
 /// # Errors
 /// See [`DecodeError`].
@@ -32,8 +35,8 @@ pub fn decode_joined(
     output: impl Into<Target>,
     what: Joining,
     progress: &mut dyn FnMut(usize),
-) -> Result<usize, DecodeError> {
-    let Joining { fps, shift, dry_run, memory, layer } = what;
+) -> Result<(usize, Vec<String>), DecodeError> {
+    let Joining { fps, shift, dry_run, memory, layer, morphs } = what;
     let timing = Timing { fps, start: None };
     let mut all = Vec::with_capacity(inputs.len());
     for (path, range) in inputs {
@@ -45,7 +48,8 @@ pub fn decode_joined(
     let numbers = all.iter().flat_map(|(chosen, _)| &chosen.options.numbers).map(|number| number + shift).collect();
     let frames = all.iter().map(|(chosen, _)| chosen.wanted.len()).sum();
     let (first, rest) = &all[0];
-    let options = FrameOptions { numbers, ..first.options.clone() };
+    let morphs = MorphOptions { diagonal: Some(diagonal(&rest.points)), ..morphs };
+    let options = FrameOptions { numbers, morphs, ..first.options.clone() };
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
     let same = |a: &(Chosen<'_>, Model), b: &(Chosen<'_>, Model)| {
         (a.1.points.len(), &a.1.faces, a.0.options.origin) == (b.1.points.len(), &b.1.faces, b.0.options.origin)
@@ -65,8 +69,9 @@ pub fn decode_joined(
         chosen.write(&bound, &mut *writer, &mut |count| progress(done + count))?;
         done += chosen.wanted.len();
     }
+    let notes = writer.notes();
     if !dry_run {
         writer.finish()?;
     }
-    Ok(frames)
+    Ok((frames, notes))
 }

@@ -94,3 +94,27 @@ fn frame_rate_of_an_mdd_survives() {
     let times = 8..8 + 4 * small.frames.len();
     assert_eq!(dir.read("back.mdd")[times.clone()], mdd[times]);
 }
+
+#[test]
+fn morph_targets_are_decoded_and_encoded_again() {
+    let (dir, small) = Dir::with_encoded();
+    let points = small.rest.points.len();
+    dir.cager("decode out.cager -o back.npy").succeeds();
+    let truth = read_frames(&dir.path("back.npy"), points);
+    let told = dir.cager("decode out.cager -o walk.glb --targets 19").succeeds();
+    assert!(told.stdout.contains("walk.glb: its 19 morph targets are"), "{}", told.stdout);
+    // Of the quads of the rest pose it has the triangles.
+    let line = "encode --rest rest.obj --cage cage.obj --frames walk.glb -o again.cager --force";
+    dir.cager(line).succeeds();
+    dir.cager("decode again.cager -o again.glb --max-error 1e-4 --float").succeeds();
+    for name in ["walk.glb", "again.glb"] {
+        let found = read_frames(&dir.path(name), points);
+        assert_eq!(found.len(), 20);
+        let errors = measure(&small.rest.points, &truth, &found);
+        let limit = if name == "walk.glb" { 1e-4 } else { 0.02 };
+        assert!(errors.l2.iter().all(|&l2| l2 < limit), "{name}: {:?}", errors.l2);
+    }
+    let refused = dir.cager("decode out.cager -o none.glb --max-error 1e-12").run();
+    assert_eq!(refused.status, Some(1));
+    assert!(refused.stderr.contains("cannot hold --max-error 0.000000000001"), "{}", refused.stderr);
+}

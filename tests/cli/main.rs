@@ -11,6 +11,7 @@ mod defaults;
 mod demo;
 mod encode;
 mod explore;
+mod farm;
 #[cfg(unix)]
 mod full_disk;
 mod golden;

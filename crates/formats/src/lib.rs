@@ -8,6 +8,7 @@ pub mod atomic;
 pub mod biovision;
 mod error;
 pub mod frames;
+mod glb;
 mod listing;
 mod matrix;
 pub mod mesh;
@@ -21,9 +22,9 @@ mod usd;
 pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
 pub use error::{Action, Error};
 pub use frames::{
-    CacheFormat, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence, create_frames,
-    frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames, open_frames_bytes,
-    open_frames_in, open_selected_frames,
+    CacheFormat, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence, MorphOptions,
+    create_frames, frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames,
+    open_frames_bytes, open_frames_in, open_selected_frames,
 };
 pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};

@@ -21,7 +21,6 @@ pub const FORMATS: &[Listed] = &[
     still("ply", "Polygon File Format", true),
     still("off", "Object File Format", true),
     still("stl", "Stereolithography", true),
-    Listed { says: "metres, Y up", ..still("glb", "binary glTF", false) },
     animated("npy", "NumPy array", true, "nothing"),
     animated("npz", "NumPy archive", false, "frame rate"),
     animated("pc2", "point cache of 3ds Max and Blender", true, "frame numbers"),
@@ -30,6 +29,8 @@ pub const FORMATS: &[Listed] = &[
     animated("usdc", "Universal Scene Description, binary", true, "unit, up axis, frame rate, times"),
     animated("usdz", "the same as a package", true, "unit, up axis, frame rate, times"),
     animated("usd", "the same, binary", true, "unit, up axis, frame rate, times"),
+    animated("glb", "binary glTF", true, "metres, Y up, times"),
+    animated("gltf", "the same as text and files", false, "metres, Y up, times"),
 ];
 
 const fn still(extension: &'static str, name: &'static str, written: bool) -> Listed {
@@ -48,8 +49,9 @@ mod tests {
     #[test]
     fn every_format_that_is_read_is_listed() {
         let listed = |animated: bool| FORMATS.iter().filter(move |f| f.animated == animated).map(|f| f.extension);
-        let meshes = MeshFormat::STILL.map(MeshFormat::extension);
-        assert_eq!(listed(false).collect::<Vec<_>>(), meshes);
+        // Of glTF one mesh may be read, and all frames of a capture.
+        let meshes = MeshFormat::STILL.into_iter().filter(|&format| format != MeshFormat::Glb);
+        assert_eq!(listed(false).collect::<Vec<_>>(), meshes.map(MeshFormat::extension).collect::<Vec<_>>());
         let caches: Vec<_> = listed(true).filter(|&extension| extension != "npz").collect();
         assert_eq!(caches, CacheFormat::ALL.map(CacheFormat::extension));
     }

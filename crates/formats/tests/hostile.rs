@@ -73,7 +73,8 @@ type Try = fn(&str, &[u8]) -> bool;
 fn samples() -> Vec<(&'static str, Vec<u8>, Try)> {
     let meshes = meshes().into_iter().map(|(name, bytes)| (name, bytes, try_mesh as Try));
     let caches = caches().into_iter().map(|(name, bytes)| (name, bytes, try_cache as Try));
-    meshes.chain(caches).collect()
+    let animated = ("a.glb", animated_glb(), try_cache as Try);
+    meshes.chain(caches).chain([animated]).collect()
 }
 
 #[test]

@@ -77,7 +77,6 @@ fn several_frames_in_one_mesh_file_are_refused_with_a_folder_for_them() {
     ] {
         refused(&dir, line, &["pose.obj", "holds one mesh", "--frame K", "pose/", "'pose/*.obj'"]);
     }
-    refused(&dir, "decode walk.cager --frame 0 -o pose.glb", &["pose.glb", "of one frame in .obj .ply .off .stl"]);
 }
 
 #[test]

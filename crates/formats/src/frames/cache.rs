@@ -8,22 +8,25 @@ use super::fortran::Transposed;
 use super::layout::{LONGEST_HEADER, Layout, Order};
 use super::times::Times;
 use super::widen::Scalar;
-use super::{CacheFormat, FrameReader, mdd, npy, pc2};
+use super::{CacheFormat, FrameReader, FrameSelection, mdd, npy, pc2};
 use crate::alembic;
 use crate::error::{Error, Fault};
+use crate::glb;
 use crate::signature::Signature;
 use crate::usd;
 
-/// Opens a cache: reads the header and compares its promise with `length`, the bytes there are, and with the points that are expected. `prim` is the
-/// mesh of an archive of several.
+/// Opens a cache: reads the header and compares its promise with `length`, the bytes there are, and with the points that are expected. Of a scene
+/// what is selected is read, and from `folder` what it has in other files.
 pub(super) fn open<'a>(
     format: CacheFormat,
     path: &Path,
     mut source: impl Read + Seek + Send + 'a,
     length: u64,
     expected_points: usize,
-    prim: Option<&str>,
+    selection: &FrameSelection,
+    folder: Option<&Path>,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let prim = selection.prim.as_deref();
     let read = |cause| Error::read(path, cause);
     let mut head = Vec::new();
     source.by_ref().take(LONGEST_HEADER as u64).read_to_end(&mut head).map_err(read)?;
@@ -37,6 +40,10 @@ pub(super) fn open<'a>(
         CacheFormat::Mdd => mdd::layout(&head),
         CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usd => {
             return usd::open_frames(path, source, length, expected_points, prim);
+        }
+        CacheFormat::Glb | CacheFormat::Gltf => {
+            let kind = glb::Source { is_text: format == CacheFormat::Gltf, folder };
+            return glb::open_frames(path, (source, length), &kind, expected_points, selection);
         }
         CacheFormat::Abc => return alembic::open_frames(path, source, length, expected_points, prim),
     };

@@ -11,8 +11,10 @@ pub struct FrameSelection {
     pub range: Option<FrameRange>,
     /// The rest pose, the cage: files that are left out where they lie among the frames, unless they are called as frames are.
     pub no_frames: Vec<PathBuf>,
-    /// The mesh of a scene (Alembic, USD) that has several, by its path or name.
+    /// The mesh of a scene (Alembic, USD, glTF) that has several, by its path or name.
     pub prim: Option<String>,
+    /// Frames per second to take of an animation that has keys and no frames (glTF); those at the times of its keys by default.
+    pub rate: Option<f64>,
     /// Whether files of several sequences are taken one after another, in natural order, instead of refused.
     pub join_sequences: bool,
 }

@@ -6,7 +6,7 @@ use cager_geometry::mesh::Polygons;
 
 use super::merged::Merged;
 use super::names::Sequence;
-use super::{FrameReader, cut, single};
+use super::{FrameReader, FrameSelection, cut, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{FrameFaces, MeshFormat, read_frame_file};
 
@@ -38,7 +38,7 @@ impl SequenceReader {
             Error::NonFinite { path, point, .. } => Error::NonFinite { path, frame, point },
             other => other.in_frame(frame),
         };
-        let mut reader = single::open_cache(path, self.points, None).map_err(named)?;
+        let mut reader = single::open_cache(path, self.points, &FrameSelection::default()).map_err(named)?;
         if reader.frames() != 1 {
             let what = format!(
                 "frame {frame}: has {} frames, where a folder of arrays has one in each; name this file alone, or join the arrays in Python with numpy.concatenate",

@@ -1,11 +1,12 @@
 //! A capture with all frames in one file.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 
-use super::{CacheFormat, FrameReader, cache, npz};
+use super::{CacheFormat, FrameReader, FrameSelection, cache, npz};
 use crate::error::{Error, Fault};
+use crate::glb;
 use crate::mesh::{MeshFormat, extensions};
 
 /// Whether the name is that of a point cache or an archive of arrays.
@@ -22,12 +23,19 @@ fn is_archive(path: &Path) -> bool {
     path.extension().is_some_and(|found| found.eq_ignore_ascii_case("npz"))
 }
 
+/// Whether a mesh file has an animation, whose frames are those of a capture; others are one frame.
+pub(super) fn is_animated(path: &Path) -> Result<bool, Error> {
+    if MeshFormat::guess(path) != Some(MeshFormat::Glb) {
+        return Ok(false);
+    }
+    Ok(glb::is_animated(&fs::read(path).map_err(|cause| Error::read(path, cause))?))
+}
+
 /// Opens a point cache, or the frames in an archive of arrays.
-/// `prim` is the mesh of an archive of several.
 pub(super) fn open_cache(
     path: &Path,
     expected_points: usize,
-    prim: Option<&str>,
+    selection: &FrameSelection,
 ) -> Result<Box<dyn FrameReader>, Error> {
     let read = |cause| Error::read(path, cause);
     let open = || File::open(path).map_err(read);
@@ -37,7 +45,7 @@ pub(super) fn open_cache(
     let Some(format) = CacheFormat::from_path(path) else { return Err(unknown(path)) };
     let file = open()?;
     let length = file.metadata().map_err(read)?.len();
-    cache::open(format, path, file, length, expected_points, prim)
+    cache::open(format, path, file, length, expected_points, selection, path.parent())
 }
 
 /// A file that is not read, and how its contents can come here.
@@ -45,7 +53,7 @@ pub(super) fn unknown(path: &Path) -> Error {
     let what = match way_out(path) {
         Some(way_out) => way_out,
         None => format!(
-            "is not a capture that is read; give .npy .pc2 .mdd .abc .usdc .usdz .npz, or {} files in a folder",
+            "is not a capture that is read; give .npy .pc2 .mdd .abc .usdc .usdz .glb .npz, or {} files in a folder",
             extensions(&MeshFormat::STILL)
         ),
     };
@@ -63,7 +71,6 @@ pub(super) fn way_out(path: &Path) -> Option<String> {
         }
         "fbx" => "an FBX scene",
         "dae" => "a Collada scene",
-        "gltf" => "glTF in separate files",
         "blend" => "a Blender scene",
         "ma" | "mb" => "a Maya scene",
         "max" => "a 3ds Max scene",

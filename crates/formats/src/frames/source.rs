@@ -14,7 +14,7 @@ use crate::mesh::{MeshFormat, extensions};
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2`, `.mdd`, `.abc` or `.usd` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
+/// `source` is a `.npy`, `.pc2`, `.mdd`, `.abc`, `.usd` or animated `.glb` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
 /// one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
 /// `10.obj` and `1.5.obj` before `2.obj`; other files, and in a folder hidden ones, are passed over. In a pattern every part of the path may be a glob
 /// or have `%04d` or `####` in place of a number; what is there by that name is no pattern.
@@ -40,7 +40,7 @@ pub fn open_selected_frames(
     let reader = match fs::metadata(path) {
         Ok(found) if found.is_dir() => open_files(path, files::in_folder(path)?, expected_points, selection),
         Ok(found) if !found.is_file() => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
-        Ok(_) => open_file(path, expected_points, selection.prim.as_deref()),
+        Ok(_) => open_file(path, expected_points, selection),
         Err(_) if files::is_pattern(path) => open_files(path, files::matching(path)?, expected_points, selection),
         Err(cause) => Err(Error::read(path, cause)),
     }?;
@@ -125,15 +125,15 @@ pub fn open_frames_in<'a>(
     length: u64,
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
-    cache::open(format, name, source, length, expected_points, None)
+    cache::open(format, name, source, length, expected_points, &FrameSelection::default(), None)
 }
 
-fn open_file(path: &Path, expected_points: usize, prim: Option<&str>) -> Result<Box<dyn FrameReader>, Error> {
-    if MeshFormat::guess(path).is_some() {
+fn open_file(path: &Path, expected_points: usize, selection: &FrameSelection) -> Result<Box<dyn FrameReader>, Error> {
+    if MeshFormat::guess(path).is_some() && !single::is_animated(path)? {
         let sequence = Sequence::of_all(vec![path.to_owned()]);
         return Ok(Box::new(SequenceReader::new(sequence, expected_points, Vec::new())));
     }
-    single::open_cache(path, expected_points, prim)
+    single::open_cache(path, expected_points, selection)
 }
 
 /// Opens what a folder holds or a pattern matches: meshes where there are any, else caches.
@@ -146,6 +146,11 @@ fn open_files(
     let (meshes, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|path| MeshFormat::guess(path).is_some());
     let caches = captures(&others);
     let (frames, notes) = without(meshes, &selection.no_frames, caches.is_empty());
+    if let [only] = frames.as_slice()
+        && single::is_animated(only)?
+    {
+        return single::open_cache(only, expected_points, selection);
+    }
     if !frames.is_empty() {
         one_format(&frames).map_err(|fault| fault.at(source))?;
         return open_sequence(source, frames, notes, expected_points, selection);
@@ -153,7 +158,7 @@ fn open_files(
     let (caches, notes) = without(caches, &selection.no_frames, true);
     match caches.as_slice() {
         [] => Err(no_frames_in(source, &others)),
-        [cache] => single::open_cache(cache, expected_points, selection.prim.as_deref()),
+        [cache] => single::open_cache(cache, expected_points, selection),
         several if several.iter().all(|path| single::is_array(path)) => {
             open_sequence(source, caches, notes, expected_points, selection)
         }

@@ -2,7 +2,7 @@
 
 /// What the values of colours are.
 #[derive(Clone, Copy)]
-pub(super) enum Scale {
+pub(crate) enum Scale {
     /// Fractions of full light.
     Fractions,
     /// Fractions, or of 255: the file does not say.
@@ -11,18 +11,18 @@ pub(super) enum Scale {
 
 /// The colours of vertices as they are read; none at all where one vertex has none, or one that is no colour.
 #[derive(Default)]
-pub(super) struct Colors {
+pub(crate) struct Colors {
     found: Vec<[f32; 3]>,
 }
 
 impl Colors {
-    pub(super) fn push(&mut self, color: [f32; 3]) {
+    pub(crate) fn push(&mut self, color: [f32; 3]) {
         self.found.push(color);
     }
 
     /// In sRGB for so many points. Where the file does not say what the values are, they are of 255 if one is above 2, or if all are whole
     /// and one is above 1; fractions that rounding or strong light put above 1 are full light.
-    pub(super) fn finish(self, points: usize, scale: Scale) -> Vec<[u8; 3]> {
+    pub(crate) fn finish(self, points: usize, scale: Scale) -> Vec<[u8; 3]> {
         let all = || self.found.iter().flatten().copied();
         let largest = all().fold(0.0, f32::max);
         let of_bytes = largest > 2.0 || largest > 1.0 && all().all(|x| x.fract() == 0.0);
@@ -39,7 +39,7 @@ impl Colors {
 }
 
 /// A fraction of linear light in sRGB (IEC 61966-2-1).
-pub(super) fn srgb(linear: f32) -> f32 {
+pub(crate) fn srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 

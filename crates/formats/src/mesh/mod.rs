@@ -1,7 +1,6 @@
 //! Models from and to mesh files.
 
 mod colors;
-mod glb;
 mod obj;
 mod off;
 mod parsed;
@@ -17,11 +16,13 @@ use cager_geometry::mesh::{Model, Polygons};
 
 use crate::alembic;
 use crate::error::{Error, Fault};
+use crate::glb;
 use crate::signature::Signature;
 use crate::text::{Lines, quoted};
 use crate::units::Units;
 use crate::usd;
 
+pub(crate) use colors::{Colors, Scale, srgb};
 pub(crate) use parsed::Contents;
 use parsed::Parsed;
 pub(crate) use parsed::check_face;
@@ -49,12 +50,24 @@ pub enum MeshFormat {
     Usdz,
     /// Universal Scene Description of any kind.
     Usd,
+    /// glTF 2.0 as text, with its data in it or in files beside it.
+    Gltf,
 }
 
 impl MeshFormat {
     /// All formats.
-    pub const ALL: [Self; 9] =
-        [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb, Self::Abc, Self::Usdc, Self::Usdz, Self::Usd];
+    pub const ALL: [Self; 10] = [
+        Self::Obj,
+        Self::Ply,
+        Self::Off,
+        Self::Stl,
+        Self::Glb,
+        Self::Abc,
+        Self::Usdc,
+        Self::Usdz,
+        Self::Usd,
+        Self::Gltf,
+    ];
 
     /// Formats of one mesh that stands still, of which each file of a folder may be a frame.
     pub(crate) const STILL: [Self; 5] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb];
@@ -71,6 +84,7 @@ impl MeshFormat {
             Self::Usdc => "usdc",
             Self::Usdz => "usdz",
             Self::Usd => "usd",
+            Self::Gltf => "gltf",
         }
     }
 
@@ -83,9 +97,6 @@ impl MeshFormat {
             return Ok(format);
         }
         let found = match path.extension() {
-            Some(found) if found.eq_ignore_ascii_case("gltf") => {
-                "glTF in separate files is not read; export it as binary .glb".to_owned()
-            }
             Some(found) if found.eq_ignore_ascii_case("usda") => {
                 "text of USD is not read; write it as binary with usdcat in.usda -o out.usdc".to_owned()
             }
@@ -99,7 +110,7 @@ impl MeshFormat {
         Err(Fault::unsupported(found).at(path))
     }
 
-    /// Whether a file has a whole scene, of which one mesh is taken.
+    /// Whether a file has a whole scene, which may have several meshes and other files.
     fn is_scene(self) -> bool {
         !Self::STILL.contains(&self)
     }
@@ -137,7 +148,7 @@ pub fn read_model_with_note(path: &Path) -> Result<(Model, Option<String>), Erro
     read_prim_with_note(path, None)
 }
 
-/// As [`read_model_with_note`], of a scene (Alembic, USD) the mesh that `prim` names by its path or name, where it has several.
+/// As [`read_model_with_note`], of a scene (Alembic, USD, glTF) the mesh that `prim` names by its path or name, where it has several.
 ///
 /// # Errors
 /// As [`read_model`]; no such mesh, or several of that name.
@@ -167,7 +178,7 @@ pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, O
 /// that are not read, [`Error::Invalid`] for a coordinate that is not finite, a face with a vertex
 /// that does not exist, and a file without points. Faces of fewer than three corners are left out.
 pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<Model, Error> {
-    read_bytes(format, name, bytes, Contents::PointsAndFaces).map(|parsed| parsed.model)
+    read_bytes(format, name, bytes, Contents::PointsAndFaces, None).map(|parsed| parsed.model)
 }
 
 /// The faces of the file of a frame, and the text that they are in: most frames have the same ones, which are then not parsed again.
@@ -182,7 +193,7 @@ pub(crate) struct FrameFaces {
 /// are the same; the caller puts them there again.
 pub(crate) fn read_frame_file(path: &Path, known: &mut FrameFaces) -> Result<Model, Error> {
     let (format, bytes) = read_named(path)?;
-    let read = |contents| read_bytes(format, path, &bytes, contents).map(|parsed| parsed.model);
+    let read = |contents| read_bytes(format, path, &bytes, contents, None).map(|parsed| parsed.model);
     if !known.text.is_empty() && bytes.ends_with(&known.text) {
         return Ok(Model { faces: std::mem::take(&mut known.faces), ..read(Contents::Points)? });
     }
@@ -204,19 +215,25 @@ fn parse_file(path: &Path, prim: Option<&str>) -> Result<Parsed, Error> {
         let read = |cause| Error::read(path, cause);
         let file = File::open(path).map_err(read)?;
         let length = file.metadata().map_err(read)?.len();
-        return read_scene(format, path, file, length, prim);
+        return read_scene(format, path, file, length, (prim, path.parent()));
     }
     let (format, bytes) = read_named(path)?;
-    read_bytes(format, path, &bytes, Contents::PointsAndFaces)
+    read_bytes(format, path, &bytes, Contents::PointsAndFaces, prim)
 }
 
 fn read_scene(
     format: MeshFormat,
     name: &Path,
-    source: impl Read + Seek + Send,
+    mut source: impl Read + Seek + Send,
     length: u64,
-    prim: Option<&str>,
+    (prim, folder): (Option<&str>, Option<&Path>),
 ) -> Result<Parsed, Error> {
+    if format == MeshFormat::Gltf {
+        let mut bytes = Vec::new();
+        source.read_to_end(&mut bytes).map_err(|cause| Error::read(name, cause))?;
+        let kind = glb::Source { is_text: true, folder };
+        return finished(format, name, &bytes, glb::read(&bytes, &kind, prim).map(Parsed::from));
+    }
     let (model, left_out, units) = if format == MeshFormat::Abc {
         let (model, left_out) = alembic::read_model(name, source, length, prim)?;
         (model, left_out, None)
@@ -226,7 +243,13 @@ fn read_scene(
     Ok(Parsed { model, left_out, units })
 }
 
-fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents) -> Result<Parsed, Error> {
+fn read_bytes(
+    format: MeshFormat,
+    name: &Path,
+    bytes: &[u8],
+    contents: Contents,
+    prim: Option<&str>,
+) -> Result<Parsed, Error> {
     let parsed = if bytes.is_empty() {
         Err(Fault::damaged("is empty; export the mesh or copy the file again"))
     } else {
@@ -235,10 +258,15 @@ fn read_bytes(format: MeshFormat, name: &Path, bytes: &[u8], contents: Contents)
             MeshFormat::Ply => ply::read(bytes, contents),
             MeshFormat::Off => off::read(bytes, contents),
             MeshFormat::Stl => stl::read(bytes).map(Parsed::from),
-            MeshFormat::Glb => glb::read(bytes).map(Parsed::from),
-            scene => return read_scene(scene, name, Cursor::new(bytes), bytes.len() as u64, None),
+            MeshFormat::Glb => glb::read(bytes, &glb::Source::default(), prim).map(Parsed::from),
+            scene => return read_scene(scene, name, Cursor::new(bytes), bytes.len() as u64, (prim, None)),
         }
     };
+    finished(format, name, bytes, parsed)
+}
+
+/// What a file gave, unless it has no points or far too many.
+fn finished(format: MeshFormat, name: &Path, bytes: &[u8], parsed: Result<Parsed, Fault>) -> Result<Parsed, Error> {
     parsed
         .map_err(|fault| cut_in_last_line(fault, bytes))
         .and_then(|parsed| match parsed.model.points.len() {

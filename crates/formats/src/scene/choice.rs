@@ -68,7 +68,7 @@ pub(crate) fn named(scene: &impl Objects, all: &[usize], prim: &str) -> Vec<usiz
 }
 
 /// Meshes with their points, as far as a message has room.
-fn list(scene: &mut impl Objects, meshes: &[usize]) -> String {
+pub(crate) fn list(scene: &mut impl Objects, meshes: &[usize]) -> String {
     let mut words = Vec::new();
     for &mesh in meshes.iter().take(LISTED) {
         words.push(format!("{} ({})", shown_path(scene, mesh), scene.told(mesh)));

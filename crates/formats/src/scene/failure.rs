@@ -24,6 +24,14 @@ impl From<Fault> for Failure {
 }
 
 impl Failure {
+    /// What is wrong with bytes that no disk was needed for.
+    pub(crate) fn of_bytes(self) -> Fault {
+        match self {
+            Self::Io(cause) => Fault::damaged(format!("cannot be read ({cause}); copy the file again")),
+            Self::Fault(fault) => fault,
+        }
+    }
+
     pub(crate) fn at(self, path: &Path) -> Error {
         match self {
             Self::Io(cause) => Error::read(path, cause),

@@ -6,7 +6,7 @@ mod failure;
 mod matrix;
 mod reader;
 
-pub(crate) use choice::{Objects, choose, named, shown, shown_path};
+pub(crate) use choice::{Objects, choose, list, named, shown, shown_path};
 pub(crate) use faces::{Faces, most_corners, topology_changes};
 pub(crate) use failure::Failure;
 pub(crate) use matrix::{IDENTITY, Matrix, determinant, inverse, multiply, rotation};

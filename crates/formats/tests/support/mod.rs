@@ -242,3 +242,15 @@ pub fn numbers(reader: &dyn FrameReader) -> Vec<f64> {
 pub fn wide(frames: &[Vec<f32>]) -> Vec<Vec<f64>> {
     frames.iter().map(|frame| frame.iter().map(|&x| x.into()).collect()).collect()
 }
+
+/// Two points with a morph target, and three keys of its weight.
+pub fn animated_glb() -> Vec<u8> {
+    let json = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":60}],
+        "bufferViews":[{"buffer":0,"byteLength":24},{"buffer":0,"byteOffset":12,"byteLength":24},{"buffer":0,"byteOffset":36,"byteLength":24}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":2,"type":"VEC3"},{"bufferView":1,"componentType":5126,"count":2,"type":"VEC3"},
+        {"bufferView":2,"componentType":5126,"count":3,"type":"SCALAR"},{"bufferView":2,"byteOffset":12,"componentType":5126,"count":3,"type":"SCALAR"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"mode":0,"targets":[{"POSITION":1}]}]}],"nodes":[{"mesh":0}],
+        "animations":[{"channels":[{"sampler":0,"target":{"node":0,"path":"weights"}}],"samplers":[{"input":2,"output":3}]}]}"#;
+    let numbers = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 0.0, 0.5, 1.0, 0.25, 0.5, -1.0_f32];
+    glb_file(json, &numbers.map(f32::to_le_bytes).concat())
+}

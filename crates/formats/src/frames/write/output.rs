@@ -13,7 +13,7 @@ pub trait FrameWriter: Send {
     ///
     /// # Errors
     /// [`Error::PointCount`] for another number of coordinates, [`Error::NonFinite`], [`Error::FrameCount`] for more
-    /// frames than announced, [`Error::Io`].
+    /// frames than announced, [`Error::Unsupported`] where morph targets lose more than they may, [`Error::Io`].
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error>;
 
     /// Goes on with frames of another mesh: the number of its points, its faces, and of the options its origin and what rounding may lose.
@@ -21,6 +21,11 @@ pub trait FrameWriter: Send {
     /// # Errors
     /// [`Error::Unsupported`] where the output is no folder of mesh files, [`Error::Invalid`] for no points and faces without their points.
     fn change_mesh(&mut self, points: usize, faces: &Polygons, options: &FrameOptions) -> Result<(), Error>;
+
+    /// What the user should know of the output, once all frames are written.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Makes the frames durable and gives the output its name.
     ///
@@ -33,9 +38,9 @@ pub trait FrameWriter: Send {
 /// What some formats store beside the positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
-    /// Frames per second, for the times in `.mdd`, `.abc` and `.usdc`: 24 by default.
+    /// Frames per second, for the times in `.mdd`, `.abc`, `.usdc` and `.glb`: 24 by default.
     pub fps: f64,
-    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.abc` and `.usdc`; 0, 1, 2, … where the list is empty.
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.abc`, `.usdc` and `.glb`; 0, 1, 2, … where the list is empty.
     pub numbers: Vec<f64>,
     /// What is added to all positions, which are then written in double precision by the formats that have it.
     pub origin: Option<Point>,
@@ -43,6 +48,21 @@ pub struct FrameOptions {
     pub rounding: f64,
     /// What the positions mean, for the formats that say it; metres and Y up where nothing is told.
     pub units: Option<Units>,
+    /// How `.glb` holds the frames.
+    pub morphs: MorphOptions,
+}
+
+/// How frames become morph targets: as their principal components, which lose something.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MorphOptions {
+    /// Targets at the most, up to 255; 64 by default, or 255 with an error that is to be held.
+    pub targets: Option<usize>,
+    /// What may be lost, as a share of the diagonal: as few targets are taken as hold it.
+    pub max_error: Option<f64>,
+    /// The diagonal of the rest pose; that of the mean shape by default.
+    pub diagonal: Option<f64>,
+    /// Whether positions are floats instead of whole numbers of 16 bits.
+    pub floats: bool,
 }
 
 impl FrameOptions {
@@ -60,7 +80,14 @@ impl FrameOptions {
 
 impl Default for FrameOptions {
     fn default() -> Self {
-        Self { fps: 24.0, numbers: Vec::new(), origin: None, rounding: 0.0, units: None }
+        Self {
+            fps: 24.0,
+            numbers: Vec::new(),
+            origin: None,
+            rounding: 0.0,
+            units: None,
+            morphs: MorphOptions::default(),
+        }
     }
 }
 

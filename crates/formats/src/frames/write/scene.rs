@@ -78,7 +78,7 @@ fn check(announced: &Announced, format: CacheFormat, faces: &Polygons) -> Result
 }
 
 /// The name of the mesh: that of the file, with `_` for what names in Maya cannot have.
-fn name(path: &Path) -> String {
+pub(super) fn name(path: &Path) -> String {
     const MOST: usize = 64;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let plain = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(MOST);

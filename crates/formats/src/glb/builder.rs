@@ -1,15 +1,4 @@
-//! Binary glTF 2.0: the triangles and points of its default scene.
-//!
-//! The `gltf` crate turns the JSON into a document; everything that the document refers to is looked up here with
-//! checks, because the crate's own accessors and validation panic on indices out of range.
-
-mod accessor;
-mod buffers;
-mod container;
-mod faults;
-mod meshopt;
-mod scene;
-mod skin;
+//! The points and faces of placed meshes.
 
 use std::collections::HashMap;
 use std::collections::btree_map::Entry;
@@ -18,47 +7,20 @@ use cager_geometry::mesh::{Model, Point};
 use cager_geometry::vector::along;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Mesh, Root};
 
-use super::colors::{Colors, Scale, srgb};
-use super::parsed::check_face;
+use super::buffers::Buffers;
+use super::container;
+use super::faults::too_large;
+use super::scene::{Placement, Scene};
+use super::skin::{Joints, Skins};
 use crate::error::Fault;
-use buffers::Buffers;
-use faults::{dangling, too_large};
-use scene::{Placement, Scene};
-use skin::{Joints, Skins};
+use crate::mesh::{Colors, Contents, Scale, check_face, srgb};
 
-pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
-    let chunks = container::split(bytes)?;
-    let root = container::document(chunks.json)?;
-    let scene = Scene::of(&root)?;
-    let mut builder = Builder {
-        root: &root,
-        scene: &scene,
-        buffers: Buffers::new(&root, chunks.binary, bytes.len()),
-        skins: Skins::new(),
-        model: Model::default(),
-        colors: Colors::default(),
-        most: MAX_ITEMS_OF_ANY_FILE + MAX_ITEMS_PER_BYTE * bytes.len(),
-        unpacked: 0,
-    };
-    for placement in &scene.placements {
-        builder.place(placement)?;
-    }
-    let Builder { mut model, colors, .. } = builder;
-    model.colors = colors.finish(model.points.len(), Scale::Fractions);
-    Ok(model)
-}
-
-/// Points, corners and primitives that any file may have.
-const MAX_ITEMS_OF_ANY_FILE: usize = 1 << 16;
-/// Those beyond, for each byte of the file: enough for seven copies of a mesh and more.
-const MAX_ITEMS_PER_BYTE: usize = 2;
-
-struct Builder<'a> {
-    root: &'a Root,
+/// Puts meshes together, one placement after another.
+pub(super) struct Builder<'a, 'b> {
+    buffers: &'a Buffers<'b>,
     scene: &'a Scene,
-    buffers: Buffers<'a>,
+    contents: Contents,
     skins: Skins,
     model: Model,
     colors: Colors,
@@ -68,13 +30,22 @@ struct Builder<'a> {
     unpacked: usize,
 }
 
-impl Builder<'_> {
+impl<'a, 'b> Builder<'a, 'b> {
+    pub(super) fn new(buffers: &'a Buffers<'b>, scene: &'a Scene, contents: Contents) -> Self {
+        let (model, colors, skins) = (Model::default(), Colors::default(), Skins::new());
+        Self { buffers, scene, contents, skins, model, colors, most: buffers.most_items(), unpacked: 0 }
+    }
+
+    /// The meshes of placements in their order, as one.
+    pub(super) fn build(mut self, placements: &[Placement]) -> Result<Model, Fault> {
+        placements.iter().try_for_each(|placement| self.place(placement))?;
+        let Self { mut model, colors, .. } = self;
+        model.colors = colors.finish(model.points.len(), Scale::Fractions);
+        Ok(model)
+    }
+
     fn place(&mut self, placement: &Placement) -> Result<(), Fault> {
-        let mesh: &Mesh = self
-            .root
-            .meshes
-            .get(placement.mesh)
-            .ok_or_else(|| dangling(&format!("mesh {}", placement.mesh), self.root.meshes.len()))?;
+        let mesh = placement.mesh_in(&self.buffers.root)?;
         let mirrored = match placement.skin {
             Some(skin) => self.joints(skin)?.mirror(),
             None => placement.mirrored(),
@@ -92,7 +63,7 @@ impl Builder<'_> {
 
     fn joints(&mut self, skin: usize) -> Result<&Joints, Fault> {
         if let Entry::Vacant(entry) = self.skins.entry(skin) {
-            let (joints, read) = Joints::of(skin, self.scene, &self.buffers, self.most)?;
+            let (joints, read) = Joints::of(skin, self.scene, self.buffers, self.most)?;
             self.most -= read;
             entry.insert(joints);
         }
@@ -119,7 +90,7 @@ impl Builder<'_> {
             Fault::unsupported(format!("{place} has no POSITION; export the mesh without compression"))
         })?;
         // Some files have the plain data as well.
-        if is_draco && self.root.accessors.get(positions.value()).is_some_and(|a| a.buffer_view.is_none()) {
+        if is_draco && self.buffers.root.accessors.get(positions.value()).is_some_and(|a| a.buffer_view.is_none()) {
             return Err(container::draco());
         }
         let (base, count) = match placed.get(&positions.value()) {
@@ -127,14 +98,15 @@ impl Builder<'_> {
             None => {
                 let added = self.add_points(positions.value(), primitive, placement, place)?;
                 // Of primitives that share their points, the first one's.
-                if let Some(colors) = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0))) {
+                let colors = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0)));
+                if let Some(colors) = colors.filter(|_| self.contents == Contents::PointsAndFaces) {
                     self.add_colors(colors.value(), added.1, place);
                 }
                 placed.insert(positions.value(), added);
                 added
             }
         };
-        if mode == Mode::Points {
+        if mode == Mode::Points || self.contents == Contents::Points {
             return Ok(());
         }
         let corners = match primitive.indices {
@@ -162,7 +134,7 @@ impl Builder<'_> {
         self.morph(&mut points, primitive, placement, place)?;
         if let Some(skin) = placement.skin {
             self.joints(skin)?;
-            self.skins[&skin].pose(&mut points, primitive, &self.buffers, place)?;
+            self.skins[&skin].pose(&mut points, primitive, self.buffers, place)?;
         }
         let base = self.model.points.len();
         for (k, &point) in points.iter().enumerate() {
@@ -185,15 +157,24 @@ impl Builder<'_> {
         placement: &Placement,
         place: &str,
     ) -> Result<(), Fault> {
-        let node = placement.node.and_then(|node| self.root.nodes[node].weights.as_ref());
-        let weights = node.or(self.root.meshes[placement.mesh].weights.as_ref());
+        let node = placement.node.and_then(|node| self.buffers.root.nodes[node].weights.as_ref());
+        let weights = node.or(self.buffers.root.meshes[placement.mesh].weights.as_ref());
         let targets = primitive.targets.iter().flatten().zip(weights.into_iter().flatten());
         for (target, &weight) in targets.filter(|&(_, &weight)| weight != 0.0) {
             let Some(positions) = &target.positions else { continue };
+            let (target, weight) = (positions.value(), f64::from(weight));
+            // Of most targets only some points move.
+            if let Some(moved) = self.buffers.moved_points(target, points.len(), place)? {
+                self.most = self.most.checked_sub(moved.len() + 1).ok_or_else(too_large)?;
+                for (at, moved) in moved {
+                    points[at] = along(points[at], weight, moved);
+                }
+                continue;
+            }
             self.most = self.most.checked_sub(points.len() + 1).ok_or_else(too_large)?;
-            let moved = self.buffers.positions(positions.value(), points.len(), place)?;
+            let moved = self.buffers.positions(target, points.len(), place)?;
             for (point, moved) in points.iter_mut().zip(moved) {
-                *point = along(*point, weight.into(), moved);
+                *point = along(*point, weight, moved);
             }
         }
         Ok(())

@@ -13,11 +13,55 @@ use crate::error::Fault;
 impl Buffers<'_> {
     /// The positions of an accessor, which must have no more than `most`.
     pub(super) fn positions(&self, index: usize, most: usize, place: &str) -> Result<Vec<Point>, Fault> {
+        let kind = self.position_kind(index, place)?;
+        self.read(index, kind, most, place, |point| point)
+    }
+
+    /// The points that a sparse accessor names among so many, and where it moves them; none where all are stored.
+    pub(super) fn moved_points(
+        &self,
+        index: usize,
+        most: usize,
+        place: &str,
+    ) -> Result<Option<Vec<(usize, Point)>>, Fault> {
+        let accessor = self.accessor(index)?;
+        let Some(sparse) = accessor.sparse.as_ref().filter(|_| accessor.buffer_view.is_none()) else {
+            return Ok(None);
+        };
+        let kind = self.position_kind(index, place)?;
+        let at = self.sparse_indices(sparse, most, place)?;
+        if let Some(outside) = at.iter().find(|&&at| at >= most) {
+            return Err(Fault::damaged(format!(
+                "{place}: a sparse accessor moves point {outside} of {most}; export the mesh again"
+            )));
+        }
+        let (view, offset) = (sparse.values.buffer_view.value(), sparse.values.byte_offset.0);
+        let found = self.elements(view, offset, kind.size(), sparse.count.0, place)?;
+        Ok(Some(at.into_iter().zip(found.bytes.chunks(found.stride).map(|element| kind.numbers(element))).collect()))
+    }
+
+    fn position_kind(&self, index: usize, place: &str) -> Result<Kind, Fault> {
         let kind = self.kind(index, place)?;
         if kind.shape != Type::Vec3 || kind.component == ComponentType::U32 {
             return Err(kind.unexpected("positions", place));
         }
-        self.read(index, kind, most, place, |point| point)
+        Ok(kind)
+    }
+
+    /// Numbers of an animation, `width` to an element: fractions, or as they are; no more than `most` elements.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        index: usize,
+        most: usize,
+        place: &str,
+    ) -> Result<Vec<[f32; N]>, Fault> {
+        let kind = self.kind(index, place)?;
+        let shape = [Type::Scalar, Type::Scalar, Type::Scalar, Type::Vec3, Type::Vec4][N.min(4)];
+        if kind.shape != shape || kind.component == ComponentType::U32 {
+            return Err(kind.unexpected("values of an animation", place));
+        }
+        let kind = Kind { normalized: kind.component != ComponentType::F32, ..kind };
+        self.read(index, kind, most, place, |numbers: [f64; N]| numbers.map(|x| x as f32))
     }
 
     /// The colours of an accessor in linear light, which must have no more than `most`; an opacity is passed over.
@@ -108,7 +152,8 @@ impl Buffers<'_> {
             None => (0..count.ok_or_else(too_large)?).map(|_| convert(&[0; MAX_ELEMENT_BYTES][..size])).collect(),
         };
         if let Some(sparse) = &accessor.sparse {
-            let replaced = self.sparse_indices(sparse, most, place)?;
+            // More than there are would be read for nothing.
+            let replaced = self.sparse_indices(sparse, values.len(), place)?;
             let (view, offset) = (sparse.values.buffer_view.value(), sparse.values.byte_offset.0);
             let found = self.elements(view, offset, size, sparse.count.0, place)?;
             for (at, element) in replaced.into_iter().zip(found.bytes.chunks(found.stride)) {

@@ -2,7 +2,7 @@
 
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{add, combination, cross, dot};
-use gltf::json::{Index, Node, Root};
+use gltf::json::{Index, Mesh, Node, Root};
 
 use super::faults::dangling;
 use crate::error::Fault;
@@ -17,6 +17,8 @@ pub(super) struct Scene {
     pub(super) placements: Vec<Placement>,
     /// From each node's space to the world's; none for nodes outside the scene.
     worlds: Vec<Option<Affine>>,
+    /// The node above each.
+    pub(super) parents: Vec<Option<usize>>,
 }
 
 /// A mesh at its place in the scene.
@@ -30,6 +32,11 @@ pub(super) struct Placement {
 }
 
 impl Placement {
+    pub(super) fn mesh_in<'a>(&self, root: &'a Root) -> Result<&'a Mesh, Fault> {
+        let count = root.meshes.len();
+        root.meshes.get(self.mesh).ok_or_else(|| dangling(&format!("mesh {}", self.mesh), count))
+    }
+
     pub(super) fn apply(&self, p: Point) -> Point {
         if self.transform == IDENTITY { p } else { apply(&self.transform, p) }
     }
@@ -43,7 +50,7 @@ impl Placement {
 impl Scene {
     /// The meshes of the default scene in the order of their nodes, or all meshes as they are where no node has one.
     pub(super) fn of(root: &Root) -> Result<Self, Fault> {
-        let worlds = transforms(root)?;
+        let (worlds, parents) = transforms(root)?;
         let mut placements = Vec::new();
         for (k, (node, world)) in root.nodes.iter().zip(&worlds).enumerate() {
             let (Some(mesh), Some(world)) = (node.mesh, world) else { continue };
@@ -62,7 +69,7 @@ impl Scene {
             let alone = |mesh| Placement { mesh, node: None, skin: None, transform: IDENTITY };
             placements.extend((0..root.meshes.len()).map(alone));
         }
-        Ok(Self { placements, worlds })
+        Ok(Self { placements, worlds, parents })
     }
 
     /// From a node's space to the world's.
@@ -84,11 +91,14 @@ pub(super) fn mirrors(transform: &Affine) -> bool {
     dot(a, cross(b, c)) < 0.0
 }
 
-/// From each node's space to the world's; none for nodes outside the default scene.
-fn transforms(root: &Root) -> Result<Vec<Option<Affine>>, Fault> {
-    let mut transforms = vec![None; root.nodes.len()];
-    let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, IDENTITY)).collect();
-    while let Some((index, parent)) = open.pop() {
+/// As [`transforms`] gives it.
+type Tree = (Vec<Option<Affine>>, Vec<Option<usize>>);
+
+/// From each node's space to the world's, none for nodes outside the default scene; and the node above each.
+fn transforms(root: &Root) -> Result<Tree, Fault> {
+    let (mut transforms, mut parents) = (vec![None; root.nodes.len()], vec![None; root.nodes.len()]);
+    let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, IDENTITY, None)).collect();
+    while let Some((index, parent, above)) = open.pop() {
         let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), root.nodes.len()))?;
         if transforms[index].is_some() {
             return Err(Fault::damaged(format!(
@@ -96,10 +106,10 @@ fn transforms(root: &Root) -> Result<Vec<Option<Affine>>, Fault> {
             )));
         }
         let world = compose(&parent, &local(node));
-        transforms[index] = Some(world);
-        open.extend(children(node).map(|child| (child, world)));
+        (transforms[index], parents[index]) = (Some(world), above);
+        open.extend(children(node).map(|child| (child, world, Some(index))));
     }
-    Ok(transforms)
+    Ok((transforms, parents))
 }
 
 fn roots(root: &Root) -> Result<Vec<usize>, Fault> {

@@ -1,5 +1,7 @@
 //! The container: a header, a chunk of JSON and a chunk of binary data.
 
+use std::ops::Range;
+
 use gltf::json::Root;
 
 use crate::error::Fault;
@@ -7,7 +9,8 @@ use crate::text::quoted;
 
 pub(super) struct Chunks<'a> {
     pub(super) json: &'a [u8],
-    pub(super) binary: &'a [u8],
+    /// Where the other chunk is in the file.
+    pub(super) binary: Range<usize>,
 }
 
 pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
@@ -18,7 +21,7 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
         return Err(Fault::unsupported(format!("is glTF {version}.0; export the mesh as glTF 2.0")));
     }
     let mut rest = bytes.get(12..length as usize).ok_or_else(|| truncated(length.into(), bytes.len()))?;
-    let (mut json, mut binary) = (None, None);
+    let (end, mut json, mut binary) = (length as usize, None, None);
     while !rest.is_empty() {
         let (Some(length), Some(kind)) = (word(rest, 0), rest.get(4..8)) else {
             return Err(truncated(8, rest.len()));
@@ -26,14 +29,17 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
         let chunk = rest[8..].get(..length as usize).ok_or_else(|| truncated(length.into(), rest.len() - 8))?;
         match kind {
             b"JSON" if json.is_none() => json = Some(chunk),
-            b"BIN\0" if binary.is_none() => binary = Some(chunk),
+            b"BIN\0" if binary.is_none() => {
+                let start = end - rest.len() + 8;
+                binary = Some(start..start + chunk.len());
+            }
             // The format asks readers to skip what they do not know.
             _ => {}
         }
         rest = &rest[8 + chunk.len()..];
     }
     let json = json.ok_or_else(|| Fault::damaged("has no JSON chunk; export the mesh again"))?;
-    Ok(Chunks { json, binary: binary.unwrap_or_default() })
+    Ok(Chunks { json, binary: binary.unwrap_or(end..end) })
 }
 
 /// Parses the JSON; the indices in it are not checked.

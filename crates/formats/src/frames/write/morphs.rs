@@ -1,0 +1,143 @@
+//! All frames as morph targets of binary glTF: their principal components, which are known once all frames are.
+
+use std::io::{BufWriter, Write};
+
+use cager_geometry::mesh::Polygons;
+
+use super::output::{Announced, FrameOptions, FrameWriter, check_precision};
+use super::scene::name;
+use crate::atomic::{AtomicFile, Target};
+use crate::error::{Error, Fault};
+use crate::glb::{LARGEST_SIDE, MorphScene, Morphs, Wanted};
+use crate::mesh::check_face;
+
+/// Bytes that frames may have, which are all in memory.
+const MOST_BYTES: usize = 1 << 30;
+
+pub(super) struct MorphWriter {
+    announced: Announced,
+    file: AtomicFile,
+    wanted: Wanted,
+    scene: MorphScene,
+    frames: Vec<f32>,
+    notes: Vec<String>,
+}
+
+impl MorphWriter {
+    pub(super) fn create(
+        announced: Announced,
+        target: &Target,
+        faces: &Polygons,
+        options: &FrameOptions,
+    ) -> Result<Self, Error> {
+        let path = &announced.path;
+        if options.origin.is_some() {
+            check_precision(options, path)?;
+        }
+        let wanted = Wanted {
+            targets: options.morphs.targets,
+            max_error: options.morphs.max_error,
+            diagonal: options.morphs.diagonal.filter(|diagonal| *diagonal > 0.0),
+        };
+        check(&announced, faces, &wanted).map_err(|fault| fault.at(path))?;
+        let (times, note) = times(announced.frames, options).map_err(|fault| fault.at(path))?;
+        let scene = MorphScene {
+            name: name(path),
+            triangles: faces.triangulated(),
+            times,
+            origin: options.origin.unwrap_or_default(),
+            floats: options.morphs.floats,
+        };
+        let notes = note.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
+        let file = AtomicFile::create(target)?;
+        Ok(Self { announced, file, wanted, scene, frames: Vec::new(), notes })
+    }
+
+    /// Writes the file, once all frames are there.
+    fn write(&mut self) -> Result<(), Error> {
+        let Announced { path, points, frames, .. } = &self.announced;
+        let morphs = Morphs::of(&self.frames, *points, &self.wanted, &self.scene).map_err(|fault| fault.at(path))?;
+        let found = morphs.deviation();
+        if found.targets > 0 {
+            self.notes.push(format!(
+                "{}: its {} morph targets are {:.1e} of the diagonal from the {frames} frames at most, {:.1e} in the mean ({})",
+                path.display(),
+                found.targets,
+                found.share(found.largest),
+                found.share(found.rms),
+                if self.scene.floats { "floats" } else { "16 bits a coordinate" },
+            ));
+        }
+        let mut out = BufWriter::with_capacity(1 << 16, &mut self.file);
+        let written = morphs.write(&mut out).and_then(|()| out.flush());
+        written.map_err(|cause| Error::write(path, cause))
+    }
+}
+
+fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(), Fault> {
+    let Announced { points, frames, .. } = *announced;
+    let targets = wanted.most().min(frames).min(3 * points);
+    // Frames and targets, then weights and errors of each frame.
+    let bytes = (frames + targets).saturating_mul(12 * points).saturating_add(frames.saturating_mul(32 * targets));
+    if bytes > MOST_BYTES || frames.min(3 * points) > LARGEST_SIDE {
+        return Err(Fault::unsupported(format!(
+            "cannot hold {frames} frames of {points} points as morph targets, which takes more than {} MB or more than {LARGEST_SIDE} frames; take fewer of them (--range), or write .usdc or .abc",
+            MOST_BYTES >> 20
+        )));
+    }
+    faces.iter().enumerate().try_for_each(|(k, face)| check_face(face, points, || format!("face {k}")))
+}
+
+/// The seconds of frames, which glTF counts from 0 on in single precision, and what is to be said of them.
+fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<String>), Fault> {
+    if frames < 2 {
+        return Ok((Vec::new(), None));
+    }
+    let seconds =
+        |first: f64| -> Vec<f32> { (0..frames).map(|k| ((options.number(k) - first) / options.fps) as f32).collect() };
+    let told = seconds(0.0);
+    let ascend = |times: &[f32]| times.windows(2).all(|pair| pair[1] > pair[0]);
+    // Late frames are between those that single precision tells apart.
+    let is_exact = |(k, time): (usize, &f32)| (f64::from(*time) * options.fps - options.number(k)).abs() <= 1e-3;
+    if told[0] >= 0.0 && ascend(&told) && told.iter().enumerate().all(is_exact) {
+        return Ok((told, None));
+    }
+    let moved = seconds(options.number(0));
+    if !ascend(&moved) {
+        return Err(Fault::unsupported(
+            "has times in single precision, which cannot tell these frames apart; give a smaller --fps, or write .npy",
+        ));
+    }
+    let note = format!("frame {} is at 0 s, as glTF has no times before that and no very late ones", options.number(0));
+    Ok((moved, Some(note)))
+}
+
+impl FrameWriter for MorphWriter {
+    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
+        self.announced.admit(positions)?;
+        self.frames.extend_from_slice(positions);
+        if self.announced.written + 1 == self.announced.frames {
+            let written = self.write();
+            // What was not written is not counted, so that nothing is finished.
+            if written.is_err() {
+                self.frames.truncate(self.frames.len() - positions.len());
+                return written;
+            }
+        }
+        self.announced.written += 1;
+        Ok(())
+    }
+
+    fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
+        Err(self.announced.one_mesh())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), Error> {
+        self.announced.check_complete()?;
+        self.file.commit()
+    }
+}

@@ -1,0 +1,231 @@
+//! Where the bytes of views are: in the binary chunk, in a `data:` URI, or packed.
+
+use std::borrow::Cow;
+use std::cell::{Cell, OnceCell};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path};
+
+use base64::Engine as _;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use gltf::json::Root;
+
+use super::container::{Chunks, document, split};
+use super::faults::{dangling, too_large};
+use super::meshopt::Packed;
+use crate::error::Fault;
+use crate::text::quoted;
+
+/// Bytes that packed views of any file may have.
+const UNPACKED_FREE: usize = 1 << 20;
+/// Those beyond, for each byte of the file.
+const UNPACKED_PER_BYTE: usize = 24;
+
+/// Points, corners and primitives that any file may have.
+const MAX_ITEMS_OF_ANY_FILE: usize = 1 << 16;
+/// Those beyond, for each byte of the file: enough for seven copies of a mesh and more.
+const MAX_ITEMS_PER_BYTE: usize = 2;
+
+/// The files' padding is not always whole.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
+pub(super) struct Buffers<'a> {
+    pub(super) root: Root,
+    binary: Cow<'a, [u8]>,
+    /// By buffer: what its `data:` URI holds, once it was asked for.
+    decoded: Vec<OnceCell<Vec<u8>>>,
+    /// By view: what was packed.
+    unpacked: Vec<OnceCell<Vec<u8>>>,
+    /// Bytes that were unpacked, and that may be at the most.
+    taken: Cell<usize>,
+    most: usize,
+    /// Bytes of the file.
+    file: usize,
+}
+
+impl<'a> Buffers<'a> {
+    /// Those of a `.glb` file, or of the text of a `.gltf` file whose other files lie in a folder, if they may be read.
+    pub(super) fn open(bytes: impl Into<Cow<'a, [u8]>>, source: &Source<'_>) -> Result<Self, Fault> {
+        let bytes: Cow<'a, [u8]> = bytes.into();
+        let length = bytes.len();
+        let (root, binary) = if source.is_text {
+            (document(&bytes)?, 0..0)
+        } else {
+            let Chunks { json, binary } = split(&bytes)?;
+            (document(json)?, binary)
+        };
+        let binary = match bytes {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[binary]),
+            Cow::Owned(mut bytes) => {
+                bytes.truncate(binary.end);
+                bytes.drain(..binary.start);
+                Cow::Owned(bytes)
+            }
+        };
+        let others = match source.folder {
+            Some(folder) => others(&root, folder)?,
+            None => Vec::new(),
+        };
+        let length = length + others.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
+        let buffers = Self::new(root, binary, length);
+        others.into_iter().for_each(|(k, bytes)| drop(buffers.decoded[k].set(bytes)));
+        Ok(buffers)
+    }
+
+    fn new(root: Root, binary: Cow<'a, [u8]>, file: usize) -> Self {
+        Self {
+            decoded: vec![OnceCell::new(); root.buffers.len()],
+            unpacked: vec![OnceCell::new(); root.buffer_views.len()],
+            root,
+            binary,
+            taken: Cell::new(0),
+            most: UNPACKED_FREE + UNPACKED_PER_BYTE * file,
+            file,
+        }
+    }
+
+    /// Points, corners and primitives that a file may have: nodes may repeat a mesh, and primitives an accessor, any number of times in a few bytes each.
+    pub(super) fn most_items(&self) -> usize {
+        MAX_ITEMS_OF_ANY_FILE + MAX_ITEMS_PER_BYTE * self.file
+    }
+
+    /// Unpacks what an accessor reads, and gives the bytes that were unpacked up to now; what is wrong with it is told when it is read.
+    pub(super) fn unpack_for(&self, accessor: usize) -> usize {
+        if let Some(view) = self.root.accessors.get(accessor).and_then(|accessor| accessor.buffer_view) {
+            let _ = self.view(view.value(), "");
+        }
+        self.taken.get()
+    }
+
+    /// The bytes of a view, and its stride where it has one.
+    pub(super) fn view(&self, index: usize, place: &str) -> Result<(&[u8], Option<usize>), Fault> {
+        let views = &self.root.buffer_views;
+        let view = views.get(index).ok_or_else(|| dangling(&format!("bufferView {index}"), views.len()))?;
+        let stride = view.byte_stride.map(|stride| stride.0);
+        let Some(packed) = Packed::of(view) else {
+            let offset = view.byte_offset.map_or(0, |offset| offset.0);
+            return Ok((self.part(view.buffer.value(), offset, view.byte_length.0, place)?, stride));
+        };
+        let cell = &self.unpacked[index];
+        if cell.get().is_none() {
+            let damaged = || {
+                Fault::damaged(format!(
+                    "{place}: the packed bufferView {index} is not understood; export the mesh again"
+                ))
+            };
+            let packed = packed.ok_or_else(damaged)?;
+            let size = packed.size().ok_or_else(damaged)?;
+            let taken = self.taken.get().checked_add(size).filter(|&taken| taken <= self.most).ok_or_else(too_large)?;
+            let stream = self.part(packed.buffer, packed.offset, packed.length, place)?;
+            let unpacked = packed.unpack(stream).ok_or_else(damaged)?;
+            cell.get_or_init(|| unpacked);
+            self.taken.set(taken);
+        }
+        Ok((cell.get().map_or(&[], Vec::as_slice), stride))
+    }
+
+    fn part(&self, buffer: usize, offset: u64, length: u64, place: &str) -> Result<&[u8], Fault> {
+        let bytes = self.buffer(buffer, place)?;
+        let range = || {
+            let start = usize::try_from(offset).ok()?;
+            bytes.get(start..start.checked_add(usize::try_from(length).ok()?)?)
+        };
+        range().ok_or_else(|| outside(place))
+    }
+
+    fn buffer(&self, index: usize, place: &str) -> Result<&[u8], Fault> {
+        let buffers = &self.root.buffers;
+        let buffer = buffers.get(index).ok_or_else(|| dangling(&format!("buffer {index}"), buffers.len()))?;
+        if let Some(bytes) = self.decoded[index].get() {
+            return Ok(bytes);
+        }
+        let Some(uri) = &buffer.uri else {
+            if index == 0 {
+                return Ok(&self.binary);
+            }
+            return Err(Fault::unsupported(format!(
+                "{place}: buffer {index} has no data of its own; export the mesh without compression"
+            )));
+        };
+        let Some(data) = uri.strip_prefix("data:") else {
+            return Err(Fault::unsupported(format!(
+                "{place}: has its data in another file; export one self-contained .glb"
+            )));
+        };
+        let text = data.split_once(";base64,").map(|(_, text)| text.trim_ascii());
+        let decoded = text.and_then(|text| BASE64.decode(text).ok()).ok_or_else(|| {
+            Fault::damaged(format!("{place}: the data: URI of buffer {index} is not base64; export the mesh again"))
+        })?;
+        Ok(self.decoded[index].get_or_init(|| decoded))
+    }
+}
+
+/// What is read: a `.gltf` file, which is text, or a `.glb`.
+#[derive(Default)]
+pub(crate) struct Source<'a> {
+    pub(crate) is_text: bool,
+    /// Where other files lie that may be read.
+    pub(crate) folder: Option<&'a Path>,
+}
+
+/// What is in other files, by the numbers of buffers.
+fn others(root: &Root, folder: &Path) -> Result<Vec<(usize, Vec<u8>)>, Fault> {
+    let (mut found, mut room) = (Vec::new(), LARGEST);
+    for (k, buffer) in root.buffers.iter().enumerate() {
+        let Some(uri) = buffer.uri.as_ref().filter(|uri| !uri.starts_with("data:")) else { continue };
+        let name = decoded_uri(uri);
+        let is_below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+        if uri.contains(':') || name.is_empty() || !Path::new(&name).components().all(is_below) {
+            return Err(Fault::unsupported(format!(
+                "has its data in {}, which is not in its folder; export one self-contained .glb",
+                quoted(uri.as_bytes())
+            )));
+        }
+        let mut bytes = Vec::new();
+        let read = File::open(folder.join(&name)).and_then(|file| file.take(room + 1).read_to_end(&mut bytes));
+        read.map_err(|cause| {
+            let name = quoted(name.as_bytes());
+            Fault::damaged(format!("has its data in {name}, which cannot be read ({cause}); copy it beside the file"))
+        })?;
+        room = room.checked_sub(bytes.len() as u64).ok_or_else(too_long)?;
+        found.push((k, bytes));
+    }
+    Ok(found)
+}
+
+/// A URI without its escapes, such as `%20`.
+fn decoded_uri(uri: &str) -> String {
+    let (mut bytes, mut rest) = (Vec::new(), uri.as_bytes());
+    while let [first, behind @ ..] = rest {
+        let digits = behind.get(..2).filter(|_| *first == b'%').and_then(|digits| str::from_utf8(digits).ok());
+        match digits.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
+            Some(byte) => {
+                bytes.push(byte);
+                rest = &behind[2..];
+            }
+            None => {
+                bytes.push(*first);
+                rest = behind;
+            }
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Bytes that files may have together, as they are held in memory.
+pub(super) const LARGEST: u64 = 1 << 31;
+
+pub(super) fn too_long() -> Fault {
+    Fault::unsupported(format!(
+        "is larger than {} GiB, which glTF is read up to; export the mesh as Alembic or USD",
+        LARGEST >> 30
+    ))
+}
+
+pub(super) fn outside(place: &str) -> Fault {
+    Fault::damaged(format!("{place}: reaches beyond the binary data; copy or export the file again"))
+}

@@ -1,0 +1,159 @@
+//! One value that an animation moves: its keys, and what lies between them.
+
+use gltf::json::animation::{Channel as Stored, Interpolation, Property, Sampler};
+use gltf::json::validation::Checked;
+use gltf::json::{Animation, Node, Root};
+
+use super::buffers::Buffers;
+use super::faults::dangling;
+use crate::error::Fault;
+
+/// Seconds within which two times are one.
+pub(super) const NEAR: f64 = 1e-6;
+
+/// What moves one property of a node.
+pub(super) struct Channel {
+    pub(super) node: usize,
+    pub(super) property: Property,
+    interpolation: Interpolation,
+    /// Seconds, ascending; at least one.
+    pub(super) times: Vec<f64>,
+    /// Numbers of a value.
+    width: usize,
+    /// A value for each time, or with [`Interpolation::CubicSpline`] its tangent before, itself and its tangent behind.
+    values: Vec<f32>,
+}
+
+impl Channel {
+    /// Reads a channel; none where it has no node or nothing to move. `room` is how many numbers may still be read.
+    pub(super) fn read(
+        animation: &Animation,
+        stored: &Stored,
+        buffers: &Buffers<'_>,
+        room: &mut usize,
+        place: &str,
+    ) -> Result<Option<Self>, Fault> {
+        let unknown =
+            |what: &str| Fault::damaged(format!("{place}: its {what} is unknown; export the animation again"));
+        let count = animation.samplers.len();
+        let sampler: &Sampler = animation
+            .samplers
+            .get(stored.sampler.value())
+            .ok_or_else(|| dangling(&format!("sampler {}", stored.sampler.value()), count))?;
+        let Checked::Valid(property) = stored.target.path else { return Err(unknown("path")) };
+        let Checked::Valid(interpolation) = sampler.interpolation else { return Err(unknown("interpolation")) };
+        let node = stored.target.node.value();
+        let width = match property {
+            Property::Rotation => 4,
+            Property::Translation | Property::Scale => 3,
+            Property::MorphTargetWeights => targets(&buffers.root, node),
+        };
+        if width == 0 {
+            return Ok(None);
+        }
+        let times: Vec<[f32; 1]> = buffers.numbers(sampler.input.value(), *room, place)?;
+        *room -= times.len();
+        let times: Vec<f64> = times.into_iter().map(|[time]| time.into()).collect();
+        if let Some(k) = times.iter().position(|time| !time.is_finite()).or_else(|| descent(&times)) {
+            return Err(Fault::invalid(format!(
+                "{place}: its time {k} is not after the one before; export the animation again"
+            )));
+        }
+        let output = sampler.output.value();
+        let values = match property {
+            Property::MorphTargetWeights => buffers.numbers::<1>(output, *room, place)?.into_flattened(),
+            Property::Rotation => buffers.numbers::<4>(output, *room / 4, place)?.into_flattened(),
+            Property::Translation | Property::Scale => buffers.numbers::<3>(output, *room / 3, place)?.into_flattened(),
+        };
+        *room -= values.len();
+        if let Some(k) = values.iter().position(|value| !value.is_finite()) {
+            return Err(Fault::invalid(format!("{place}: its value {k} is not finite; export the animation again")));
+        }
+        let each = if interpolation == Interpolation::CubicSpline { 3 * width } else { width };
+        if times.is_empty() || times.len().checked_mul(each) != Some(values.len()) {
+            return Err(Fault::damaged(format!(
+                "{place}: has {} values for {} times of {each} each; export the animation again",
+                values.len(),
+                times.len()
+            )));
+        }
+        Ok(Some(Self { node, property, interpolation, times, width, values }))
+    }
+
+    /// Puts the value at a time into a node.
+    pub(super) fn apply(&self, time: f64, node: &mut Node) {
+        let mut value = vec![0.0; self.width];
+        self.value(time, &mut value);
+        match self.property {
+            Property::MorphTargetWeights => node.weights = Some(value.iter().map(|&x| x as f32).collect()),
+            Property::Rotation => {
+                let [x, y, z, w] = std::array::from_fn(|k| value[k]);
+                let length = (x * x + y * y + z * z + w * w).sqrt();
+                let turn = if length > 0.0 { [x, y, z, w].map(|x| (x / length) as f32) } else { [0.0, 0.0, 0.0, 1.0] };
+                node.rotation = Some(gltf::json::scene::UnitQuaternion(turn));
+            }
+            Property::Translation => node.translation = Some(std::array::from_fn(|k| value[k] as f32)),
+            Property::Scale => node.scale = Some(std::array::from_fn(|k| value[k] as f32)),
+        }
+    }
+
+    /// The value at a time; before the first and behind the last, theirs.
+    fn value(&self, time: f64, out: &mut [f64]) {
+        let last = self.times.len() - 1;
+        let before = self.times.partition_point(|&key| key <= time + NEAR).saturating_sub(1);
+        let step = self.times[(before + 1).min(last)] - self.times[before];
+        let share =
+            if time > self.times[before] + NEAR && step > 0.0 { (time - self.times[before]) / step } else { 0.0 };
+        let cubic = self.interpolation == Interpolation::CubicSpline;
+        let part = |key: usize, part: usize| {
+            let first = if cubic { 3 * key + part } else { key } * self.width;
+            &self.values[first..first + self.width]
+        };
+        let (a, b) = (part(before, 1), part((before + 1).min(last), 1));
+        out.iter_mut().zip(a).for_each(|(out, &a)| *out = a.into());
+        if share == 0.0 || self.interpolation == Interpolation::Step {
+            return;
+        }
+        if cubic {
+            // The cubic Hermite spline; tangents are stored for a step of one second.
+            let (t, [behind, ahead]) = (share, [part(before, 2), part(before + 1, 0)]);
+            let (t2, t3) = (t * t, t * t * t);
+            for (k, out) in out.iter_mut().enumerate() {
+                let [a, b, m, n] = [a[k], b[k], behind[k], ahead[k]].map(f64::from);
+                *out = (2.0 * t3 - 3.0 * t2 + 1.0) * a
+                    + step * (t3 - 2.0 * t2 + t) * m
+                    + (3.0 * t2 - 2.0 * t3) * b
+                    + step * (t3 - t2) * n;
+            }
+        } else if self.property == Property::Rotation {
+            spherical(out, b, share);
+        } else {
+            out.iter_mut().zip(b).for_each(|(out, &b)| *out += share * (f64::from(b) - *out));
+        }
+    }
+}
+
+/// Turns from one unit quaternion to another on the shorter way.
+fn spherical(from: &mut [f64], to: &[f32], share: f64) {
+    let dot: f64 = from.iter().zip(to).map(|(a, &b)| a * f64::from(b)).sum();
+    let (sign, cosine) = (dot.signum(), dot.abs().min(1.0));
+    let angle = cosine.acos();
+    // The limit, where both are the same but for rounding.
+    let [a, b] = if angle < 1e-6 {
+        [1.0 - share, share]
+    } else {
+        [(1.0 - share) * angle, share * angle].map(|part| part.sin() / angle.sin())
+    };
+    from.iter_mut().zip(to).for_each(|(from, &to)| *from = a * *from + sign * b * f64::from(to));
+}
+
+/// How many morph targets the mesh of a node has.
+fn targets(root: &Root, node: usize) -> usize {
+    let mesh = root.nodes.get(node).and_then(|node| root.meshes.get(node.mesh?.value()));
+    let all = mesh.into_iter().flat_map(|mesh| &mesh.primitives);
+    all.map(|primitive| primitive.targets.as_ref().map_or(0, Vec::len)).max().unwrap_or(0)
+}
+
+fn descent(times: &[f64]) -> Option<usize> {
+    (1..times.len()).find(|&k| times[k] <= times[k - 1])
+}

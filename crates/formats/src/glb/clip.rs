@@ -1,0 +1,148 @@
+//! The animation that moves chosen meshes.
+
+use std::collections::HashSet;
+use std::ops::Range;
+
+use gltf::json::Root;
+use gltf::json::animation::Property;
+use gltf::json::validation::Checked;
+
+use super::buffers::Buffers;
+use super::channel::{Channel, NEAR};
+use super::faults::dangling;
+use super::scene::Scene;
+use crate::error::Fault;
+use crate::scene::shown;
+
+/// Names of other animations that a message lists.
+const LISTED: usize = 4;
+
+pub(super) struct Clip {
+    pub(super) channels: Vec<Channel>,
+    /// What is to be said of others.
+    pub(super) note: Option<String>,
+}
+
+impl Clip {
+    /// The first animation that moves the chosen placements; none where none does.
+    pub(super) fn of(buffers: &Buffers<'_>, scene: &Scene, chosen: Range<usize>) -> Result<Option<Self>, Fault> {
+        let root = &buffers.root;
+        let movers = Movers::of(root, scene, chosen);
+        let moves = |k: &usize| {
+            let channels = &root.animations[*k].channels;
+            channels.iter().any(|channel| movers.move_by(channel.target.node.value(), property(&channel.target.path)))
+        };
+        let mut moving = (0..root.animations.len()).filter(moves);
+        let Some(first) = moving.next() else { return Ok(None) };
+        let (animation, mut room) = (&root.animations[first], buffers.most_items());
+        let mut channels = Vec::new();
+        for (k, stored) in animation.channels.iter().enumerate() {
+            let node = stored.target.node.value();
+            if !movers.move_by(node, property(&stored.target.path)) {
+                continue;
+            }
+            let place = format!("animation {first}, channel {k}");
+            let same = |other: &Channel| other.node == node && Checked::Valid(other.property) == stored.target.path;
+            if channels.iter().any(same) {
+                return Err(Fault::damaged(format!(
+                    "{place}: moves what another channel moves; export the animation again"
+                )));
+            }
+            let channel = Channel::read(animation, stored, buffers, &mut room, &place)?;
+            let fixed = root.nodes.get(node).ok_or_else(|| dangling(&format!("node {node}"), root.nodes.len()))?;
+            let Some(channel) = channel else { continue };
+            if fixed.matrix.is_some() && channel.property != Property::MorphTargetWeights {
+                return Err(Fault::unsupported(format!(
+                    "{place}: moves node {node}, which has a matrix; export it with translation, rotation and scale"
+                )));
+            }
+            channels.push(channel);
+        }
+        let others: Vec<usize> = moving.collect();
+        let name = |k: usize| match &root.animations[k].name {
+            Some(name) => shown(name),
+            None => format!("animation {k}"),
+        };
+        let note = (!others.is_empty()).then(|| {
+            let listed: Vec<String> = others.iter().take(LISTED).map(|&k| name(k)).collect();
+            let more =
+                if others.len() > LISTED { format!(" and {} more", others.len() - LISTED) } else { String::new() };
+            format!(
+                "of its {} animations {} is read, and {}{more} left out; export those to files of their own",
+                others.len() + 1,
+                name(first),
+                listed.join(", ")
+            )
+        });
+        Ok(Some(Self { channels, note }))
+    }
+
+    /// The times of all keys, ascending, none twice.
+    pub(super) fn key_times(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.channels.iter().flat_map(|channel| &channel.times).copied().collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup_by(|b, a| *b - *a <= NEAR);
+        times
+    }
+
+    /// Puts the nodes where they are at a time.
+    pub(super) fn apply(&self, time: f64, root: &mut Root) {
+        for channel in &self.channels {
+            if let Some(node) = root.nodes.get_mut(channel.node) {
+                channel.apply(time, node);
+            }
+        }
+    }
+}
+
+fn property(path: &Checked<Property>) -> Option<Property> {
+    match path {
+        Checked::Valid(property) => Some(*property),
+        Checked::Invalid => None,
+    }
+}
+
+/// The nodes that say where chosen meshes are.
+struct Movers {
+    /// Those whose transforms do.
+    transforms: Vec<bool>,
+    /// Those whose weights do.
+    weights: HashSet<usize>,
+}
+
+impl Movers {
+    fn of(root: &Root, scene: &Scene, chosen: Range<usize>) -> Self {
+        let mut movers = Self { transforms: vec![false; root.nodes.len()], weights: HashSet::new() };
+        let mut skins = HashSet::new();
+        for placement in &scene.placements[chosen] {
+            movers.weights.extend(placement.node);
+            match placement.skin {
+                Some(skin) if skins.insert(skin) => {
+                    let joints = root.skins.get(skin).map_or(&[][..], |skin| &skin.joints);
+                    joints.iter().for_each(|joint| movers.add(scene, joint.value()));
+                }
+                Some(_) => {}
+                None => placement.node.into_iter().for_each(|node| movers.add(scene, node)),
+            }
+        }
+        movers
+    }
+
+    /// A node and all above it.
+    fn add(&mut self, scene: &Scene, node: usize) {
+        let mut next = Some(node);
+        while let Some(mark) = next.and_then(|node| self.transforms.get_mut(node)).filter(|mark| !**mark) {
+            *mark = true;
+            next = next.and_then(|node| scene.parents[node]);
+        }
+    }
+
+    fn move_by(&self, node: usize, property: Option<Property>) -> bool {
+        match property {
+            Some(Property::MorphTargetWeights) => self.weights.contains(&node),
+            Some(_) => self.transforms.get(node) == Some(&true),
+            // Told when it is read.
+            None => true,
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! The frames of an animation: at the times of its keys, or so many a second.
+
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
+use std::path::Path;
+
+use cager_geometry::mesh::Polygons;
+
+use super::buffers::{Buffers, LARGEST, Source, too_long};
+use super::builder::Builder;
+use super::choice::{choose, listed};
+use super::clip::Clip;
+use super::container;
+use super::scene::Scene;
+use crate::error::{Error, Fault};
+use crate::frames::{FrameReader, FrameSelection, Times};
+use crate::mesh::Contents;
+use crate::scene::{self, Animation, Failure, check_held};
+
+/// Frames per second that programs have.
+const RATES: [f64; 10] =
+    [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0, 24_000.0 / 1001.0, 30_000.0 / 1001.0, 60_000.0 / 1001.0];
+/// Frames past which the number of one says nothing.
+const FARTHEST: f64 = 1e9;
+
+/// Opens the frames of a file of `length` bytes: of the mesh that is selected of several, or else of all as one.
+pub(crate) fn open_frames<'a>(
+    path: &Path,
+    (source, length): (impl Read + Seek, u64),
+    kind: &Source<'_>,
+    expected_points: usize,
+    selection: &FrameSelection,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let open = || {
+        let bytes = read_all(source, length)?;
+        MeshFrames::open(bytes, kind, expected_points, selection)
+    };
+    scene::open(path, open().map_err(|failure: Failure| failure.at(path))?, expected_points)
+}
+
+/// Whether a file has animations; files that cannot be read have none.
+pub(crate) fn is_animated(bytes: &[u8]) -> bool {
+    let root = container::split(bytes).and_then(|chunks| container::document(chunks.json));
+    root.is_ok_and(|root| !root.animations.is_empty())
+}
+
+fn read_all(mut source: impl Read + Seek, length: u64) -> Result<Vec<u8>, Failure> {
+    if length > LARGEST {
+        return Err(too_long().into());
+    }
+    let mut bytes = Vec::new();
+    source.seek(SeekFrom::Start(0))?;
+    source.take(LARGEST).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+struct MeshFrames {
+    /// The document, whose nodes are put where they are at the time of a frame.
+    buffers: Buffers<'static>,
+    /// Of the placements in the scene.
+    chosen: Range<usize>,
+    clip: Option<Clip>,
+    grid: Grid,
+    faces: Polygons,
+    points: usize,
+}
+
+impl MeshFrames {
+    fn open(
+        bytes: Vec<u8>,
+        source: &Source<'_>,
+        expected_points: usize,
+        selection: &FrameSelection,
+    ) -> Result<Self, Failure> {
+        let buffers = Buffers::open(bytes, source)?;
+        let scene = Scene::of(&buffers.root)?;
+        let chosen = choose(&buffers.root, &scene, selection.prim.as_deref())?;
+        let rest = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen.clone()])?;
+        let points = rest.points.len();
+        if points == 0 {
+            return Err(Fault::invalid("has no points; export the mesh with its vertices").into());
+        }
+        if points != expected_points && chosen.len() > 1 {
+            let what = format!(
+                "holds {} meshes, {}, which together have {points} points, and {expected_points} are expected; choose one by its path with --prim, where the command has it, or export the one mesh alone",
+                chosen.len(),
+                listed(&buffers.root, &scene)
+            );
+            return Err(Fault::invalid(what).into());
+        }
+        let clip = Clip::of(&buffers, &scene, chosen.clone())?;
+        let keys = clip.as_ref().map_or_else(Vec::new, Clip::key_times);
+        // A byte of the file stands for a few points of frames at the most: weights of targets, or turns of joints.
+        let held = buffers.most_items().saturating_mul(POINTS_PER_ITEM);
+        let mut grid = Grid::of(keys, selection.rate, |frames| frames.saturating_mul(points) <= held)?;
+        if let Some(note) = clip.as_ref().and_then(|clip| clip.note.clone()) {
+            let others = &mut grid.times.note;
+            *others = Some(others.take().map_or(note.clone(), |told| format!("{told}; {note}")));
+        }
+        Ok(Self { buffers, chosen, clip, grid, faces: rest.faces, points })
+    }
+}
+
+impl Animation for MeshFrames {
+    fn points(&self) -> usize {
+        self.points
+    }
+
+    fn frames(&self) -> usize {
+        self.grid.frames
+    }
+
+    fn times(&self) -> &Times {
+        &self.grid.times
+    }
+
+    fn faces(&self) -> &Polygons {
+        &self.faces
+    }
+
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
+        if let Some(clip) = &self.clip {
+            clip.apply(self.grid.seconds(frame), &mut self.buffers.root);
+        }
+        let scene = Scene::of(&self.buffers.root)?;
+        let placements = &scene.placements[self.chosen.clone()];
+        let model = Builder::new(&self.buffers, &scene, Contents::Points).build(placements)?;
+        out.clear();
+        out.extend_from_slice(model.points.as_flattened());
+        Ok(out.len() == 3 * self.points)
+    }
+}
+
+/// When frames are.
+struct Grid {
+    times: Times,
+    frames: usize,
+    /// Seconds of frames at keys.
+    keys: Vec<f64>,
+    /// Frames per second of those that are not.
+    rate: f64,
+}
+
+impl Grid {
+    /// At the times of keys, or at whole numbers of frames of a rate as far as these go.
+    fn of(keys: Vec<f64>, rate: Option<f64>, is_held: impl Fn(usize) -> bool) -> Result<Self, Fault> {
+        let (Some(&first), Some(&last)) = (keys.first(), keys.last()) else {
+            let times = Times { frame_rate: rate, ..Times::default() };
+            return Ok(Self { times, frames: 1, keys: vec![0.0], rate: 1.0 });
+        };
+        let Some(rate) = rate.filter(|_| keys.len() > 1) else {
+            check_held(keys.len(), is_held(keys.len()))?;
+            let mut times = Times::of(&keys, usual_rate(&keys))?;
+            if let Some(note) = times.note.as_mut().filter(|_| times.numbers.is_some()) {
+                note.push_str("; with --sample-rate, where the command has it, they are evenly spaced");
+            }
+            return Ok(Self { times, frames: keys.len(), keys, rate: 1.0 });
+        };
+        const SLACK: f64 = 1e-3;
+        let [start, end] =
+            [(first * rate - SLACK).ceil(), (last * rate + SLACK).floor().max((first * rate - SLACK).ceil())];
+        if [start, end].iter().any(|number| number.abs() > FARTHEST) {
+            return Err(Fault::invalid(format!(
+                "has times from {first} s to {last} s, too far for {rate} frames per second; export it again with times in seconds"
+            )));
+        }
+        let count = (end - start) as usize + 1;
+        check_held(count, keys.len() >= count / 2)?;
+        let times = Times { frame_rate: Some(rate), first: start, ..Times::default() };
+        Ok(Self { times, frames: count, keys: Vec::new(), rate })
+    }
+
+    fn seconds(&self, frame: usize) -> f64 {
+        self.keys.get(frame).copied().unwrap_or_else(|| self.times.number(frame) / self.rate)
+    }
+}
+
+/// Points of frames for each number in the file: more are a bomb, not a capture.
+const POINTS_PER_ITEM: usize = 1 << 12;
+/// The most by which single precision may move a key from its frame, in frames.
+const LARGEST_ROUNDING: f64 = 0.02;
+
+/// The rate at which all keys are at whole frames, as far as single precision tells.
+fn usual_rate(keys: &[f64]) -> Option<f64> {
+    let beside = |rate: f64| {
+        let off = |key: &f64| {
+            let frame = key * rate;
+            (frame - frame.round()).abs() - (1e-3 + 1e-6 * frame.abs()).min(LARGEST_ROUNDING)
+        };
+        keys.iter().map(off).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let fitting = RATES.into_iter().map(|rate| (beside(rate), rate)).filter(|(off, _)| *off <= 0.0);
+    fitting.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, rate)| rate)
+}

@@ -1,0 +1,38 @@
+//! glTF 2.0, binary or in several files: the triangles and points of its default scene, at rest and as an animation moves them, and animations of one mesh written.
+//!
+//! The `gltf` crate turns the JSON into a document; everything that the document refers to is looked up here with
+//! checks, because the crate's own accessors and validation panic on indices out of range.
+
+mod accessor;
+mod buffers;
+mod builder;
+mod channel;
+mod choice;
+mod clip;
+mod container;
+mod faults;
+mod frames;
+mod meshopt;
+mod scene;
+mod skin;
+mod write;
+
+use cager_geometry::mesh::Model;
+
+use crate::error::Fault;
+use crate::mesh::Contents;
+use crate::scene::Failure;
+use buffers::Buffers;
+pub(crate) use buffers::Source;
+use builder::Builder;
+pub(crate) use frames::{is_animated, open_frames};
+use scene::Scene;
+pub(crate) use write::{LARGEST_SIDE, Morphs, Scene as MorphScene, Wanted};
+
+/// The meshes of the default scene at rest as one, or the one of several that `prim` names.
+pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prim: Option<&str>) -> Result<Model, Fault> {
+    let buffers = Buffers::open(bytes, source)?;
+    let scene = Scene::of(&buffers.root)?;
+    let chosen = choice::choose(&buffers.root, &scene, prim).map_err(Failure::of_bytes)?;
+    Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen])
+}

@@ -1,0 +1,67 @@
+//! Frames as morph targets, the principal components of all of them, with their weights as an animation.
+
+mod components;
+mod document;
+mod stored;
+
+use std::io::{self, Write};
+
+use cager_geometry::mesh::Point;
+
+use crate::error::Fault;
+use components::{Components, Frames};
+pub(crate) use components::{Deviation, LARGEST_SIDE, Wanted};
+use document::Document;
+use stored::Stored;
+
+/// What is written beside the frames.
+pub(crate) struct Scene {
+    /// The name of the node and its mesh.
+    pub(crate) name: String,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Seconds of each frame; none where there is but one.
+    pub(crate) times: Vec<f32>,
+    /// What is added to all positions.
+    pub(crate) origin: Point,
+    /// Whether positions are floats instead of whole numbers of 16 bits.
+    pub(crate) floats: bool,
+}
+
+/// A mesh with its morph targets, ready to be written.
+pub(crate) struct Morphs<'a> {
+    scene: &'a Scene,
+    stored: Stored,
+    components: Components,
+}
+
+impl<'a> Morphs<'a> {
+    /// Those of frames of so many points each, `x y z x y z …`, one after another.
+    ///
+    /// # Errors
+    /// More than is wanted is lost; a file beyond 4 GiB.
+    pub(crate) fn of(frames: &[f32], points: usize, wanted: &Wanted, scene: &'a Scene) -> Result<Self, Fault> {
+        let frames = Frames::new(frames, points);
+        let mut stored = Stored::base(&frames, scene.floats);
+        // The node's place is rounded too.
+        let place = document::place(&stored, scene);
+        let rounding = place.map(|x| f64::from(x as f32) - x);
+        let components = Components::of(&frames, &mut stored, wanted, rounding)?;
+        stored.truncate(components.deviation.targets);
+        let morphs = Self { scene, stored, components };
+        morphs.document().check()?;
+        Ok(morphs)
+    }
+
+    fn document(&self) -> Document<'_> {
+        Document { scene: self.scene, stored: &self.stored, weights: &self.components.weights }
+    }
+
+    /// Targets, and how far what is written is from the frames.
+    pub(crate) fn deviation(&self) -> &Deviation {
+        &self.components.deviation
+    }
+
+    pub(crate) fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        self.document().write(out)
+    }
+}
