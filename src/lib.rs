@@ -47,5 +47,4 @@ pub mod telemetry;
 pub mod timing;
 pub mod transfer;
 mod transfers;
-mod unreadable;
 pub mod webhooks;

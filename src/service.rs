@@ -15,7 +15,6 @@ use crate::shape_spaces::ShapeSpaces;
 use crate::store::{ContentKey, Disk, Store, StoreError};
 use crate::tasks::blocking;
 use crate::transfers::Transfer;
-use crate::unreadable::UnreadableFiles;
 use crate::webhooks::{Webhooks, WebhooksError};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -23,7 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use tokio_util::sync::CancellationToken;
 
-/// Threads that write frame logs; they mostly wait for the disk.
+/// Threads that store frames; they mostly wait for the disk.
 const COMMIT_THREADS: usize = 4;
 /// Recoveries that keep what they know while they wait, beside one for each that may work.
 const RECOVERIES_KEPT: u64 = 4;
@@ -58,7 +57,6 @@ pub struct Service {
     pub(crate) recoveries: Jobs<Recovery>,
     pub(crate) transfers: Jobs<Transfer>,
     pub(crate) shape_spaces: ShapeSpaces,
-    pub(crate) unread: UnreadableFiles,
     pub(crate) designs: DesignPool,
     /// Recoveries that follow frames or are finished.
     pub(crate) recovering: Arc<Budget>,
@@ -157,14 +155,10 @@ impl Service {
         }
         let opened = Store::open(&config.data, disk)?;
         for damaged in &opened.quarantined {
-            tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged; moved to quarantine");
+            tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged, and left out");
             metrics::counter!("cager_quarantined_total").increment(1);
         }
         let webhooks = Webhooks::open(config.webhooks.as_deref(), opened.store.clone(), stop.clone())?;
-        let unread = UnreadableFiles::default();
-        for left in &opened.unread {
-            unread.add(left.kind, &left.name, None, &format!("{}: {}", left.path.display(), left.why));
-        }
         let owners = opened.sessions.iter().map(|meta| (meta.key, meta.tenant.clone())).collect();
         let engine = Engine::new(config.workers).map_err(StartError::Threads)?;
         let solvers = Arc::new(Solvers::new(opened.store.clone(), &config, &owners).map_err(StartError::Threads)?);
@@ -183,7 +177,6 @@ impl Service {
             transfers: Jobs::default(),
             shape_spaces: ShapeSpaces::new(config.budget(config.shape_bytes), config.shape_idle_s),
             transferring: config.budget(config.max_transfers as u64),
-            unread,
             designs: DesignPool::new(&config, designer).map_err(StartError::Threads)?,
             recovering: config.budget(config.max_recoveries as u64),
             recoveries_kept: config.budget(config.max_recoveries as u64 + RECOVERIES_KEPT),
@@ -210,19 +203,19 @@ impl Service {
         });
         let count = opened.sessions.len();
         for meta in opened.sessions {
-            service.resume_and_track_session(meta);
+            service.resume(meta)?;
         }
         let cage_jobs = opened.cage_jobs.len();
         for meta in opened.cage_jobs {
-            service.resume_and_track_job::<CageDesign>(meta);
+            service.resume_job::<CageDesign>(meta)?;
         }
         let recoveries = opened.recoveries.len();
         for meta in opened.recoveries {
-            service.resume_and_track_job::<Recovery>(meta);
+            service.resume_job::<Recovery>(meta)?;
         }
         let transfers = opened.transfers.len();
         for meta in opened.transfers {
-            service.resume_and_track_job::<Transfer>(meta);
+            service.resume_job::<Transfer>(meta)?;
         }
         service.orphans().iter().for_each(|key| service.forget_orphan(key));
         service.resumed.store(true, Ordering::Release);
@@ -232,21 +225,20 @@ impl Service {
             recoveries,
             transfers,
             quarantined = opened.quarantined.len(),
-            unread = service.unread.summary(),
             "sessions resumed"
         );
         tokio::spawn(Arc::clone(&service).sweep(stop.clone()));
-        tokio::spawn(Arc::clone(&service).check_logs(stop.clone()));
+        tokio::spawn(Arc::clone(&service).check_stored(stop.clone()));
         let watching = Arc::clone(&service);
         tokio::spawn(async move { watching.access.clone().watch(stop).await });
         Ok(service)
     }
 
-    /// Stored content that no session uses, left by a crash between storing content and session. Empty while unreadable or quarantined
+    /// Stored content that no session uses, left by a crash between storing content and session. Empty while quarantined
     /// sessions may need it. Blocks.
     fn orphans(&self) -> Vec<ContentKey> {
         let found = || -> Result<Vec<ContentKey>, StoreError> {
-            if !self.unread.is_empty() || self.store.has_quarantined()? {
+            if self.store.keeps_contents()? {
                 return Ok(Vec::new());
             }
             Ok(self.store.contents()?.into_iter().filter(|key| !self.registry.uses_content(key)).collect())
@@ -257,19 +249,6 @@ impl Service {
         })
     }
 
-    /// Removes orphaned content while the service runs.
-    pub(crate) async fn forget_orphans(self: &Arc<Self>) {
-        let service = Arc::clone(self);
-        for key in blocking(move || service.orphans()).await.unwrap_or_default() {
-            // The lock keeps new sessions from using it meanwhile.
-            let _content = self.registry.content_lock(&key).await;
-            if !self.registry.uses_content(&key) {
-                let service = Arc::clone(self);
-                let _ = blocking(move || service.forget_orphan(&key)).await;
-            }
-        }
-    }
-
     fn forget_orphan(&self, key: &ContentKey) {
         match self.store.remove_content(key) {
             Ok(()) => tracing::info!(%key, "a rest pose and cage of no session are removed"),
@@ -277,17 +256,13 @@ impl Service {
         }
     }
 
-    /// Verifies the logs and containers of all resumed sessions in the background, so that damage is found before a client needs them.
-    async fn check_logs(self: Arc<Self>, stop: CancellationToken) {
+    /// Reads frames and containers of all resumed sessions in the background, so that damage is found before a client needs them.
+    async fn check_stored(self: Arc<Self>, stop: CancellationToken) {
         for session in self.registry.all() {
             if stop.is_cancelled() {
                 return;
             }
-            // Errors are logged and recorded in the session.
-            let _ = session.ensure_loaded().await;
-            let found = Arc::clone(&session);
-            let _ = blocking(move || found.check_container()).await;
-            session.close_files_if_idle();
+            let _ = blocking(move || session.check_stored()).await;
         }
     }
 

@@ -1,6 +1,7 @@
 //! A disk in memory, so that what is stored can be any bytes.
 
 use cager::store::disk::{Disk, DiskFile, Entry};
+use cager_store::{Catalog, CatalogError, Key, SqliteCatalog};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, ErrorKind};
@@ -89,7 +90,11 @@ impl Disk for MemoryDisk {
     }
 
     fn remove_dir(&self, path: &Path) -> io::Result<()> {
-        lock(&self.0).remove(path).map(|_| ()).ok_or_else(|| ErrorKind::NotFound.into())
+        let mut files = lock(&self.0);
+        if files.keys().any(|place| place.parent() == Some(path)) {
+            return Err(ErrorKind::DirectoryNotEmpty.into());
+        }
+        files.remove(path).map(|_| ()).ok_or_else(|| ErrorKind::NotFound.into())
     }
 
     fn list(&self, path: &Path) -> io::Result<Vec<Entry>> {
@@ -121,6 +126,24 @@ impl Disk for MemoryDisk {
 
     fn free_bytes(&self, _: &Path) -> io::Result<u64> {
         Ok(1 << 30)
+    }
+
+    /// One for all disks of a thread, empty each time.
+    fn catalog(&self, path: &Path) -> Result<Arc<dyn Catalog>, CatalogError> {
+        thread_local! {
+            static CATALOG: (Arc<SqliteCatalog>, tempfile::TempDir) = {
+                let memory = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir());
+                let folder = memory.expect("a folder");
+                let catalog = SqliteCatalog::open(&folder.path().join("catalog.db")).expect("a catalogue");
+                (Arc::new(catalog), folder)
+            };
+        }
+        self.put(path, &[]);
+        let catalog = CATALOG.with(|(catalog, _)| Arc::clone(catalog));
+        for record in catalog.records()? {
+            catalog.remove(Key { kind: record.kind, id: &record.id })?;
+        }
+        Ok(catalog)
     }
 }
 

@@ -192,7 +192,7 @@ impl CageJob {
     /// The cage of a completed job. Blocks.
     ///
     /// # Errors
-    /// `CAGE_NOT_READY`, `CAGE_FAILED`; damage, after which the job has failed and is in quarantine.
+    /// `CAGE_NOT_READY`, `CAGE_FAILED`; damage, after which the job has failed.
     pub(crate) fn completed_cage(&self, store: &Store) -> Result<Bytes, ApiError> {
         match self.cage(store)? {
             Cage::Final { obj, .. } => Ok(obj),
@@ -205,7 +205,7 @@ impl CageJob {
     /// The best cage there is. Blocks.
     ///
     /// # Errors
-    /// `CAGE_NOT_READY`, `CAGE_FAILED`; damage, after which the job has failed and is in quarantine.
+    /// `CAGE_NOT_READY`, `CAGE_FAILED`; damage, after which the job has failed.
     pub(crate) fn cage(&self, store: &Store) -> Result<Cage, ApiError> {
         let best = self.status().progress.best.clone();
         match self.phase() {

@@ -11,7 +11,6 @@ use super::{health, origin};
 use crate::auth::Scope;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::Kind;
 use axum::extract::{Path, Request, State};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::Response;
@@ -115,10 +114,6 @@ async fn sessions(State(service): State<Arc<Service>>, Query(query): Query<PageQ
 }
 
 async fn delete_session(State(service): State<Arc<Service>>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    if service.registry.find_any(&id).is_err() && service.delete_unread(Kind::Session, &id).await? {
-        tracing::info!(session = %id, "deleted by the operator, unread");
-        return Ok(StatusCode::NO_CONTENT);
-    }
     let session = service.registry.find_any(&id)?;
     tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
     service.delete(&session).await?;

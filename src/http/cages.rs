@@ -186,6 +186,7 @@ fn follow(
                 let read = tokio::task::spawn_blocking(move || form.read(&reading, next as u32, most)).await;
                 let bytes = match read.map_err(io::Error::other).and_then(|bytes| bytes) {
                     Ok(bytes) => bytes,
+                    Err(_) if session.is_going() => return None,
                     Err(error) => return Some((Err(error), (u64::MAX, changes, place))),
                 };
                 if !bytes.is_empty() {

@@ -100,8 +100,7 @@ impl<W: Work> TenantResource for Job<W> {
     }
 }
 
-/// The tenant's session or job named in the path, whether or not its files can be read. Rejects with 404 if it does not exist or
-/// belongs to another tenant, and with 503 if its owner cannot be read.
+/// The tenant's session or job named in the path. Rejects with 404 if it does not exist or belongs to another tenant.
 pub(crate) struct Requested<T>(pub(crate) Arc<T>);
 
 impl<T: TenantResource> FromRequestParts<Arc<Service>> for Requested<T> {
@@ -112,8 +111,7 @@ impl<T: TenantResource> FromRequestParts<Arc<Service>> for Requested<T> {
         let id = Path::<String>::from_request_parts(parts, service).await;
         let missing = || ApiError::new(problem::NOT_FOUND, format!("the id of the {} is missing", T::KIND.name()));
         let Path(id) = id.map_err(|_| missing())?;
-        let read = service.retry_unreadable(T::KIND, &tenant.name, &id).await;
-        T::find(service, &tenant.name, &id).or_else(|missing| read.and(Err(missing))).map(Self)
+        T::find(service, &tenant.name, &id).map(Self)
     }
 }
 
@@ -129,7 +127,6 @@ impl FromRequestParts<Arc<Service>> for RequestedSession {
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
         let Requested(session) = Requested::<Session>::from_request_parts(parts, service).await?;
-        service.retry_unreadable(Kind::Session, &tenant.name, &session.meta.id).await?;
         match session.ensure_loaded().await {
             // For a failed session the failure is all there is to know.
             Err(_) if session.has_failed() => {}
@@ -139,7 +136,7 @@ impl FromRequestParts<Arc<Service>> for RequestedSession {
     }
 }
 
-/// The tenant's job named in the path. Rejects as [`Requested`], and with 503 if its files cannot be read.
+/// The tenant's job named in the path. Rejects as [`Requested`].
 pub(crate) struct RequestedJob<W: Work> {
     pub(crate) tenant: Arc<Tenant>,
     pub(crate) job: Arc<Job<W>>,
@@ -151,7 +148,6 @@ impl<W: Work> FromRequestParts<Arc<Service>> for RequestedJob<W> {
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {
         let Caller(tenant) = Caller::from_request_parts(parts, service).await?;
         let Requested(job) = Requested::<Job<W>>::from_request_parts(parts, service).await?;
-        service.retry_unreadable(kind_of::<W>(), &tenant.name, job.id()).await?;
         Ok(Self { tenant, job })
     }
 }

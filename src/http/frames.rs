@@ -12,7 +12,7 @@ use crate::session::facts::Facts;
 use crate::session::registry::Reserved;
 use crate::session::upload::{FrameJob, Permits, Upload, UploadEvent};
 use crate::session::{LiveLane, Phase, Session, gone};
-use crate::store::LogEntry;
+use crate::store::FrameEntry;
 use crate::telemetry::RequestId;
 use axum::Extension;
 use axum::body::Body;
@@ -374,7 +374,7 @@ fn answers(
             let item = match step {
                 UploadEvent::Done => return None,
                 UploadEvent::Frames(frames) => {
-                    let entries: Vec<LogEntry> = {
+                    let entries: Vec<FrameEntry> = {
                         let known = session.frames();
                         frames.iter().filter_map(|&frame| known.entry(frame).copied()).collect()
                     };
@@ -394,12 +394,12 @@ fn answers(
     })
 }
 
-pub(crate) fn result_of(entry: &LogEntry) -> FrameResult {
+pub(crate) fn result_of(entry: &FrameEntry) -> FrameResult {
     let measured = |x: f32| Some(x).filter(|x| !x.is_nan());
     FrameResult { frame: entry.frame, l2: measured(entry.l2), linf: measured(entry.linf) }
 }
 
-fn as_lines(entries: &[LogEntry]) -> Bytes {
+fn as_lines(entries: &[FrameEntry]) -> Bytes {
     let mut lines = Vec::with_capacity(64 * entries.len());
     for entry in entries {
         if serde_json::to_writer(&mut lines, &result_of(entry)).is_ok() {
@@ -410,12 +410,12 @@ fn as_lines(entries: &[LogEntry]) -> Bytes {
 }
 
 /// Frame records of solved cages.
-pub(crate) async fn as_records(session: Arc<Session>, entries: Vec<LogEntry>) -> io::Result<Bytes> {
+pub(crate) async fn as_records(session: Arc<Session>, entries: Vec<FrameEntry>) -> io::Result<Bytes> {
     tokio::task::spawn_blocking(move || records_of(&session, &entries)).await.map_err(io::Error::other)?
 }
 
 /// As [`as_records`], blocking.
-pub(crate) fn records_of(session: &Session, entries: &[LogEntry]) -> io::Result<Bytes> {
+pub(crate) fn records_of(session: &Session, entries: &[FrameEntry]) -> io::Result<Bytes> {
     let rows = session.facts().map_or(0, |facts| facts.unknowns);
     let mut cages = Vec::with_capacity(entries.len() * 12 * rows as usize);
     session.read_cages(entries, &mut cages)?;

@@ -22,27 +22,24 @@ pub(crate) struct Health {
     version: &'static str,
     /// Seconds since it started.
     uptime_s: f64,
-    /// What needs the operator's attention although the service is ready: files that cannot be read.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    detail: Option<String>,
 }
 
-fn health(service: &Service, detail: Option<String>) -> Json<Health> {
+fn health(service: &Service) -> Json<Health> {
     let uptime_s = service.started.elapsed().as_secs_f64();
-    Json(Health { status: "ok", version: env!("CARGO_PKG_VERSION"), uptime_s, detail })
+    Json(Health { status: "ok", version: env!("CARGO_PKG_VERSION"), uptime_s })
 }
 
 /// Liveness: the process answers.
 #[utoipa::path(get, path = "/healthz", operation_id = "get_health", tag = "operation", security(()), responses((status = 200, description = "The process is running", body = Health)))]
 pub(crate) async fn live(State(service): State<Arc<Service>>) -> Json<Health> {
-    health(&service, None)
+    health(&service)
 }
 
 /// Readiness: sessions are resumed and the disk takes writes.
 #[utoipa::path(get, path = "/readyz", operation_id = "get_readiness", tag = "operation", security(()), responses((status = 200, description = "The service is ready", body = Health)))]
 pub(crate) async fn ready(State(service): State<Arc<Service>>) -> Result<Json<Health>, ApiError> {
     service.ready().await?;
-    Ok(health(&service, service.unread.summary()))
+    Ok(health(&service))
 }
 
 /// Metrics in Prometheus' text format. They name tenants: where the service has tokens, one of the scope `admin` is needed. The operators'

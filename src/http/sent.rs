@@ -4,7 +4,7 @@ use super::extract::{Query, RequestedSession};
 use super::openapi;
 use crate::problem::ApiError;
 use crate::session::Session;
-use crate::store::{LogEntry, StoredPart};
+use crate::store::{FrameEntry, StoredPart};
 use crate::tasks::blocking;
 use axum::response::{IntoResponse, Response};
 use cager_proto::messages::{Sent, SentFile, SentFrame};
@@ -62,7 +62,7 @@ fn file(StoredPart { name, bytes, blake3 }: StoredPart) -> SentFile {
     SentFile { name, bytes, blake3 }
 }
 
-fn frame(entry: &LogEntry) -> SentFrame {
+fn frame(entry: &FrameEntry) -> SentFrame {
     let digest = entry.full_digest.unwrap_or(entry.handle_digest);
     let mut blake3 = String::with_capacity(2 * digest.len());
     for byte in digest {

@@ -1,11 +1,10 @@
 //! Jobs found on disk, ended and deleted.
 
 use super::{Job, Outcome, Phase, Work, kind_of};
-use crate::problem::ApiError;
+use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{FolderMeta as _, JobMeta as _, Store, StoreError, Workshop};
+use crate::store::{JobMeta as _, RecordMeta as _, Store, StoreError, Workshop};
 use crate::tasks::{blocking, to_the_end};
-use crate::unreadable;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
 
@@ -20,45 +19,49 @@ pub(crate) enum Ended<F> {
 }
 
 impl Service {
-    /// Resumes a job found on disk; one without outcome is begun again. If its outcome cannot be read, it is registered as failed so that it
-    /// can be deleted, and resumed when this is called again.
+    /// Resumes a job found on disk; one without outcome is begun again. One whose files cannot be read has failed until the next start.
     ///
     /// # Errors
-    /// I/O errors of its files.
+    /// Those of the catalogue.
     pub(crate) fn resume_job<W: Work>(self: &Arc<Self>, meta: W::Meta) -> Result<(), StoreError> {
         let (id, kind) = (meta.id().to_owned(), kind_of::<W>());
-        let (phase, error) = match self.store.job_outcome(kind, &id) {
-            Ok(Some(Outcome::Completed(found))) => (Phase::Completed(found), None),
-            Ok(Some(Outcome::Failed(problem))) => (Phase::Failed(problem), None),
-            Ok(None) => (Phase::Waiting, None),
+        let is_damaged = self.store.damage(kind, &id)?.is_some();
+        let phase = match self.store.outcome(kind, &id) {
+            _ if is_damaged => Phase::Failed(Job::<W>::damaged().problem),
+            Ok(Some(Outcome::Completed(found))) => Phase::Completed(found),
+            Ok(Some(Outcome::Failed(problem))) => Phase::Failed(problem),
+            Ok(None) => Phase::Waiting,
             Err(error @ StoreError::Damaged { .. }) => {
                 tracing::warn!(job = %id, %error, "the outcome of a job is damaged, so it is begun again");
-                (Phase::Waiting, None)
+                Phase::Waiting
             }
-            Err(error) => (Phase::Failed(unreadable::problem(kind).problem), Some(error)),
+            Err(error) => return Err(error),
         };
         let unfinished = matches!(phase, Phase::Waiting);
-        if !unfinished && error.is_none() {
+        // Of a damaged one a person may want to save what was sent.
+        if !unfinished && !is_damaged {
             W::forget_input(&self.store, &id);
         }
         // Rather too much than nothing where it cannot be counted.
         let bytes = self.store.bytes(kind, &id).unwrap_or_else(|_| meta.sent_bytes());
         let job = Arc::new(Job::<W>::new(meta, phase, bytes));
-        let loaded = if unfinished { W::load(&self.store, &job) } else { Ok(()) };
-        let error = loaded.err().map_or(error, |found| {
-            let is_damage = matches!(found, StoreError::Damaged { .. });
-            if is_damage {
-                job.fail_if_damaged(&self.store, found);
-                return None;
+        match if unfinished { W::load(&self.store, &job) } else { Ok(()) } {
+            Ok(()) => {}
+            Err(error @ StoreError::Damaged { .. }) => drop(job.fail_if_damaged(&self.store, error)),
+            Err(error) => {
+                tracing::error!(job = %id, %error, "the files of a job cannot be read, and are left where they are");
+                let detail = format!(
+                    "the files of this {} cannot be read; nothing was removed, so have the operator check the disk and restart the service",
+                    W::NAME
+                );
+                job.set_phase(Phase::Failed(ApiError::new(problem::STORAGE_FAILED, detail).problem));
             }
-            job.set_phase(Phase::Failed(unreadable::problem(kind).problem));
-            Some(found)
-        });
+        }
         W::jobs(self).insert(Arc::clone(&job));
         if !job.status().phase.is_final() {
             W::begin(Arc::clone(self), job);
         }
-        error.map_or(Ok(()), Err)
+        Ok(())
     }
 
     /// Keeps how work on a job ended. Whether the job is over.
@@ -139,7 +142,6 @@ impl Service {
         let (service, job) = (Arc::clone(self), Arc::clone(job));
         to_the_end(async move {
             let (store, id, kind) = (service.store.clone(), job.id().to_owned(), kind_of::<W>());
-            let _unread = service.unread.hold(kind, &id).await;
             job.deleting.store(true, SeqCst);
             let deleted = blocking(move || store.delete(kind, &id)).await.and_then(|deleted| Ok(deleted?));
             if deleted.is_err() {
@@ -147,7 +149,6 @@ impl Service {
                 job.touch();
             }
             deleted?;
-            service.unread.forget(kind, job.id());
             W::jobs(&service).remove(job.id());
             job.deleted().cancel();
             job.touch();

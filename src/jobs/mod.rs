@@ -14,7 +14,7 @@ pub(crate) use results::{Frames, Piece, ResultsError, Stoppable};
 use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{FolderMeta as _, JobMeta, Kind, Store, StoreError, StoredPart};
+use crate::store::{JobMeta, Kind, RecordMeta as _, Store, StoreError, StoredPart};
 use crate::sync::lock;
 use cager_proto::messages::Problem;
 use serde::de::DeserializeOwned;
@@ -197,7 +197,13 @@ impl<W: Work> Job<W> {
         self.touch();
     }
 
-    /// The response for a storage error; damage fails the job and quarantines it.
+    /// The failure of a job whose stored data is damaged.
+    pub(crate) fn damaged() -> ApiError {
+        let detail = format!("stored data of this {} is damaged; send the request again", W::NAME);
+        ApiError::new(W::FAILED, detail)
+    }
+
+    /// The response for a storage error; damage fails the job, also in the store.
     pub(crate) fn fail_if_damaged(&self, store: &Store, error: StoreError) -> ApiError {
         if self.is_going() {
             return ApiError::new(problem::NOT_FOUND, format!("the {} was deleted", W::NAME));
@@ -205,13 +211,11 @@ impl<W: Work> Job<W> {
         let StoreError::Damaged { what, .. } = &error else {
             return error.into();
         };
-        let detail =
-            format!("stored data of this {} is damaged and was moved to quarantine; send the request again", W::NAME);
-        let failed = ApiError::new(W::FAILED, detail);
-        tracing::error!(job = self.id(), %error, "a job is damaged and put in quarantine");
+        let failed = Self::damaged();
+        tracing::error!(job = self.id(), %error, "a job is damaged");
         metrics::counter!("cager_quarantined_total").increment(1);
-        if let Err(error) = store.quarantine(kind_of::<W>(), self.id(), what) {
-            tracing::error!(job = self.id(), %error, "it could not be moved");
+        if let Err(error) = store.mark_damaged(kind_of::<W>(), self.id(), what) {
+            tracing::error!(job = self.id(), %error, "the damage could not be noted");
         }
         self.set_phase(Phase::Failed(failed.problem.clone()));
         failed
@@ -220,5 +224,5 @@ impl<W: Work> Job<W> {
 
 /// Where its jobs lie in the store.
 pub(crate) const fn kind_of<W: Work>() -> Kind {
-    <W::Meta as crate::store::FolderMeta>::KIND
+    <W::Meta as crate::store::RecordMeta>::KIND
 }

@@ -78,7 +78,7 @@ impl StoredSurfaces {
         if self.is_counted.swap(false, SeqCst) {
             let (store, id) = (&self.service.store, self.job.id());
             let noted = if self.is_idle() {
-                store.forget_attempts(Kind::Recovery, id)
+                store.set_attempts(Kind::Recovery, id, |_| 0).map(|_| ())
             } else {
                 store.uncount_attempt(Kind::Recovery, id)
             };

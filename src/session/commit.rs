@@ -1,16 +1,16 @@
-//! Group commit of solved frames: everything queued for a session is appended and synced once, then its uploads are notified.
+//! Group commit of solved frames: everything queued for a session is stored at once, then its uploads are notified.
 
 use super::upload::Permits;
 use super::{Phase, Session};
 use crate::problem::{self, ApiError};
-use crate::store::{FrameLog, LogEntry, LogRecord, StoreError};
+use crate::store::{FrameEntry, NewFrame, StoreError};
 use crate::sync::lock;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 
-/// Approximate size of a log record without its cage, in bytes.
+/// Approximate size of a stored frame without its cage, in bytes.
 const RECORD_BYTES: usize = 96;
 
 /// Approximate bytes on disk of a frame with a cage of so many unknowns, of which so many bytes wait to be coded.
@@ -20,8 +20,8 @@ pub(crate) fn frame_bytes(unknowns: usize, posted: usize) -> u64 {
 
 /// A solved frame that is not on disk yet.
 pub(crate) struct SolvedFrame {
-    /// What the log will say of it.
-    pub(crate) entry: LogEntry,
+    /// What is stored of it beside its cage.
+    pub(crate) entry: FrameEntry,
     pub(crate) cage: Vec<f32>,
     /// As it was posted, where it has to wait on disk until its group is coded.
     pub(crate) posted: Option<Vec<u8>>,
@@ -36,7 +36,7 @@ pub(crate) struct CommitQueue {
     pub(super) busy: bool,
 }
 
-/// Handle to the threads that append to frame logs and sync them.
+/// Handle to the threads that store frames.
 #[derive(Clone)]
 pub(crate) struct Committer {
     sessions: Sender<Arc<Session>>,
@@ -55,7 +55,7 @@ impl Committer {
     }
 }
 
-/// Approximate size of frames in the log, in bytes.
+/// Approximate size of stored frames, in bytes.
 fn stored_bytes(solved: &[SolvedFrame]) -> u64 {
     solved.iter().map(|s| frame_bytes(s.cage.len() / 3, s.posted.as_ref().map_or(0, Vec::len))).sum()
 }
@@ -99,28 +99,28 @@ impl Session {
         let _ = self.committer.sessions.send(Arc::clone(self));
     }
 
-    /// Appends frames, syncs the log and notifies their uploads.
+    /// Stores frames and notifies their uploads.
     fn write(&self, solved: &[SolvedFrame]) {
         let solved = self.before_first_orphan(solved);
         if solved.is_empty() {
             return;
         }
-        let mut records: Vec<LogRecord<'_>> =
-            solved.iter().map(|s| LogRecord { entry: s.entry, cage: &s.cage }).collect();
-        let mut log = lock(&self.log);
+        let mut records: Vec<NewFrame<'_>> =
+            solved.iter().map(|s| NewFrame { entry: s.entry, cage: &s.cage }).collect();
+        let mut is_unknown = lock(&self.appending);
         if let Phase::Failed(problem) = self.status().phase {
-            // The session's files are in quarantine.
-            drop(log);
+            drop(is_unknown);
             self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
             self.give_up(solved, &ApiError::new(problem::SESSION_FAILED, problem.detail));
             return;
         }
         let mut found = 0;
-        let outcome = self.open_log(&mut log).and_then(|log| {
-            // Opening the log may have found some of these frames on disk; they are not written again.
+        let known = if *is_unknown { self.load_frames() } else { Ok(()) };
+        let outcome = known.and_then(|()| {
+            // Loading may have found some of these frames; they are not stored again.
             records.retain(|record| self.frames().adds_information(&record.entry));
             found = (solved.len() - records.len()) as u64;
-            // First what has to be coded: a frame that the log has, has been posted as its digest there says.
+            // First what has to be coded: a frame that is stored, has been posted as its digest says.
             let posted: Vec<(u32, &[u8])> = solved
                 .iter()
                 .filter_map(|s| Some((s.entry.frame, s.posted.as_deref()?)))
@@ -129,13 +129,11 @@ impl Session {
             if !posted.is_empty() {
                 self.keep_frames(&posted)?;
             }
-            log.append(&records)
+            self.store.append_frames(&self.meta.id, &records)
         });
-        if outcome.is_err() {
-            // Opening the log again determines whether it is usable.
-            *log = None;
-        }
-        drop(log);
+        // The answer may have been lost: then loading tells. What had no room was not stored.
+        *is_unknown = outcome.as_ref().is_err_and(|error| !matches!(error, StoreError::Full { .. }));
+        drop(is_unknown);
         match outcome {
             Ok(entries) => {
                 // These were counted when they were found.
@@ -193,13 +191,5 @@ impl Session {
             let uploads = self.frames().release_claim(s.entry.frame);
             uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.entry.frame)));
         }
-    }
-
-    /// The open log. Opening it adds frames found in it to the session's frames.
-    pub(super) fn open_log<'a>(&self, log: &'a mut Option<FrameLog>) -> Result<&'a mut FrameLog, StoreError> {
-        if log.is_none() {
-            *log = Some(self.load_log()?);
-        }
-        Ok(log.as_mut().expect("it was just opened"))
     }
 }

@@ -9,7 +9,7 @@ use crate::preparation::{Choices, Geometry, Prepared};
 use cager_proto::container;
 use std::io::{self, Write};
 
-/// Frames read from the log at a time.
+/// Stored frames read at a time.
 const READ_FRAMES: usize = 64;
 
 /// Writes a container from its beginning on: the meshes, then frames in order, and what comes after them.

@@ -142,10 +142,9 @@ impl Service {
         Ok(session)
     }
 
-    /// Removes what is left of a session that could not be created; what cannot be removed is looked at again later, so that nothing takes
-    /// space that is in nobody's quota. The caller holds the lock of its content.
+    /// Removes what is left of a session that could not be created. The caller holds the lock of its content.
     async fn forget_uncreated(&self, meta: &SessionMeta) {
-        let is_used = self.registry.uses_content(&meta.key) || !self.unread.is_empty();
+        let is_used = self.registry.uses_content(&meta.key);
         let (store, id, key) = (self.store.clone(), meta.id.clone(), meta.key);
         let left = blocking(move || {
             let deleted = store.delete(Kind::Session, &id);
@@ -156,11 +155,12 @@ impl Service {
         });
         match left.await {
             Ok((false, Ok(()))) => {}
-            Ok((false, Err(error))) => {
-                tracing::warn!(%error, "the content of a session that was not created still takes space");
-                self.unread.look_for_orphans();
+            Ok((_, Err(error))) => {
+                tracing::warn!(%error, "the content of a session that was not created takes space until the next start");
             }
-            _ => self.unread.add(Kind::Session, &meta.id, Some(&meta.tenant), "it could not be created, nor removed"),
+            _ => {
+                tracing::warn!(session = %meta.id, "what could not be created takes space until it is found by the next start")
+            }
         }
     }
 
@@ -245,11 +245,9 @@ impl Service {
     }
 
     fn keep_outcome(&self, session: &Arc<Session>, outcome: Outcome) -> impl Future<Output = ()> + use<> {
-        let (store, id, session) = (self.store.clone(), session.meta.id.clone(), Arc::clone(session));
+        let (store, id) = (self.store.clone(), session.meta.id.clone());
         let done = tokio::task::spawn_blocking(move || {
-            // First the log, then the outcome: after a restart a ready session without a log is taken for damaged.
-            let log = if matches!(outcome, Outcome::Ready(_)) { session.make_log() } else { Ok(()) };
-            if let Err(error) = log.and_then(|()| store.put_note(&id, OUTCOME, &outcome)) {
+            if let Err(error) = store.set_outcome(Kind::Session, &id, &outcome) {
                 tracing::warn!(session = %id, %error, "the outcome of the preparation could not be stored; a restart prepares the session again");
             }
         });
@@ -300,7 +298,6 @@ impl Service {
     async fn delete_alone(&self, session: &Arc<Session>) -> Result<(), ApiError> {
         let (store, id, key) = (self.store.clone(), session.meta.id.clone(), session.meta.key);
         let _content = self.registry.content_lock(&key).await;
-        let _unread = self.unread.hold(Kind::Session, &id).await;
         let removed = id.clone();
         session.set_deleting(true);
         let deleted = blocking({
@@ -308,10 +305,9 @@ impl Service {
             move || store.delete(Kind::Session, &removed)
         });
         deleted.await?.inspect_err(|_| session.set_deleting(false))?;
-        // It may have been registered again since it was looked up.
-        self.registry.remove(&id).iter().chain([session]).for_each(|session| session.mark_deleted());
-        self.unread.forget(Kind::Session, &id);
-        if !self.registry.uses_content(&key) && self.unread.is_empty() {
+        self.registry.remove(&id);
+        session.mark_deleted();
+        if !self.registry.uses_content(&key) {
             let gone = blocking(move || store.remove_content(&key)).await?;
             if let Err(error) = gone {
                 tracing::warn!(session = %id, %error, "the content of a deleted session still takes space");
@@ -355,6 +351,3 @@ fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) 
         trace: Context::current(),
     }
 }
-
-/// Name of the note that stores the [`Outcome`].
-pub(super) const OUTCOME: &str = "outcome";

@@ -2,7 +2,7 @@
 
 use super::upload::Upload;
 use crate::capture::StoredError;
-use crate::store::LogEntry;
+use crate::store::{CagePlace, FrameEntry};
 use rangemap::RangeSet;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -20,14 +20,14 @@ pub(crate) struct Digests {
 }
 
 impl Digests {
-    /// The entry of a frame with these digests and errors, whose place in the log is not known yet.
-    pub(super) fn entry(self, frame: u32, error: &StoredError) -> LogEntry {
+    /// The entry of a frame with these digests and errors, whose place is not known yet.
+    pub(super) fn entry(self, frame: u32, error: &StoredError) -> FrameEntry {
         let &StoredError { l2, linf, squared, spread } = error;
         let (handle_digest, full_digest) = (self.handles, self.full);
-        LogEntry { frame, offset: 0, l2, linf, squared, spread, handle_digest, full_digest }
+        FrameEntry { frame, place: CagePlace::default(), l2, linf, squared, spread, handle_digest, full_digest }
     }
 
-    fn of(entry: &LogEntry) -> Self {
+    fn of(entry: &FrameEntry) -> Self {
         Self { handles: entry.handle_digest, full: entry.full_digest }
     }
 
@@ -67,7 +67,7 @@ pub(crate) enum Claim {
 /// The frames of one session.
 #[derive(Default)]
 pub(crate) struct Frames {
-    solved: BTreeMap<u32, LogEntry>,
+    solved: BTreeMap<u32, FrameEntry>,
     /// The keys of `solved` as ranges, so that missing ones are found without visiting every frame.
     runs: RangeSet<u64>,
     pending: HashMap<u32, Pending>,
@@ -97,7 +97,7 @@ pub(crate) enum SealError {
 
 impl Frames {
     #[cfg(test)]
-    pub(crate) fn new(entries: Vec<LogEntry>) -> Self {
+    pub(crate) fn new(entries: Vec<FrameEntry>) -> Self {
         // Of a frame that is there twice, the first counts.
         let mut frames = Self::default();
         for entry in entries {
@@ -174,7 +174,7 @@ impl Frames {
     }
 
     /// Adds a frame that is on disk; returns the uploads that wait for it.
-    pub(crate) fn solved(&mut self, entry: LogEntry) -> Vec<Arc<Upload>> {
+    pub(crate) fn solved(&mut self, entry: FrameEntry) -> Vec<Arc<Upload>> {
         if self.adds_information(&entry) {
             self.solved.insert(entry.frame, entry);
         }
@@ -193,12 +193,12 @@ impl Frames {
     }
 
     /// Whether the entry adds to what is known: a new frame, or the errors of one that was not measured.
-    pub(crate) fn adds_information(&self, entry: &LogEntry) -> bool {
+    pub(crate) fn adds_information(&self, entry: &FrameEntry) -> bool {
         self.solved.get(&entry.frame).is_none_or(|known| known.full_digest.is_none() && entry.full_digest.is_some())
     }
 
-    /// Whether a frame found in the log has the content that pending uploads sent; true if none is pending.
-    pub(crate) fn matches_pending(&self, entry: &LogEntry) -> bool {
+    /// Whether a stored frame has the content that pending uploads sent; true if none is pending.
+    pub(crate) fn matches_pending(&self, entry: &FrameEntry) -> bool {
         self.pending.get(&entry.frame).is_none_or(|pending| pending.digests.agree(&Digests::of(entry)))
     }
 
@@ -208,22 +208,22 @@ impl Frames {
     }
 
     /// The entry of a solved frame.
-    pub(crate) fn entry(&self, frame: u32) -> Option<&LogEntry> {
+    pub(crate) fn entry(&self, frame: u32) -> Option<&FrameEntry> {
         self.solved.get(&frame)
     }
 
     /// All solved frames, ascending.
-    pub(crate) fn entries(&self) -> impl ExactSizeIterator<Item = &LogEntry> {
+    pub(crate) fn entries(&self) -> impl ExactSizeIterator<Item = &FrameEntry> {
         self.solved.values()
     }
 
     /// Solved frames from `first` on, ascending.
-    pub(crate) fn entries_from(&self, first: u32) -> impl Iterator<Item = &LogEntry> {
+    pub(crate) fn entries_from(&self, first: u32) -> impl Iterator<Item = &FrameEntry> {
         self.solved.range(first..).map(|(_, entry)| entry)
     }
 
     /// Up to `most` entries of consecutive frames from `first` on.
-    pub(crate) fn run(&self, first: u32, most: usize) -> Vec<LogEntry> {
+    pub(crate) fn run(&self, first: u32, most: usize) -> Vec<FrameEntry> {
         self.solved
             .range(first..)
             .zip(u64::from(first)..)
@@ -275,7 +275,7 @@ impl Frames {
 mod tests {
     use super::*;
 
-    fn entry(frame: u32) -> LogEntry {
+    fn entry(frame: u32) -> FrameEntry {
         let error = StoredError { l2: 0.0, linf: 0.0, squared: 0.0, spread: 0.0 };
         Digests { handles: [1; 16], full: Some([2; 16]) }.entry(frame, &error)
     }
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn a_whole_frame_is_measured_after_its_handle_rows() {
         let upload = Arc::new(Upload::default());
-        let mut frames = Frames::new(vec![LogEntry { full_digest: None, ..entry(3) }]);
+        let mut frames = Frames::new(vec![FrameEntry { full_digest: None, ..entry(3) }]);
         let handles = Digests { handles: [1; 16], full: None };
         let whole = Digests { full: Some([2; 16]), ..handles };
         assert_eq!(frames.claim(3, handles, &upload), Claim::Known);
@@ -336,13 +336,13 @@ mod tests {
         assert_eq!(frames.claim(3, whole, &upload), Claim::Measure);
         assert_eq!((frames.solved_count(), frames.received_count()), (1, 1));
         assert_eq!(frames.claim(3, whole, &upload), Claim::Waiting);
-        assert_eq!(frames.solved(LogEntry { offset: 77, ..entry(3) }).len(), 2);
-        assert_eq!(frames.entry(3).map(|entry| entry.offset), Some(77));
+        assert_eq!(frames.solved(FrameEntry { l2: 7.0, ..entry(3) }).len(), 2);
+        assert_eq!(frames.entry(3).map(|entry| entry.l2), Some(7.0));
         assert_eq!(frames.claim(3, whole, &upload), Claim::Known);
-        assert!(!frames.adds_information(&LogEntry { full_digest: None, ..entry(3) }), "what was measured stays");
-        frames.solved(LogEntry { full_digest: None, ..entry(4) });
+        assert!(!frames.adds_information(&FrameEntry { full_digest: None, ..entry(3) }), "what was measured stays");
+        frames.solved(FrameEntry { full_digest: None, ..entry(4) });
         for frame in 0..3 {
-            frames.solved(LogEntry { full_digest: None, ..entry(frame) });
+            frames.solved(FrameEntry { full_digest: None, ..entry(frame) });
         }
         assert_eq!(frames.claim(2, whole, &upload), Claim::Measure);
         assert_eq!(frames.seal_at(5, false), Err(SealError::Measuring), "its answer has to be in the container");

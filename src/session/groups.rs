@@ -9,7 +9,7 @@ use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder, group_frames};
 use crate::preparation::{Choices, Geometry, Prepared, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{LogEntry, SessionBytes, StoreError};
+use crate::store::{FrameEntry, SessionBytes, StoreError};
 use crate::sync::lock;
 use crate::tasks::blocking;
 use cager_proto::messages::CodedFrames;
@@ -121,7 +121,7 @@ impl Session {
     /// Reads a coded group. Blocks.
     ///
     /// # Errors
-    /// A group that was left out at completion meanwhile; damage, after which the session has failed and is in quarantine; I/O errors.
+    /// A group that was left out at completion meanwhile; damage, after which the session has failed; I/O errors.
     pub(crate) fn read_group(&self, first: u32) -> Result<StoredGroup, ApiError> {
         let found = self.store.group(&self.meta.id, first, true).map_err(|error| self.fail_if_damaged(error))?;
         match found {
@@ -139,7 +139,7 @@ impl Session {
         lock(&self.groups).failed.as_ref().map_or(Ok(()), |(_, error)| Err(error.clone()))
     }
 
-    /// Finds the coded groups on disk. The frames of the log are known already. Blocks.
+    /// Finds the coded groups on disk. The stored frames are known already. Blocks.
     pub(super) fn load_groups(&self) -> Result<(), StoreError> {
         if self.goal.is_none() {
             return Ok(());
@@ -210,7 +210,7 @@ impl Session {
     }
 
     /// The entries of the next group: all of them solved, and the group as long as groups are, or up to `end`, which a completion says.
-    fn next_group(&self, end: Option<u32>) -> Option<Vec<LogEntry>> {
+    fn next_group(&self, end: Option<u32>) -> Option<Vec<FrameEntry>> {
         self.facts()?;
         let (_, most) = self.frame_bytes();
         let (first, count) = {
@@ -235,7 +235,7 @@ impl Session {
         goal: Goal,
         coder: &mut GroupCoder,
         diagonal: f64,
-        entries: &[LogEntry],
+        entries: &[FrameEntry],
         end: Option<u32>,
     ) -> Result<(), ApiError> {
         let (first, row_bytes) = (entries[0].frame, 12 * self.facts().map_or(0, |facts| facts.unknowns as usize));

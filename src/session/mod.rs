@@ -22,7 +22,7 @@ use crate::engine::Lane;
 use crate::preparation::Choices;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Completion, FrameLog, Kind, LogEntry, LogReader, SessionMeta, Store, StoreError};
+use crate::store::{Completion, FrameEntry, Kind, SessionMeta, Store, StoreError};
 use crate::sync::lock;
 use crate::webhooks::Webhooks;
 use cager_core::regularize::Regularizer;
@@ -45,11 +45,10 @@ pub(crate) struct Session {
     webhooks: Arc<Webhooks>,
     status: Mutex<Status>,
     frames: Mutex<Frames>,
-    /// Whether the log exists on disk. It is created before the outcome of the preparation is stored, so that a log missing after a restart is
-    /// recognised as damage.
-    pub(crate) has_log: AtomicBool,
-    /// Whether the frames in the log have been added to `frames`.
+    /// Whether the stored frames have been added to `frames`.
     loaded: AtomicBool,
+    /// Taken while frames are stored or loaded; whether they have to be loaded again, after a write of which it is not known how it ended.
+    appending: Mutex<bool>,
     queued: Arc<AtomicU64>,
     /// Bytes of its files and content on disk, and of frames queued for writing.
     pub(crate) bytes: AtomicU64,
@@ -58,8 +57,6 @@ pub(crate) struct Session {
     waiting: Mutex<CommitQueue>,
     /// The last solved frame and its cage, in sessions whose frames depend on their predecessors.
     last_solved: Mutex<Option<(u32, Vec<f32>)>>,
-    log: Mutex<Option<FrameLog>>,
-    reader: Mutex<Option<LogReader>>,
     lane: Mutex<Weak<LiveLane>>,
     /// What the container is to meet; without it frames are stored as they are solved for.
     goal: Option<Goal>,
@@ -133,15 +130,13 @@ impl Session {
             webhooks: Arc::clone(&service.webhooks),
             status: Mutex::new(status),
             frames: Mutex::new(frames),
-            has_log: AtomicBool::new(false),
             loaded: AtomicBool::new(is_new),
+            appending: Mutex::new(false),
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
             container: AtomicU64::new(0),
             waiting: Mutex::default(),
             last_solved: Mutex::default(),
-            log: Mutex::default(),
-            reader: Mutex::default(),
             lane: Mutex::default(),
             goal,
             groups: Mutex::default(),
@@ -208,39 +203,35 @@ impl Session {
         self.deleting.store(deleting, Ordering::SeqCst);
     }
 
-    /// The response for a storage error. Not by `?`, which would not know that the session is being deleted.
-    pub(crate) fn storage_error(&self, error: StoreError) -> ApiError {
-        if self.deleting.load(Ordering::SeqCst) || self.is_deleted() { gone() } else { error.into() }
+    /// Whether it is deleted, or being deleted.
+    pub(crate) fn is_going(&self) -> bool {
+        self.deleting.load(Ordering::SeqCst) || self.is_deleted()
     }
 
-    /// Reads the frames in the log, once. Blocks.
+    /// The response for a storage error. Not by `?`, which would not know that the session is being deleted.
+    pub(crate) fn storage_error(&self, error: StoreError) -> ApiError {
+        if self.is_going() { gone() } else { error.into() }
+    }
+
+    /// Reads the stored frames, once. Blocks.
     ///
     /// # Errors
-    /// A damaged log, after which the session has failed and is in quarantine; I/O errors.
+    /// Damaged frames, after which the session has failed; I/O errors.
     pub(crate) fn load(&self) -> Result<(), ApiError> {
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
         }
         match self.status() {
-            // The log is loaded before the session becomes ready.
+            // Frames are loaded before the session becomes ready.
             Status { facts: None, .. } => return Ok(()),
-            // The session is in quarantine; only its failure is known.
+            // Only its failure is known.
             Status { phase: Phase::Failed(_), .. } => return Ok(()),
             _ => {}
         }
-        let mut log = lock(&self.log);
-        let opened = match self.loaded.load(Ordering::Acquire) {
-            true => Ok(()),
-            false => self.open_log(&mut log).map(|_| ()),
-        };
-        drop(log);
-        opened.map_err(|error| self.fail_if_damaged(error))
-    }
-
-    /// Creates the log if it is missing. Blocks.
-    pub(crate) fn make_log(&self) -> Result<(), StoreError> {
-        let mut log = lock(&self.log);
-        if self.is_deleted() { Ok(()) } else { self.open_log(&mut log).map(|_| ()) }
+        let appending = lock(&self.appending);
+        let loaded = if self.loaded.load(Ordering::Acquire) { Ok(()) } else { self.load_frames() };
+        drop(appending);
+        loaded.map_err(|error| self.fail_if_damaged(error))
     }
 
     /// As [`Self::load`], on the blocking pool.
@@ -252,29 +243,25 @@ impl Session {
         tokio::task::spawn_blocking(move || session.load()).await.map_err(|e| ApiError::internal(&e))?
     }
 
-    /// Opens the log and adds the frames found in it to `frames`. The caller holds the lock of `log`.
-    fn load_log(&self) -> Result<FrameLog, StoreError> {
-        let rows = self.facts().map_or(0, |facts| facts.unknowns);
-        if self.has_log.load(Ordering::Acquire) && !self.store.has_log(&self.meta.id)? {
-            return Err(self.damaged("the frame log is gone"));
-        }
-        let (log, mut entries) = self.store.open_log(&self.meta.id, rows)?;
-        self.has_log.store(true, Ordering::Release);
+    /// Adds the stored frames to `frames`. The caller holds `appending`.
+    fn load_frames(&self) -> Result<(), StoreError> {
+        let mut entries = self.store.frames(&self.meta.id)?;
         if let Some(frames) = self.declared() {
             // Frames beyond the declared number were discarded at completion.
             entries.retain(|entry| entry.frame < frames);
+            if entries.len() < frames as usize {
+                return Err(self.damaged(format!("{} of {frames} frames are there", entries.len())));
+            }
         }
-        if let Some(frames) = self.declared()
-            && entries.len() < frames as usize
-        {
-            return Err(self.damaged(format!("{} of {frames} frames are there", entries.len())));
+        let rows = self.facts().map_or(0, |facts| facts.unknowns);
+        if let Some(entry) = entries.iter().find(|entry| entry.cage_bytes() != 12 * rows) {
+            return Err(self.damaged(format!("the cage of frame {} has not {rows} rows", entry.frame)));
         }
-        *lock(&self.reader) = Some(log.reader());
-        // In a log that was loaded before, new entries are frames that reached the disk although their append reported an error.
+        // Where they were loaded before, new ones are frames that were stored although that reported an error.
         let mut frames = self.frames();
-        let new: Vec<LogEntry> = entries.into_iter().filter(|e| frames.adds_information(e)).collect();
+        let new: Vec<FrameEntry> = entries.into_iter().filter(|e| frames.adds_information(e)).collect();
         if self.loaded.load(Ordering::Acquire) {
-            // The append that failed has taken them off the count.
+            // The write that failed has taken them off the count.
             self.bytes.fetch_add(new.len() as u64 * self.stored_frame_bytes(), Ordering::Relaxed);
         }
         for entry in new {
@@ -288,20 +275,17 @@ impl Session {
             self.load_groups()?;
         }
         self.loaded.store(true, Ordering::Release);
-        Ok(log)
+        Ok(())
     }
 
     /// Damage of its frames.
     fn damaged(&self, what: impl Into<String>) -> StoreError {
-        StoreError::damaged(&self.store.log_path(&self.meta.id), what)
+        self.store.damaged_session(&self.meta.id, what.into())
     }
 
-    /// Marks the session as failed and moves its files to quarantine. The caller holds none of its locks.
-    fn quarantine(&self, path: &std::path::Path, what: &str) -> ApiError {
-        let error = ApiError::new(
-            problem::SESSION_FAILED,
-            "stored frames of this session are damaged, and its files were moved to quarantine; upload the capture to a new session",
-        );
+    /// Marks the session as failed, also in the store. The caller holds none of its locks.
+    fn mark_damaged(&self, what: &str) -> ApiError {
+        let error = frames_are_damaged();
         {
             let mut status = lock(&self.status);
             if matches!(status.phase, Phase::Failed(_)) {
@@ -311,13 +295,12 @@ impl Session {
             status.phase = Phase::Failed(error.problem.clone());
         }
         self.touch();
-        // From here on nothing is appended, so nothing is acknowledged.
-        *lock(&self.log) = None;
-        *lock(&self.reader) = None;
-        tracing::error!(session = %self.meta.id, path = %path.display(), what, "the frame log is damaged; the session is moved to quarantine");
+        // From here on nothing is stored, so nothing is acknowledged.
+        drop(lock(&self.appending));
+        tracing::error!(session = %self.meta.id, what, "stored frames are damaged; the session takes no more");
         metrics::counter!("cager_quarantined_total").increment(1);
-        if let Err(error) = self.store.quarantine(Kind::Session, &self.meta.id, what) {
-            tracing::error!(session = %self.meta.id, %error, "it could not be moved");
+        if let Err(error) = self.store.mark_damaged(Kind::Session, &self.meta.id, what) {
+            tracing::error!(session = %self.meta.id, %error, "the damage could not be noted");
         }
         self.webhooks.send_unrecorded(self);
         error
@@ -326,29 +309,28 @@ impl Session {
     /// Appends the cages of these frames to `out`, m × 12 bytes each. Blocks.
     ///
     /// # Errors
-    /// A damaged log, after which the session has failed and is in quarantine; I/O errors.
-    pub(crate) fn read_cages(&self, entries: &[LogEntry], out: &mut Vec<u8>) -> Result<(), ApiError> {
-        self.reader().and_then(|reader| reader.read_cages(entries, out)).map_err(|error| self.fail_if_damaged(error))
+    /// Damaged frames, after which the session has failed; I/O errors.
+    pub(crate) fn read_cages(&self, entries: &[FrameEntry], out: &mut Vec<u8>) -> Result<(), ApiError> {
+        self.store.cages(&self.meta.id, entries, out).map_err(|error| self.fail_if_damaged(error))
     }
 
-    /// A reader of the log, reopened without scanning if it was closed while idle.
-    fn reader(&self) -> Result<LogReader, StoreError> {
-        let mut kept = lock(&self.reader);
-        if let Some(reader) = &*kept {
-            return Ok(reader.clone());
+    /// Reads all that is stored of its frames and its container, so that damage is found before a client needs them. Blocks.
+    pub(crate) fn check_stored(&self) {
+        if self.has_failed() || self.facts().is_none() {
+            return;
         }
-        let rows = self.facts().map_or(0, |facts| facts.unknowns);
-        let reader = self.store.log_reader(&self.meta.id, rows)?;
-        Ok(kept.insert(reader).clone())
+        match self.store.check_frames(&self.meta.id) {
+            Ok(()) => self.check_container(),
+            // It is logged.
+            Err(error) => drop(self.fail_if_damaged(error)),
+        }
     }
 
-    /// The response for a storage error; damage fails the session and quarantines it.
+    /// The response for a storage error; damage fails the session.
     pub(crate) fn fail_if_damaged(&self, error: StoreError) -> ApiError {
         match error {
             // During deletion, missing files are not damage.
-            StoreError::Damaged { path, what } if !self.deleting.load(Ordering::SeqCst) && !self.is_deleted() => {
-                self.quarantine(&path, &what)
-            }
+            StoreError::Damaged { what, .. } if !self.is_going() => self.mark_damaged(&what),
             error => self.storage_error(error),
         }
     }
@@ -368,27 +350,18 @@ impl Session {
         })
     }
 
-    /// Retries what failed before: determining the completion state, and rewriting log blocks that a failed sync may have lost. Blocks.
+    /// Retries to determine the completion state where that failed before. Blocks.
     pub(crate) fn retry_failed_writes(&self) {
         if let Ok(_one) = self.completing.try_lock()
             && let Err(error) = self.resolve_completion()
         {
             tracing::warn!(session = %self.meta.id, detail = %error.problem.detail, "whether the session is complete cannot be determined yet");
         }
-        if self.has_failed() || !self.store.log_needs_rewrite(&self.meta.id) {
-            return;
-        }
-        if let Err(error) = self.open_log(&mut lock(&self.log)) {
-            tracing::warn!(session = %self.meta.id, %error, "the frame log cannot be made safe yet");
-        }
     }
 
-    /// Closes files of a session that nobody uses.
-    pub(crate) fn close_files_if_idle(&self) {
-        let idle = lock(&self.lane).strong_count() == 0 && !lock(&self.waiting).busy;
-        if idle && let Ok(mut log) = self.log.try_lock() {
-            *lock(&self.reader) = None;
-            *log = None;
+    /// Forgets what coding keeps in memory of a session that nobody uses.
+    pub(crate) fn forget_if_idle(&self) {
+        if lock(&self.lane).strong_count() == 0 && !lock(&self.waiting).busy {
             self.forget_coder();
         }
     }
@@ -415,6 +388,12 @@ impl Session {
         let detail = "the rest pose and cage of this session are missing on the service's disk; upload the same files as a new session, or have the operator restore them from a backup";
         ApiError::new(problem::SESSION_FAILED, detail)
     }
+}
+
+/// The failure of a session whose stored frames are damaged.
+fn frames_are_damaged() -> ApiError {
+    let detail = "stored frames of this session are damaged, and it takes no more; upload the capture to a new session";
+    ApiError::new(problem::SESSION_FAILED, detail)
 }
 
 /// The error that ends requests to a deleted session.

@@ -1,6 +1,5 @@
 //! Resuming sessions found on disk.
 
-use super::create::OUTCOME;
 use super::facts::Outcome;
 use super::frames::Frames;
 use super::{Phase, Session, Status};
@@ -8,10 +7,8 @@ use crate::preparation::{Choices, Prepared};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, Kind, SessionBytes, SessionMeta, Store, StoreError};
-use crate::unreadable;
 use cager_core::inversion::SolverOptions;
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
 
 /// Whether the session was completed, from its completion mark and container.
 pub(super) enum CompletionState {
@@ -19,7 +16,7 @@ pub(super) enum CompletionState {
     None,
     /// It was completed, and its container has the recorded length.
     Intact(Completion),
-    /// It was completed, but the mark or the container is damaged. Completing it again rewrites the same bytes from the log.
+    /// It was completed, but the mark or the container is damaged. Completing it again writes the same bytes again from what is stored.
     Damaged,
 }
 
@@ -34,7 +31,12 @@ impl CompletionState {
             }
             Err(error) => return Err(error),
         };
-        let (there, expected) = (store.container_bytes(id)?, completion.container_bytes);
+        let expected = completion.container_bytes;
+        // It may be readable later.
+        let there = store.container_bytes(id).unwrap_or_else(|error| {
+            tracing::error!(session = %id, %error, "the container cannot be read");
+            expected
+        });
         if there != expected {
             tracing::error!(session = %id, there, expected, "the container is incomplete; complete the session again");
             return Ok(Self::Damaged);
@@ -109,35 +111,31 @@ fn as_it_was_meant(mut meta: SessionMeta) -> SessionMeta {
 }
 
 impl Service {
-    /// Resumes a session found on disk. If its files cannot be read, it is registered as failed so that it can be deleted, and resumed when
-    /// this is called again.
+    /// Resumes a session found on disk.
+    ///
+    /// # Errors
+    /// Those of the catalogue.
     pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) -> Result<(), StoreError> {
         let meta = as_it_was_meant(meta);
-        let outcome = match self.store.note(&meta.id, OUTCOME) {
+        let bytes = self.store.bytes_of_session(&meta).unwrap_or_else(|error| {
+            tracing::warn!(session = %meta.id, %error, "its files cannot be counted");
+            SessionBytes::default()
+        });
+        if self.store.damage(Kind::Session, &meta.id)?.is_some() {
+            let status = Status { phase: Phase::Failed(super::frames_are_damaged().problem), facts: None };
+            self.registry.insert(self.found(meta, status, bytes));
+            return Ok(());
+        }
+        let outcome = match self.store.outcome(Kind::Session, &meta.id) {
             Err(error @ StoreError::Damaged { .. }) => {
                 tracing::warn!(session = %meta.id, %error, "the outcome of the preparation is damaged; the session is prepared again");
-                Ok(None)
+                None
             }
-            outcome => outcome,
+            outcome => outcome?,
         };
-        let found = outcome.and_then(|outcome| {
-            // What cannot be counted would be in nobody's quota.
-            let bytes = self.store.bytes_of_session(&meta)?;
-            Ok((outcome, CompletionState::read(&self.store, &meta.id)?, bytes))
-        });
-        match found {
-            Ok((outcome, mark, bytes)) => {
-                self.resume_with(meta, outcome, mark, bytes);
-                Ok(())
-            }
-            Err(error) => {
-                let problem = unreadable::problem(Kind::Session).problem;
-                let status = Status { phase: Phase::Failed(problem), facts: None };
-                let bytes = self.store.bytes_of_session(&meta).unwrap_or_default();
-                self.registry.insert(self.found(meta, status, bytes));
-                Err(error)
-            }
-        }
+        let mark = CompletionState::read(&self.store, &meta.id)?;
+        self.resume_with(meta, outcome, mark, bytes);
+        Ok(())
     }
 
     fn resume_with(
@@ -166,7 +164,6 @@ impl Service {
         let ready = status.facts.is_some();
         let session = self.found(meta, status, bytes);
         if ready {
-            session.has_log.store(true, Relaxed);
             let phase = mark.phase(&mut session.frames());
             session.set_phase(phase);
         }

@@ -7,7 +7,7 @@ use crate::jobs::{Jobs, Work};
 use crate::problem::{self, ApiError};
 use crate::recovery::Recovery;
 use crate::service::Service;
-use crate::store::JobMeta as _;
+use crate::store::{JobMeta as _, RecordMeta as _};
 use crate::tasks::blocking;
 use crate::transfers::Transfer;
 use std::sync::Arc;
@@ -103,7 +103,7 @@ impl Service {
         Err(ApiError::new(problem::QUOTA_EXCEEDED, detail).limit(tenant.limits.max_bytes))
     }
 
-    /// Periodically deletes what has expired, retries what could not be read, and closes idle files, until `stop`.
+    /// Periodically deletes what has expired, and forgets what idle sessions keep in memory, until `stop`.
     pub(crate) async fn sweep(self: Arc<Self>, stop: CancellationToken) {
         loop {
             tokio::select! {
@@ -116,10 +116,6 @@ impl Service {
 
     /// One round of [`Self::sweep`].
     pub(crate) async fn sweep_once(self: &Arc<Self>) {
-        self.retry_all_unreadable().await;
-        if self.unread.should_sweep_orphans() {
-            self.forget_orphans().await;
-        }
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64;
         let expired = |tenant: &str, created_ms: u64| {
             let most_s = self.access.tenant(tenant).limits.max_age_s;
@@ -139,7 +135,7 @@ impl Service {
             } else {
                 let retried = Arc::clone(&session);
                 let _ = blocking(move || retried.retry_failed_writes()).await;
-                session.close_files_if_idle();
+                session.forget_if_idle();
             }
         }
     }

@@ -13,7 +13,7 @@ use std::time::Instant;
 use tokio::sync::{Notify, OwnedSemaphorePermit};
 use tokio_util::sync::CancellationToken;
 
-/// State of one frame upload. Pending answers are frame numbers only; their contents are read from the log.
+/// State of one frame upload. Pending answers are frame numbers only; their contents are read from the store.
 #[derive(Default)]
 pub(crate) struct Upload {
     state: Mutex<State>,

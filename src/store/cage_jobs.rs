@@ -1,9 +1,10 @@
 //! Cage jobs: the input of a cage design, and the designed cage.
 
-use super::jobs::{ATTEMPTS, OUTCOME, job_meta, outcome_of};
-use super::scan::Kind;
-use super::{ContentKey, Idempotency, Spool, Store, StoreError, StoredFile, StoredPart, meta};
+use super::jobs::job_meta;
+use super::records::outcome_of;
+use super::{ContentKey, Idempotency, Kind, Spool, Store, StoreError, StoredFile, StoredPart};
 use cager_proto::cage_messages::CageOptions;
+use cager_store::Change;
 use serde::{Deserialize, Serialize};
 
 /// Metadata of a cage job, fixed at its creation.
@@ -31,9 +32,8 @@ pub struct CageJobMeta {
     pub idempotency: Option<Idempotency>,
 }
 
-job_meta!(CageJobMeta, Kind::CageJob, META, |meta| meta.rest.bytes + meta.frames.bytes);
+job_meta!(CageJobMeta, Kind::CageJob, |meta| meta.rest.bytes + meta.frames.bytes);
 
-const META: &str = "job.json";
 const REST: &str = "rest";
 const FRAMES: &str = "frames";
 const CAGE: &str = "cage.obj";
@@ -41,26 +41,21 @@ const CAGE: &str = "cage.obj";
 const CAGE_BYTES: u64 = 64 << 20;
 
 impl Store {
-    /// Creates a job with its input, atomically; durable on `Ok`.
+    /// Creates a job with its input; durable on `Ok`.
     pub fn create_cage_job(&self, meta: &CageJobMeta, rest: &[u8], frames: Spool) -> Result<(), StoreError> {
         self.create_job(meta, [(REST, rest)], Some((FRAMES, frames)))
     }
 
-    /// Creates a finished job without input, atomically; durable on `Ok`.
+    /// Creates a finished job without input; durable on `Ok`.
     pub fn create_finished_cage_job<T: Serialize>(
         &self,
         meta: &CageJobMeta,
         outcome: &T,
         cage: &[u8],
     ) -> Result<(), StoreError> {
-        let (files, place) = (self.files(), self.folder(Kind::CageJob, &meta.id)?);
-        let bytes = meta::wrap(&place.join(META), "cage job", meta)?;
-        let outcome = meta::wrap(&place.join(OUTCOME), outcome_of(Kind::CageJob), outcome)?;
-        files.publish_folder(&place, |staging| {
-            files.write_new(&staging.join(META), &bytes)?;
-            files.write_new(&staging.join(CAGE), cage)?;
-            files.write_new(&staging.join(OUTCOME), &outcome)
-        })
+        let outcome = self.sealed(outcome_of(Kind::CageJob), outcome)?;
+        let files = self.files();
+        self.create(meta, vec![Change::Outcome(outcome)], |staging| files.write_new(&staging.join(CAGE), cage))
     }
 
     /// The rest pose of a job that is not finished.
@@ -88,7 +83,7 @@ impl Store {
         if let Some(cage) = cage {
             files.replace(&folder.join(CAGE), cage)?;
         }
-        self.set_job_outcome(Kind::CageJob, id, outcome)?;
+        self.set_outcome(Kind::CageJob, id, outcome)?;
         self.forget_cage_job_input(id);
         Ok(())
     }
@@ -103,6 +98,6 @@ impl Store {
 
     /// Removes the input of a finished job, best effort: files that remain are removed at the next start.
     pub fn forget_cage_job_input(&self, id: &str) {
-        self.forget_files(Kind::CageJob, id, [REST, FRAMES, ATTEMPTS]);
+        self.forget_files(Kind::CageJob, id, [REST, FRAMES]);
     }
 }

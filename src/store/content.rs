@@ -4,6 +4,7 @@ use super::{ContentKey, Store, StoreError, meta};
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering::Relaxed;
 
 /// A rest pose as it was uploaded, and its cage, uploaded or made by the service.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -142,9 +143,9 @@ impl Store {
         Ok(entries.iter().filter_map(|entry| entry.name.to_str()?.parse().ok()).collect())
     }
 
-    /// Whether anything is in quarantine.
-    pub fn has_quarantined(&self) -> Result<bool, StoreError> {
-        Ok(!self.files().list(&self.files().quarantine)?.is_empty())
+    /// Whether content of no session may be needed: something is in quarantine, or could not be read at the start.
+    pub fn keeps_contents(&self) -> Result<bool, StoreError> {
+        Ok(self.inner.keeps_contents.load(Relaxed) || !self.files().list(&self.files().quarantine)?.is_empty())
     }
 
     /// Bytes of a content's files; 0 where there is none.

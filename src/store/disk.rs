@@ -1,5 +1,6 @@
 //! The file layer below the store: few operations, so that each of them can be made to fail in a test (`tests/faults/`).
 
+use cager_store::{Catalog, CatalogError, SqliteCatalog};
 use std::ffi::OsString;
 use std::fmt::Debug;
 use std::fs::{self, DirBuilder, File, FileTimes, OpenOptions, TryLockError};
@@ -54,6 +55,11 @@ pub trait Disk: Send + Sync + Debug {
     fn lock(&self, path: &Path) -> io::Result<Option<File>>;
     /// Bytes that may still be written to the file system of `path`.
     fn free_bytes(&self, path: &Path) -> io::Result<u64>;
+    /// Opens the catalogue in this file, which is created if it is missing.
+    ///
+    /// # Errors
+    /// The catalogue's.
+    fn catalog(&self, path: &Path) -> Result<Arc<dyn Catalog>, CatalogError>;
 }
 
 /// An open file with positioned reads and writes, so that readers and a writer can share it. Every call fails as the system does.
@@ -190,6 +196,10 @@ impl Disk for LocalDisk {
     fn free_bytes(&self, path: &Path) -> io::Result<u64> {
         let system = rustix::fs::statvfs(path)?;
         Ok(system.f_bavail.saturating_mul(system.f_frsize))
+    }
+
+    fn catalog(&self, path: &Path) -> Result<Arc<dyn Catalog>, CatalogError> {
+        Ok(Arc::new(SqliteCatalog::open(path)?))
     }
 }
 

@@ -23,7 +23,7 @@ impl Store {
     }
 
     /// Writes frames, `stride` bytes each, into the file that begins with frame `first`; durable on `Ok`, with `is_known` where the file's name
-    /// was durable before. They have no checksum: the log has their digests.
+    /// was durable before. They have no checksum: the catalogue has their digests.
     pub fn put_frames(
         &self,
         id: &str,

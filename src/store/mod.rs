@@ -1,16 +1,14 @@
-//! Persistent data: sessions with their frame logs and containers, uploaded content, cage jobs and prepared solvers. All calls block.
+//! Persistent data: sessions with their frames and containers, uploaded content, jobs and prepared solvers. All calls block.
 //! Calls with an id that is not valid fail with [`StoreError::BadId`], calls that write may fail with [`StoreError::Full`], and any call may
 //! fail as the disk does, with [`StoreError::Io`]; the documentation of each names only further errors.
 //!
 //! ```text
 //! lock             locked while a process uses the folder
-//! sessions/<id>/   session.json  frames.log  capture.cager  complete.json  outcome.json  announce.json
-//!                  frames-<first>  group-<first>  last-<first>
-//! cages/<id>/      job.json  rest  frames  attempts.json  cage.obj  outcome.json
-//! recoveries/<id>/ recovery.json  template  cage  rig  manifold  frame-<k>  attempts.json  complete.json
-//!                  capture.cager  cages  report.json  joints.csv  joints.bvh  outcome.json
-//! transfers/<id>/  transfer.json  target  source  source_rest  source_frames  cage  attempts.json
-//!                  capture.cager  report.json  outcome.json
+//! catalog.db       records of sessions and jobs, and the cages of frames (crate `cager-store`), with -wal, -shm and .reserve beside it
+//! sessions/<id>/   capture.cager  frames-<first>  group-<first>  last-<first>
+//! cages/<id>/      rest  frames  cage.obj
+//! recoveries/<id>/ template  cage  rig  manifold  frame-<k>  capture.cager  cages  report.json  joints.csv  joints.bvh
+//! transfers/<id>/  target  source  source_rest  source_frames  cage  capture.cager  report.json
 //! contents/<key>/  content.json  rest  cage  matrix
 //! prepared/<key>.solver
 //! tmp/             being written; emptied at start       trash/       being removed; emptied at start
@@ -18,15 +16,16 @@
 //! ```
 //!
 //! Files and folders are written in `tmp/`, synced and renamed into place; folders are moved to `trash/` before they are removed. So
-//! everything in `sessions`, `cages`, `recoveries`, `transfers`, `contents` and `prepared` is complete. Only the frame log grows in place, whose recovery [`log`]
-//! describes, and frames that wait to be coded, whose digests it has.
+//! everything in `sessions`, `cages`, `recoveries`, `transfers`, `contents` and `prepared` is complete, but for frames that wait to be coded,
+//! whose digests the catalogue has. A record is there before its folder and after it: what it says of its phase decides.
 
 use crate::store::files::Files;
-use std::collections::HashSet;
+use cager_store::{Catalog, CatalogError};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 mod cage_jobs;
 mod content;
@@ -36,14 +35,15 @@ mod error;
 #[path = "../../tests/faults/mod.rs"]
 mod faults;
 mod files;
+mod frames;
 mod groups;
+mod import;
 mod jobs;
-pub mod log;
 mod meta;
 mod names;
 mod prepared;
+mod records;
 mod recoveries;
-mod scan;
 mod sessions;
 mod solver_file;
 mod spool;
@@ -54,15 +54,14 @@ mod workshop;
 mod tests;
 
 pub use cage_jobs::CageJobMeta;
+pub use cager_store::{CagePlace, FrameEntry, Kind, NewFrame};
 pub use content::{Content, NamedFile, StoredPart};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
 pub(crate) use jobs::JobMeta;
-pub use log::{FrameLog, LogEntry, LogReader, LogRecord};
 pub use names::{ContentKey, is_session_id};
+pub(crate) use records::RecordMeta;
 pub use recoveries::{RecoveryMeta, RecoveryParts};
-pub(crate) use scan::FolderMeta;
-pub use scan::{Kind, Unreadable};
 pub use sessions::{Completion, Container, Idempotency, SessionBytes, SessionMeta};
 pub use spool::{Spool, StoredFile};
 pub use transfers::{PAIRS, SOURCE, SOURCE_FRAMES, TransferMeta};
@@ -77,19 +76,15 @@ pub struct Store {
 #[derive(Debug)]
 struct Inner {
     files: Files,
-    /// Shared with every open frame log, so that the folder stays locked while one is written.
-    lock: Arc<File>,
-    /// Which logs are open, and which need rewriting.
-    logs: Arc<Mutex<LogRegistry>>,
+    catalog: Arc<dyn Catalog>,
+    catalog_path: PathBuf,
+    /// Something that may need content could not be read at the start.
+    keeps_contents: AtomicBool,
+    _lock: File,
 }
 
-#[derive(Debug, Default)]
-struct LogRegistry {
-    /// Sessions whose log is open; a second writer is refused.
-    open: HashSet<String>,
-    /// Sessions whose log may have lost data in a failed sync.
-    needs_rewrite: HashSet<String>,
-}
+/// Name of the catalogue's file.
+const CATALOG: &str = "catalog.db";
 
 /// An opened store and its contents.
 #[derive(Debug)]
@@ -104,10 +99,8 @@ pub struct Opened {
     pub recoveries: Vec<RecoveryMeta>,
     /// Its transfers, oldest first.
     pub transfers: Vec<TransferMeta>,
-    /// Sessions and jobs that were damaged and moved to quarantine.
+    /// What is damaged and left out: files were moved to quarantine, records stay where they are.
     pub quarantined: Vec<Quarantined>,
-    /// Sessions and jobs that could not be read and were left in place.
-    pub unread: Vec<Unreadable>,
 }
 
 /// A damaged object in quarantine.
@@ -115,7 +108,7 @@ pub struct Opened {
 pub struct Quarantined {
     /// Name of the session, or of the file.
     pub name: String,
-    /// Path in quarantine.
+    /// Where it is now.
     pub path: PathBuf,
     /// What is wrong with it.
     pub why: String,
@@ -123,10 +116,11 @@ pub struct Quarantined {
 
 impl Store {
     /// Opens the folder `root` for this process alone, creating it if it is missing. Finishes interrupted deletions, removes temporary
-    /// files, and moves objects with damaged metadata to `quarantine/`. Unreadable ones stay in place.
+    /// files, takes over what an earlier version stored, and moves objects with damaged metadata to `quarantine/`.
     ///
     /// # Errors
-    /// [`StoreError::Locked`] if another process uses it, or I/O errors of the folder itself. Damaged sessions are not an error.
+    /// [`StoreError::Locked`] if another process uses it; [`StoreError::Damaged`] where its catalogue is damaged, or is missing while sessions or
+    /// jobs are there. Damaged sessions are not an error.
     pub fn open(root: &Path, disk: Arc<dyn Disk>) -> Result<Opened, StoreError> {
         make_folder(&*disk, root)?;
         let lock_path = root.join("lock");
@@ -156,15 +150,44 @@ impl Store {
                 tracing::warn!(%error, "something deleted still takes space");
             }
         }
-        let scan::FolderScan { metas: mut sessions, mut quarantined, mut unread } = scan::find::<SessionMeta>(&files)?;
-        sessions.sort_by(|a, b| (a.created_ms, &a.id).cmp(&(b.created_ms, &b.id)));
-        let cage_jobs = jobs::find(&files, &mut quarantined, &mut unread)?;
-        let recoveries = jobs::find(&files, &mut quarantined, &mut unread)?;
-        let transfers = jobs::find(&files, &mut quarantined, &mut unread)?;
+        let catalog_path = files.root.join(CATALOG);
+        let is_new = !files.exists(&catalog_path)?;
+        if is_new && import::is_without_records(&files)? {
+            let what = "it is missing, and there are sessions or jobs in the folder";
+            return Err(StoreError::damaged(&catalog_path, what));
+        }
+        let catalog = files.disk.catalog(&catalog_path).map_err(|e| of_catalog(&catalog_path, "open", e))?;
+        files.sync_dir(&files.root)?;
+        let keeps_contents = AtomicBool::new(false);
+        let store = Self { inner: Arc::new(Inner { files, catalog, catalog_path, keeps_contents, _lock: lock }) };
+        let records = store.catalog().records().map_err(|e| store.failed("open", e))?;
+        if records.is_empty() && import::is_without_records(store.files())? {
+            let what = "it is empty, and there are sessions or jobs in the folder";
+            return Err(StoreError::damaged(store.catalog_path(), what));
+        }
+        let mut quarantined = Vec::new();
+        let (records, left) = store.take_over(records, &mut quarantined)?;
+        store.match_folders(&records, &left, &mut quarantined)?;
+        let records = store.tidy_records(records);
+        let sessions = store.metas(&records, &mut quarantined);
+        let cage_jobs = store.metas(&records, &mut quarantined);
+        let recoveries = store.metas(&records, &mut quarantined);
+        let transfers = store.metas(&records, &mut quarantined);
         quarantined.sort_by(|a, b| a.name.cmp(&b.name));
-        let inner = Inner { files, lock: Arc::new(lock), logs: Arc::default() };
-        let store = Self { inner: Arc::new(inner) };
-        Ok(Opened { store, sessions, cage_jobs, recoveries, transfers, quarantined, unread })
+        Ok(Opened { store, sessions, cage_jobs, recoveries, transfers, quarantined })
+    }
+
+    fn catalog(&self) -> &dyn Catalog {
+        &*self.inner.catalog
+    }
+
+    fn catalog_path(&self) -> &Path {
+        &self.inner.catalog_path
+    }
+
+    /// An error of the catalogue.
+    fn failed(&self, action: &'static str, error: CatalogError) -> StoreError {
+        of_catalog(self.catalog_path(), action, error)
     }
 
     fn files(&self) -> &Files {
@@ -176,14 +199,27 @@ impl Store {
         self.files().disk.free_bytes(&self.files().root).unwrap_or(0)
     }
 
-    /// Checks that the store can write and sync.
+    /// Checks that the store can write and sync, files and records.
     pub fn probe(&self) -> Result<(), StoreError> {
         let files = self.files();
         let path = files.temporary("probe");
         let written = files.write_new(&path, b"probe\n");
         files.discard(&path);
-        written
+        written.and_then(|()| self.catalog().probe().map_err(|e| self.failed("write", e)))
     }
+}
+
+fn of_catalog(path: &Path, action: &'static str, error: CatalogError) -> StoreError {
+    let cause: io::Error = match error {
+        CatalogError::Full => return StoreError::Full { path: path.to_owned() },
+        CatalogError::Damaged(what) => return StoreError::damaged(path, what),
+        CatalogError::Gone => io::ErrorKind::NotFound.into(),
+        CatalogError::Taken => io::ErrorKind::AlreadyExists.into(),
+        // While the service runs that is no damage of the session that met it.
+        CatalogError::Corrupt(what) if action == "open" => return StoreError::damaged(path, what),
+        other => io::Error::other(other),
+    };
+    StoreError::of(path, action, cause)
 }
 
 /// Creates a folder and its parents, durably, unless it exists.

@@ -1,10 +1,10 @@
 //! Recoveries: what was sent, frame by frame, and what was made of it.
 
 use super::files::Files;
-use super::jobs::{ATTEMPTS, job_meta};
-use super::scan::Kind;
-use super::{Idempotency, NamedFile, Store, StoreError, StoredPart, meta};
+use super::jobs::job_meta;
+use super::{Idempotency, Kind, NamedFile, Store, StoreError, StoredPart, meta};
 use cager_proto::recovery_messages::RecoveryOptions;
+use cager_store::{Change, Key};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -62,17 +62,15 @@ impl<T> RecoveryParts<T> {
     }
 }
 
-job_meta!(RecoveryMeta, Kind::Recovery, "recovery.json", |meta| meta.parts.named().map(|(_, part)| part.bytes).sum());
+job_meta!(RecoveryMeta, Kind::Recovery, |meta| meta.parts.named().map(|(_, part)| part.bytes).sum());
 
 const TEMPLATE: &str = "template";
-const COMPLETE: &str = "complete.json";
-const REACHED: &str = "reached.json";
 const FRAME: &str = "frame-";
 /// Most bytes before the content of a frame's file: a name and a digest.
 const HEAD_BYTES: u64 = 4096;
 
 impl Store {
-    /// Creates a recovery, atomically; durable on `Ok`.
+    /// Creates a recovery; durable on `Ok`.
     pub fn create_recovery(&self, meta: &RecoveryMeta, parts: &RecoveryParts<NamedFile>) -> Result<(), StoreError> {
         self.create_job(meta, parts.named().map(|(name, part)| (name, &part.bytes[..])), None)
     }
@@ -154,23 +152,17 @@ impl Store {
     /// # Errors
     /// Not found where it was deleted.
     pub fn declare_recovery(&self, id: &str, frames: u32) -> Result<(), StoreError> {
-        let path = self.folder(Kind::Recovery, id)?.join(COMPLETE);
-        self.files().replace(&path, &meta::wrap(&path, "completion", &frames)?)
+        self.change(Key { kind: Kind::Recovery, id }, &[Change::Declared(frames)])
     }
 
     /// How many frames a recovery has in all, where that was said.
-    ///
-    /// # Errors
-    /// [`StoreError::Damaged`].
     pub fn declared_recovery(&self, id: &str) -> Result<Option<u32>, StoreError> {
-        meta::read(self.files(), &self.folder(Kind::Recovery, id)?.join(COMPLETE), "completion")
+        Ok(self.record(Kind::Recovery, id)?.and_then(|record| record.declared))
     }
 
     /// How many frames of a recovery were ever followed, as far as was noted.
     pub fn reached_recovery(&self, id: &str) -> Result<u32, StoreError> {
-        let path = self.folder(Kind::Recovery, id)?.join(REACHED);
-        // An unreadable number restarts at 0.
-        Ok(meta::read(self.files(), &path, "progress").ok().flatten().unwrap_or(0))
+        Ok(self.record(Kind::Recovery, id)?.map_or(0, |record| record.reached))
     }
 
     /// Notes durably that more frames than ever before were followed, so that the attempts before count no longer.
@@ -178,9 +170,7 @@ impl Store {
     /// # Errors
     /// Not found where it was deleted.
     pub fn note_reached_recovery(&self, id: &str, frames: u32) -> Result<(), StoreError> {
-        let path = self.folder(Kind::Recovery, id)?.join(REACHED);
-        self.files().replace(&path, &meta::wrap(&path, "progress", &frames)?)?;
-        self.forget_attempts(Kind::Recovery, id)
+        self.change(Key { kind: Kind::Recovery, id }, &[Change::Reached(frames), Change::Attempts(0)])
     }
 
     /// Removes the input of a recovery that is over, best effort: files that remain are removed at the next start.
@@ -188,7 +178,7 @@ impl Store {
         let folder = self.folder(Kind::Recovery, id);
         let frames = folder.and_then(|folder| frame_names(self.files(), &folder)).unwrap_or_default();
         self.forget_files(Kind::Recovery, id, frames);
-        self.forget_files(Kind::Recovery, id, [TEMPLATE, "cage", "rig", "manifold", COMPLETE, ATTEMPTS, REACHED]);
+        self.forget_files(Kind::Recovery, id, [TEMPLATE, "cage", "rig", "manifold"]);
     }
 }
 

@@ -1,13 +1,13 @@
-//! Sessions: metadata, container, completion mark and notes.
+//! Sessions: metadata, container, completion mark and announcement.
 
-use super::scan::{FolderMeta, Kind};
-use super::{ContentKey, Store, StoreError, StoredFile, meta};
+use super::records::RecordMeta;
+use super::{ContentKey, Kind, Store, StoreError, StoredFile};
 use cager_proto::messages::SessionOptions;
+use cager_store::{Change, Key};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// Metadata of a session, fixed at its creation.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -70,32 +70,36 @@ pub struct SessionBytes {
     pub container: u64,
 }
 
-impl FolderMeta for SessionMeta {
+impl RecordMeta for SessionMeta {
     const KIND: Kind = Kind::Session;
-    const FILE: &str = META;
 
     fn id(&self) -> &str {
         &self.id
     }
+
+    fn created_ms(&self) -> u64 {
+        self.created_ms
+    }
 }
 
-const META: &str = "session.json";
-const COMPLETE: &str = "complete.json";
 const CONTAINER: &str = "capture.cager";
 /// Bytes of a container gathered before a write.
 const BUFFER_BYTES: usize = 1 << 18;
-/// Age after which the kernel has written a folder entry back.
-const WRITEBACK_AGE: Duration = Duration::from_secs(600);
+/// What they are called where they are stored.
+const COMPLETION: &str = "completion";
+const ANNOUNCEMENT: &str = "announce";
+
+fn key(id: &str) -> Key<'_> {
+    Key { kind: Kind::Session, id }
+}
 
 impl Store {
-    /// Creates a session, atomically; durable on `Ok`.
+    /// Creates a session; durable on `Ok`.
     ///
     /// # Errors
     /// [`StoreError::Io`] with `AlreadyExists` where the id is taken.
     pub fn create_session(&self, meta: &SessionMeta) -> Result<(), StoreError> {
-        let (files, place) = (self.files(), self.folder(Kind::Session, &meta.id)?);
-        let bytes = meta::wrap(&place.join(META), "session", meta)?;
-        files.publish_folder(&place, |staging| files.write_new(&staging.join(META), &bytes))
+        self.create(meta, Vec::new(), |_| Ok(()))
     }
 
     /// Atomically writes the session's container, replacing an existing one; durable on `Ok`. A [`StoreError`] inside the [`io::Error`]
@@ -123,26 +127,16 @@ impl Store {
 
     /// Writes the completion mark, durably.
     pub fn complete(&self, id: &str, completion: &Completion) -> Result<(), StoreError> {
-        let path = self.folder(Kind::Session, id)?.join(COMPLETE);
-        self.files().replace(&path, &meta::wrap(&path, "completion", completion)?)
+        self.change(key(id), &[Change::Completion(self.sealed(COMPLETION, completion)?)])
     }
 
-    /// Reads the completion mark; `None` if there is none. A mark that is returned is durable.
+    /// Reads the completion mark; `None` if there is none.
     ///
     /// # Errors
     /// [`StoreError::Damaged`].
     pub fn completion(&self, id: &str) -> Result<Option<Completion>, StoreError> {
-        let folder = self.folder(Kind::Session, id)?;
-        let found: Option<Completion> = meta::read(self.files(), &folder.join(COMPLETE), "completion")?;
-        if found.is_some() {
-            // An earlier process may have renamed the mark without syncing the folder; old entries have been written back since.
-            let entries = self.files().list(&folder)?;
-            let old = |e: &super::disk::Entry| e.modified.elapsed().is_ok_and(|age| age > WRITEBACK_AGE);
-            if !entries.iter().all(old) {
-                self.files().sync_dir(&folder)?;
-            }
-        }
-        Ok(found)
+        let completion = self.record(Kind::Session, id)?.and_then(|record| record.completion);
+        completion.map(|bytes| self.unsealed((Kind::Session, id), COMPLETION, &bytes)).transpose()
     }
 
     /// Length of the session's container; 0 where there is none.
@@ -152,12 +146,13 @@ impl Store {
         file.map_or(Ok(0), |file| file.length().map_err(|e| StoreError::of(&path, "read", e)))
     }
 
-    /// Bytes of the session's files and of its content.
+    /// Bytes of the session's files, frames and content.
     pub fn bytes_of_session(&self, meta: &SessionMeta) -> Result<SessionBytes, StoreError> {
         let entries = self.files().list(&self.folder(Kind::Session, &meta.id)?)?;
         let container = entries.iter().find(|entry| entry.name == CONTAINER).map_or(0, |entry| entry.bytes);
         let own: u64 = entries.iter().map(|entry| entry.bytes).sum();
-        Ok(SessionBytes { all: own + self.content_bytes(&meta.key)?, container })
+        let frames = self.record(Kind::Session, &meta.id)?.map_or(0, |record| record.frame_bytes);
+        Ok(SessionBytes { all: own + frames + self.content_bytes(&meta.key)?, container })
     }
 
     /// Removes the session's container, if there is one. It may come back with a power cut.
@@ -177,19 +172,18 @@ impl Store {
         Ok(bytes == completion.container_bytes && digest.as_str() == completion.container_digest)
     }
 
-    /// Atomically stores a note about the session, replacing an earlier one of that name; durable on `Ok`. `name` is a file name without
-    /// extension.
-    pub fn put_note<T: Serialize>(&self, id: &str, name: &'static str, note: &T) -> Result<(), StoreError> {
-        let path = self.folder(Kind::Session, id)?.join(name).with_extension("json");
-        self.files().replace(&path, &meta::wrap(&path, name, note)?)
+    /// Stores what has to be announced about the session, in place of what had to be before; durable on `Ok`.
+    pub fn set_announcement<T: Serialize>(&self, id: &str, message: &T) -> Result<(), StoreError> {
+        self.change(key(id), &[Change::Announcement(self.sealed(ANNOUNCEMENT, message)?)])
     }
 
-    /// A note of the session; None where there is none.
+    /// What has to be announced about the session.
     ///
     /// # Errors
     /// [`StoreError::Damaged`].
-    pub fn note<T: DeserializeOwned>(&self, id: &str, name: &'static str) -> Result<Option<T>, StoreError> {
-        meta::read(self.files(), &self.folder(Kind::Session, id)?.join(name).with_extension("json"), name)
+    pub fn announcement<T: DeserializeOwned>(&self, id: &str) -> Result<Option<T>, StoreError> {
+        let message = self.record(Kind::Session, id)?.and_then(|record| record.announcement);
+        message.map(|bytes| self.unsealed((Kind::Session, id), ANNOUNCEMENT, &bytes)).transpose()
     }
 
     /// Path of the session's container, whether or not it exists. For an invalid id it is a path where nothing exists.

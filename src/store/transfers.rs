@@ -1,8 +1,7 @@
 //! Transfers: what was sent, and what was made of it.
 
-use super::jobs::{ATTEMPTS, job_meta};
-use super::scan::Kind;
-use super::{Idempotency, NamedFile, Spool, Store, StoreError, StoredFile, StoredPart};
+use super::jobs::job_meta;
+use super::{Idempotency, Kind, NamedFile, Spool, Store, StoreError, StoredFile, StoredPart};
 use cager_proto::transfer_messages::TransferOptions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -31,7 +30,7 @@ pub struct TransferMeta {
     pub idempotency: Option<Idempotency>,
 }
 
-job_meta!(TransferMeta, Kind::Transfer, "transfer.json", |meta| meta.parts.values().map(|part| part.bytes).sum());
+job_meta!(TransferMeta, Kind::Transfer, |meta| meta.parts.values().map(|part| part.bytes).sum());
 
 /// The part that is a whole container.
 pub const SOURCE: &str = "source";
@@ -41,7 +40,7 @@ pub const PAIRS: &str = "pairs";
 pub const SOURCE_FRAMES: &str = "source_frames";
 
 impl Store {
-    /// Creates a transfer, atomically; durable on `Ok`. The large part is on disk already.
+    /// Creates a transfer; durable on `Ok`. The large part is on disk already.
     pub fn create_transfer(
         &self,
         meta: &TransferMeta,
@@ -77,10 +76,7 @@ impl Store {
 
     /// Removes the input of a transfer that is over, best effort: files that remain are removed at the next start.
     pub fn forget_transfer_input(&self, id: &str) {
-        self.forget_files(
-            Kind::Transfer,
-            id,
-            ["target", SOURCE, "source_rest", SOURCE_FRAMES, "cage", PAIRS, ATTEMPTS],
-        );
+        let sent = ["target", SOURCE, "source_rest", SOURCE_FRAMES, "cage", PAIRS];
+        self.forget_files(Kind::Transfer, id, sent);
     }
 }

@@ -1,7 +1,6 @@
 //! Results of a job while they are made: in a folder of their own in `tmp/`, then moved into the job's.
 
-use super::scan::Kind;
-use super::{Store, StoreError, StoredPart};
+use super::{Kind, Store, StoreError, StoredPart};
 use serde::Serialize;
 use std::fs::File;
 use std::io;
@@ -72,6 +71,6 @@ impl Store {
             }
         }
         files.sync_dir(&folder)?;
-        self.set_job_outcome(kind, id, outcome)
+        self.set_outcome(kind, id, outcome)
     }
 }

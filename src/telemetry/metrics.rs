@@ -1,7 +1,6 @@
 //! Metrics for operators, in Prometheus' format. `docs/OPERATIONS.md` lists them.
 
 use crate::service::Service;
-use crate::store::Kind;
 use crate::sync::lock;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use metrics_process::Collector;
@@ -67,9 +66,6 @@ pub(crate) fn observe(service: &Service) {
     metrics::gauge!("cager_memory_bytes", "use" => "downloads").set(service.download_memory.used() as f64);
     metrics::gauge!("cager_disk_bytes", "use" => "spool").set(service.spool_space.used() as f64);
     metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
-    for (kind, what) in Kind::ALL {
-        metrics::gauge!("cager_unread", "what" => what).set(service.unread.count(kind) as f64);
-    }
     metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
     metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
     // A tenant without sessions is reported as 0, not with its last value.
@@ -87,11 +83,10 @@ fn describe() {
     use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
     describe_counter!("cager_frames_total", "Frames solved and on disk, by tenant and rows sent");
     describe_counter!("cager_received_bytes_total", Unit::Bytes, "Bytes of frames received, by tenant");
-    describe_counter!("cager_log_bytes_total", Unit::Bytes, "Bytes written to frame logs");
+    describe_counter!("cager_log_bytes_total", Unit::Bytes, "Bytes of cages stored");
     describe_counter!("cager_sessions_created_total", "Sessions made, by tenant");
     describe_counter!("cager_sessions_expired_total", "Sessions deleted because of their age");
-    describe_counter!("cager_quarantined_total", "Damaged sessions, jobs and files moved to quarantine");
-    describe_gauge!("cager_unread", "Sessions and jobs whose files cannot be read, left where they are");
+    describe_counter!("cager_quarantined_total", "Sessions, jobs and files found damaged");
     describe_gauge!("cager_build_info", "Always 1; version and commit of the program");
     describe_counter!("cager_webhooks_total", "Messages to webhooks, by result: delivered, given_up, gone");
     describe_counter!("cager_rejections_total", "Requests turned away, by reason");

@@ -1,7 +1,7 @@
 //! Delivering a message, with retries.
 
 use super::file::Hook;
-use super::{Event, NOTE, PendingMessage};
+use super::{Event, PendingMessage};
 use crate::http_client::Client;
 use crate::store::Store;
 use crate::sync::lock;
@@ -61,7 +61,7 @@ impl Message {
         let noted = tokio::task::spawn_blocking(move || {
             let mut due = self.due();
             due.left.retain(|hook| *hook != told);
-            self.store.put_note(&self.session, NOTE, &*due)
+            self.store.set_announcement(&self.session, &*due)
         });
         // If this is not stored, the message is sent again after a restart with the same id. Notes of a deleted session are gone.
         if let Ok(Err(error)) = noted.await {

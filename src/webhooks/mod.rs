@@ -42,9 +42,6 @@ pub(crate) struct PendingMessage {
     left: Vec<String>,
 }
 
-/// Name of the session note that stores [`PendingMessage`].
-const NOTE: &str = "announce";
-
 /// The configured receivers.
 pub(crate) struct Webhooks {
     hooks: Vec<Arc<Hook>>,
@@ -86,7 +83,7 @@ impl Webhooks {
     /// Storage errors.
     pub(crate) fn keep(&self, session: &Session, event: Event) -> Result<Option<PendingMessage>, StoreError> {
         let due = self.due(session, event);
-        due.as_ref().map_or(Ok(()), |due| self.store.put_note(&session.meta.id, NOTE, due))?;
+        due.as_ref().map_or(Ok(()), |due| self.store.set_announcement(&session.meta.id, due))?;
         Ok(due)
     }
 
@@ -95,7 +92,7 @@ impl Webhooks {
         if self.hooks.is_empty() {
             return;
         }
-        let due = self.store.note(&session.meta.id, NOTE).unwrap_or_else(|error| {
+        let due = self.store.announcement(&session.meta.id).unwrap_or_else(|error| {
             tracing::warn!(session = %session.meta.id, %error, "the pending webhook message of this session cannot be read");
             None
         });
@@ -104,7 +101,7 @@ impl Webhooks {
             Event::Failed => session.has_failed(),
         };
         if let Some(due) = due.filter(ended) {
-            // The message contains frame counts; if the log cannot be read, that is logged.
+            // The message contains frame counts; if frames cannot be read, that is logged.
             let _ = session.load();
             self.tell(session, due);
         }

@@ -3,6 +3,7 @@
 use super::super::disk::{Disk, DiskFile, Entry, LocalDisk};
 use super::shadow::Shadow;
 use super::{FaultyDisk, Op, State, Verdict, stopped};
+use cager_store::{Catalog, CatalogError};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -83,6 +84,19 @@ impl Disk for FaultyDisk {
     fn free_bytes(&self, path: &Path) -> io::Result<u64> {
         let told = self.state().free_bytes;
         told.map_or_else(|| LocalDisk.free_bytes(path), Ok)
+    }
+
+    /// What is in the folder only says that there is one.
+    fn catalog(&self, path: &Path) -> Result<Arc<dyn Catalog>, CatalogError> {
+        let failed = |error: io::Error| match error.kind() {
+            io::ErrorKind::StorageFull => CatalogError::Full,
+            _ => CatalogError::Failed(error.to_string()),
+        };
+        match self.open(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => drop(self.create_new(path).map_err(failed)?),
+            opened => drop(opened.map_err(failed)?),
+        }
+        super::catalog::open(self, path)
     }
 }
 

@@ -1,7 +1,7 @@
 //! A disk that fails on demand, for tests: errors of single operations, short writes, syncs that lose what they should keep,
 //! processes that stop anywhere, and power cuts. The tests of the store and those of the whole service share it.
 
-#![allow(dead_code, unreachable_pub, reason = "each of them uses a part")]
+#![allow(dead_code, unreachable_pub, unused_imports, reason = "each of them uses a part")]
 
 use super::disk::DiskFile;
 use files::FaultyFile;
@@ -11,8 +11,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+mod catalog;
 mod files;
 mod shadow;
+
+pub use catalog::Hooked;
 
 /// Kinds of operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,6 +44,10 @@ pub enum Op {
     SyncDir,
     /// Noting a use.
     Touch,
+    /// A change of the catalogue.
+    Change,
+    /// The answer to such a change, which is done.
+    Answer,
 }
 
 /// What happens to an operation.
@@ -48,7 +55,8 @@ pub enum Op {
 pub enum Fault {
     /// It fails with this `errno` and does nothing; a sync loses all that it should have kept.
     Error(i32),
-    /// As an error; a sync also ruins the blocks it tried to write, with older bytes in them.
+    /// As an error; a sync also ruins the blocks it tried to write, with older bytes in them, and a catalogue that did not answer a change can not be
+    /// read either until the faults end.
     Ruin(i32),
     /// A write takes half of its bytes and succeeds. Other operations are as ever.
     Short,
@@ -88,6 +96,9 @@ struct State {
     /// Files opened before a restart are dead.
     generation: u64,
     free_bytes: Option<u64>,
+    catalog: Option<catalog::Kept>,
+    /// Nothing can be read from the catalogue.
+    is_mute: bool,
 }
 
 /// A disk over the system's own, with faults in it. Everything under its root is also kept in memory.
@@ -119,6 +130,8 @@ impl FaultyDisk {
             stopped: false,
             generation: 0,
             free_bytes: None,
+            catalog: None,
+            is_mute: false,
         };
         Ok(Self { state: Arc::new(Mutex::new(state)) })
     }
@@ -145,7 +158,9 @@ impl FaultyDisk {
 
     /// No more faults, but for a stop that has happened.
     pub fn disarm(&self) {
-        self.state().armed.clear();
+        let mut state = self.state();
+        state.armed.clear();
+        state.is_mute = false;
     }
 
     /// Stops here: all operations fail until [`Self::restart`].
@@ -180,6 +195,7 @@ impl FaultyDisk {
     pub fn restart(&self, loss: Loss) -> io::Result<()> {
         let mut state = self.state();
         state.armed.clear();
+        state.is_mute = false;
         state.stopped = false;
         state.generation += 1;
         match loss {

@@ -5,4 +5,4 @@ use cager::store::disk;
 #[path = "../faults/mod.rs"]
 mod shared;
 
-pub(crate) use shared::{Fault, FaultyDisk, Loss, Op};
+pub(crate) use shared::{Fault, FaultyDisk, Hooked, Loss, Op};

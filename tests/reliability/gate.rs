@@ -1,7 +1,9 @@
-//! A disk whose syncs can be held up for as long as a test wants.
+//! A disk whose syncs and changes of the catalogue can be held up for as long as a test wants.
 
+use crate::faults::{Hooked, Op};
 use cager::store::Disk;
 use cager::store::disk::{DiskFile, Entry};
+use cager_store::{Catalog, CatalogError};
 use std::fs::File;
 use std::io;
 use std::path::Path;
@@ -107,6 +109,17 @@ impl<D: Disk> Disk for GatedDisk<D> {
 
     fn free_bytes(&self, path: &Path) -> io::Result<u64> {
         self.disk.free_bytes(path)
+    }
+
+    fn catalog(&self, path: &Path) -> Result<Arc<dyn Catalog>, CatalogError> {
+        let gate = self.gate.clone();
+        let hook = move |op| {
+            if op == Op::Change {
+                gate.pass();
+            }
+            Ok(())
+        };
+        Ok(Hooked::new(self.disk.catalog(path)?, hook))
     }
 }
 

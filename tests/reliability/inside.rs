@@ -82,13 +82,6 @@ impl Inside {
         self.start().await;
     }
 
-    /// As [`Self::restart`], with faults from the start on.
-    pub(crate) async fn restart_with(&mut self, loss: Loss, arm: impl FnOnce(&FaultyDisk)) {
-        self.stop(loss).await;
-        arm(&self.disk);
-        self.start().await;
-    }
-
     async fn stop(&mut self, loss: Loss) {
         self.disk.stop();
         let Running { service, stop, served, .. } = self.running.take().expect("it runs");

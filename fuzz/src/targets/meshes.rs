@@ -149,7 +149,7 @@ pub(super) const GLB: Target = Target {
     ..target("glb", |bytes| read(MeshFormat::Glb, &with_lengths(bytes)), glb_seeds, GLB_WORDS)
 };
 
-const GLB_WORDS: &[&str] = &[
+pub(super) const GLB_WORDS: &[&str] = &[
     "{",
     "}",
     "[",
@@ -257,7 +257,7 @@ fn packed_glb() -> Vec<u8> {
 }
 
 /// Where the first byte says so, the lengths are made right again, so that changes of the JSON get further.
-fn with_lengths(bytes: &[u8]) -> Vec<u8> {
+pub(super) fn with_lengths(bytes: &[u8]) -> Vec<u8> {
     let Some((mode, file)) = bytes.split_first() else { return Vec::new() };
     let mut file = file.to_vec();
     if mode & 1 != 0 && file.len() >= 20 {

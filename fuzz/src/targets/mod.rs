@@ -4,6 +4,7 @@ mod alembic;
 mod bodies;
 mod container;
 mod frames;
+mod gltf;
 mod meshes;
 mod scenes;
 mod settings;
@@ -28,6 +29,7 @@ pub const TARGETS: &[Target] = &[
     alembic::ABC,
     usd::USDC,
     usd::USDZ,
+    gltf::GLB_FRAMES,
     frames::NPZ,
     container::CONTAINER,
     bodies::RECORD,

@@ -42,6 +42,11 @@ pub(super) fn read(cache: CacheFormat, mesh: MeshFormat, name: &str, mut bytes: 
 pub(super) fn seeds(name: &str, uneven: [f64; 3]) -> Vec<Vec<u8>> {
     let uneven = FrameOptions { numbers: uneven.to_vec(), ..FrameOptions::default() };
     let far = FrameOptions { origin: Some([1e6, 0.0, 0.0]), ..FrameOptions::default() };
+    written(name, &[FrameOptions::default(), uneven, far])
+}
+
+/// Three frames of a triangle for each of several options.
+pub(super) fn written(name: &str, options: &[FrameOptions]) -> Vec<Vec<u8>> {
     let written = |options: &FrameOptions| {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);
@@ -54,5 +59,5 @@ pub(super) fn seeds(name: &str, uneven: [f64; 3]) -> Vec<Vec<u8>> {
         writer.finish().expect("a file");
         [vec![3], std::fs::read(&path).expect("a file")].concat()
     };
-    [FrameOptions::default(), uneven, far].iter().map(written).collect()
+    options.iter().map(written).collect()
 }

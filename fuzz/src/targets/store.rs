@@ -3,13 +3,12 @@
 use super::{byte, mend};
 use crate::Target;
 use crate::disk::MemoryDisk;
-use cager::store::{Content, ContentKey, LogEntry, LogRecord, NamedFile, SessionMeta, Store};
+use cager::store::{Content, ContentKey, Kind, NamedFile, SessionMeta, Store};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{Rows, Solver, SolverOptions};
 use cager_geometry::mesh::TriMesh;
 use cager_proto::messages::SessionOptions;
-use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -27,37 +26,29 @@ pub(super) const LOG: Target = Target {
     name: "log",
     run: log,
     seeds: || {
-        let log = |mode: u8, rows: u8, groups: &[&[u32]]| {
-            let disk = MemoryDisk::default();
-            let (mut log, _) = open(&disk).open_log(ID, rows.into()).expect("a log");
-            let cage = vec![0.5; 3 * usize::from(rows)];
-            for frames in groups {
-                let records: Vec<_> = frames.iter().map(|&frame| record(frame, &cage)).collect();
-                log.append(&records).expect("an append");
+        let log = |mode: u8, rows: u8, frames: &[u32]| {
+            let mut file = vec![0; 4096];
+            file[..8].copy_from_slice(b"CGRLOG\r\n");
+            file[8] = 1;
+            file[12] = rows;
+            file[16..16 + ID.len()].copy_from_slice(ID.as_bytes());
+            for frame in frames {
+                let durable = file.len() as u64;
+                let start = file.len();
+                file.resize(start + 72 + 12 * usize::from(rows) + 4, 0);
+                file[start..start + 4].copy_from_slice(&frame.to_le_bytes());
+                file[start + 4] = u8::from(frame.is_multiple_of(2));
+                file[start + 32..start + 40].copy_from_slice(&durable.to_le_bytes());
             }
-            [&[mode, rows], &disk.get(Path::new(LOG_PATH)).expect("a file")[..]].concat()
+            mend_log(&mut file, rows.into(), true);
+            [&[mode, rows], &file[..]].concat()
         };
-        vec![log(0, 1, &[]), log(1, 2, &[&[4, 5], &[0]]), log(3, 1, &[&[1], &[2], &[1, 3]])]
+        vec![log(0, 1, &[]), log(1, 2, &[4, 5, 0]), log(3, 1, &[1, 2, 1, 3])]
     },
     words: &["CGRLOG\r\n"],
     fixed: 4 << 20,
     per_byte: 32,
 };
-
-fn record(frame: u32, cage: &[f32]) -> LogRecord<'_> {
-    let full_digest = frame.is_multiple_of(2).then_some([3; 16]);
-    let entry = LogEntry {
-        frame,
-        offset: 0,
-        l2: 0.5,
-        linf: f32::NAN,
-        squared: 1.0,
-        spread: 2.0,
-        handle_digest: [frame as u8; 16],
-        full_digest,
-    };
-    LogRecord { entry, cage }
-}
 
 fn log(mut bytes: &[u8]) {
     let (mode, rows) = (byte(&mut bytes), u32::from(byte(&mut bytes) % 8));
@@ -66,26 +57,43 @@ fn log(mut bytes: &[u8]) {
         mend_log(&mut file, rows as usize, mode & 2 != 0);
     }
     let disk = MemoryDisk::default();
+    drop(open(&disk));
+    let folder = Path::new(LOG_PATH).parent().expect("a folder");
+    cager::store::Disk::create_dir(&disk, folder).expect("a folder");
+    disk.put(Path::new(FILES[0].0), &session_file());
     disk.put(Path::new(LOG_PATH), &file);
-    let store = open(&disk);
-    let opened = store.open_log(ID, rows);
-    let Ok((mut log, entries)) = opened else {
-        assert_eq!(disk.get(Path::new(LOG_PATH)).expect("a file"), file, "a damaged log was changed");
+    let opened = Store::open(Path::new("/data"), Arc::new(disk.clone())).expect("damage is no error");
+    let store = opened.store;
+    if !opened.quarantined.is_empty() {
         return;
-    };
-    let frames: HashSet<u32> = entries.iter().map(|entry| entry.frame).collect();
-    assert_eq!(frames.len(), entries.len(), "a frame twice");
+    }
+    assert!(opened.sessions.iter().map(|meta| &meta.id).eq([ID]), "the session is not accounted for");
+    let entries = store.frames(ID).expect("what was taken over is readable");
     let mut cages = Vec::new();
-    log.reader().read_cages(&entries, &mut cages).expect("what was given is readable");
-    assert_eq!(cages.len(), entries.len() * 12 * rows as usize);
-    let cage = vec![1.0; 3 * rows as usize];
-    let new = (0..).find(|frame| !frames.contains(frame)).unwrap_or_default();
-    log.append(&[record(new, &cage)]).expect("an append");
-    drop(log);
-    let (_, again) = store.open_log(ID, rows).expect("a log that was just written");
-    assert_eq!(again.len(), entries.len() + 1);
-    let same = |(a, b): (&LogEntry, &LogEntry)| (a.frame, a.offset) == (b.frame, b.offset);
-    assert!(entries.iter().zip(&again).all(same), "other frames the second time");
+    store.cages(ID, &entries, &mut cages).expect("what was given is readable");
+    let is_damaged = store.damage(Kind::Session, ID).expect("a record").is_some();
+    assert_eq!(disk.get(Path::new(LOG_PATH)).is_some(), is_damaged, "a damaged log stays, and no other");
+}
+
+/// The file of a session's metadata, as earlier versions wrote it.
+fn session_file() -> Vec<u8> {
+    let body = serde_json::to_vec(&meta()).expect("metadata");
+    [head("session", &body).as_bytes(), &body, b"}\n"].concat()
+}
+
+fn meta() -> SessionMeta {
+    let options = SessionOptions { lambda: Some(0.3), name: Some("n".into()), ..SessionOptions::default() };
+    let idempotency = Some(cager::store::Idempotency { key: "k".into(), fingerprint: "f".into() });
+    SessionMeta {
+        made_cage: None,
+        id: ID.into(),
+        tenant: "t".into(),
+        created_ms: 1,
+        key: KEY,
+        solver_version: 1,
+        options,
+        idempotency,
+    }
 }
 
 /// Makes the checksums of the header, the records, and with `marks` of the marks right.
@@ -171,30 +179,19 @@ pub(super) const SMALL_FILES: Target = Target {
     seeds: || {
         let disk = MemoryDisk::default();
         let store = open(&disk);
-        let options = SessionOptions { lambda: Some(0.3), name: Some("n".into()), ..SessionOptions::default() };
-        let idempotency = Some(cager::store::Idempotency { key: "k".into(), fingerprint: "f".into() });
-        let meta = SessionMeta {
-            made_cage: None,
-            id: ID.into(),
-            tenant: "t".into(),
-            created_ms: 1,
-            key: KEY,
-            solver_version: 1,
-            options,
-            idempotency,
-        };
-        store.create_session(&meta).expect("a session");
-        let completion = cager::store::Completion { frames: 6, container_bytes: 7, container_digest: "00".into() };
-        store.complete(ID, &completion).expect("a completion");
         let content = Content {
             rest: NamedFile { name: "a.obj".into(), bytes: vec![1] },
             cage: NamedFile { name: "b.obj".into(), bytes: vec![2] },
             matrix: None,
         };
         store.put_content(&KEY, &content).expect("content");
-        let seeds = FILES.iter().enumerate().flat_map(|(k, (path, kind))| {
-            let file = disk.get(Path::new(path)).expect("a file");
-            let body = file[head(kind, b"").len()..file.len() - 2].to_vec();
+        let completion = cager::store::Completion { frames: 6, container_bytes: 7, container_digest: "00".into() };
+        let described = disk.get(Path::new(FILES[2].0)).expect("a file");
+        let content = described[head("content", b"").len()..described.len() - 2].to_vec();
+        let json = |value: serde_json::Result<Vec<u8>>| value.expect("JSON");
+        let bodies = [json(serde_json::to_vec(&meta())), json(serde_json::to_vec(&completion)), content];
+        let seeds = FILES.iter().zip(bodies).enumerate().flat_map(|(k, ((_, kind), body))| {
+            let file = [head(kind, &body).as_bytes(), &body, b"}\n"].concat();
             [[&[k as u8], &file[..]].concat(), [&[k as u8 | 0x80], &body[..]].concat()]
         });
         seeds.collect()
@@ -236,19 +233,18 @@ fn small_file(mut bytes: &[u8]) {
     let folder = Path::new(path).parent().expect("a folder");
     cager::store::Disk::create_dir(&disk, folder).expect("a folder");
     disk.put(Path::new(path), &file);
+    if kind == "completion" {
+        disk.put(Path::new(FILES[0].0), &session_file());
+    }
     let opened = Store::open(Path::new("/data"), Arc::new(disk.clone())).expect("damage is no error");
     if kind == "session" {
-        assert_eq!(
-            opened.sessions.len() + opened.quarantined.len() + opened.unread.len(),
-            1,
-            "the session is not accounted for"
-        );
+        assert_eq!(opened.sessions.len() + opened.quarantined.len(), 1, "the session is not accounted for");
         assert!(opened.sessions.iter().all(|meta| meta.id == ID));
     }
     let store = opened.store;
     if let Ok(Some(completion)) = store.completion(ID) {
         assert_eq!(kind, "completion");
-        store.complete("g", &completion).expect("it can be written again");
+        store.complete(ID, &completion).expect("it can be written again");
     }
     // Where it says that the parts are of other bytes than are there.
     let content = store.content(&KEY);

@@ -1,7 +1,8 @@
 //! What the store's tests share.
 
 use super::faults::FaultyDisk;
-use super::{Completion, Content, ContentKey, Idempotency, NamedFile, Opened, SessionMeta, Store};
+use super::{CagePlace, Completion, Content, ContentKey, FrameEntry, Idempotency, NamedFile, NewFrame, Opened};
+use super::{SessionMeta, Store, StoreError};
 use cager_core::cage::Cage;
 use cager_core::coordinates;
 use cager_core::inversion::{Handles, Solver, SolverOptions};
@@ -14,6 +15,7 @@ use tempfile::TempDir;
 
 mod cage_jobs;
 mod faults;
+mod import;
 mod prepared;
 mod recoveries;
 mod sessions;
@@ -94,4 +96,45 @@ pub(crate) fn completion() -> Completion {
         container_bytes: bytes.len() as u64,
         container_digest: blake3::hash(&bytes).to_hex().to_string(),
     }
+}
+
+pub(crate) fn cage(frame: u32) -> Vec<f32> {
+    (0..3 * ROWS).map(|i| frame as f32 * 100.0 + i as f32 + 0.25).collect()
+}
+
+pub(crate) fn entry(frame: u32) -> FrameEntry {
+    let f = f64::from(frame);
+    let measured = frame.is_multiple_of(2);
+    FrameEntry {
+        frame,
+        place: CagePlace::default(),
+        l2: if measured { frame as f32 + 0.5 } else { f32::NAN },
+        linf: if measured { frame as f32 + 0.75 } else { f32::NAN },
+        squared: f * 3.0,
+        spread: f * 7.0,
+        handle_digest: [frame as u8; 16],
+        full_digest: measured.then_some([!(frame as u8); 16]),
+    }
+}
+
+pub(crate) fn append(store: &Store, id: &str, frames: &[u32]) -> Result<Vec<FrameEntry>, StoreError> {
+    let cages: Vec<Vec<f32>> = frames.iter().map(|&frame| cage(frame)).collect();
+    let new = frames.iter().zip(&cages).map(|(&frame, cage)| NewFrame { entry: entry(frame), cage });
+    store.append_frames(id, &new.collect::<Vec<_>>())
+}
+
+/// The frames of a session, each of which has to be what was appended to the bit.
+pub(crate) fn frames(store: &Store, id: &str) -> Result<Vec<u32>, StoreError> {
+    let (entries, mut bytes) = (store.frames(id)?, Vec::new());
+    store.cages(id, &entries, &mut bytes)?;
+    let expected: Vec<u8> = entries.iter().flat_map(|e| cage(e.frame)).flat_map(f32::to_le_bytes).collect();
+    assert!(bytes == expected, "other cages than were stored");
+    for found in &entries {
+        let right = entry(found.frame);
+        assert!(found.l2 == right.l2 || (found.l2.is_nan() && right.l2.is_nan()));
+        assert!(found.linf == right.linf || (found.linf.is_nan() && right.linf.is_nan()));
+        assert_eq!((found.squared, found.spread), (right.squared, right.spread));
+        assert_eq!((found.handle_digest, found.full_digest), (right.handle_digest, right.full_digest));
+    }
+    Ok(entries.iter().map(|entry| entry.frame).collect())
 }

@@ -103,7 +103,7 @@ fn a_solver_of_another_version_is_made_anew_and_not_called_damaged() {
     for other in [newer, b"CGRSOLV\x04 and more".to_vec(), b"CGRSOLV\x03".to_vec()] {
         std::fs::write(&path, other).unwrap();
         assert!(store.prepared(&KEY).unwrap().is_none());
-        assert!(!store.has_quarantined().unwrap());
+        assert!(!store.keeps_contents().unwrap());
         store.put_prepared(&KEY, &SOLVER).unwrap();
         assert!(store.prepared(&KEY).unwrap().is_some(), "nothing took its place");
     }
@@ -119,7 +119,7 @@ fn a_cage_is_read_without_its_rest_pose() {
     std::fs::remove_file(place.join("rest")).unwrap();
     assert_eq!(store.content_cage(&KEY).unwrap(), Some(content().cage));
     std::fs::write(place.join("cage"), b"v 0 0 0").unwrap();
-    assert!(store.content_cage(&KEY).is_err() && store.has_quarantined().unwrap());
+    assert!(store.content_cage(&KEY).is_err() && store.keeps_contents().unwrap());
 }
 
 #[test]

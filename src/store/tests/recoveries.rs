@@ -21,7 +21,7 @@ fn parts() -> RecoveryParts<NamedFile> {
     }
 }
 
-fn meta(id: &str) -> RecoveryMeta {
+pub(super) fn meta(id: &str) -> RecoveryMeta {
     let Ok(parts) = parts().map(|_, part| Ok::<_, Infallible>(StoredPart::of(&part.name, &part.bytes)));
     RecoveryMeta {
         id: id.into(),
@@ -95,7 +95,7 @@ fn look(given: &Given, told: &Told, what: &str) {
     assert!(!told.created || there("a"), "{what}: a recovery is lost");
     assert!(!(told.deleted && there("b")), "{what}: a deleted recovery came back");
     if there("a") {
-        let outcome: Option<String> = store.job_outcome(Kind::Recovery, "a").unwrap();
+        let outcome: Option<String> = store.outcome(Kind::Recovery, "a").unwrap();
         assert!(outcome.is_some() || !told.finished, "{what}: an outcome is lost");
         if let Some(outcome) = outcome {
             assert_eq!(outcome, OUTCOME, "{what}");
@@ -133,7 +133,7 @@ fn what_is_over_keeps_its_results_and_not_its_input() {
     let names = std::fs::read_dir(given.root().join("recoveries/a")).unwrap();
     let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
-    assert_eq!(names, ["capture.cager", "outcome.json", "recovery.json"]);
+    assert_eq!(names, ["capture.cager"]);
     assert!(store.put_recovery_frame("b", 0, &part(0), FRAMES[0].1).is_err(), "it was deleted");
     assert!(store.put_recovery_frame("../a", 0, &part(0), FRAMES[0].1).is_err());
 }

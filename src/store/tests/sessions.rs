@@ -1,55 +1,83 @@
-//! Sessions: damaged, locked, misnamed, and their containers.
+//! Sessions: damaged, lost, locked, misnamed, and their containers.
 
-use super::{EIO, ENOSPC, Given, ROWS, completion, meta};
+use super::{ENOSPC, Given, append, completion, frames, meta};
 use crate::store::faults::{Fault, Op};
 use crate::store::{Kind, LocalDisk, Opened, SessionMeta, Store, StoreError};
+use cager_store::{Key, NewRecord, Phase};
 use std::io;
 use std::sync::Arc;
 
 #[test]
-fn a_damaged_session_is_set_aside_and_blocks_nobody() {
+fn a_record_that_cannot_be_read_stays_and_blocks_nobody() {
     let given = Given::new();
     let store = given.open().store;
-    for id in ["a", "b", "c", "d", "e"] {
+    for id in ["a", "e"] {
         store.create_session(&meta(id)).unwrap();
+    }
+    let mut changed = store.sealed("session", &meta("b")).unwrap();
+    changed[200] ^= 1;
+    let of_another = store.sealed("session", &meta("a")).unwrap();
+    for (id, bytes) in [("b", &changed), ("d", &of_another), ("../x", &of_another)] {
+        let key = Key { kind: Kind::Session, id };
+        let record = NewRecord { key, created_ms: 1, phase: Phase::Open, meta: bytes };
+        store.catalog().create(record).unwrap();
     }
     drop(store);
     let sessions = given.root().join("sessions");
-    let mut bytes = std::fs::read(sessions.join("b/session.json")).unwrap();
-    bytes[200] ^= 1;
-    std::fs::write(sessions.join("b/session.json"), bytes).unwrap();
-    std::fs::remove_file(sessions.join("c/session.json")).unwrap();
-    std::fs::copy(sessions.join("a/session.json"), sessions.join("d/session.json")).unwrap();
     std::fs::create_dir(sessions.join("Not an id")).unwrap();
-    for _ in 0..2 {
+    std::fs::create_dir(sessions.join("unknown")).unwrap();
+    std::fs::write(sessions.join("unknown/capture.cager"), "x").unwrap();
+    for round in 0..2 {
         // A name that is taken in quarantine is no obstacle.
         std::fs::write(sessions.join("stray"), "x").unwrap();
-        let Opened { sessions, quarantined, .. } = Store::open(given.root(), Arc::new(LocalDisk)).unwrap();
+        let Opened { sessions, quarantined, .. } = given.open();
         assert_eq!(sessions, [meta("a"), meta("e")]);
-        for found in &quarantined {
-            assert!(found.path.starts_with(given.root().join("quarantine")) && found.path.exists(), "{found:?}");
-            assert!(found.why.contains(&found.name), "{found:?}");
-        }
+        assert!(quarantined.iter().all(|found| found.path.exists()), "{quarantined:?}");
         let names: Vec<&str> = quarantined.iter().map(|found| found.name.as_str()).collect();
-        assert!(names == ["Not an id", "b", "c", "d", "stray"] || names == ["stray"], "{names:?}");
+        let expected = ["../x", "b", "d", "stray", "unknown"];
+        assert_eq!(names, expected[..if round == 0 { 5 } else { 4 }], "records stay where they are");
     }
-    let Opened { store, .. } = Store::open(given.root(), Arc::new(LocalDisk)).unwrap();
-    store.quarantine(Kind::Session, "e", "its log is damaged").unwrap();
-    let note = std::fs::read_to_string(given.root().join("quarantine/e.why.txt")).unwrap();
-    assert_eq!(note, "its log is damaged\n");
+    let note = std::fs::read_to_string(given.root().join("quarantine/unknown.why.txt")).unwrap();
+    assert_eq!(note, "there is no session of this name in the catalogue\n");
+    assert!(!sessions.join("Not an id").exists(), "an empty folder is nothing");
 }
 
 #[test]
-fn a_session_that_cannot_be_read_now_is_left_where_it_is() {
+fn a_damaged_session_stays_so_until_it_is_deleted() {
     let given = Given::new();
-    given.open().store.create_session(&meta("a")).unwrap();
-    given.disk.fail(Some(Op::Read), 2, Fault::Error(EIO));
-    let opened = given.open();
-    assert_eq!((opened.sessions.len(), opened.quarantined.len(), opened.unread.len()), (0, 0, 1));
-    let left = &opened.unread[0];
-    assert!(left.path.ends_with("sessions/a") && left.path.exists() && left.why.contains("session.json"), "{left:?}");
-    drop(opened);
-    assert_eq!(given.open().sessions, [meta("a")]);
+    let store = given.open().store;
+    store.create_session(&meta("a")).unwrap();
+    store.mark_damaged(Kind::Session, "a", "frame 3").unwrap();
+    drop(store);
+    let Opened { store, sessions, .. } = given.open();
+    assert_eq!(sessions, [meta("a")]);
+    assert_eq!(store.damage(Kind::Session, "a").unwrap().as_deref(), Some("frame 3"));
+    store.delete(Kind::Session, "a").unwrap();
+    assert!(store.mark_damaged(Kind::Session, "a", "frame 4").is_err_and(|error| error.is_not_found()));
+}
+
+#[test]
+fn a_folder_that_has_lost_its_catalogue_is_left_as_it_is() {
+    let given = Given::new();
+    let folder = given.root().join("data");
+    let open = || Store::open(&folder, Arc::new(LocalDisk));
+    let store = open().unwrap().store;
+    store.create_session(&meta("a")).unwrap();
+    append(&store, "a", &[1, 2]).unwrap();
+    store.write_container("a", &mut |out| out.write_all(b"container")).unwrap();
+    drop(store);
+    let catalog = folder.join("catalog.db");
+    std::fs::rename(&catalog, folder.join("elsewhere")).unwrap();
+    let refused = open();
+    assert!(matches!(&refused, Err(StoreError::Damaged { path, .. }) if *path == catalog), "{refused:?}");
+    assert!(folder.join("sessions/a/capture.cager").exists() && !catalog.exists());
+    std::fs::write(&catalog, "not a database, whatever it is").unwrap();
+    let refused = open();
+    assert!(matches!(&refused, Err(StoreError::Damaged { path, .. }) if *path == catalog), "{refused:?}");
+    std::fs::rename(folder.join("elsewhere"), &catalog).unwrap();
+    let Opened { store, sessions, quarantined, .. } = open().unwrap();
+    assert!(quarantined.is_empty() && sessions == [meta("a")]);
+    assert_eq!(frames(&store, "a").unwrap(), [1, 2]);
 }
 
 #[test]
@@ -58,10 +86,10 @@ fn one_process_at_a_time() {
     let opened = given.open();
     let refused = Store::open(given.root(), Arc::new(LocalDisk));
     assert!(matches!(refused, Err(StoreError::Locked { .. })), "{refused:?}");
-    let log = opened.store.create_session(&meta("a")).and_then(|()| opened.store.open_log("a", ROWS)).unwrap();
+    let store = opened.store.clone();
     drop(opened);
-    assert!(matches!(Store::open(given.root(), Arc::new(LocalDisk)), Err(StoreError::Locked { .. })), "a log is open");
-    drop(log);
+    assert!(matches!(Store::open(given.root(), Arc::new(LocalDisk)), Err(StoreError::Locked { .. })), "it is in use");
+    drop(store);
     given.open();
 }
 
@@ -73,8 +101,9 @@ fn names_from_outside_touch_no_path() {
         let refused = [
             store.create_session(&SessionMeta { id: id.into(), ..meta("a") }),
             store.delete(Kind::Session, id),
-            store.quarantine(Kind::Session, id, "?"),
-            store.open_log(id, ROWS).map(|_| ()),
+            store.mark_damaged(Kind::Session, id, "?"),
+            append(&store, id, &[1]).map(|_| ()),
+            store.frames(id).map(|_| ()),
             store.write_container(id, &mut |_| Ok(())).map(|_| ()),
             store.complete(id, &completion()),
             store.completion(id).map(|_| ()),
@@ -112,7 +141,7 @@ fn a_container_is_replaced_whole_or_not_at_all() {
         .unwrap();
     assert_eq!(std::fs::read(store.container_path("a")).unwrap(), big);
     assert_eq!(container.digest, blake3::hash(&big).to_hex().as_str());
-    assert!(store.bytes(Kind::Session, "a").expect("a session") > container.bytes);
+    assert_eq!(store.bytes(Kind::Session, "a").expect("a session"), container.bytes);
     let damage = || StoreError::Damaged { path: "x".into(), what: "y".into() };
     let failed = store.write_container("a", &mut |out| {
         out.write_all(b"half")?;

@@ -8,5 +8,4 @@ mod provider;
 mod restart;
 mod stop;
 mod traces;
-mod unread;
 mod webhooks;

@@ -2,8 +2,7 @@
 
 use crate::support::{Capture, OCTETS, Raw, TestApp, chunked, eventually, form, lines};
 use cager_proto::messages::{CacheUse, Session, SessionState};
-use serde_json::{Value, json};
-use std::path::Path;
+use serde_json::json;
 
 #[tokio::test]
 async fn a_session_goes_on_after_a_restart_and_ends_in_the_same_container() {
@@ -92,7 +91,8 @@ async fn a_rest_pose_that_a_crash_left_without_a_session_is_removed() {
     let contents = app.session_file(&kept.id, "../../contents");
     let count = || std::fs::read_dir(&contents).expect("a folder").count();
     assert_eq!(count(), 2);
-    std::fs::remove_dir_all(app.session_file(&lost.id, "")).expect("a session");
+    // As when the service ended before it made the record.
+    app.set_record(&lost.id, "phase = 17");
     let app = app.again();
     app.prepared(&kept.id).await;
     assert_eq!(count(), 1);
@@ -122,19 +122,9 @@ async fn a_damaged_container_is_found_written_again_and_counted_once() {
     assert_eq!(app.metric(stored).await, before);
 }
 
-/// Writes a small file of the data folder anew, with its digest, after a change to what it says.
-fn rewrite(file: &Path, change: impl FnOnce(&mut Value)) {
-    let mut whole: Value = serde_json::from_slice(&std::fs::read(file).expect("a file")).expect("JSON");
-    change(&mut whole["body"]);
-    let (kind, body) = (whole["kind"].as_str().expect("a kind"), whole["body"].to_string());
-    let digest = blake3::hash(body.as_bytes()).to_hex();
-    let text = format!("{{\"format\":1,\"kind\":\"{kind}\",\"blake3\":\"{digest}\",\"body\":{body}}}\n");
-    std::fs::write(file, text).expect("a file");
-}
-
 /// As after an upgrade: the session was made by an older version, and the solvers that it prepared are gone.
 fn age(app: &TestApp, id: &str) {
-    rewrite(&app.session_file(id, "session.json"), |body| body["solver_version"] = 1.into());
+    app.rewrite(id, "meta", |body| body["solver_version"] = 1.into());
     for solver in std::fs::read_dir(app.session_file(id, "../../prepared")).expect("a folder") {
         std::fs::remove_file(solver.expect("a file").path()).expect("a file");
     }
@@ -165,7 +155,7 @@ async fn a_session_whose_handles_are_others_after_an_upgrade_says_so_and_keeps_i
     let cages = app.cages(&session.id).await;
     app.kill();
     age(&app, &session.id);
-    rewrite(&app.session_file(&session.id, "outcome.json"), |body| {
+    app.rewrite(&session.id, "outcome", |body| {
         body["ready"]["handles_digest"] = blake3::hash(b"others").to_hex().to_string().into();
     });
     let app = app.again();
@@ -191,7 +181,7 @@ async fn a_session_that_codes_frames_goes_on_as_it_began_after_what_is_usual_cha
     app.upload(&session.id, 0, capture.raw(0..10)).await;
     app.kill();
     age(&app, &session.id);
-    rewrite(&app.session_file(&session.id, "session.json"), |body| {
+    app.rewrite(&session.id, "meta", |body| {
         body["options"] = json!({ "max_error": 1e-2 });
     });
     let app = app.again();
@@ -200,4 +190,60 @@ async fn a_session_that_codes_frames_goes_on_as_it_began_after_what_is_usual_cha
     app.upload(&session.id, 10, capture.raw(10..20)).await;
     app.complete(&session.id, 20).await.expect(200);
     assert!(app.container(&session.id).await == expected);
+}
+
+#[tokio::test]
+async fn a_session_whose_mark_of_completion_is_damaged_is_completed_again_and_hides_nothing() {
+    let mut app = TestApp::start();
+    let capture = Capture::tiny();
+    let session = app.completed(capture, 15).await;
+    let container = app.container(&session.id).await;
+    app.kill();
+    app.set_record(&session.id, "completion = x'7b7d'");
+    app = app.again();
+    assert_eq!(app.session(&session.id).await.state, SessionState::Ready);
+    let frames = format!("/v1/sessions/{}/frames?first=15", session.id);
+    app.post(&frames, OCTETS, capture.raw(15..20)).await.problem(409, "session-completed");
+    app.complete(&session.id, 15).await.expect(200);
+    assert!(app.container(&session.id).await == container);
+}
+
+#[tokio::test]
+async fn a_session_whose_rest_pose_is_missing_says_so_until_it_is_back() {
+    let mut app = TestApp::start();
+    let capture = Capture::tiny();
+    let session = app.ready(capture).await;
+    app.upload(&session.id, 0, capture.raw(0..20)).await;
+    app.kill();
+    let (there, away) = (app.data().join("contents"), app.data().join("away"));
+    std::fs::rename(&there, &away).expect("a folder");
+    // As when it was prepared by a process that ended before it could say so.
+    app.set_record(&session.id, "outcome = NULL");
+    app = app.again();
+    let failed = app.settled(&session.id).await;
+    assert_eq!(failed.problem.expect("a problem").word(), "session-failed");
+    app.kill();
+    std::fs::remove_dir_all(&there).expect("a folder");
+    std::fs::rename(&away, &there).expect("a folder");
+    app = app.again();
+    app.prepared(&session.id).await;
+    app.complete(&session.id, 20).await.expect(200);
+    assert!(app.container(&session.id).await == capture.encoded(20));
+}
+
+#[tokio::test]
+async fn a_container_that_cannot_be_read_is_served_when_it_can() {
+    let mut app = TestApp::start();
+    let session = app.completed(Capture::tiny(), 15).await;
+    let container = app.container(&session.id).await;
+    app.kill();
+    // A folder in its place, which nobody can read, not even an administrator.
+    let (file, aside) = (app.session_file(&session.id, "capture.cager"), app.data().join("aside"));
+    std::fs::rename(&file, &aside).expect("a file");
+    std::fs::create_dir(&file).expect("a folder");
+    app = app.again();
+    assert_eq!(app.session(&session.id).await.state, SessionState::Completed);
+    std::fs::remove_dir(&file).expect("a folder");
+    std::fs::rename(&aside, &file).expect("a file");
+    assert!(app.container(&session.id).await == container);
 }

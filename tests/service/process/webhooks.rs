@@ -87,7 +87,7 @@ async fn what_is_found_completed_only_after_preparing_again_is_told_as_well() {
     let session = app.completed(Capture::tiny(), 2).await;
     let first = receiver.next().await;
     app.kill();
-    std::fs::remove_file(app.session_file(&session.id, "outcome.json")).expect("a file");
+    app.set_record(&session.id, "outcome = NULL");
     let _app = app.again();
     assert_eq!(receiver.next().await.header("webhook-id"), first.header("webhook-id"));
 }
@@ -100,7 +100,7 @@ async fn a_session_that_cannot_be_prepared_is_told_of_with_its_reason() {
     let session = app.ready(Capture::small()).await;
     app.kill();
     // Nothing of its preparation is left, nor of its rest pose.
-    std::fs::remove_file(app.session_file(&session.id, "outcome.json")).expect("a file");
+    app.set_record(&session.id, "outcome = NULL");
     for folder in ["prepared", "contents"] {
         let folder = app.session_file("", &format!("../{folder}"));
         std::fs::remove_dir_all(&folder).expect("a folder");
@@ -121,11 +121,7 @@ async fn damage_is_told_of() {
     let session = app.ready(Capture::tiny()).await;
     app.upload(&session.id, 0, Capture::tiny().raw(0..2)).await;
     app.kill();
-    let log = app.session_file(&session.id, "frames.log");
-    let mut bytes = std::fs::read(&log).expect("a log");
-    let middle = 4096 + 200;
-    bytes[middle] ^= 0xff;
-    std::fs::write(&log, bytes).expect("a log");
+    app.damage_frames(&session.id);
     let _app = app.again();
     let message = checked(&receiver.next().await);
     assert_eq!((&message["type"], &message["data"]["session"]["state"]), (&json!("session.failed"), &json!("failed")));

@@ -159,6 +159,35 @@ impl TestApp {
         self.place.path().join("data")
     }
 
+    fn catalog(&self) -> rusqlite::Connection {
+        rusqlite::Connection::open(self.data().join("catalog.db")).expect("a catalogue")
+    }
+
+    /// Changes what is stored of a session or job behind the service's back.
+    pub(crate) fn set_record(&self, id: &str, change: &str) {
+        let changed = self.catalog().execute(&format!("UPDATE records SET {change} WHERE id = ?1"), [id]);
+        assert_eq!(changed.expect(change), 1);
+    }
+
+    /// Changes what is stored of a session or job in a column, with its digest.
+    pub(crate) fn rewrite(&self, id: &str, column: &str, change: impl FnOnce(&mut serde_json::Value)) {
+        let find = format!("SELECT {column} FROM records WHERE id = ?1");
+        let stored: Vec<u8> = self.catalog().query_row(&find, [id], |row| row.get(0)).expect("a record");
+        let mut whole: serde_json::Value = serde_json::from_slice(&stored).expect("JSON");
+        change(&mut whole["body"]);
+        let (kind, body) = (whole["kind"].as_str().expect("a kind"), whole["body"].to_string());
+        let digest = blake3::hash(body.as_bytes()).to_hex();
+        let text = format!("{{\"format\":1,\"kind\":\"{kind}\",\"blake3\":\"{digest}\",\"body\":{body}}}\n");
+        let put = format!("UPDATE records SET {column} = ?2 WHERE id = ?1");
+        self.catalog().execute(&put, rusqlite::params![id, text.into_bytes()]).expect("a record");
+    }
+
+    /// Damages the cages that are stored of a session.
+    pub(crate) fn damage_frames(&self, id: &str) {
+        let damage = "UPDATE chunks SET bytes = zeroblob(length(bytes)) WHERE record = (SELECT number FROM records WHERE id = ?1)";
+        assert!(self.catalog().execute(damage, [id]).expect("frames") > 0);
+    }
+
     /// A value of `/metrics`; 0 where it is not there yet.
     pub(crate) async fn metric(&self, name: &str) -> f64 {
         let text = self.get("/metrics").await.expect(200).text();

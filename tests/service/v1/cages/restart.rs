@@ -44,8 +44,8 @@ async fn a_killed_service_designs_what_it_was_asked_and_keeps_what_it_had() {
 }
 
 #[tokio::test]
-async fn a_damaged_cage_goes_to_quarantine_and_its_design_has_failed() {
-    let app = TestApp::start();
+async fn a_damaged_cage_is_found_and_its_design_has_failed_from_then_on() {
+    let mut app = TestApp::start();
     let job = app.design(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 1.0})).await;
     app.designed(&job.id).await;
     let file = app.cage_file(&job.id, "cage.obj");
@@ -54,6 +54,8 @@ async fn a_damaged_cage_goes_to_quarantine_and_its_design_has_failed() {
     std::fs::write(&file, bytes).expect("a cage");
     app.get(&format!("/v1/cages/{}/cage.obj", job.id)).await.problem(409, "cage-failed");
     assert_eq!(app.cage_job(&job.id).await.state, CageState::Failed);
-    assert!(!file.exists());
     assert_eq!(app.metric("cager_quarantined_total").await, 1.0);
+    app.kill();
+    app = app.again();
+    assert_eq!(app.cage_job(&job.id).await.state, CageState::Failed);
 }

@@ -110,7 +110,7 @@ async fn a_key_of_a_version_with_other_fingerprints_still_answers() {
     let first: Session = app.create_with(form(capture, &json!({})), Some("k")).await.is(201);
     app.kill();
     {
-        let data = app.session_file(&first.id, "session.json").ancestors().nth(3).expect("a folder").to_owned();
+        let data = app.data();
         let opened = Store::open(&data, Arc::new(LocalDisk)).expect("a store");
         let mut meta = opened.sessions.first().expect("a session").clone();
         meta.idempotency = Some(Idempotency { key: "k".to_owned(), fingerprint: "0".repeat(64) });

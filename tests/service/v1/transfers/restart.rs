@@ -32,9 +32,7 @@ async fn one_that_ends_the_service_again_and_again_is_given_up() {
     let [_, waiting] = [created(&app, &json!({})).await, created(&app, &json!({})).await];
     app.kill();
     let folder = app.data().join("transfers").join(&waiting.id);
-    let checksum = blake3::hash(b"5").to_hex();
-    let attempts = format!("{{\"format\":1,\"kind\":\"attempts\",\"blake3\":\"{checksum}\",\"body\":5}}\n");
-    std::fs::write(folder.join("attempts.json"), attempts).expect("a file");
+    app.set_record(&waiting.id, "attempts = 5");
     let app = app.again();
     let failed = ended(&app, &waiting.id).await;
     assert_eq!(failed.state, JobState::Failed);

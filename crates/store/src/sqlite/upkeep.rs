@@ -1,0 +1,169 @@
+//! What the file needs from time to time: its log written back, room given back to the disk, and a reserve for deletions on a full one.
+
+use super::Writer;
+use crate::CatalogError;
+use rusqlite::Connection;
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Weak};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Pause between two rounds.
+const PAUSE: Duration = Duration::from_secs(2);
+/// Length of the log from which on writing waits until it is written back.
+const LONG_LOG: u64 = 256 << 20;
+/// Pages that are given back at once.
+const FREED_PAGES: u32 = 1024;
+/// So many unused pages are given back also while others write.
+const MANY_UNUSED_PAGES: u32 = 16 * FREED_PAGES;
+/// How often they are in a round on a full disk, or where they are many.
+const STEPS: u32 = 64;
+/// Bytes that are kept free for deletions.
+pub(super) const RESERVE: usize = 8 << 20;
+
+/// Handle to the thread that does it, which ends with it.
+#[derive(Debug)]
+pub(super) struct Upkeep {
+    written: Arc<AtomicBool>,
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Upkeep {
+    pub(super) fn start(path: &Path, connection: Connection, writer: Weak<Writer>) -> Result<Self, CatalogError> {
+        let written = Arc::new(AtomicBool::new(true));
+        let (reserve, log) = (beside(path, "reserve"), beside(path, "-wal"));
+        let (stop, stopped) = channel::<()>();
+        let rounds = Rounds { connection, writer, log, reserve, written: Arc::clone(&written) };
+        rounds.keep_reserve();
+        let work = move || {
+            while matches!(stopped.recv_timeout(PAUSE), Err(RecvTimeoutError::Timeout)) {
+                let done = rounds.once();
+                // On a full disk the one fails, and the other helps.
+                let done = if rounds.keep_reserve() { done } else { rounds.make_room() };
+                if let Err(error) = done {
+                    tracing::debug!(%error, "the catalogue's log is written back later");
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name("catalogue-upkeep".to_owned()).spawn(work);
+        let thread = thread.map_err(|error| CatalogError::Failed(format!("threads cannot be started: {error}")))?;
+        Ok(Self { written, stop: Some(stop), thread: Some(thread) })
+    }
+
+    /// Has the next round look at the log.
+    pub(super) fn note_write(&self) {
+        self.written.store(true, Relaxed);
+    }
+}
+
+impl Drop for Upkeep {
+    fn drop(&mut self) {
+        self.stop = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Gives the reserve of a file to what cannot do without. Whether it was there.
+pub(super) fn give_reserve(path: &Path) -> bool {
+    fs::remove_file(beside(path, "reserve")).is_ok()
+}
+
+struct Rounds {
+    connection: Connection,
+    writer: Weak<Writer>,
+    log: PathBuf,
+    reserve: PathBuf,
+    written: Arc<AtomicBool>,
+}
+
+impl Rounds {
+    fn once(&self) -> Result<(), CatalogError> {
+        if self.written.swap(false, Relaxed) {
+            self.connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))?;
+            // Deletions on a busy service give their room back as well.
+            let unused: u32 = self.connection.pragma_query_value(None, "freelist_count", |row| row.get(0))?;
+            if unused > MANY_UNUSED_PAGES {
+                for _ in 0..STEPS {
+                    self.free_pages()?;
+                }
+                self.written.store(true, Relaxed);
+            }
+            if fs::metadata(&self.log).is_ok_and(|log| log.len() > LONG_LOG) {
+                // Those who read or write meanwhile wait, or it is tried again.
+                self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
+            }
+            return Ok(());
+        }
+        // Nothing was written for a while.
+        let is_freed = self.free_pages()?;
+        // The file ends earlier when that is written back.
+        self.written.fetch_or(is_freed, Relaxed);
+        Ok(())
+    }
+
+    /// Gives all that it can back to a full disk, for the reserve.
+    fn make_room(&self) -> Result<(), CatalogError> {
+        let freed = (0..STEPS).try_for_each(|_| self.free_pages().map(|_| ()));
+        self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
+        self.keep_reserve();
+        freed
+    }
+
+    /// Gives some unused pages back. Whether there were any.
+    fn free_pages(&self) -> Result<bool, CatalogError> {
+        let free: u32 = self.connection.pragma_query_value(None, "freelist_count", |row| row.get(0))?;
+        if free > 0
+            && let Some(writer) = self.writer.upgrade()
+        {
+            let freed = move |connection: &Connection| {
+                let mut statement = connection.prepare(&format!("PRAGMA incremental_vacuum({FREED_PAGES})"))?;
+                let mut rows = statement.query([])?;
+                while rows.next()?.is_some() {}
+                Ok(())
+            };
+            writer.run(freed)?;
+        }
+        Ok(free > 0)
+    }
+
+    /// Makes the reserve, unless it is there. Whether there is room for it.
+    fn keep_reserve(&self) -> bool {
+        let temporary = self.reserve.with_extension("tmp");
+        if self.reserve.exists() {
+            return true;
+        }
+        // What others have room for shall not fail meanwhile.
+        let system = self.reserve.parent().and_then(|folder| rustix::fs::statvfs(folder).ok());
+        if system.is_some_and(|system| system.f_bavail.saturating_mul(system.f_frsize) < 2 * RESERVE as u64) {
+            return false;
+        }
+        let make = || -> std::io::Result<()> {
+            let _ = fs::remove_file(&temporary);
+            let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&temporary)?;
+            // Not zeros, of which some file systems keep nothing.
+            file.write_all(&vec![0xa5; RESERVE])?;
+            file.sync_all()?;
+            fs::rename(&temporary, &self.reserve)
+        };
+        let made = make();
+        if made.is_err() {
+            let _ = fs::remove_file(&temporary);
+        }
+        made.is_ok()
+    }
+}
+
+/// A file beside the catalogue's.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(if ending.starts_with('-') { ending.to_owned() } else { format!(".{ending}") });
+    name.into()
+}
