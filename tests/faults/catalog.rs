@@ -116,11 +116,7 @@ pub(super) fn open(disk: &FaultyDisk, path: &Path) -> Result<Arc<dyn Catalog>, C
             Verdict::Error(error) | Verdict::Ruin(error) if error.kind() == std::io::ErrorKind::StorageFull => {
                 Err(CatalogError::Full)
             }
-            Verdict::Error(error) => Err(CatalogError::Failed(error.to_string())),
-            Verdict::Ruin(error) => {
-                state.is_mute = op == Op::Answer;
-                Err(CatalogError::Failed(error.to_string()))
-            }
+            Verdict::Error(error) | Verdict::Ruin(error) => Err(CatalogError::Failed(error.to_string())),
         }
     };
     Ok(Hooked::new(inner, hook))

@@ -55,9 +55,10 @@ pub enum Op {
 pub enum Fault {
     /// It fails with this `errno` and does nothing; a sync loses all that it should have kept.
     Error(i32),
-    /// As an error; a sync also ruins the blocks it tried to write, with older bytes in them, and a catalogue that did not answer a change can not be
-    /// read either until the faults end.
+    /// As an error; a sync also ruins the blocks it tried to write, with older bytes in them.
     Ruin(i32),
+    /// As an error; where that is the answer to a change of the catalogue, nothing can be read from it either until the faults end.
+    Mute(i32),
     /// A write takes half of its bytes and succeeds. Other operations are as ever.
     Short,
     /// The process ends here: a write takes half of its bytes, nothing else happens, and all later operations fail until
@@ -242,6 +243,10 @@ impl State {
             None => Verdict::Whole,
             Some(Fault::Short) => Verdict::Half,
             Some(Fault::Error(errno)) => Verdict::Error(io::Error::from_raw_os_error(errno)),
+            Some(Fault::Mute(errno)) => {
+                self.is_mute |= op == Op::Answer;
+                Verdict::Error(io::Error::from_raw_os_error(errno))
+            }
             Some(Fault::Ruin(errno)) => Verdict::Ruin(io::Error::from_raw_os_error(errno)),
             Some(Fault::Stop) => {
                 self.stopped = true;

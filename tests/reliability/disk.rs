@@ -156,7 +156,7 @@ async fn frames_answered_after_a_completion_that_failed_are_there_after_a_restar
         let session = inside.ready(&SMALL, "unsettled").await;
         let mut answered = inside.post(&session.id, 0, SMALL.many(0..40)).await.frames;
         // The container is put in place; whether the mark of completion is, nobody can say.
-        inside.disk.fail_from(Some(Op::Answer), 1, Fault::Ruin(5));
+        inside.disk.fail_from(Some(Op::Answer), 1, Fault::Mute(5));
         inside.impatient().complete(&session.id, 40).await.expect_err("the disk refuses");
         let posted = inside.post(&session.id, 40, SMALL.many(40..50)).await;
         answered.extend(posted.frames);

@@ -131,7 +131,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     expect(await movedVertices()).toBeGreaterThan(6);
     await page.keyboard.press('Escape');
     await page.keyboard.down('Shift');
-    await page.mouse.move(420, 60);
+    await page.mouse.move(420, 110);
     await page.mouse.down();
     await page.mouse.move(1100, 620, { steps: 4 });
     await page.mouse.up();

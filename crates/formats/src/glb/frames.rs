@@ -182,13 +182,6 @@ const LARGEST_ROUNDING: f64 = 0.02;
 
 /// The rate at which all keys are at whole frames, as far as single precision tells.
 fn usual_rate(keys: &[f64]) -> Option<f64> {
-    let beside = |rate: f64| {
-        let off = |key: &f64| {
-            let frame = key * rate;
-            (frame - frame.round()).abs() - (1e-3 + 1e-6 * frame.abs()).min(LARGEST_ROUNDING)
-        };
-        keys.iter().map(off).fold(f64::NEG_INFINITY, f64::max)
-    };
-    let fitting = RATES.into_iter().map(|rate| (beside(rate), rate)).filter(|(off, _)| *off <= 0.0);
-    fitting.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, rate)| rate)
+    let is_whole = |frame: f64| (frame - frame.round()).abs() <= (1e-3 + 1e-6 * frame.abs()).min(LARGEST_ROUNDING);
+    RATES.into_iter().find(|rate| keys.iter().all(|key| is_whole(key * rate)))
 }

@@ -26,6 +26,9 @@ const STEPS: u32 = 64;
 /// Bytes that are kept free for deletions.
 pub(super) const RESERVE: usize = 8 << 20;
 
+/// Bytes of it that are written at a time.
+const PIECE: usize = 32 << 10;
+
 /// Handle to the thread that does it, which ends with it.
 #[derive(Debug)]
 pub(super) struct Upkeep {
@@ -149,7 +152,7 @@ impl Rounds {
             let _ = fs::remove_file(&temporary);
             let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&temporary)?;
             // Not zeros, of which some file systems keep nothing.
-            file.write_all(&vec![0xa5; RESERVE])?;
+            (0..RESERVE / PIECE).try_for_each(|_| file.write_all(&[0xa5; PIECE]))?;
             file.sync_all()?;
             fs::rename(&temporary, &self.reserve)
         };

@@ -91,16 +91,15 @@ fn a_flipped_bit_of_a_cage_is_found_and_the_others_are_read() {
 }
 
 #[test]
-fn an_unknown_number_of_a_record_is_damage() {
+fn a_record_with_an_unknown_number_is_left_out() {
     let dir = Dir::new();
     let catalog = dir.open();
     open(&catalog, "a");
     for change in ["kind = 9", "phase = 200", "phase = -1", "attempts = 1 << 40", "declared = -5"] {
         dir.beside().execute(&format!("UPDATE records SET {change}"), []).expect(change);
-        let read = catalog.records();
-        assert!(is_damaged(&read), "{change}: {read:?}");
+        assert_eq!(catalog.records(), Ok(Vec::new()), "{change}");
         dir.beside()
-            .execute("UPDATE records SET kind = 0, phase = 2, attempts = 0, declared = NULL", [])
+            .execute("UPDATE records SET kind = 0, phase = 68, attempts = 0, declared = NULL", [])
             .expect("restored");
         assert_eq!(catalog.records().map(|records| records.len()), Ok(1));
     }

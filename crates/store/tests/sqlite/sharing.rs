@@ -103,5 +103,5 @@ fn threads_write_and_read_at_once() {
         }
     });
     let records = catalog.records().expect("records");
-    assert!(records.iter().all(|record| record.reached == 40 && record.frame_bytes == 40 * 600), "{records:?}");
+    assert!(records.iter().all(|record| record.reached == 40 && record.frame_bytes == 40 * (600 + 96)), "{records:?}");
 }
