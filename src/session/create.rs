@@ -159,7 +159,7 @@ impl Service {
                 tracing::warn!(%error, "the content of a session that was not created takes space until the next start");
             }
             _ => {
-                tracing::warn!(session = %meta.id, "what could not be created takes space until it is found by the next start")
+                tracing::warn!(session = %meta.id, "what could not be created takes space until it is found by the next start");
             }
         }
     }

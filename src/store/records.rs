@@ -10,6 +10,9 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
 
+/// Folders that could not be read at the start, and are left where they are.
+pub(super) type Left = HashSet<(Kind, String)>;
+
 /// What a session or job is; fixed at its creation.
 pub(crate) trait RecordMeta: Serialize + DeserializeOwned {
     const KIND: Kind;
@@ -210,7 +213,7 @@ impl Store {
     pub(super) fn match_folders(
         &self,
         records: &[Record],
-        left: &HashSet<(Kind, String)>,
+        left: &Left,
         quarantined: &mut Vec<Quarantined>,
     ) -> Result<(), StoreError> {
         let files = self.files();

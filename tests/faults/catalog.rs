@@ -22,7 +22,7 @@ impl fmt::Debug for Hooked {
 
 impl Hooked {
     /// With this hook, for [`Op::Read`], [`Op::Change`] and [`Op::Answer`].
-    pub fn new(
+    pub fn over(
         inner: Arc<dyn Catalog>,
         hook: impl Fn(Op) -> Result<(), CatalogError> + Send + Sync + 'static,
     ) -> Arc<dyn Catalog> {
@@ -119,7 +119,7 @@ pub(super) fn open(disk: &FaultyDisk, path: &Path) -> Result<Arc<dyn Catalog>, C
             Verdict::Error(error) | Verdict::Ruin(error) => Err(CatalogError::Failed(error.to_string())),
         }
     };
-    Ok(Hooked::new(inner, hook))
+    Ok(Hooked::over(inner, hook))
 }
 
 impl FaultyDisk {

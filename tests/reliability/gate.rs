@@ -119,7 +119,7 @@ impl<D: Disk> Disk for GatedDisk<D> {
             }
             Ok(())
         };
-        Ok(Hooked::new(self.disk.catalog(path)?, hook))
+        Ok(Hooked::over(self.disk.catalog(path)?, hook))
     }
 }
 

@@ -4,7 +4,7 @@
 mod log;
 
 use super::files::Files;
-use super::records::{all, meta_of};
+use super::records::{Left, all, meta_of};
 use super::{CageJobMeta, Kind, Quarantined, RecordMeta, RecoveryMeta, SessionMeta, Store, StoreError, TransferMeta};
 use super::{is_session_id, meta};
 use cager_store::{Change, FrameEntry, Key, NewFrame, NewRecord, Phase, Record};
@@ -54,7 +54,7 @@ impl Store {
         &self,
         records: Vec<Record>,
         quarantined: &mut Vec<Quarantined>,
-    ) -> Result<(Vec<Record>, HashSet<(Kind, String)>), StoreError> {
+    ) -> Result<(Vec<Record>, Left), StoreError> {
         let (files, mut left) = (self.files(), HashSet::new());
         let phases: HashMap<(Kind, &str), Phase> = records.iter().map(|r| ((r.kind, &r.id[..]), r.phase)).collect();
         let mut changed = false;
