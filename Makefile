@@ -1,4 +1,4 @@
-# Every developer command. CI calls the same ones.
+# Every developer command. CI calls the same ones. Tests are built with --workspace always: for one package alone its dependencies would be built anew, with other features.
 
 CARGO ?= cargo
 PYTHON ?= python3
@@ -74,10 +74,10 @@ captures: ## run the tests that need the real captures in CAGER_CAPTURES (../sha
 	fi
 
 proxies: ## uploads through nginx, HAProxy, Caddy and Traefik as docs/OPERATIONS.md has them; those that are not installed are left out
-	CAGER_PROXY_UPLOADS=30 $(CARGO) test --locked --test service proxies -- --nocapture --test-threads 1
+	CAGER_PROXY_UPLOADS=30 $(CARGO) test --workspace --locked --test service proxies -- --nocapture --test-threads 1
 
 blender: $(BLENDER) ## the round trip through Blender itself; installs bpy, which needs Python 3.11
-	CAGER_BLENDER_PYTHON=$(abspath $(BLENDER)) $(CARGO) test --locked --test cli blender -- --nocapture
+	CAGER_BLENDER_PYTHON=$(abspath $(BLENDER)) $(CARGO) test --workspace --locked --test cli blender -- --nocapture
 
 $(BLENDER): Makefile
 	python3.11 -m venv target/blender
@@ -85,7 +85,7 @@ $(BLENDER): Makefile
 	@touch $@
 
 alembic: $(ALEMBIC) ## written archives through the Alembic library; installs alembic3d
-	CAGER_ALEMBIC_PYTHON=$(abspath $(ALEMBIC)) $(CARGO) test --locked -p cager-formats --test alembic library -- --nocapture
+	CAGER_ALEMBIC_PYTHON=$(abspath $(ALEMBIC)) $(CARGO) test --workspace --locked --test alembic library -- --nocapture
 
 $(ALEMBIC): Makefile
 	$(PYTHON) -m venv target/alembic
@@ -93,7 +93,7 @@ $(ALEMBIC): Makefile
 	@touch $@
 
 usd: $(USD) ## written files of USD through OpenUSD itself; installs usd-core
-	CAGER_USD_PYTHON=$(abspath $(USD)) $(CARGO) test --locked -p cager-formats --test usd library -- --nocapture
+	CAGER_USD_PYTHON=$(abspath $(USD)) $(CARGO) test --workspace --locked --test usd library -- --nocapture
 
 $(USD): Makefile
 	$(PYTHON) -m venv target/usd
@@ -101,7 +101,7 @@ $(USD): Makefile
 	@touch $@
 
 gltf: $(GLTF) ## written files of glTF through the validator of Khronos and three.js; installs both, which need Node
-	CAGER_GLTF_NODE=$(abspath target/gltf) $(CARGO) test --locked -p cager-formats --test animations three -- --nocapture
+	CAGER_GLTF_NODE=$(abspath target/gltf) $(CARGO) test --workspace --locked --test animations three -- --nocapture
 
 $(GLTF): Makefile
 	mkdir -p target/gltf
@@ -109,7 +109,7 @@ $(GLTF): Makefile
 	@touch $@
 
 farm: $(FARM) ## jobs of render farms, their shots encoded; installs openjd-cli and opencue-pyoutline
-	CAGER_FARM_PYTHON=$(abspath $(FARM)) $(CARGO) test --locked --test cli farm -- --nocapture
+	CAGER_FARM_PYTHON=$(abspath $(FARM)) $(CARGO) test --workspace --locked --test cli farm -- --nocapture
 
 $(FARM): Makefile
 	$(PYTHON) -m venv target/farm
@@ -204,7 +204,7 @@ $(REGISTRATION): benches/peers/registration.txt
 	@touch $@
 
 openapi: ## write docs/openapi.json anew from the routes
-	CAGER_UPDATE_OPENAPI=1 $(CARGO) test --locked --quiet --test http openapi
+	CAGER_UPDATE_OPENAPI=1 $(CARGO) test --workspace --locked --quiet --test http openapi
 
 schemathesis: $(SCHEMATHESIS) ## hold a running service against its OpenAPI document; SCHEMATHESIS_ARGS for more
 	$(CARGO) build --locked --bin cager

@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(300);
 /// What corresponds: the target has the source's points first. One pair is a little off, so that it shows.
 const PAIRS: &str = "0 0 # as they are\n100 100\n200,215\n";
+/// Vertices of the cages that are designed.
+const CAGE_VERTICES: u32 = 60;
 /// Frames of the motion.
 const FRAMES: u32 = 5;
 
@@ -53,9 +55,12 @@ fn motion() -> &'static Motion {
 }
 
 impl Motion {
+    /// A request with these options; its cage is small, and soon designed, where they do not say otherwise.
     fn form(&self, options: &Value) -> Form {
+        let mut options = options.clone();
+        options.as_object_mut().expect("options").entry("cage_vertices").or_insert(CAGE_VERTICES.into());
         Form::new()
-            .part("options", text(options))
+            .part("options", text(&options))
             .part("source_rest", file("rest.obj", &self.capture.rest.obj))
             .part("source_frames", file("frames.npy", &self.frames))
             .part("target", file("copy.obj", &self.target))
@@ -77,8 +82,10 @@ impl Motion {
             ("pairs.txt", PAIRS.as_bytes()),
         ];
         files.iter().for_each(|(name, bytes)| std::fs::write(folder.path().join(name), bytes).expect("a file"));
+        let size =
+            if more.contains("--cage-vertices") { String::new() } else { format!("--cage-vertices {CAGE_VERTICES}") };
         let done = Command::new(env!("CARGO_BIN_EXE_cager"))
-            .args(format!("transfer {source} --target copy.obj -o out.cager {more}").split_whitespace())
+            .args(format!("transfer {source} --target copy.obj -o out.cager {more} {size}").split_whitespace())
             .current_dir(folder.path())
             .stdin(Stdio::null())
             .output()

@@ -1,6 +1,6 @@
 //! From a motion and another model to an animation of that.
 
-use super::{FRAMES, PAIRS, completed, create, created, ended, motion, transfer};
+use super::{CAGE_VERTICES, FRAMES, PAIRS, completed, create, created, ended, motion, transfer};
 use crate::support::{TestApp, file, text};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
 use cager_proto::messages::JobState;
@@ -63,7 +63,8 @@ async fn a_container_and_a_completed_session_are_sources_as_well() {
     let container = app.get(&format!("/v1/sessions/{}/capture.cager", session.id)).await.expect(200).body;
     let expected = motion().moved_from("--source in.cager", &container, "--align none");
     let target = || Form::new().part("target", file("copy.obj", &motion().target));
-    let named = target().part("options", text(&json!({"align": "none", "source_session": session.id})));
+    let named = target()
+        .part("options", text(&json!({"align": "none", "source_session": session.id, "cage_vertices": CAGE_VERTICES})));
     let job: Transfer = create(&app, named, None).await.is(202);
     assert!(completed(&app, &job.id).await == expected, "another file than that of the command line");
     // By the client library.
@@ -71,6 +72,7 @@ async fn a_container_and_a_completed_session_are_sources_as_well() {
     let mut new =
         NewTransfer::new(TransferSource::Container(named("in.cager", &container)), named("copy.obj", &motion().target));
     new.options.align = Some(SourceAlignment::None);
+    new.options.cage_vertices = Some(CAGE_VERTICES);
     let job = client.create_transfer(&new).await.expect("a transfer");
     let told: Vec<_> = client.transfer_events(&job.id).collect().await;
     let last = told.into_iter().next_back().expect("an event").expect("a progress");
