@@ -29,7 +29,7 @@ pub(super) fn prepare(link: &Link, limit: Duration) -> Result<(), Trouble> {
             link.batch(&format!("CREATE SCHEMA {schema}")).await?;
         }
         let version = version(link, &schema).await?;
-        for (step, to) in STEPS.iter().zip(1..).skip(version as usize) {
+        for (step, to) in STEPS.iter().zip(1i64..).skip(version as usize) {
             link.batch(step).await?;
             link.query("UPDATE catalogue SET version = $1", &[&to]).await?;
         }
