@@ -72,12 +72,6 @@ fn a_database_that_takes_no_writes_is_told_and_used_again() {
     let Some(server) = Server::start() else { return };
     let catalog = server.open();
     open(&catalog, "a");
-    let set = |what: &str| {
-        server.sql(&format!(
-            "SET default_transaction_read_only = off; ALTER DATABASE postgres {what} default_transaction_read_only"
-        ));
-    };
-    set("RESET");
     server.sql("ALTER DATABASE postgres SET default_transaction_read_only = on");
     server.sql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'cager'");
     let cage = cage(0, 4);
@@ -87,7 +81,7 @@ fn a_database_that_takes_no_writes_is_told_and_used_again() {
         assert!(error.contains("takes no writes") && error.contains("database postgres"), "{error}");
     }
     assert_eq!(catalog.frames("a"), Ok(Vec::new()), "it is read meanwhile");
-    set("RESET");
+    server.sql("ALTER DATABASE postgres RESET default_transaction_read_only");
     assert_eq!(catalog.append("a", &new).expect("appended").len(), 1);
 }
 

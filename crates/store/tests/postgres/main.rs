@@ -5,6 +5,7 @@
 mod conformance;
 mod away;
 mod damage;
+mod figures;
 mod opening;
 mod sharing;
 mod support;

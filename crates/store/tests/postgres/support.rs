@@ -106,7 +106,10 @@ impl Server {
     fn try_sql(&self, sql: &str) -> Result<String, String> {
         let mut command = Command::new(self.programs.join("psql"));
         command.args(["-X", "-A", "-t", "-q", "-v", "ON_ERROR_STOP=1", "-U", "cager", "-d", "postgres", "-c", sql]);
-        let of = command.arg("-h").arg(self.folder.path()).env("PGOPTIONS", "-csearch_path=cager");
+        let of = command
+            .arg("-h")
+            .arg(self.folder.path())
+            .env("PGOPTIONS", "-csearch_path=cager -cdefault_transaction_read_only=off");
         let done = of.output().expect("psql");
         let said = String::from_utf8_lossy(&done.stdout).trim().to_owned();
         if done.status.success() { Ok(said) } else { Err(String::from_utf8_lossy(&done.stderr).into_owned()) }
