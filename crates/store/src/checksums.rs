@@ -1,6 +1,6 @@
 //! Checksums of what is stored: databases do not keep any of their rows.
 
-use crate::FrameEntry;
+use crate::{CatalogError, FrameEntry};
 
 /// CRC-32C of a cage, which belongs to one frame of one session.
 pub(crate) fn of_cage(session: &str, frame: u32, cage: &[u8]) -> u32 {
@@ -23,6 +23,11 @@ pub(crate) fn of_entry(session: &str, entry: &FrameEntry) -> u32 {
     add(handle_digest);
     add(full_digest.as_ref().map_or(&[], |digest| &digest[..]));
     crc
+}
+
+/// What is said of a frame of which something else is stored.
+pub(crate) fn mismatch(frame: u32) -> CatalogError {
+    CatalogError::Damaged(format!("frame {frame} does not match its checksum"))
 }
 
 /// One pattern for all that are not numbers, and one for both zeros: a database keeps none of them apart.

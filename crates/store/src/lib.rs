@@ -1,14 +1,18 @@
 //! What a service has to remember, in a database made for it: its sessions and jobs, what became of them, and the frames of sessions.
 //! Large files (uploads, containers, coded groups) are kept beside it, by their records' ids.
 //!
-//! [`Catalog`] is what the service asks for; [`SqliteCatalog`] keeps it in one file. Everything that a call changes is changed as a whole and
+//! [`Catalog`] is what the service asks for; [`SqliteCatalog`] keeps it in one file, [`PostgresCatalog`] in a database that several processes share. Everything that a call changes is changed as a whole and
 //! durable when it returns `Ok`; after an error nothing is changed, unless the error is that of a database whose answer was lost. All calls block.
 
 mod checksums;
+mod chunks;
 mod error;
+mod numbers;
+mod postgres;
 mod sqlite;
 
 pub use error::CatalogError;
+pub use postgres::PostgresCatalog;
 pub use sqlite::SqliteCatalog;
 
 use std::fmt::Debug;

@@ -6,8 +6,9 @@ mod tests;
 mod upkeep;
 mod writer;
 
-use crate::{CagePlace, Catalog, CatalogError, Change, FrameEntry, Key, NewFrame, NewRecord, Phase, Record, checksums};
-use rows::{kind_number, phase_number};
+use crate::chunks::{Chunk, add_cage, chunks, lost};
+use crate::numbers::{kind_number, phase_number};
+use crate::{CagePlace, Catalog, CatalogError, Change, FrameEntry, Key, NewFrame, NewRecord, Phase, Record};
 use rusqlite::{Connection, OpenFlags, OptionalExtension as _, params};
 use std::fs::OpenOptions;
 use std::os::unix::fs::OpenOptionsExt as _;
@@ -19,18 +20,12 @@ use writer::Writer;
 
 /// Version of the tables.
 const VERSION: i64 = 1;
-/// Most frames whose cages are stored together.
-const CHUNK_FRAMES: usize = 64;
-/// Bytes of cages from which on they are stored.
-const CHUNK_BYTES: usize = 256 << 10;
 /// Chunks of a removed record that are removed in one transaction, between which others can write.
 const REMOVED_CHUNKS: u32 = 64;
 /// As [`REMOVED_CHUNKS`], for what is known of frames.
 const REMOVED_FRAMES: u32 = 4096;
 /// Pages of 4 KiB in the log from which on who writes writes it back.
 const LOG_PAGES: u32 = (upkeep::RESERVE / 2 / 4096) as u32;
-/// About what a frame takes beside its cage.
-const FRAME_BYTES: usize = 96;
 /// How often a deletion asks for the reserve on a full disk, and its pause where that is not there.
 const RESERVE_TRIES: u32 = 4;
 const RESERVE_PAUSE: Duration = Duration::from_millis(50);
@@ -223,7 +218,7 @@ impl Catalog for SqliteCatalog {
     }
 
     fn append(&self, id: &str, frames: &[NewFrame<'_>]) -> Result<Vec<FrameEntry>, CatalogError> {
-        let chunks: Vec<Chunk> = chunks(frames).map(|frames| Chunk::new(id, frames)).collect();
+        let chunks = chunks(id, frames);
         let id = id.to_owned();
         self.write(move |connection| {
             let number = session(connection, &id)?;
@@ -238,10 +233,10 @@ impl Catalog for SqliteCatalog {
                     stored.push(entry);
                 }
             }
-            let bytes: usize = chunks.iter().map(|chunk| chunk.bytes.len() + FRAME_BYTES * chunk.entries.len()).sum();
+            let bytes: i64 = chunks.iter().map(Chunk::counted).sum();
             let sql = "UPDATE records SET frame_bytes = frame_bytes + ?2 WHERE number = ?1 AND phase <> ?3";
             let grown = connection.prepare_cached(sql)?;
-            let is_there = { grown }.execute(params![number, bytes as i64, phase_number(Phase::Deleted)])? == 1;
+            let is_there = { grown }.execute(params![number, bytes, phase_number(Phase::Deleted)])? == 1;
             if is_there { Ok(stored) } else { Err(CatalogError::Gone) }
         })
     }
@@ -268,9 +263,9 @@ impl Catalog for SqliteCatalog {
             for together in frames.chunk_by(|a, b| a.place.chunk == b.place.chunk) {
                 let found = statement.query_row(params![together[0].place.chunk, number], |row| {
                     let chunk = row.get_ref(0)?.as_blob()?;
-                    Ok(together.iter().try_for_each(|entry| add_cage(id, entry, chunk, out)))
+                    Ok(together.iter().try_for_each(|entry| add_cage(id, entry, chunk, 0, out)))
                 });
-                found.optional()?.unwrap_or_else(|| Err(damaged(&together[0])))?;
+                found.optional()?.unwrap_or_else(|| Err(lost(&together[0])))?;
             }
             Ok(())
         });
@@ -285,54 +280,4 @@ impl Catalog for SqliteCatalog {
             Ok(())
         })
     }
-}
-
-/// Cages that are stored together, and the frames that they belong to.
-struct Chunk {
-    bytes: Vec<u8>,
-    entries: Vec<FrameEntry>,
-}
-
-impl Chunk {
-    fn new(session: &str, frames: &[NewFrame<'_>]) -> Self {
-        let mut bytes = Vec::with_capacity(frames.iter().map(|frame| 4 * frame.cage.len()).sum());
-        let entries = frames.iter().map(|NewFrame { entry, cage }| {
-            let offset = bytes.len();
-            bytes.extend(cage.iter().flat_map(|x| x.to_le_bytes()));
-            let crc = checksums::of_cage(session, entry.frame, &bytes[offset..]);
-            let place = CagePlace { chunk: 0, offset: offset as u32, bytes: 4 * cage.len() as u32, crc };
-            FrameEntry { place, ..*entry }
-        });
-        let entries = entries.collect();
-        Self { bytes, entries }
-    }
-}
-
-/// Frames as they are stored together.
-fn chunks<'a, 'b>(mut frames: &'a [NewFrame<'b>]) -> impl Iterator<Item = &'a [NewFrame<'b>]> {
-    std::iter::from_fn(move || {
-        let mut bytes = 0;
-        let fits = |frame: &&NewFrame<'_>| {
-            let fits = bytes < CHUNK_BYTES;
-            bytes += 4 * frame.cage.len();
-            fits
-        };
-        let count = frames.iter().take(CHUNK_FRAMES).take_while(fits).count();
-        let (now, later) = frames.split_at(count);
-        frames = later;
-        (count > 0).then_some(now)
-    })
-}
-
-/// Appends the cage of a frame, which its chunk holds.
-fn add_cage(session: &str, entry: &FrameEntry, chunk: &[u8], out: &mut Vec<u8>) -> Result<(), CatalogError> {
-    let CagePlace { offset, bytes, crc, .. } = entry.place;
-    let cage = chunk.get(offset as usize..).and_then(|rest| rest.get(..bytes as usize));
-    let cage = cage.filter(|cage| checksums::of_cage(session, entry.frame, cage) == crc);
-    out.extend_from_slice(cage.ok_or_else(|| damaged(entry))?);
-    Ok(())
-}
-
-fn damaged(entry: &FrameEntry) -> CatalogError {
-    CatalogError::Damaged(format!("the cage of frame {} is not what was written", entry.frame))
 }

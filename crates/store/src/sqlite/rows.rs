@@ -1,50 +1,26 @@
 //! Rows of the tables and what they say.
 
-use crate::{CagePlace, CatalogError, Change, FrameEntry, Kind, Phase, Record, checksums};
+use crate::{CagePlace, CatalogError, Change, FrameEntry, Kind, Record, checksums, numbers};
 use rusqlite::types::Type;
 use rusqlite::{Connection, Row, ToSql, params};
 
 pub(super) const RECORD: &str = "SELECT kind, id, created_ms, phase, meta, outcome, completion, announcement, damage, attempts, declared, reached, frame_bytes FROM records";
 
-pub(super) fn kind_number(kind: Kind) -> u8 {
-    match kind {
-        Kind::Session => 0,
-        Kind::CageJob => 1,
-        Kind::Recovery => 2,
-        Kind::Transfer => 3,
-    }
-}
-
-/// Several bits apart: rows have no checksum, and what is deleted is removed by the next start.
-pub(super) fn phase_number(phase: Phase) -> u8 {
-    match phase {
-        Phase::Creating => 0x11,
-        Phase::Importing => 0x22,
-        Phase::Open => 0x44,
-        Phase::Deleted => 0x78,
-    }
-}
-
 /// The kind and the id of a row of [`RECORD`] that cannot be read otherwise, as far as they can.
 pub(super) fn identity(row: &Row<'_>) -> String {
-    let kind: Option<u8> = row.get(0).ok();
-    let kind = Kind::ALL.into_iter().find(|of| Some(kind_number(*of)) == kind).map_or("record", Kind::name);
-    format!("{kind} {}", row.get::<_, String>(1).unwrap_or_default())
+    let kind = row.get(0).ok().and_then(numbers::kind);
+    format!("{} {}", kind.map_or("record", Kind::name), row.get::<_, String>(1).unwrap_or_default())
 }
 
 pub(super) fn record(row: &Row<'_>) -> rusqlite::Result<Record> {
     let unknown = |column, what: &str| {
         rusqlite::Error::FromSqlConversionFailure(column, Type::Integer, format!("an unknown {what}").into())
     };
-    let (kind, phase): (u8, u8) = (row.get(0)?, row.get(3)?);
-    let kind = Kind::ALL.into_iter().find(|of| kind_number(*of) == kind).ok_or_else(|| unknown(0, "kind"))?;
-    let phases = [Phase::Creating, Phase::Importing, Phase::Open, Phase::Deleted];
-    let phase = phases.into_iter().find(|of| phase_number(*of) == phase).ok_or_else(|| unknown(3, "phase"))?;
     Ok(Record {
-        kind,
+        kind: numbers::kind(row.get(0)?).ok_or_else(|| unknown(0, "kind"))?,
         id: row.get(1)?,
         created_ms: row.get::<_, i64>(2)? as u64,
-        phase,
+        phase: numbers::phase(row.get(3)?).ok_or_else(|| unknown(3, "phase"))?,
         meta: row.get(4)?,
         outcome: row.get(5)?,
         completion: row.get(6)?,
@@ -60,19 +36,16 @@ pub(super) fn record(row: &Row<'_>) -> rusqlite::Result<Record> {
 /// Makes a change of the record with this number.
 pub(super) fn change(connection: &Connection, number: i64, change: &Change) -> Result<(), CatalogError> {
     let phase;
-    let (column, value): (&str, &dyn ToSql) = match change {
+    let value: &dyn ToSql = match change {
         Change::Phase(to) => {
-            phase = phase_number(*to);
-            ("phase", &phase)
+            phase = numbers::phase_number(*to);
+            &phase
         }
-        Change::Outcome(bytes) => ("outcome", bytes),
-        Change::Completion(bytes) => ("completion", bytes),
-        Change::Announcement(bytes) => ("announcement", bytes),
-        Change::Damage(what) => ("damage", what),
-        Change::Attempts(count) => ("attempts", count),
-        Change::Declared(frames) => ("declared", frames),
-        Change::Reached(frames) => ("reached", frames),
+        Change::Outcome(bytes) | Change::Completion(bytes) | Change::Announcement(bytes) => bytes,
+        Change::Damage(what) => what,
+        Change::Attempts(count) | Change::Declared(count) | Change::Reached(count) => count,
     };
+    let column = numbers::column(change);
     let mut statement = connection.prepare_cached(&format!("UPDATE records SET {column} = ?2 WHERE number = ?1"))?;
     statement.execute(params![number, value])?;
     Ok(())
@@ -96,7 +69,7 @@ pub(super) fn frame(session: &str, row: &Row<'_>) -> Result<FrameEntry, CatalogE
     };
     match row.get::<_, u32>(11)? == checksums::of_entry(session, &entry) {
         true => Ok(entry),
-        false => Err(CatalogError::Damaged(format!("frame {} does not match its checksum", entry.frame))),
+        false => Err(checksums::mismatch(entry.frame)),
     }
 }
 

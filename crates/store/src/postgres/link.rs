@@ -1,0 +1,129 @@
+//! One connection, and what is done by it: on the thread that asks for it.
+
+use super::place::Place;
+use super::trouble::Trouble;
+use crate::CatalogError;
+use futures_util::future::join;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::future::Future;
+use std::time::Duration;
+use tokio::runtime::{Builder, Runtime};
+use tokio::time::timeout;
+use tokio_postgres::types::ToSql;
+use tokio_postgres::{Client, NoTls, Row, Statement};
+
+/// Parameters of a statement.
+pub(super) type Parameters<'a> = &'a [&'a (dyn ToSql + Sync)];
+
+pub(super) struct Link {
+    client: Client,
+    statements: RefCell<HashMap<String, Statement>>,
+    /// Always there until it is dropped.
+    runtime: Option<Runtime>,
+}
+
+impl Link {
+    pub(super) fn connect(place: &Place) -> Result<Self, CatalogError> {
+        let runtime = Builder::new_current_thread().enable_io().enable_time().build();
+        let runtime = runtime.map_err(|error| CatalogError::Failed(format!("{}: {error}", place.name)))?;
+        let connecting = async {
+            // What moves the bytes only goes on while a call waits.
+            match &place.tls {
+                Some(tls) => {
+                    let (client, connection) = place.config.connect(tls.clone()).await?;
+                    tokio::spawn(connection);
+                    Ok(client)
+                }
+                None => {
+                    let (client, connection) = place.config.connect(NoTls).await?;
+                    tokio::spawn(connection);
+                    Ok(client)
+                }
+            }
+        };
+        let connected = runtime.block_on(within(place.connect, connecting));
+        match connected {
+            Ok(client) => Ok(Self { client, statements: RefCell::default(), runtime: Some(runtime) }),
+            Err(trouble) => {
+                runtime.shutdown_background();
+                Err(trouble.explain(&place.name))
+            }
+        }
+    }
+
+    /// Does `work`, for at most so long.
+    pub(super) fn read<T>(
+        &self,
+        limit: Duration,
+        work: &impl AsyncFn(&Self) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        self.block_on(within(limit, work(self)))
+    }
+
+    /// Does `work` in a transaction. Only after [`Trouble::Unknown`] something may be changed.
+    pub(super) fn write<T>(
+        &self,
+        limit: Duration,
+        work: &impl AsyncFn(&Self) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        self.block_on(async {
+            let worked = async {
+                // Sent together, in this order.
+                let (begun, worked) = join(self.client.batch_execute("BEGIN"), work(self)).await;
+                begun?;
+                worked
+            };
+            match within(limit, worked).await {
+                Ok(value) => {
+                    let committed = within(limit, async { Ok(self.client.batch_execute("COMMIT").await?) }).await;
+                    committed.map(|()| value).map_err(|trouble| match trouble.is_broken() {
+                        true => Trouble::Unknown(Box::new(trouble)),
+                        false => trouble,
+                    })
+                }
+                Err(trouble) => {
+                    if !trouble.is_broken() {
+                        within(limit, async { Ok(self.client.batch_execute("ROLLBACK").await?) }).await?;
+                    }
+                    Err(trouble)
+                }
+            }
+        })
+    }
+
+    pub(super) async fn query(&self, sql: &str, parameters: Parameters<'_>) -> Result<Vec<Row>, Trouble> {
+        let known = self.statements.borrow().get(sql).cloned();
+        let statement = match known {
+            Some(statement) => statement,
+            None => {
+                let statement = self.client.prepare(sql).await?;
+                self.statements.borrow_mut().insert(sql.to_owned(), statement.clone());
+                statement
+            }
+        };
+        Ok(self.client.query(&statement, parameters).await?)
+    }
+
+    pub(super) async fn batch(&self, sql: &str) -> Result<(), Trouble> {
+        Ok(self.client.batch_execute(sql).await?)
+    }
+
+    fn block_on<T>(&self, work: impl Future<Output = Result<T, Trouble>>) -> Result<T, Trouble> {
+        let ended = || CatalogError::Failed("the connection has ended".to_owned());
+        self.runtime.as_ref().ok_or_else(ended)?.block_on(work)
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        // Wherever that happens: it does not wait.
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
+    }
+}
+
+async fn within<T>(limit: Duration, work: impl Future<Output = Result<T, Trouble>>) -> Result<T, Trouble> {
+    timeout(limit, work).await.unwrap_or(Err(Trouble::TimedOut))
+}

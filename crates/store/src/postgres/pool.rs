@@ -1,0 +1,108 @@
+//! The connections of one process to a database.
+
+use super::link::Link;
+use super::place::Place;
+use super::trouble::Trouble;
+use crate::CatalogError;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Most connections at once.
+const CONNECTIONS: usize = 8;
+/// How much longer than the database a call waits, for the way there and back.
+const WAY: Duration = Duration::from_secs(2);
+
+pub(super) struct Pool {
+    place: Place,
+    /// How long a statement may take.
+    limit: Duration,
+    links: Mutex<Links>,
+    freed: Condvar,
+}
+
+#[derive(Default)]
+struct Links {
+    idle: Vec<Link>,
+    /// How many are used or being made.
+    taken: usize,
+}
+
+impl Pool {
+    /// Begins with a connection. `limit` is how long the database lets statements take.
+    pub(super) fn new(place: Place, link: Link, limit: Duration) -> Self {
+        let links = Links { idle: vec![link], taken: 0 };
+        Self { place, limit: limit.saturating_add(WAY), links: Mutex::new(links), freed: Condvar::new() }
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.place.name
+    }
+
+    pub(super) fn read<T>(&self, work: &impl AsyncFn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
+        self.twice(|link| link.read(self.limit, work))
+    }
+
+    /// Does `work` in a transaction.
+    pub(super) fn write<T>(&self, work: &impl AsyncFn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
+        self.twice(|link| link.write(self.limit, work))
+    }
+
+    /// Calls once, and once more by a new connection where nothing was changed and that may help.
+    fn twice<T>(&self, call: impl Fn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
+        let outcome = match self.once(false, &call)? {
+            Err(trouble) if trouble.is_passing() => {
+                tracing::debug!(?trouble, "a call of the database is tried again");
+                self.once(true, &call)?
+            }
+            outcome => outcome,
+        };
+        outcome.map_err(|trouble| trouble.explain(self.name()))
+    }
+
+    fn once<T>(
+        &self,
+        is_new: bool,
+        call: impl Fn(&Link) -> Result<T, Trouble>,
+    ) -> Result<Result<T, Trouble>, CatalogError> {
+        let place = self.wait_for_place()?;
+        let kept = if is_new { None } else { self.links().idle.pop() };
+        let link = kept.map_or_else(|| Link::connect(&self.place), Ok)?;
+        let outcome = call(&link);
+        // Dropped below, not while others wait for the lock.
+        let mut dropped = Vec::new();
+        if outcome.as_ref().is_err_and(Trouble::is_broken) {
+            dropped.append(&mut self.links().idle);
+            dropped.push(link);
+        } else {
+            self.links().idle.push(link);
+        }
+        drop(place);
+        Ok(outcome)
+    }
+
+    fn wait_for_place(&self) -> Result<Taken<'_>, CatalogError> {
+        let is_full = |links: &mut Links| links.taken >= CONNECTIONS;
+        let waited = self.freed.wait_timeout_while(self.links(), self.limit, is_full);
+        let (mut links, waited) = waited.unwrap_or_else(PoisonError::into_inner);
+        if waited.timed_out() {
+            let said = format!("{} is too slow: {CONNECTIONS} connections are busy, and others wait", self.name());
+            return Err(CatalogError::Failed(said));
+        }
+        links.taken += 1;
+        Ok(Taken(self))
+    }
+
+    fn links(&self) -> MutexGuard<'_, Links> {
+        self.links.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// One of the connections that there may be.
+struct Taken<'a>(&'a Pool);
+
+impl Drop for Taken<'_> {
+    fn drop(&mut self) {
+        self.0.links().taken -= 1;
+        self.0.freed.notify_one();
+    }
+}
