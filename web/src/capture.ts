@@ -110,19 +110,6 @@ export interface LiveStatus {
   readonly droppedFrames: number;
 }
 
-/** Residual layers, which can be left out of blocks while a capture plays over a slow connection. */
-export interface ResidualLayers {
-  /**
-   * Whether blocks are read without their residual. Once that ends, those that were read so are read again: the capture fires `replaced`, or says
-   * that they were preliminary.
-   */
-  leftOut: boolean;
-  /** Bytes that all of them take. */
-  readonly bytes: number;
-  /** Bytes per second that the capture was read at of late; null before it is known. */
-  readonly bytesPerSecond: number | null;
-}
-
 /** A capture that is being looked at, from a file, a finished session or one that is still running. */
 export interface Capture {
   readonly name: string;
@@ -135,8 +122,6 @@ export interface Capture {
   readonly frames: number;
   /** Bytes that all frames take in the container, residuals included, where these are known. */
   readonly frameBytes?: number | undefined;
-  /** Residual layers, where the capture has some. */
-  readonly residuals?: ResidualLayers | null;
   /** Whether no more frames will come. */
   readonly complete: boolean;
   /** Errors of the frames known so far; may be shorter than `frames`. */

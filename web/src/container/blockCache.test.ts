@@ -2,13 +2,13 @@ import { describe, expect, it } from 'vitest';
 import type { FrameBlock } from '../capture';
 import { BlockCache } from './blockCache';
 
-/** A cache whose blocks, of so many bytes, are loaded when the test says so. */
-function setUp(bytes = 16) {
+/** A cache whose blocks are loaded when the test says so. */
+function setUp() {
   const loading: { first: number; signal: AbortSignal; finish: () => void; fail: (error: Error) => void }[] = [];
   const cache = new BlockCache(
     (first, signal) =>
       new Promise((resolve, reject) => {
-        const block: FrameBlock = { first, count: 1, cages: new Float32Array(bytes / 4), residual: null };
+        const block: FrameBlock = { first, count: 1, cages: new Float32Array(4), residual: null };
         loading.push({ first, signal, finish: () => resolve(block), fail: reject });
       }),
   );
@@ -78,7 +78,7 @@ describe('BlockCache', () => {
   });
 
   it('lets go of the blocks used longest ago', async () => {
-    const { cache, loading } = setUp(100 * 2 ** 20);
+    const { cache, loading } = setUp();
     for (const first of [0, 1, 0, 2]) {
       const block = cache.get(first);
       loading.at(-1)?.finish();

@@ -2,9 +2,8 @@
 
 import type { FrameBlock } from '../capture';
 
-/** Bytes of blocks that are kept; the two used last stay whatever they take. */
-const MAX_BYTES = 256 * 2 ** 20;
-const MIN_BLOCKS = 2;
+/** Blocks that are kept: what is played, and what comes next. Whoever shows frames keeps more of them. */
+const KEPT_BLOCKS = 2;
 
 interface Pending {
   readonly promise: Promise<FrameBlock>;
@@ -62,18 +61,6 @@ export class BlockCache {
     this.done.clear();
   }
 
-  /** Forgets all blocks, to load them anew; those that somebody waits for still come to them. */
-  forget(): void {
-    for (const [first, pending] of this.pending) {
-      if (pending.waiting === 0) {
-        this.giveUp(first, pending);
-      } else {
-        this.remove(first, pending);
-      }
-    }
-    this.done.clear();
-  }
-
   private start(first: number): Pending {
     const running = this.pending.get(first);
     if (running !== undefined) {
@@ -112,24 +99,11 @@ export class BlockCache {
   private keep(block: FrameBlock): void {
     this.done.delete(block.first);
     this.done.set(block.first, block);
-    let bytes = 0;
-    for (const kept of this.done.values()) {
-      bytes += bytesOf(kept);
-    }
-    for (const [first, oldest] of this.done) {
-      if (bytes <= MAX_BYTES || this.done.size <= MIN_BLOCKS) {
-        break;
-      }
-      this.done.delete(first);
-      bytes -= bytesOf(oldest);
+    const [oldest] = this.done.keys();
+    if (this.done.size > KEPT_BLOCKS) {
+      this.done.delete(oldest);
     }
   }
-}
-
-function bytesOf({ cages, residual }: FrameBlock): number {
-  return (
-    cages.byteLength + (residual === null ? 0 : residual.shapes.byteLength + residual.correctionVectors.byteLength)
-  );
 }
 
 /** The promise's result, or the signal's reason as soon as it is aborted. */

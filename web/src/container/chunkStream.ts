@@ -38,11 +38,6 @@ export class ChunkStream {
     return this.begun.frames > 0 ? this.begun.bytes / this.begun.frames : null;
   }
 
-  /** Whether the bytes that came end within a section. */
-  get isWithinSection(): boolean {
-    return this.parser.waiting > 0;
-  }
-
   /** @throws {ContainerError} for bytes behind which nothing can be found, and for damaged frames. */
   *push(piece: Uint8Array): Generator<StoredChunk, void, undefined> {
     this.parser.append(piece);

@@ -29,11 +29,6 @@ export class Layout {
     return last === undefined ? 0 : last.first + last.count;
   }
 
-  /** Bytes of the residuals of all frames. */
-  get residualBytes(): number {
-    return this.chunks.reduce((sum, { residual }) => sum + (residual?.fields.payloadBytes ?? 0), 0);
-  }
-
   /** Bytes of the sections of all frames and their residuals. */
   get frameBytes(): number {
     let bytes = 0;

@@ -10,7 +10,6 @@ import { checkSize, type Chunk, type Layout } from './layout';
 import { decodePayload } from './codecs';
 import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
 import { readContents, readSections, scanSections } from './sectionReader';
-import { ContainerResiduals, MeteredSource } from './residuals';
 import { checkPrelude, type Entry, PRELUDE_BYTES } from './section';
 import { EndsCache, type Source } from './source';
 import { decodeErrors, decodeFrameNumbers, decodeReport, NO_ERRORS } from './tail';
@@ -42,8 +41,7 @@ export interface ContainerCapture extends Capture {
  */
 export async function openContainer(source: Source, options: OpenOptions = {}): Promise<ContainerCapture> {
   const { signal, name = 'capture.cager', coordinates = null } = options;
-  const metered = new MeteredSource(source);
-  const ends = await EndsCache.of(metered, FIRST_BYTES, LAST_BYTES, signal);
+  const ends = await EndsCache.of(source, FIRST_BYTES, LAST_BYTES, signal);
   checkPrelude(await ends.read(0, Math.min(PRELUDE_BYTES, source.size), signal));
   const { layout, problem } = await readLayout(ends, signal);
   const head = await readHead(ends, layout, signal);
@@ -61,7 +59,7 @@ export async function openContainer(source: Source, options: OpenOptions = {}): 
   try {
     const { part, problem: colorProblem } = await readStatic(ends, layout, head, codec, signal);
     const found = problem ?? colorProblem;
-    const capture = new FileCapture(name, head, part, layout, ends, metered, codec, coordinates, found);
+    const capture = new FileCapture(name, head, part, layout, ends, codec, coordinates, found);
     await capture.readTail(signal);
     return capture;
   } catch (error) {
@@ -125,7 +123,6 @@ class FileCapture implements ContainerCapture {
   static: StaticPart;
   readonly frames: number;
   readonly frameBytes: number;
-  readonly residuals: ContainerResiduals | null;
   readonly complete = true;
   readonly events = new EventTarget();
   errors: FrameErrors = NO_ERRORS;
@@ -139,7 +136,6 @@ class FileCapture implements ContainerCapture {
     part: StaticPart,
     private readonly layout: Layout,
     private readonly source: Source,
-    metered: MeteredSource,
     private readonly codec: Codec,
     coordinates: CoordinatesOf | null,
     public problem: string | null,
@@ -147,8 +143,6 @@ class FileCapture implements ContainerCapture {
     this.static = part;
     this.frames = layout.frames;
     this.frameBytes = layout.frameBytes;
-    const { residualBytes } = layout;
-    this.residuals = residualBytes > 0 ? new ContainerResiduals(residualBytes, metered, () => this.readAgain()) : null;
     this.blocks = new BlockDecoder(part, codec, coordinates);
     this.cache = new BlockCache((first, signal) => this.load(first, signal));
   }
@@ -214,8 +208,7 @@ class FileCapture implements ContainerCapture {
   private async load(first: number, signal: AbortSignal): Promise<FrameBlock> {
     const { frames, residual } = this.layout.chunkOf(first)!;
     try {
-      const isLeftOut = residual !== null && this.residuals?.leaveOut() === true;
-      const sections = await this.readChunk({ frames, residual: isLeftOut ? null : residual }, signal);
+      const sections = await this.readChunk({ frames, residual }, signal);
       const { block, problem } = await this.blocks.decode(sections.frames, sections.residual, this.source.size, signal);
       if (problem !== null) {
         this.report(problem);
@@ -225,11 +218,6 @@ class FileCapture implements ContainerCapture {
       this.report(error);
       throw error;
     }
-  }
-
-  private readAgain(): void {
-    this.cache.forget();
-    this.events.dispatchEvent(new Event('replaced'));
   }
 
   /** Reads the sections of a chunk; frames whose residual is damaged are read without it. */

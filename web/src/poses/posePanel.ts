@@ -1,6 +1,5 @@
 import { css, html, LitElement, nothing, svg, type PropertyValues } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
-import { spectrumPanelStyle } from '../spectrum/spectrumPanelStyle';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/tokens';
 import { numberAt, numberText } from '../viewer/frameNumbers';
@@ -29,8 +28,20 @@ export class PosePanel extends LitElement {
   static override styles = [
     controls,
     picturePanelStyle,
-    spectrumPanelStyle,
     css`
+      input[type='range'] {
+        display: block;
+        width: 100%;
+        height: 26px;
+        margin: 0 0 4px;
+        border-radius: var(--cager-radius-small);
+      }
+      input[type='range']:focus-visible {
+        outline-offset: -1px;
+      }
+      p {
+        margin: var(--cager-space-2) 0 0;
+      }
       svg.pad {
         display: block;
         width: min(100%, 200px);
@@ -60,6 +71,19 @@ export class PosePanel extends LitElement {
       }
       .pose span {
         flex: 1;
+      }
+      @container (max-width: 680px) {
+        :host {
+          left: var(--cager-space-2);
+          right: var(--cager-space-2);
+          top: auto;
+          bottom: calc(var(--deck-height, 120px) + var(--cager-space-2));
+          width: auto;
+          height: 38%;
+        }
+        .panel {
+          align-self: flex-end;
+        }
       }
     `,
   ];

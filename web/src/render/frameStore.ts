@@ -1,4 +1,5 @@
 import type { Capture, FrameBlock, Residual } from '../capture';
+import { BLOCK_BYTES, OFFSET_BYTES } from '../cacheBytes';
 import type { Offsets } from './decoder';
 import type { FromResidualWorker, ToResidualWorker } from './residualWorker';
 import { moduleWorker } from '../moduleWorker';
@@ -14,10 +15,6 @@ export interface FrameData {
 /** Gives the rows of a frame to show in place of its own, both `rowsPerFrame × 3`. */
 export type FrameEdit = (frame: number, rows: Float32Array) => Float32Array;
 
-/** Bytes of blocks that are kept. */
-const BLOCK_BYTES = 192 * 2 ** 20;
-/** Bytes of offsets that are kept. */
-const OFFSET_BYTES = 96 * 2 ** 20;
 /** Frames whose offsets are kept, whatever they take. */
 const MIN_OFFSETS = 8;
 

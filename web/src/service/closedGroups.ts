@@ -1,6 +1,6 @@
 /** The coded groups of a running session that are closed: held as they are coded, and decoded when they are looked at. */
 
-import type { FrameBlock, ResidualLayers, StaticPart } from '../capture';
+import type { FrameBlock, StaticPart } from '../capture';
 import { BlockCache } from '../container/blockCache';
 import { BlockDecoder } from '../container/blocks';
 import { isDamage } from '../container/error';
@@ -25,8 +25,8 @@ export interface GroupListener {
   readonly failed: (error: unknown) => void;
 }
 
-/** Follows the groups of one session; leaving their residuals out stops receiving them, and what is here stays. */
-export class ClosedGroups implements ResidualLayers {
+/** Follows the groups of one session. */
+export class ClosedGroups {
   readonly #store = new GroupStore();
   readonly #follower: GroupFollower;
   readonly #codec: Codec = createCodec();
@@ -55,22 +55,6 @@ export class ClosedGroups implements ResidualLayers {
       listener.arrived();
     };
     this.#follower = new GroupFollower(service, id, take, connection);
-  }
-
-  get leftOut(): boolean {
-    return this.#follower.isPaused;
-  }
-
-  set leftOut(leftOut: boolean) {
-    if (!this.#closing.signal.aborted) this.#follower.isPaused = leftOut;
-  }
-
-  get bytes(): number {
-    return this.#store.residualBytes;
-  }
-
-  get bytesPerSecond(): number | null {
-    return this.#follower.throughput.bytesPerSecond;
   }
 
   /** Bytes that a frame takes in the groups; null before it is known. */

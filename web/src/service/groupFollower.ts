@@ -1,7 +1,6 @@
 /** Receives the coded groups of a running session as they close, over broken connections. */
 
 import { ChunkStream, type StoredChunk } from '../container/chunkStream';
-import { Throughput } from '../container/throughput';
 import { Backoff } from './backoff';
 import { endOf } from './groupStore';
 import type { Session } from './messages';
@@ -19,13 +18,12 @@ const FREE_BYTES = 4 << 20;
  * the one before bring that is new: however often connections break, about three times the container is received in all.
  */
 export class GroupFollower {
-  readonly throughput = new Throughput();
   /** Frames of the groups that came. */
   frames = 0;
   /** Bytes that a frame takes in them; null before it is known. */
   bytesPerFrame: number | null = null;
   #connection: ContainerConnection | null = null;
-  #isPaused = false;
+  #isClosed = false;
   /** Bytes of the container that are known, and how many of them the last connection brought. */
   #bytes = 0;
   #newBytes = 0;
@@ -45,16 +43,6 @@ export class GroupFollower {
     void this.#receive(connection);
   }
 
-  /** Whether nothing is to be received for now. */
-  get isPaused(): boolean {
-    return this.#isPaused;
-  }
-
-  set isPaused(isPaused: boolean) {
-    this.#isPaused = isPaused;
-    if (isPaused) this.#connection?.stop.abort();
-  }
-
   /** A look at the session: where nothing follows it and groups have closed, they are asked for. */
   looked({ coding }: Session): void {
     if (!coding || coding.frames <= this.frames) return;
@@ -64,13 +52,14 @@ export class GroupFollower {
       return;
     }
     const waiting = coding.bytes * (1 - this.frames / coding.frames);
-    if (this.#isPaused || now < this.#earliest || this.#bytes > this.freeBytes + this.#newBytes + waiting) return;
+    if (this.#isClosed || now < this.#earliest || this.#bytes > this.freeBytes + this.#newBytes + waiting) return;
     this.#newBytes = 0;
     void this.#receive(connect(this.service, this.id));
   }
 
   close(): void {
-    this.isPaused = true;
+    this.#isClosed = true;
+    this.#connection?.stop.abort();
   }
 
   /** Reads a connection until it ends, whyever. */
@@ -81,10 +70,7 @@ export class GroupFollower {
     try {
       for (const piece of connection.begun) this.#take(stream, piece);
       for await (const piece of connection.pieces) {
-        const now = performance.now();
-        // Between two groups the service has nothing to send.
-        if (stream.isWithinSection) this.throughput.add(piece.length, (now - this.#lastPieceAt) / 1000);
-        this.#lastPieceAt = now;
+        this.#lastPieceAt = performance.now();
         this.#take(stream, piece);
       }
     } catch {

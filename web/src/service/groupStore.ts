@@ -1,25 +1,20 @@
 /** Coded groups of frames as the service sent them, as far as they fit into memory. */
 
+import { GROUP_BYTES } from '../cacheBytes';
 import type { StoredChunk, StoredSection } from '../container/chunkStream';
 import { HEADER_BYTES } from '../container/section';
 import type { Source } from '../container/source';
 
-/** Most bytes of groups that are kept; the earliest ones go first. */
-const MAX_BYTES = 96 << 20;
-
-/** Keeps groups in the order of their frames. */
+/** Keeps groups in the order of their frames; the earliest ones go first. */
 export class GroupStore {
-  /** Bytes of all residuals that came. */
-  residualBytes = 0;
   readonly #groups: StoredChunk[] = [];
   #keptBytes = 0;
 
-  constructor(private readonly mostBytes = MAX_BYTES) {}
+  constructor(private readonly mostBytes = GROUP_BYTES) {}
 
   /** Takes the group that follows the last one. */
   put(group: StoredChunk): void {
     this.#groups.push(group);
-    this.residualBytes += group.residual?.payload.length ?? 0;
     this.#keptBytes += bytesOf(group);
     while (this.#keptBytes > this.mostBytes && this.#groups.length > 1)
       this.#keptBytes -= bytesOf(this.#groups.shift()!);

@@ -1,6 +1,6 @@
 /** A session that is still running, as a {@link Capture}: what is solved so far, live, until it is completed and read from its container. */
 
-import type { Capture, FrameBlock, FrameErrors, LiveStatus, ResidualLayers, StaticPart } from '../capture';
+import type { Capture, FrameBlock, FrameErrors, LiveStatus, StaticPart } from '../capture';
 import type { Source } from '../container/source';
 import { persistently } from './backoff';
 import { ClosedGroups } from './closedGroups';
@@ -99,10 +99,6 @@ export class LiveCapture implements SessionCapture {
     return bytes === null ? undefined : bytes * this.frames;
   }
 
-  get residuals(): ResidualLayers | null {
-    return this.#finished ? (this.#finished.residuals ?? null) : this.#groups;
-  }
-
   get problem(): string | null {
     return this.#finished?.problem ?? this.#lastProblem ?? this.#follower.problem;
   }
@@ -171,7 +167,6 @@ export class LiveCapture implements SessionCapture {
         const finished = await persistently(opening, { signal, onRetry });
         this.#lastProblem = null;
         finished.events.addEventListener('change', () => this.#changed());
-        finished.events.addEventListener('replaced', () => this.events.dispatchEvent(new Event('replaced')));
         // The meshes are the same; whoever made buffers of them can keep these.
         this.static = { ...this.static, report: finished.static.report };
         this.frames = finished.frames;

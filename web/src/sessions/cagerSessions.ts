@@ -23,9 +23,8 @@ import { sessionsStyle } from './sessionsStyle';
 import './signIn';
 
 const PAGE_ROWS = 25;
-/** HTTP/1.1 has six connections to a host, for all tabs together: most sessions are polled there instead. */
-const STREAMS_OF_HTTP1 = 2;
-const STREAMS_OF_HTTP2 = 16;
+/** Sessions that are followed by streams: HTTP/1.1 has six connections to a host, for all tabs together. The others are polled. */
+const STREAMS = 2;
 
 /**
  * The sessions of the service beside the page: newest first, kept up to date while the page is seen, to be searched, opened, downloaded and
@@ -107,15 +106,13 @@ export class Sessions extends LitElement {
 
   protected override updated(): void {
     const shown = this.#shown(this.#list.sessions).rows;
-    const [navigation] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
-    const streams = /^h[23]$/.test(navigation.nextHopProtocol) ? STREAMS_OF_HTTP2 : STREAMS_OF_HTTP1;
     const isOn = !document.hidden && this.isConnected && !this.wantsToken;
     this.#figures.want(isOn ? shown : []);
     this.#list.shown = new Set(shown.map(({ id }) => id));
     // Those that move first: some wait for ever.
     const unfinished = shown.filter(isUnfinished).map(({ id }) => id);
     const moves = (id: string): number => Math.sign(this.#list.rates.of(id) ?? 0);
-    const ids = unfinished.sort((a, b) => moves(b) - moves(a)).slice(0, streams);
+    const ids = unfinished.sort((a, b) => moves(b) - moves(a)).slice(0, STREAMS);
     this.#list.follow(isOn ? ids : []);
   }
 

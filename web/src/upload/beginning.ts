@@ -4,23 +4,18 @@ import type { Service } from '../service/service';
 import type { Dropped, Item } from './classify';
 import { marksOf } from './fileMarks';
 import { KeptUpload, newKey } from './keptUpload';
-import { type Choices, designOf, optionsOf, sendsHandles } from './optionsForm';
+import { type Choices, designOf, optionsOf } from './optionsForm';
 import type { Plan } from './plan';
 import { UploadJob } from './uploadJob';
 
 /** The record of an upload that begins now. */
-export async function newUpload(
-  service: Service,
-  plan: Plan,
-  choices: Choices,
-  items: readonly Item[],
-): Promise<KeptUpload> {
+export function newUpload(service: Service, plan: Plan, choices: Choices, items: readonly Item[]): KeptUpload {
   return new KeptUpload({
     key: newKey(),
     service: service.address(''),
     begun: Date.now(),
     choices,
-    marks: await marksOf(items),
+    marks: marksOf(items),
     frames: plan.frames.frames,
     session: null,
     design: null,
@@ -34,7 +29,6 @@ export function jobOf(service: Service, plan: Plan, kept: KeptUpload): UploadJob
   const request = {
     options: optionsOf(choices, frames.frames, cage !== null),
     design: designOf(choices, cage !== null),
-    handlesOnly: sendsHandles(choices, 12 * frames.frames * frames.points),
   };
   return new UploadJob(service, plan, request, kept);
 }

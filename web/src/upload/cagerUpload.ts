@@ -157,13 +157,9 @@ export class Upload extends LitElement {
 
   #submit = (event: SubmitEvent): void => {
     event.preventDefault();
-    void this.#begin();
-  };
-
-  async #begin(): Promise<void> {
     const { plan, choices, items } = this;
-    if (plan) this.#run(plan, await newUpload(this.#service, plan, choices, items));
-  }
+    if (plan) this.#run(plan, newUpload(this.#service, plan, choices, items));
+  };
 
   #run(plan: Plan, kept: KeptUpload): void {
     // Somebody may press twice.
@@ -250,7 +246,7 @@ export class Upload extends LitElement {
     let [fitting, misfit]: [Interrupted | null, Misfit | null] = [null, null];
     try {
       plan = await planOf(this.items);
-      ({ fitting, misfit } = fittingOf(this.interrupted, await marksOf(this.items)));
+      ({ fitting, misfit } = fittingOf(this.interrupted, marksOf(this.items)));
     } catch (error) {
       finding = sentenceOf(error);
     }

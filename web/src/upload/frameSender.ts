@@ -19,19 +19,15 @@ export interface Heard {
   readonly sent: (frames: number, bytes: number) => void;
 }
 
-/** Posts frames of a capture, whole or the rows of the handles alone. */
+/** Posts frames of a capture. */
 export class FrameSender {
   #batchBytes = FIRST_BYTES;
 
-  /**
-   * @param path of the session's frames
-   * @param handles numbers of the points to send of each frame, in this order; null for all points
-   */
+  /** @param path of the session's frames */
   constructor(
     private readonly service: Service,
     private readonly path: string,
     private readonly source: FrameSource,
-    private readonly handles: Uint32Array | null,
     private readonly heard: Heard,
   ) {}
 
@@ -65,13 +61,13 @@ export class FrameSender {
   }
 
   get #frameBytes(): number {
-    return 12 * (this.handles?.length ?? this.source.points);
+    return 12 * this.source.points;
   }
 
   async #post(first: number, count: number, signal: AbortSignal): Promise<void> {
-    const body = this.#chosen(await this.source.read(first, count), count);
+    const body = await this.source.read(first, count);
     const began = performance.now();
-    const response = await this.service.request(`${this.path}?first=${first}${this.handles ? '&rows=handles' : ''}`, {
+    const response = await this.service.request(`${this.path}?first=${first}`, {
       method: 'POST',
       headers: { 'Content-Type': 'application/octet-stream', Accept: 'application/x-ndjson' },
       body: body as Float32Array<ArrayBuffer>,
@@ -86,19 +82,6 @@ export class FrameSender {
     }
     this.heard.sent(count, body.byteLength);
     this.#adapt(body.byteLength, (performance.now() - began) / 1000);
-  }
-
-  #chosen(frames: Float32Array, count: number): Float32Array {
-    if (!this.handles) return frames;
-    const { handles } = this;
-    const rows = new Float32Array(count * 3 * handles.length);
-    for (let k = 0; k < count; k += 1) {
-      for (let i = 0; i < handles.length; i += 1) {
-        const from = 3 * (k * this.source.points + handles[i]);
-        rows.set(frames.subarray(from, from + 3), 3 * (k * handles.length + i));
-      }
-    }
-    return rows;
   }
 
   #adapt(bytes: number, seconds: number): void {

@@ -63,14 +63,6 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
         ${stage === 'designing' ? designFacts(job) : html`<span><b>${count(job.done)}</b> of ${counted(total, 'frame')}</span>`}
         ${stage === 'sending' ? html`<span>${perSecond(job.framesPerSecond)}</span><span>${size(job.bytesPerSecond)}/s</span>` : nothing}
         ${stage === 'sending' && job.secondsLeft !== null ? html`<span>${span(job.secondsLeft)} left</span>` : nothing}
-        ${
-          job.handlesOnly
-            ? html`<span
-                >${count(session?.handle_count ?? 0)} of ${counted(plan.frames.points, 'point')} of each frame
-                sent</span
-              >`
-            : nothing
-        }
         ${containerFacts(job.figures)}
       </div>
       ${

@@ -1,8 +1,13 @@
 import { expect, test } from 'vitest';
-import { DEFAULT_CHOICES, designOf, optionsOf, sendsHandles } from './optionsForm';
+import { DEFAULT_CHOICES, designOf, optionsOf } from './optionsForm';
 
 test('what_is_left_empty_is_the_services_choice', () => {
-  expect(optionsOf(DEFAULT_CHOICES, 12, true)).toEqual({ frames: 12, coordinates: 'mvc' });
+  const cages = { ...DEFAULT_CHOICES, accuracy: 'cages' } as const;
+  expect(optionsOf(cages, 12, true)).toEqual({ frames: 12, coordinates: 'mvc' });
+});
+
+test('points_are_off_by_a_thousandth_of_the_diagonal_at_most_where_nobody_chose', () => {
+  expect(optionsOf(DEFAULT_CHOICES, 12, true)).toEqual({ frames: 12, coordinates: 'mvc', max_error: 0.001 });
 });
 
 test('choices_become_options', () => {
@@ -15,7 +20,7 @@ test('choices_become_options', () => {
     cage: { vertices: 200 },
     max_error: 0.0005,
   });
-  expect(optionsOf({ ...choices, accuracy: 'standard' }, 12, true)).toMatchObject({ quality: 'standard' });
+  expect(optionsOf({ ...choices, accuracy: 'master' }, 12, true)).toMatchObject({ quality: 'master' });
   expect(optionsOf(choices, 12, true)).not.toHaveProperty('cage');
 });
 
@@ -36,13 +41,6 @@ test('a_cage_is_designed_where_it_was_asked_for_and_none_was_given', () => {
   expect(designOf(choices, true)).toBeNull();
   expect(designOf(DEFAULT_CHOICES, false)).toBeNull();
   // Its number of vertices is the design's, and so are the coordinates.
-  expect(optionsOf(choices, 12, false)).toEqual({ frames: 12, coordinates: 'mvc', name: 'walk' });
+  expect(optionsOf(choices, 12, false)).toEqual({ frames: 12, coordinates: 'mvc', name: 'walk', max_error: 0.001 });
   expect(optionsOf(choices, 12, true).coordinates).toBe('green');
-});
-
-test('handle_rows_are_sent_where_whole_frames_would_take_long', () => {
-  expect(sendsHandles(DEFAULT_CHOICES, 10 << 20)).toBe(false);
-  expect(sendsHandles(DEFAULT_CHOICES, 100 << 20)).toBe(true);
-  expect(sendsHandles({ ...DEFAULT_CHOICES, send: 'all' }, 100 << 20)).toBe(false);
-  expect(sendsHandles({ ...DEFAULT_CHOICES, send: 'handles' }, 1)).toBe(true);
 });

@@ -18,13 +18,12 @@ export interface Choices {
   /** That error, in per cent of the diagonal. */
   readonly cageError: string;
   readonly cageSeconds: string;
-  readonly send: 'auto' | 'all' | 'handles';
 }
 
 export const DEFAULT_CHOICES: Choices = {
   name: '',
   coordinates: 'mvc',
-  accuracy: 'cages',
+  accuracy: 'standard',
   bound: '0.1',
   frameRate: '',
   cage: 'rest',
@@ -32,11 +31,10 @@ export const DEFAULT_CHOICES: Choices = {
   cageGoal: 'vertices',
   cageError: '0.1',
   cageSeconds: '',
-  send: 'auto',
 };
 
-/** From here on, `auto` sends handle rows alone: whole frames would take long, and errors are a luxury then. */
-const LARGE_BYTES = 64 << 20;
+/** Largest error of the accuracy `standard`, as a fraction of the diagonal: nobody sees it. */
+const STANDARD_ERROR = 0.001;
 
 /** The options of a session. */
 export function optionsOf(choices: Choices, frames: number, hasCage: boolean): SessionOptions {
@@ -49,6 +47,7 @@ export function optionsOf(choices: Choices, frames: number, hasCage: boolean): S
   const vertices = Number(choices.cageVertices);
   if (!hasCage && !isDesigned && choices.cageVertices.trim() !== '') options.cage = { vertices };
   if (choices.accuracy === 'bound') options.max_error = Number(choices.bound) / 100;
+  else if (choices.accuracy === 'standard') options.max_error = STANDARD_ERROR;
   else if (choices.accuracy !== 'cages') options.quality = choices.accuracy;
   return options;
 }
@@ -65,11 +64,6 @@ export function designOf(choices: Choices, hasCage: boolean): DesignOptions | nu
   else if (vertices !== '') options.vertices = Number(vertices);
   if (seconds !== '') options.time_limit_s = Number(seconds);
   return options;
-}
-
-/** Whether handle rows alone shall be sent of a capture of so many bytes, where the session allows it. */
-export function sendsHandles(choices: Choices, bytes: number): boolean {
-  return choices.send === 'handles' || (choices.send === 'auto' && bytes > LARGE_BYTES);
 }
 
 /** The fields of the form. `onChange` gets the choices anew whenever one is changed. */
@@ -89,10 +83,10 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
       <div class="field">
         <label for="accuracy">Accuracy</label>
         <select id="accuracy" aria-describedby="accuracy-hint" @change=${set('accuracy')}>
-          ${option('accuracy', 'cages', 'Cages only, no error limit')}
-          ${option('accuracy', 'preview', 'Preview: small, cages only')}
-          ${option('accuracy', 'standard', 'Standard: visually lossless')}
+          ${option('accuracy', 'standard', 'Standard: visually lossless, 0.1 % at most')}
           ${option('accuracy', 'master', 'Master: 0.01 % at most')} ${option('accuracy', 'bound', 'Custom limit')}
+          ${option('accuracy', 'preview', 'Preview: small, cages only')}
+          ${option('accuracy', 'cages', 'Cages only, no error limit')}
         </select>
         <span class="hint" id="accuracy-hint">
           ${isCoded ? 'Frames are coded in groups, and the container is small.' : 'Cages are kept exactly; details that they cannot follow are lost.'}
@@ -145,16 +139,6 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
           </select>
           <span class="hint" id="coordinates-hint">
             ${isDesigned ? 'Cages are designed for mean value coordinates.' : 'How points follow the cage.'}
-          </span>
-        </div>
-        <div class="field">
-          <label for="send">What is sent</label>
-          <select id="send" aria-describedby="send-hint" ?disabled=${isCoded} @change=${set('send')}>
-            ${option('send', 'auto', 'Choose by size')} ${option('send', 'all', 'Whole frames')}
-            ${option('send', 'handles', 'What the solver reads')}
-          </select>
-          <span class="hint" id="send-hint">
-            ${isCoded ? 'This accuracy needs whole frames.' : 'The solver reads a few hundred points of a frame. Errors are measured of whole frames alone.'}
           </span>
         </div>
       </div>

@@ -34,8 +34,6 @@ export interface UploadRequest {
   readonly options: SessionOptions;
   /** What the cage is to be that is designed first; null where none is. */
   readonly design: DesignOptions | null;
-  /** Send handle rows alone where these are less. */
-  readonly handlesOnly: boolean;
 }
 
 /** One upload. Fires `change`. */
@@ -49,8 +47,6 @@ export class UploadJob extends EventTarget {
   figures: Figures | null = null;
   /** Frames that the service has acknowledged. */
   done = 0;
-  /** Whether the handles' rows alone are sent, and errors so are not measured. */
-  handlesOnly = false;
   readonly measured: Measured;
   readonly #frames = new RateMeter();
   readonly #bytes = new RateMeter();
@@ -203,7 +199,7 @@ export class UploadJob extends EventTarget {
 
   async #send(id: string, signal: AbortSignal): Promise<void> {
     const { frames } = this.plan;
-    const sender = await this.#sender(id, signal);
+    const sender = this.#sender(id);
     const backoff = new Backoff();
     await this.#recall(id, signal);
     // Whatever broke off, what is missing then is what the service says.
@@ -237,30 +233,20 @@ export class UploadJob extends EventTarget {
     }
   }
 
-  async #sender(id: string, signal: AbortSignal): Promise<FrameSender> {
-    const handles = await this.#retry(() => this.service.handles(id, signal), signal);
-    const coded = this.session?.coding !== undefined;
-    this.handlesOnly =
-      this.request.handlesOnly && !coded && this.session?.handles !== 'all' && handles.length < this.plan.frames.points;
-    return new FrameSender(
-      this.service,
-      sessionPath(id, 'frames'),
-      this.plan.frames,
-      this.handlesOnly ? handles : null,
-      {
-        solved: (result) => {
-          this.measured.l2[result.frame] = result.l2 ?? Number.NaN;
-          this.measured.linf[result.frame] = result.linf ?? Number.NaN;
-        },
-        sent: (count, bytes) => {
-          this.done += count;
-          this.#frames.add(count);
-          this.#bytes.add(bytes);
-          this.trouble = '';
-          this.#changed();
-        },
+  #sender(id: string): FrameSender {
+    return new FrameSender(this.service, sessionPath(id, 'frames'), this.plan.frames, {
+      solved: (result) => {
+        this.measured.l2[result.frame] = result.l2 ?? Number.NaN;
+        this.measured.linf[result.frame] = result.linf ?? Number.NaN;
       },
-    );
+      sent: (count, bytes) => {
+        this.done += count;
+        this.#frames.add(count);
+        this.#bytes.add(bytes);
+        this.trouble = '';
+        this.#changed();
+      },
+    });
   }
 
   async #retry<T>(work: () => Promise<T>, signal: AbortSignal): Promise<T> {

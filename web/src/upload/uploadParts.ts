@@ -2,7 +2,7 @@ import { html, nothing } from 'lit';
 import * as glyphs from '../sessions/glyphs';
 import { counted, size } from '../sessions/text';
 import type { Item, Role } from './classify';
-import { type Choices, sendsHandles } from './optionsForm';
+import type { Choices } from './optionsForm';
 import type { Plan } from './plan';
 
 /** What the buttons of the drop zone do. */
@@ -80,10 +80,8 @@ export function itemRow(item: Item, onRole: (role: Role) => void) {
 /** What will be sent. */
 export function planSummary({ frames, cage, remarks }: Plan, choices: Choices) {
   const bytes = 12 * frames.frames * frames.points;
-  const isAll = choices.accuracy !== 'cages' || !sendsHandles(choices, bytes);
   const sentences = [
     `${counted(frames.frames, 'frame')} of ${counted(frames.points, 'point')}, ${size(bytes)} in single precision.`,
-    isAll ? 'They are sent whole.' : 'Only what the solver reads of them is sent; errors are not measured.',
     cage || choices.cage === 'motion' ? '' : 'The service makes a cage around the rest pose.',
     ...remarks,
   ];

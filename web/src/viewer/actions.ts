@@ -58,7 +58,6 @@ export function perform(action: Action, viewer: CagerViewer) {
     figures: () => (viewer.figures = !viewer.figures),
     edit: () => void viewer.toggleEditing(),
     poses: () => void viewer.togglePoses(),
-    spectrum: () => void viewer.toggleSpectrum(),
     beside: () => viewer.toggleBeside(),
     help: () => viewer.openHelp(),
   };

@@ -24,7 +24,6 @@ import { writeReadout } from './readout';
 import { canRecord } from './recording';
 import { correspondenceOf, readReport, trackingOf } from './reports';
 import { actionOfKey, type Action } from './shortcuts';
-import { SpectrumMode } from './spectrumMode';
 import { followLooks, stageColors } from './stageColors';
 import { sentence } from './text';
 import type { Timeline } from './timeline';
@@ -59,7 +58,6 @@ export class CagerViewer extends CaptureElement {
   /** A second capture to show beside the first; whoever sets it closes it. */
   @property({ attribute: false }) beside: Capture | null = null;
   readonly editing = new EditMode(this);
-  readonly spectrum = new SpectrumMode(this);
   readonly poses = new PoseMode(this);
   readonly pair = new BesideMode(this);
   private readonly files = new IncomingFiles(this);
@@ -132,24 +130,15 @@ export class CagerViewer extends CaptureElement {
     if (this.dispatchEvent(wanted)) this.files.pickBeside();
   }
 
-  /** Begins or ends to edit the cage; its singular vectors are put away. */
+  /** Begins or ends to edit the cage. */
   toggleEditing(): Promise<void> {
-    this.spectrum.leave();
     this.poses.leave();
     return this.editing.toggle();
-  }
-
-  /** Shows singular vectors on the cage, or puts them away; editing it ends. */
-  async toggleSpectrum(): Promise<void> {
-    if (this.editing.isOn) await this.editing.toggle();
-    this.poses.leave();
-    await this.spectrum.toggle();
   }
 
   /** Shows the model between poses, or as its frames are again; editing it ends. */
   async togglePoses(): Promise<void> {
     if (this.editing.isOn) await this.editing.toggle();
-    this.spectrum.leave();
     await this.poses.toggle();
   }
 
@@ -222,11 +211,10 @@ export class CagerViewer extends CaptureElement {
         editing: this.editing.isOn,
         beside: this.beside !== null,
         poses: this.poses.isOn,
-        spectrum: this.spectrum.isOn,
         recording: this.recording !== null,
         recordable: canRecord(),
       })}
-      ${this.editing.panel(stem(this))} ${this.spectrum.panel(this.look)} ${this.poses.panel()}
+      ${this.editing.panel(stem(this))} ${this.poses.panel()}
       ${this.figures ? figuresPanel(player, () => (this.figures = false)) : nothing}
       ${legend(player, this.comparisonActs, this.panelShare > 0)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
@@ -268,7 +256,6 @@ export class CagerViewer extends CaptureElement {
   protected override unload() {
     this.recording?.abort();
     this.editing.close();
-    this.spectrum.close();
     this.poses.close();
     this.pair.unload();
     super.unload();
@@ -308,7 +295,7 @@ export class CagerViewer extends CaptureElement {
 
   /** Part of a narrow picture's height that a panel takes. */
   private get panelShare(): number {
-    return Math.max(this.editing.panelShare, this.spectrum.panelShare, this.poses.panelShare);
+    return Math.max(this.editing.panelShare, this.poses.panelShare);
   }
 
   /** The same with the panel of a comparison. */
@@ -324,7 +311,7 @@ export class CagerViewer extends CaptureElement {
   /** Does what a key asks for; a page that shows nothing else can hand it all key presses. */
   readonly pressKey = (event: KeyboardEvent) => {
     if (event.defaultPrevented || this.sheet.open || this.files.isAsking) return;
-    if (this.editing.pressKey(event) || this.spectrum.pressKey(event)) return;
+    if (this.editing.pressKey(event)) return;
     const action = this.player && actionOfKey(event);
     if (!action) return;
     event.preventDefault();

@@ -15,8 +15,7 @@ export function figuresPanel(player: Player, close: () => void) {
     html`<dt>${label}</dt>
       <dd>${value}</dd>`;
   const { bits, error } = decoder.precision;
-  const { live = null, residuals = null } = player.capture;
-  const connection = residuals?.bytesPerSecond ?? null;
+  const { live = null } = player.capture;
   return html`<aside class="panel glass" aria-label="Figures">
     <header>
       <h2>Capture</h2>
@@ -37,15 +36,7 @@ export function figuresPanel(player: Player, close: () => void) {
     <dl>
       ${fileRate === null ? nothing : row('Frames of this file', bitrate(fileRate))}
       ${row('Cages before compression', bitrate(cageRate))} ${row('All points, not compressed', bitrate(rawRate))}
-      ${connection === null ? nothing : row('Connection', bitrate(connection))}
     </dl>
-    ${
-      residuals?.leftOut
-        ? html`<p class="muted">
-            The connection is too slow for all of it: the cages play alone, and the residual is added when they stand.
-          </p>`
-        : nothing
-    }
     ${
       live
         ? html`<h2>Live</h2>

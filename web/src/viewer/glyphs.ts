@@ -24,7 +24,6 @@ const DRAWINGS = {
   keyboard: svg`<rect x="3" y="6.5" width="18" height="11" rx="2"/><path d="M7 10.5h.1M10.3 10.5h.1M13.7 10.5h.1M17 10.5h.1M8 14h8"/>`,
   fullscreen: svg`<path d="M9 4H4v5M15 4h5v5M20 15v5h-5M4 15v5h5"/>`,
   beside: svg`<rect x="3.5" y="5" width="7.5" height="14" rx="1.5"/><rect x="13" y="5" width="7.5" height="14" rx="1.5"/><path d="M5.800 14.500 7.300 10l1.500 4.500zM15.300 14.500l1.500-4.500 1.500 4.500z"/>`,
-  spectrum: svg`<path d="M4.500 4.500v15h15"/><path d="M8 8v8M11.500 11v5M15 13.500v2.500M18.500 15v1" stroke-width="2.200"/>`,
   poses: svg`<path d="M12 4 20 18.5H4z"/><circle cx="12" cy="13" r="2.2" fill="currentColor" stroke="none"/>`,
   edit: svg`<path d="M4.500 17.500 12 4.500l7.500 13z"/><path d="M12 11.500v7M12 11.500l-2 2.500M12 11.500l2 2.500" opacity=".55"/><g fill="currentColor" stroke="none"><circle cx="12" cy="4.500" r="2.400"/><circle cx="4.500" cy="17.500" r="2"/><circle cx="19.500" cy="17.500" r="2"/></g>`,
   close: svg`<path d="m6 6 12 12M18 6 6 18"/>`,

@@ -57,7 +57,6 @@ export function toolbar(
     editing: boolean;
     beside: boolean;
     poses: boolean;
-    spectrum: boolean;
     recording: boolean;
     recordable: boolean;
   },
@@ -73,7 +72,6 @@ export function toolbar(
     ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}
     ${tool('edit', 'edit', 'Edit the cage', act, shown.editing)}
     ${player.capture.container ? tool('poses', 'poses', 'Blend poses', act, shown.poses) : nothing}
-    ${tool('spectrum', 'spectrum', 'Singular values and vectors', act, shown.spectrum)}
     ${tool('beside', 'beside', 'Compare with another capture', act, shown.beside)}
     <hr />
     ${tool('frame', 'frame', 'Frame all of the motion', act)}

@@ -5,7 +5,6 @@ import type { Covered, Layers } from '../render/drawn';
 import type { FrameEdit } from '../render/frameStore';
 import { Motion } from '../render/motion';
 import { Stage } from '../render/stage';
-import { followBandwidth } from './bandwidth';
 import type { Comparison } from './comparison';
 import type { Heat, HeatMap, HeatRange } from './heatMap';
 import { isFetched, phiOf } from './phi';
@@ -302,7 +301,6 @@ export class Player {
   private tick(now: number) {
     this.scheduled = 0;
     const { playback } = this;
-    followBandwidth(this.capture, playback.transport);
     const sinceLast = this.lastTick === 0 ? 0 : (now - this.lastTick) / 1000;
     const seconds = Math.min(LONGEST_STEP, sinceLast);
     const turned = this.controls.advance(seconds);

@@ -1,13 +1,20 @@
 import { html, nothing } from 'lit';
 import type { PoseView } from '../poses';
-import type { SpectrumHost } from './spectrumMode';
+import type { Player } from './player';
+
+/** What showing shapes between frames needs of the viewer around it. */
+interface PoseHost {
+  readonly player: Player | null;
+  requestUpdate(): void;
+  report(problem: string): void;
+}
 
 /** Shapes between frames in a viewer: loads what shows them when it is first used. */
 export class PoseMode {
   isOn = false;
   private view: PoseView | null = null;
 
-  constructor(private readonly host: SpectrumHost) {}
+  constructor(private readonly host: PoseHost) {}
 
   /** Part of a narrow picture's height that the panel takes, as its style says. */
   get panelShare(): number {

@@ -18,7 +18,7 @@ export function writeReadout(root: ParentNode, { capture, transport }: Player, i
   const [first, number, end] = [0, frame, last].map((place) => numberAt(transport.numbers, place));
   write('[data-place]', `${numberText(number)} / ${numberText(end)}`);
   write('[data-clock]', clock((number - first) / transport.rate));
-  const hidden = isEdited(frame) || capture.residuals?.leftOut === true;
+  const hidden = isEdited(frame);
   const figure = (value: number | undefined) =>
     value === undefined || !Number.isFinite(value) || hidden ? '–' : percent(value);
   write(

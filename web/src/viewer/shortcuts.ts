@@ -37,7 +37,6 @@ export type Action =
   | 'figures'
   | 'edit'
   | 'beside'
-  | 'spectrum'
   | 'poses'
   | 'help';
 
@@ -98,7 +97,6 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'edit', keys: ['e'], label: 'Edit the cage' },
       { action: 'beside', keys: ['b'], label: 'Another capture beside this one' },
       { action: 'poses', keys: ['n'], label: 'Blend poses' },
-      { action: 'spectrum', keys: ['v'], label: 'Singular values and vectors of Φ' },
       { action: 'picture', keys: ['p'], label: 'Save a picture' },
       { action: 'turntable', keys: ['t'], label: 'Record a turntable video' },
       { action: 'help', keys: ['?'], label: 'Keyboard shortcuts' },

@@ -23,7 +23,7 @@ export async function surveyMotion(
   const wanted = new Set(Array.from({ length: FRAMES }, (_, k) => Math.round((k * last) / (FRAMES - 1))));
   for (const frame of wanted) {
     while (isBusy() && !signal.aborted) await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
-    if (signal.aborted || capture.residuals?.leftOut) return;
+    if (signal.aborted) return;
     if (motion.knows(frame)) continue;
     try {
       motion.include(await capture.block(frame, signal));

@@ -4,7 +4,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { openPage, slow } from './harness/browser';
+import { openPage } from './harness/browser';
 import type { TestClient } from './harness/client';
 import { NoisyCapture } from './harness/noisyCapture';
 import { cager, missing } from './harness/programs';
@@ -92,34 +92,9 @@ describe.skipIf(missing)('layers of a running session', { timeout: 120_000 }, ()
     await close();
   });
 
-  test('a slow connection plays the cages alone, and brings the layers when they stand', async () => {
-    const id = await started('slow', GROUP + 60, 240);
-    await expect.poll(async () => (await client.session(id)).coding!.frames, { timeout: 30_000 }).toBe(GROUP);
-    const { page, errors, close } = await openPage(site.browser, `${site.page}#/file`);
-    await page.locator('cager-viewer').waitFor({ state: 'attached' });
-    await slow(page, { downloadThroughput: 25_000 });
-    await page.evaluate((session) => (location.hash = `#/session/${session}`), id);
-    await whenShown(page);
-    await inViewer(
-      page,
-      ({ player }) => void (player!.transport = { ...player!.transport, playing: true, position: 0 }),
-      null,
-    );
-    await expect
-      .poll(() => inViewer(page, ({ player }) => player!.capture.residuals!.leftOut, null), { timeout: 30_000 })
-      .toBe(true);
-    expect(await isFinal(page, 10)).toBe(false);
-    await slow(page, {});
-    await stand(page, 10);
-    await expect.poll(() => isFinal(page, 10), { timeout: 20_000 }).toBe(true);
-    expect(errors).toEqual([]);
-    await close();
-  });
-
   /** A session whose first frames are posted. */
-  async function started(name: string, frames: number, frameRate?: number): Promise<string> {
-    const rate = frameRate === undefined ? {} : { frame_rate: frameRate };
-    const { id } = await client.create(capture, { name, max_error: MAX_ERROR, ...rate });
+  async function started(name: string, frames: number): Promise<string> {
+    const { id } = await client.create(capture, { name, max_error: MAX_ERROR });
     expect((await client.whenReady(id)).coding!.group_frames).toBe(GROUP);
     await post(id, 0, frames);
     return id;
