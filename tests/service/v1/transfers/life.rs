@@ -1,7 +1,7 @@
 //! Transfers are repeated, listed, deleted and counted as other jobs are.
 
-use super::{completed, create, created, motion, running, transfer};
-use crate::support::{Inside, SlowDesigns, TestApp, eventually};
+use super::{PATIENCE, completed, create, created, motion, running, transfer};
+use crate::support::{Inside, SlowDesigns, TestApp, eventually, within};
 use cager_proto::messages::JobState;
 use cager_proto::transfer_messages::{Transfer, TransferList, TransferStage};
 use futures_util::future::join_all;
@@ -45,7 +45,16 @@ async fn one_that_is_deleted_while_it_runs_makes_room_for_the_next() {
         let found = transfer(&app, &first.id).await;
         (found.stage == Some(TransferStage::Designing) && slow.running.load(SeqCst) == 1).then_some(found)
     };
-    assert_eq!(eventually("its cage is designed", designing).await.moved, first.frames);
+    // It is laid onto the target before, which takes its time on a busy machine.
+    let found = within("its cage is designed", PATIENCE, async {
+        loop {
+            if let Some(found) = designing().await {
+                return found;
+            }
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    });
+    assert_eq!(found.await.moved, first.frames);
     let path = format!("/v1/transfers/{}", first.id);
     let events = {
         let (api, path) = ((*app).clone(), format!("{path}/events"));
