@@ -91,7 +91,7 @@ impl PostgresCatalog {
     }
 }
 
-/// Number of a record; `None` if there is none.
+/// Number of the row of a record; `None` if the record does not exist.
 async fn number(link: &Link, key: Key<'_>) -> Result<Option<i64>, Trouble> {
     let sql = "SELECT number FROM records WHERE kind = $1 AND id = $2";
     let rows = link.query(sql, &[&kind_number(key.kind), &key.id]).await?;

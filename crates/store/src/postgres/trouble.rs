@@ -80,7 +80,7 @@ impl Trouble {
     }
 }
 
-/// A value that is none of its column: no such value was written.
+/// Whether a column holds a value that its type does not allow, which this program never writes.
 fn is_unreadable(error: &Error) -> bool {
     error.to_string().starts_with("error deserializing")
 }

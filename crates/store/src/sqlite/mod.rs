@@ -135,7 +135,7 @@ fn connect(path: &Path) -> Result<Connection, CatalogError> {
     Ok(connection)
 }
 
-/// Number of a record; `None` if there is none.
+/// Number of the row of a record; `None` if the record does not exist.
 fn number(connection: &Connection, key: Key<'_>) -> Result<Option<i64>, CatalogError> {
     let mut statement = connection.prepare_cached("SELECT number FROM records WHERE kind = ?1 AND id = ?2")?;
     Ok(statement.query_row(params![kind_number(key.kind), key.id], |row| row.get(0)).optional()?)
