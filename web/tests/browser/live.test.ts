@@ -2,7 +2,7 @@ import { execFileSync } from 'node:child_process';
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import type { Capture } from '../../src/capture';
 import { seriousFindings } from './harness/axe';
 import { openPage, slow, type Watched } from './harness/browser';
@@ -26,6 +26,8 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
 
   // A test that fails while the network is lost leaves it to the next one.
   afterEach(() => site.server.recover());
+
+  beforeEach(() => site.service.run());
 
   afterAll(() => site.close());
 

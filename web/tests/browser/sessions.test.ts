@@ -3,7 +3,7 @@ import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import { seriousFindings } from './harness/axe';
 import { openPage, PHONE } from './harness/browser';
 import { cager, missing } from './harness/programs';
@@ -20,6 +20,8 @@ describe.skipIf(missing)('the list of sessions', { timeout: 60_000 }, () => {
   beforeAll(async () => {
     site = await Site.start();
   }, 120_000);
+
+  beforeEach(() => site.service.run());
 
   afterAll(() => site.close());
 

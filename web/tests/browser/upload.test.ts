@@ -3,7 +3,7 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import { solvedFromStart } from '../../src/service/messages';
 import { seriousFindings } from './harness/axe';
 import { openPage, slow } from './harness/browser';
@@ -20,6 +20,8 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
   beforeAll(async () => {
     site = await Site.start();
   }, 120_000);
+
+  beforeEach(() => site.service.run());
 
   afterAll(() => site.close());
 
@@ -80,6 +82,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     const large = new SphereCapture(4);
     const frames = 1200;
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['502', 'ERR_']);
+    await slow(page, { uploadThroughput: 8 << 20 });
     // The bytes are made in the page: they are too many to be carried there.
     await drop(
       page,
@@ -95,6 +98,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
       .getByText(/tries again/)
       .waitFor();
     await site.service.run();
+    await slow(page, {});
     const id = await encoded(page);
     expect((await site.client().session(id)).frames).toMatchObject({ solved: frames, missing: [] });
     expect(errors).toEqual([]);

@@ -44,8 +44,9 @@ export class TestService {
     return service;
   }
 
-  /** Starts it again, at the same port. */
+  /** Starts it again, at the same port; nothing where it runs, as it does unless a test failed after it had killed it. */
   async run(): Promise<void> {
+    if (this.#process && running.has(this.#process)) return;
     const args = ['serve', '--listen', `127.0.0.1:${this.#port}`, '--data', join(this.folder, 'data'), ...this.args];
     const started = spawn(cager!, args, { stdio: ['ignore', 'pipe', 'pipe'] });
     this.#process = started;
