@@ -67,6 +67,9 @@ settings! {
     admin_listen: Option<SocketAddr> = None, Kind::Address;
     /// Folder of sessions and prepared solvers; made if it is not there.
     data: PathBuf = PathBuf::from("cager-data"), Kind::File;
+    /// Address of a PostgreSQL database for what is known of sessions, `postgres://USER:PASSWORD@HOST:5432/DATABASE`; without one it is in a file in the data
+    /// folder.
+    catalog: Option<String> = None, Kind::Secret;
     /// File of access tokens; without one everyone on this machine is tenant `local`.
     tokens: Option<PathBuf> = None, Kind::File;
     /// Address of an OpenID Connect provider whose tokens are taken as well.

@@ -136,9 +136,9 @@ impl From<StoreError> for ApiError {
                 "the service's disk is full; no acknowledged frame is lost, so try again when the operator has freed space",
             )
             .retry_after(60),
-            StoreError::Io { .. } => {
-                tracing::error!(%error, "a file of the store cannot be read or written");
-                let detail = "the service's disk failed to read or write; no acknowledged frame is lost, so try again when the operator has checked the disk";
+            StoreError::Io { .. } | StoreError::Catalog { .. } => {
+                tracing::error!(%error, "a file of the store or its catalogue cannot be read or written");
+                let detail = "the service's disk or database failed to read or write; no acknowledged frame is lost, so try again when the operator has checked it";
                 Self::new(STORAGE_FAILED, detail).retry_after(10)
             }
             StoreError::Damaged { .. } => {

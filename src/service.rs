@@ -42,6 +42,8 @@ const UPLOAD_PIECE: u64 = 64 << 10;
 
 /// How long the result of a disk probe is valid.
 const PROBE_VALIDITY: std::time::Duration = std::time::Duration::from_secs(1);
+/// How often it is looked whether another process has the database.
+const TAKEN_OVER_CHECK: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// State shared by all request handlers.
 pub struct Service {
@@ -153,7 +155,7 @@ impl Service {
         if let Some(trust) = config.trust() {
             access = access.with_provider(trust)?;
         }
-        let opened = Store::open(&config.data, disk)?;
+        let opened = Store::open(&config.data, disk, config.catalog.as_deref())?;
         for damaged in &opened.quarantined {
             tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged, and left out");
             metrics::counter!("cager_quarantined_total").increment(1);
@@ -229,6 +231,7 @@ impl Service {
         );
         tokio::spawn(Arc::clone(&service).sweep(stop.clone()));
         tokio::spawn(Arc::clone(&service).check_stored(stop.clone()));
+        tokio::spawn(Arc::clone(&service).stop_when_taken_over());
         let watching = Arc::clone(&service);
         tokio::spawn(async move { watching.access.clone().watch(stop).await });
         Ok(service)
@@ -264,6 +267,22 @@ impl Service {
             }
             let _ = blocking(move || session.check_stored()).await;
         }
+    }
+
+    /// Stops the service where another process has taken its database over.
+    async fn stop_when_taken_over(self: Arc<Self>) {
+        while !self.stop.is_cancelled() {
+            if self.is_taken_over() {
+                tracing::error!("another process has taken over the database; this one stops");
+                return self.stop.cancel();
+            }
+            let _ = tokio::time::timeout(TAKEN_OVER_CHECK, self.stop.cancelled()).await;
+        }
+    }
+
+    /// Whether another process has taken its database over.
+    pub(crate) fn is_taken_over(&self) -> bool {
+        self.store.is_taken_over()
     }
 
     /// Cancelled when the service stops.

@@ -4,10 +4,10 @@ use super::print;
 use crate::config::{ServeConfig, ServeFlags};
 use crate::http::listen::{Limits, serve, tls_config};
 use crate::http::{admin, router, spare};
-use crate::service::Service;
-use crate::store::LocalDisk;
+use crate::service::{Service, StartError};
+use crate::store::{LocalDisk, StoreError};
 use crate::telemetry;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use std::io::Write;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -17,6 +17,8 @@ use tokio_util::sync::CancellationToken;
 
 /// Connections of operators and their machines.
 const OPERATORS: usize = 64;
+/// How often it is tried to take over a database that another process has.
+const TAKEOVER_PAUSE: Duration = Duration::from_millis(250);
 
 pub(super) fn run(flags: &ServeFlags) -> Result<()> {
     let config = ServeConfig::load(flags.config.as_deref(), std::env::vars(), flags)?;
@@ -54,6 +56,8 @@ pub(crate) async fn run_until(
     tokio::spawn(telemetry::metrics::keep(stop.clone()));
     let tls = config.tls().map(|tls| tls_config(&tls)).transpose()?;
     let scheme = if tls.is_some() { "https" } else { "http" };
+    // What waits for a database that another process has listens to nobody, so that nobody is sent here.
+    let service = start(config.clone(), &stop).await?;
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))?;
@@ -64,7 +68,6 @@ pub(crate) async fn run_until(
         None => None,
     };
     let limits = config.limits();
-    let service = Service::start(config, Arc::new(LocalDisk), stop.clone())?;
     let drained = CancellationToken::new();
     let address = listener.local_addr()?;
     tracing::info!(%address, scheme, "listening");
@@ -76,11 +79,36 @@ pub(crate) async fn run_until(
         tokio::spawn(serve(operators, routes, spare, limits, None, drained.clone()));
     }
     listening(address);
-    serve(listener, router(Arc::clone(&service)), spare(service), limits, tls, stop).await?;
+    serve(listener, router(Arc::clone(&service)), spare(Arc::clone(&service)), limits, tls, stop).await?;
     // The operators' listener closes last.
     drained.cancel();
+    if service.is_taken_over() {
+        bail!("another process has taken over the database, and goes on with all sessions");
+    }
     tracing::info!("stopped");
     Ok(())
+}
+
+/// Opens the data folder. While another process has its database, waits for the end of that one.
+async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Arc<Service>> {
+    let mut is_told = false;
+    loop {
+        let (config, own) = (config.clone(), stop.clone());
+        let started = tokio::task::spawn_blocking(move || Service::start(config, Arc::new(LocalDisk), own)).await?;
+        let what = match started {
+            Err(StartError::Store(StoreError::InUse { what })) => what,
+            // Who waits does so through restarts of the database too.
+            Err(StartError::Store(StoreError::Catalog { what, .. })) if is_told => what,
+            started => return Ok(started?),
+        };
+        if !std::mem::replace(&mut is_told, true) {
+            tracing::warn!("waits, to take over when that ends: {what}");
+        }
+        tokio::select! {
+            () = tokio::time::sleep(TAKEOVER_PAUSE) => {}
+            () = stop.cancelled() => bail!("stopped while it waited for the database: {what}"),
+        }
+    }
 }
 
 /// Begins to stop at the first signal; the second one ends the process at once.

@@ -23,6 +23,10 @@ pub struct ServeFlags {
     #[arg(long, value_name = "DIR")]
     pub data: Option<PathBuf>,
 
+    /// PostgreSQL database for what is known of sessions [default: a file in the data folder]. A password is safer in the variable CAGER_CATALOG.
+    #[arg(long, value_name = "URL")]
+    pub catalog: Option<String>,
+
     /// File of settings, TOML.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -75,6 +79,7 @@ impl ServeFlags {
             ("listen", self.listen.clone()),
             ("admin_listen", self.admin_listen.clone()),
             ("data", path(&self.data)),
+            ("catalog", self.catalog.clone()),
             ("tokens", path(&self.tokens)),
             ("tls_certificate", path(&self.tls_certificate)),
             ("tls_key", path(&self.tls_key)),

@@ -10,11 +10,19 @@ pub(super) enum Kind {
     Address,
     File,
     Text,
+    /// An address, in which a password may be.
+    Secret,
     Format,
     Filter,
     List,
-    Number { least: u64, most: u64 },
-    Bytes { least: u64, most: u64 },
+    Number {
+        least: u64,
+        most: u64,
+    },
+    Bytes {
+        least: u64,
+        most: u64,
+    },
 }
 
 /// Names of all settings, in the order in which they are shown.
@@ -30,6 +38,11 @@ pub(super) fn read(name: &str, value: &Value) -> Option<Result<Value, String>> {
 /// Whether it names a file or folder.
 pub(super) fn is_file(name: &str) -> bool {
     SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, Kind::File))
+}
+
+/// Whether a password may be in it.
+pub(super) fn is_secret(name: &str) -> bool {
+    SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, Kind::Secret))
 }
 
 /// Whether sizes may be given in units.
@@ -52,7 +65,7 @@ impl Kind {
                 None | Some("") => Err("write the path of a file or folder, in quotation marks".to_owned()),
                 Some(text) => Ok(Value::String(text.to_owned())),
             },
-            Self::Text => match text.map(str::trim) {
+            Self::Text | Self::Secret => match text.map(str::trim) {
                 None | Some("") => Err("write a text, in quotation marks".to_owned()),
                 Some(text) => Ok(Value::String(text.to_owned())),
             },

@@ -17,6 +17,9 @@ impl ServeConfig {
                     let size = u64::try_from(*number).map(settings::show_bytes).unwrap_or_default();
                     format!("{name} = {}", value(&Value::String(size)))
                 }
+                Some(Value::String(address)) if settings::is_secret(name) => {
+                    format!("{name} = {}", value(&Value::String(without_password(address))))
+                }
                 Some(other) => format!("{name} = {}", value(other)),
             };
             // Writing to a string cannot fail.
@@ -24,6 +27,16 @@ impl ServeConfig {
         }
         text
     }
+}
+
+/// An address with `***` for its password.
+fn without_password(address: &str) -> String {
+    let shown = address.split_once("://").and_then(|(scheme, rest)| {
+        let (user, host) = rest.rsplit_once('@')?;
+        let (name, _) = user.split_once(':')?;
+        Some(format!("{scheme}://{name}:***@{host}"))
+    });
+    shown.unwrap_or_else(|| address.to_owned())
 }
 
 /// A value as TOML has it. Texts are escaped as in JSON, which TOML understands.

@@ -26,6 +26,28 @@ pub enum StoreError {
         /// The folder.
         path: PathBuf,
     },
+    /// Another process has the database for itself.
+    #[error("{what}")]
+    InUse {
+        /// Which database, who has it and what to do.
+        what: String,
+    },
+    /// The data folder and the database do not belong together.
+    #[error("{what}")]
+    Elsewhere {
+        /// Which, and what to do.
+        what: String,
+    },
+    /// The catalogue cannot be used.
+    #[error("could not {action} {}: {what}", path.display())]
+    Catalog {
+        /// Its file, or what the database is called.
+        path: PathBuf,
+        /// What was attempted, as a verb.
+        action: &'static str,
+        /// What went wrong, and what to do.
+        what: String,
+    },
     /// Not a valid id; nothing was looked up.
     #[error("{id:?} is not the id of a session: ids are 1 to 64 of the characters 0-9, a-z and -")]
     BadId {

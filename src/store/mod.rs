@@ -5,6 +5,7 @@
 //! ```text
 //! lock             locked while a process uses the folder
 //! catalog.db       records of sessions and jobs, and the cages of frames (crate `cager-store`), with -wal, -shm and .reserve beside it
+//! catalog.database instead of it where they are in a database: the folder's number, which that has too
 //! sessions/<id>/   capture.cager  frames-<first>  group-<first>  last-<first>
 //! cages/<id>/      rest  frames  cage.obj
 //! recoveries/<id>/ template  cage  rig  manifold  frame-<k>  capture.cager  cages  report.json  joints.csv  joints.bvh
@@ -29,6 +30,7 @@ use std::sync::atomic::AtomicBool;
 
 mod cage_jobs;
 mod content;
+mod database;
 pub mod disk;
 mod error;
 #[cfg(test)]
@@ -77,10 +79,12 @@ pub struct Store {
 struct Inner {
     files: Files,
     catalog: Arc<dyn Catalog>,
+    /// Its file, or what the database is called.
     catalog_path: PathBuf,
     /// Something that may need content could not be read at the start.
     keeps_contents: AtomicBool,
-    _lock: File,
+    /// `None` where the database has the lock.
+    _lock: Option<File>,
 }
 
 /// Name of the catalogue's file.
@@ -115,23 +119,31 @@ pub struct Quarantined {
 }
 
 impl Store {
-    /// Opens the folder `root` for this process alone, creating it if it is missing. Finishes interrupted deletions, removes temporary
+    /// Opens the folder `root` for this process alone, creating it if it is missing, with its catalogue in the database at this address where one is
+    /// given. Finishes interrupted deletions, removes temporary
     /// files, takes over what an earlier version stored, and moves objects with damaged metadata to `quarantine/`.
     ///
     /// # Errors
-    /// [`StoreError::Locked`] if another process uses it; [`StoreError::Damaged`] where its catalogue is damaged, or is missing while sessions or
+    /// [`StoreError::Locked`] or [`StoreError::InUse`] if another process uses it; [`StoreError::Elsewhere`] where database and folder do not belong
+    /// together; [`StoreError::Damaged`] where its catalogue is damaged, or is missing while sessions or
     /// jobs are there. Damaged sessions are not an error.
-    pub fn open(root: &Path, disk: Arc<dyn Disk>) -> Result<Opened, StoreError> {
+    pub fn open(root: &Path, disk: Arc<dyn Disk>, database: Option<&str>) -> Result<Opened, StoreError> {
         make_folder(&*disk, root)?;
         let lock_path = root.join("lock");
-        let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
-        let lock = lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })?;
+        let lock = || {
+            let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
+            lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })
+        };
+        // Where machines share the folder, a lock of one that is gone may stay for long; the database knows better.
+        let lock = database.is_none().then(lock).transpose()?;
         let files = Files::new(root, disk);
         let own = [&files.sessions, &files.cages, &files.recoveries, &files.transfers, &files.contents];
         let kept = [&files.trash, &files.prepared].into_iter().chain(own);
         for folder in kept.clone().chain([&files.quarantine, &files.tmp]) {
             make_folder(&*files.disk, folder)?;
         }
+        // Before anything is removed: it is another process's folder where the database is.
+        let in_database = database.map(|url| database::open(&files, url)).transpose()?;
         // They may be so on purpose: whoever made them decides.
         let is_open = |folder: &Path| disk::is_open_to_all(folder).unwrap_or(false);
         if is_open(root) && own.into_iter().any(|folder| is_open(folder)) {
@@ -150,14 +162,10 @@ impl Store {
                 tracing::warn!(%error, "something deleted still takes space");
             }
         }
-        let catalog_path = files.root.join(CATALOG);
-        let is_new = !files.exists(&catalog_path)?;
-        if is_new && import::is_without_records(&files)? {
-            let what = "it is missing, and there are sessions or jobs in the folder";
-            return Err(StoreError::damaged(&catalog_path, what));
-        }
-        let catalog = files.disk.catalog(&catalog_path).map_err(|e| of_catalog(&catalog_path, "open", e))?;
-        files.sync_dir(&files.root)?;
+        let (catalog, catalog_path) = match in_database {
+            Some(opened) => opened,
+            None => own_catalog(&files)?,
+        };
         let keeps_contents = AtomicBool::new(false);
         let store = Self { inner: Arc::new(Inner { files, catalog, catalog_path, keeps_contents, _lock: lock }) };
         let records = store.catalog().records().map_err(|e| store.failed("open", e))?;
@@ -194,6 +202,11 @@ impl Store {
         &self.inner.files
     }
 
+    /// Whether another process has taken the database over, so that this one can change nothing any more.
+    pub fn is_taken_over(&self) -> bool {
+        self.catalog().is_taken_over()
+    }
+
     /// Free space of the file system, in bytes; 0 if unknown.
     pub fn free_bytes(&self) -> u64 {
         self.files().disk.free_bytes(&self.files().root).unwrap_or(0)
@@ -209,6 +222,19 @@ impl Store {
     }
 }
 
+/// Opens the catalogue in the folder itself. Gives its path too.
+fn own_catalog(files: &Files) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
+    database::refuse(files)?;
+    let path = files.root.join(CATALOG);
+    if !files.exists(&path)? && import::is_without_records(files)? {
+        let what = "it is missing, and there are sessions or jobs in the folder";
+        return Err(StoreError::damaged(&path, what));
+    }
+    let catalog = files.disk.catalog(&path).map_err(|e| of_catalog(&path, "open", e))?;
+    files.sync_dir(&files.root)?;
+    Ok((catalog, path))
+}
+
 fn of_catalog(path: &Path, action: &'static str, error: CatalogError) -> StoreError {
     let cause: io::Error = match error {
         CatalogError::Full => return StoreError::Full { path: path.to_owned() },
@@ -217,7 +243,12 @@ fn of_catalog(path: &Path, action: &'static str, error: CatalogError) -> StoreEr
         CatalogError::Taken => io::ErrorKind::AlreadyExists.into(),
         // While the service runs that is no damage of the session that met it.
         CatalogError::Corrupt(what) if action == "open" => return StoreError::damaged(path, what),
-        other => io::Error::other(other),
+        other => {
+            // A database names itself.
+            let (what, name) = (other.to_string(), path.display().to_string());
+            let what = what.strip_prefix(&name).map_or(&what[..], str::trim_start).to_owned();
+            return StoreError::Catalog { path: path.to_owned(), action, what };
+        }
     };
     StoreError::of(path, action, cause)
 }

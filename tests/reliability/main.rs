@@ -6,6 +6,8 @@
 mod capture;
 mod client_gone;
 mod completion;
+#[path = "../database/mod.rs"]
+mod database;
 mod disk;
 mod faults;
 mod gate;

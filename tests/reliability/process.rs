@@ -1,5 +1,6 @@
 //! A `cager serve` of its own: started, watched and killed.
 
+use crate::database::Database;
 use cager_client::{Client, ClientOptions};
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
@@ -26,12 +27,20 @@ pub(crate) struct Setup {
     pub(crate) listen: SocketAddr,
     pub(crate) settings: Vec<String>,
     pub(crate) tokens: Option<PathBuf>,
+    /// Where its catalogue is, unless that is in its folder.
+    pub(crate) database: Option<Database>,
 }
 
 impl Setup {
     pub(crate) fn new(data: &Path, settings: &[&str]) -> Self {
         let listen = "127.0.0.1:0".parse().expect("an address");
-        Self { data: data.to_owned(), listen, settings: settings.iter().map(|&s| s.to_owned()).collect(), tokens: None }
+        Self {
+            data: data.to_owned(),
+            listen,
+            settings: settings.iter().map(|&s| s.to_owned()).collect(),
+            tokens: None,
+            database: Database::of_all(),
+        }
     }
 
     pub(crate) async fn start(&self) -> Server {
@@ -43,6 +52,9 @@ impl Setup {
         command.arg(&self.data);
         for setting in &self.settings {
             command.args(["--set", setting]);
+        }
+        if let Some(database) = &self.database {
+            command.args(["--catalog", &database.url()]);
         }
         if let Some(tokens) = &self.tokens {
             command.arg("--tokens").arg(tokens);

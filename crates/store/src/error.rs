@@ -24,6 +24,12 @@ pub enum CatalogError {
     /// A newer version of the program wrote it.
     #[error("it has version {0}, and this program reads up to 1: use the newer program")]
     Newer(i64),
+    /// Another process has the database for itself.
+    #[error("{0}")]
+    InUse(String),
+    /// Another process has taken the database for itself since.
+    #[error("another process has taken over the database, and this one changes nothing any more")]
+    TakenOver,
     /// Anything else.
     #[error("{0}")]
     Failed(String),

@@ -6,11 +6,13 @@
 
 mod checksums;
 mod chunks;
+mod copy;
 mod error;
 mod numbers;
 mod postgres;
 mod sqlite;
 
+pub use copy::copy;
 pub use error::CatalogError;
 pub use postgres::PostgresCatalog;
 pub use sqlite::SqliteCatalog;
@@ -218,4 +220,9 @@ pub trait Catalog: Debug + Send + Sync {
 
     /// Checks that it can be written to.
     fn probe(&self) -> Result<(), CatalogError>;
+
+    /// Whether another process has taken it over, so that nothing can be changed any more.
+    fn is_taken_over(&self) -> bool {
+        false
+    }
 }

@@ -50,7 +50,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), StoreError> {
     fn twice<T>(mut step: impl FnMut() -> Result<T, StoreError>) -> Result<T, StoreError> {
         step().or_else(|_| step())
     }
-    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone())))?.store;
+    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), None))?.store;
     for id in ["a", "b"] {
         twice(|| create(&store, id))?;
         told.created.push(id);

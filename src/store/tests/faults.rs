@@ -32,7 +32,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), ()> {
             .map_err(|error| errors.push(error))
     }
     let errors = &mut told.errors;
-    let store = twice(errors, || Store::open(given.root(), Arc::new(given.disk.clone())))?.store;
+    let store = twice(errors, || Store::open(given.root(), Arc::new(given.disk.clone()), None))?.store;
     twice(errors, || store.put_content(&KEY, &content()))?;
     told.content = true;
     twice(errors, || store.put_prepared(&KEY, &SOLVER))?;

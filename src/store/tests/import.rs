@@ -125,7 +125,7 @@ fn taking_over_may_stop_anywhere() {
         for loss in [Loss::Nothing, Loss::Everything, Loss::Torn(nth)] {
             let given = old();
             given.disk.fail(None, nth, Fault::Stop);
-            let stopped = crate::store::Store::open(given.root(), std::sync::Arc::new(given.disk.clone()));
+            let stopped = crate::store::Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), None);
             drop(stopped);
             given.disk.restart(loss).unwrap();
             look(&given, &format!("stopped at operation {nth}, {loss:?}"));

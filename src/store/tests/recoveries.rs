@@ -63,7 +63,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), StoreError> {
     fn twice<T>(mut step: impl FnMut() -> Result<T, StoreError>) -> Result<T, StoreError> {
         step().or_else(|_| step())
     }
-    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone())))?.store;
+    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), None))?.store;
     for id in ["a", "b"] {
         twice(|| match store.create_recovery(&meta(id), &parts()) {
             // Made at the first attempt, where even taking it back had failed.

@@ -1,4 +1,5 @@
 mod access;
+mod database;
 mod folder;
 mod limits;
 mod overload;

@@ -2,6 +2,8 @@
 
 mod api;
 mod capture;
+#[path = "../../database/mod.rs"]
+mod database;
 mod elsewhere;
 mod inside;
 mod raw;
@@ -10,6 +12,7 @@ pub(crate) use api::{
     Api, OCTETS, RECORDS, Reply, cage_form, cage_form_of, cages_of, file, form, form_of, lines, piece, records, text,
 };
 pub(crate) use capture::{Capture, Mesh};
+pub(crate) use database::Database;
 pub(crate) use elsewhere::{Elsewhere, Heard};
 pub(crate) use inside::{Inside, SlowDesigns};
 pub(crate) use raw::{Raw, chunked};
@@ -36,7 +39,20 @@ pub(crate) struct TestApp {
     place: Arc<TempDir>,
     flags: Vec<String>,
     environment: Vec<(String, String)>,
+    /// Where its catalogue is, unless that is in its folder.
+    database: Option<Database>,
     api: Api,
+}
+
+/// A service that does not answer yet.
+pub(crate) struct Waiting {
+    process: Child,
+    stdout: BufReader<ChildStdout>,
+    place: Arc<TempDir>,
+    flags: Vec<String>,
+    environment: Vec<(String, String)>,
+    database: Option<Database>,
+    token: Option<String>,
 }
 
 impl Deref for TestApp {
@@ -76,6 +92,29 @@ impl TestApp {
         Self::launch(Arc::new(folder()), flags, Vec::new(), None)
     }
 
+    /// Starts a service with its catalogue in a database and these settings.
+    pub(crate) fn on(database: &Database, settings: &[&str]) -> Self {
+        let flags = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]).collect();
+        Waiting::spawn(Arc::new(folder()), flags, Vec::new(), Some(database.clone()), None).ready()
+    }
+
+    /// Starts the service again, on the same folder, with its catalogue in a database.
+    pub(crate) fn moved_to(&self, database: &Database) -> Self {
+        let (place, flags) = (Arc::clone(&self.place), self.flags.clone());
+        Waiting::spawn(place, flags, Vec::new(), Some(database.clone()), self.api.token.clone()).ready()
+    }
+
+    /// Another one, on the same folder with the same settings.
+    pub(crate) fn beside(&self) -> Waiting {
+        let (place, flags, environment) = (Arc::clone(&self.place), self.flags.clone(), self.environment.clone());
+        Waiting::spawn(place, flags, environment, self.database.clone(), self.api.token.clone())
+    }
+
+    /// Of its process.
+    pub(crate) fn id(&self) -> u32 {
+        self.process.id()
+    }
+
     /// Starts a service with default settings and these variables.
     pub(crate) fn with_environment(variables: &[(&str, &str)]) -> Self {
         let variables = variables.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
@@ -103,26 +142,7 @@ impl TestApp {
         environment: Vec<(String, String)>,
         token: Option<String>,
     ) -> Self {
-        let log = std::fs::OpenOptions::new().create(true).append(true).open(place.path().join("log"));
-        let mut process = service()
-            .args(["--listen", "127.0.0.1:0", "--data"])
-            .arg(place.path().join("data"))
-            .args(&flags)
-            .envs(environment.iter().map(|(name, value)| (name, value)))
-            .stdout(Stdio::piped())
-            .stderr(log.expect("a log"))
-            .spawn()
-            .expect("the service starts");
-        let mut stdout = BufReader::new(process.stdout.take().expect("its output"));
-        let mut line = String::new();
-        stdout.read_line(&mut line).expect("its first line");
-        let Some(address) = line.trim().strip_prefix("listening on ") else {
-            let _ = process.kill();
-            panic!("{line:?}; {}", std::fs::read_to_string(place.path().join("log")).unwrap_or_default());
-        };
-        let address: SocketAddr = address.parse().expect("an address");
-        let api = Api::new(address, token, false);
-        Self { process, _stdout: stdout, address, place, flags, environment, api }
+        Waiting::spawn(place, flags, environment, Database::of_all(), token).ready()
     }
 
     /// The same over HTTP/2.
@@ -159,33 +179,48 @@ impl TestApp {
         self.place.path().join("data")
     }
 
-    fn catalog(&self) -> rusqlite::Connection {
-        rusqlite::Connection::open(self.data().join("catalog.db")).expect("a catalogue")
+    /// Changes the catalogue behind the service's back; `sql` gives a column of the rows that were changed. Gives the first one, as text.
+    fn change(&self, sql: &str) -> String {
+        match &self.database {
+            Some(database) => database.sql(sql),
+            None => {
+                let file = rusqlite::Connection::open(self.data().join("catalog.db")).expect("a catalogue");
+                file.query_row(sql, [], |row| row.get(0)).expect(sql)
+            }
+        }
     }
 
     /// Changes what is stored of a session or job behind the service's back.
     pub(crate) fn set_record(&self, id: &str, change: &str) {
-        let changed = self.catalog().execute(&format!("UPDATE records SET {change} WHERE id = ?1"), [id]);
-        assert_eq!(changed.expect(change), 1);
+        assert_eq!(self.change(&format!("UPDATE records SET {change} WHERE id = '{id}' RETURNING id")), id);
     }
 
     /// Changes what is stored of a session or job in a column, with its digest.
     pub(crate) fn rewrite(&self, id: &str, column: &str, change: impl FnOnce(&mut serde_json::Value)) {
-        let find = format!("SELECT {column} FROM records WHERE id = ?1");
-        let stored: Vec<u8> = self.catalog().query_row(&find, [id], |row| row.get(0)).expect("a record");
+        let hex = if self.database.is_some() { format!("encode({column}, 'hex')") } else { format!("hex({column})") };
+        let stored = self.change(&format!("SELECT {hex} FROM records WHERE id = '{id}'"));
+        let byte = |at: usize| u8::from_str_radix(&stored[at..at + 2], 16).expect("hexadecimal");
+        let stored: Vec<u8> = (0..stored.len()).step_by(2).map(byte).collect();
         let mut whole: serde_json::Value = serde_json::from_slice(&stored).expect("JSON");
         change(&mut whole["body"]);
         let (kind, body) = (whole["kind"].as_str().expect("a kind"), whole["body"].to_string());
         let digest = blake3::hash(body.as_bytes()).to_hex();
         let text = format!("{{\"format\":1,\"kind\":\"{kind}\",\"blake3\":\"{digest}\",\"body\":{body}}}\n");
-        let put = format!("UPDATE records SET {column} = ?2 WHERE id = ?1");
-        self.catalog().execute(&put, rusqlite::params![id, text.into_bytes()]).expect("a record");
+        let hex = text.bytes().fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"));
+        let bytes = if self.database.is_some() { format!("'\\x{hex}'") } else { format!("x'{hex}'") };
+        self.set_record(id, &format!("{column} = {bytes}"));
     }
 
     /// Damages the cages that are stored of a session.
     pub(crate) fn damage_frames(&self, id: &str) {
-        let damage = "UPDATE chunks SET bytes = zeroblob(length(bytes)) WHERE record = (SELECT number FROM records WHERE id = ?1)";
-        assert!(self.catalog().execute(damage, [id]).expect("frames") > 0);
+        let zeros = if self.database.is_some() {
+            "decode(repeat('00', length(bytes)), 'hex')"
+        } else {
+            "zeroblob(length(bytes))"
+        };
+        let of_session = format!("record = (SELECT number FROM records WHERE id = '{id}')");
+        let damaged = self.change(&format!("UPDATE chunks SET bytes = {zeros} WHERE {of_session} RETURNING 'damaged'"));
+        assert!(damaged.starts_with("damaged"));
     }
 
     /// A value of `/metrics`; 0 where it is not there yet.
@@ -229,7 +264,50 @@ impl TestApp {
 
     /// Starts the service again, on the same folder with the same settings.
     pub(crate) fn again(&self) -> Self {
-        Self::launch(Arc::clone(&self.place), self.flags.clone(), self.environment.clone(), self.api.token.clone())
+        self.beside().ready()
+    }
+}
+
+impl Waiting {
+    fn spawn(
+        place: Arc<TempDir>,
+        flags: Vec<String>,
+        environment: Vec<(String, String)>,
+        database: Option<Database>,
+        token: Option<String>,
+    ) -> Self {
+        let log = std::fs::OpenOptions::new().create(true).append(true).open(place.path().join("log"));
+        let mut process = service()
+            .args(["--listen", "127.0.0.1:0", "--data"])
+            .arg(place.path().join("data"))
+            .args(database.iter().flat_map(|database| ["--catalog".to_owned(), database.url()]))
+            .args(&flags)
+            .envs(environment.iter().map(|(name, value)| (name, value)))
+            .stdout(Stdio::piped())
+            .stderr(log.expect("a log"))
+            .spawn()
+            .expect("the service starts");
+        let stdout = BufReader::new(process.stdout.take().expect("its output"));
+        Self { process, stdout, place, flags, environment, database, token }
+    }
+
+    /// What services on this folder have logged.
+    pub(crate) fn log(&self) -> String {
+        std::fs::read_to_string(self.place.path().join("log")).unwrap_or_default()
+    }
+
+    /// Waits until it listens.
+    pub(crate) fn ready(mut self) -> TestApp {
+        let mut line = String::new();
+        self.stdout.read_line(&mut line).expect("its first line");
+        let Some(address) = line.trim().strip_prefix("listening on ") else {
+            let _ = self.process.kill();
+            panic!("{line:?}; {}", self.log());
+        };
+        let address: SocketAddr = address.parse().expect("an address");
+        let api = Api::new(address, self.token, false);
+        let Self { process, stdout, place, flags, environment, database, .. } = self;
+        TestApp { process, _stdout: stdout, address, place, flags, environment, database, api }
     }
 }
 

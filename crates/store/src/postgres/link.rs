@@ -1,5 +1,6 @@
 //! One connection, and what is done by it: on the thread that asks for it.
 
+use super::claim::Fence;
 use super::place::Place;
 use super::trouble::Trouble;
 use crate::CatalogError;
@@ -8,10 +9,11 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::future::Future;
 use std::time::Duration;
-use tokio::runtime::{Builder, Runtime};
+use tokio::runtime::{Builder, Handle, Runtime, RuntimeFlavor};
+use tokio::task::block_in_place;
 use tokio::time::timeout;
 use tokio_postgres::types::ToSql;
-use tokio_postgres::{Client, NoTls, Row, Statement};
+use tokio_postgres::{Client, NoTls, Row, SimpleQueryMessage, Statement};
 
 /// Parameters of a statement.
 pub(super) type Parameters<'a> = &'a [&'a (dyn ToSql + Sync)];
@@ -61,16 +63,17 @@ impl Link {
         self.block_on(within(limit, work(self)))
     }
 
-    /// Does `work` in a transaction. Only after [`Trouble::Unknown`] something may be changed.
+    /// Does `work` in a transaction, unless another process has taken the database over. Only after [`Trouble::Unknown`] something may be changed.
     pub(super) fn write<T>(
         &self,
         limit: Duration,
+        fence: Option<&Fence>,
         work: &impl AsyncFn(&Self) -> Result<T, Trouble>,
     ) -> Result<T, Trouble> {
         self.block_on(async {
             let worked = async {
                 // Sent together, in this order.
-                let (begun, worked) = join(self.client.batch_execute("BEGIN"), work(self)).await;
+                let (begun, worked) = join(self.begin(fence), work(self)).await;
                 begun?;
                 worked
             };
@@ -92,6 +95,16 @@ impl Link {
         })
     }
 
+    async fn begin(&self, fence: Option<&Fence>) -> Result<(), Trouble> {
+        let Some(fence) = fence else { return Ok(self.client.batch_execute("BEGIN").await?) };
+        let said = self.client.simple_query(&fence.begin).await?;
+        let taken = said.iter().rev().find_map(|message| match message {
+            SimpleQueryMessage::Row(row) => row.get(0)?.parse().ok(),
+            _ => None,
+        });
+        if taken == Some(fence.taken) { Ok(()) } else { Err(CatalogError::TakenOver.into()) }
+    }
+
     pub(super) async fn query(&self, sql: &str, parameters: Parameters<'_>) -> Result<Vec<Row>, Trouble> {
         let known = self.statements.borrow().get(sql).cloned();
         let statement = match known {
@@ -111,7 +124,12 @@ impl Link {
 
     fn block_on<T>(&self, work: impl Future<Output = Result<T, Trouble>>) -> Result<T, Trouble> {
         let ended = || CatalogError::Failed("the connection has ended".to_owned());
-        self.runtime.as_ref().ok_or_else(ended)?.block_on(work)
+        let runtime = self.runtime.as_ref().ok_or_else(ended)?;
+        match Handle::try_current().map(|handle| handle.runtime_flavor()) {
+            // Of asynchronous work, which goes on elsewhere meanwhile.
+            Ok(RuntimeFlavor::MultiThread) => block_in_place(|| runtime.block_on(work)),
+            _ => runtime.block_on(work),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The catalogue in a PostgreSQL database, for any number of processes.
 
+mod claim;
 mod link;
 mod place;
 mod pool;
@@ -11,13 +12,14 @@ mod trouble;
 use crate::chunks::{Chunk, add_cage, chunks, lost};
 use crate::numbers::phase_number;
 use crate::{CagePlace, Catalog, CatalogError, Change, FrameEntry, Key, Kind, NewFrame, NewRecord, Phase, Record};
+use claim::Claim;
 use link::Link;
 use place::Place;
 use pool::Pool;
 use rows::{kind_number, only};
 use std::fmt::Debug;
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 use tokio_postgres::types::ToSql;
 use trouble::Trouble;
@@ -42,6 +44,8 @@ pub struct PostgresCatalog {
     pool: Pool,
     /// Numbers of chunks that nobody else has.
     numbers: Mutex<Range<i64>>,
+    /// Set once this process has it for itself.
+    claim: OnceLock<Claim>,
 }
 
 impl Debug for PostgresCatalog {
@@ -71,7 +75,34 @@ impl PostgresCatalog {
             0 => Duration::MAX,
             milliseconds => Duration::from_millis(milliseconds as u64),
         };
-        Ok(Self { pool: Pool::new(place, link, limit), numbers: Mutex::new(0..0) })
+        Ok(Self { pool: Pool::new(place, link, limit), numbers: Mutex::new(0..0), claim: OnceLock::new() })
+    }
+
+    /// Takes it for this process alone, until this value is dropped or the process ends. What others have opened before changes nothing afterwards.
+    ///
+    /// # Errors
+    /// [`CatalogError::InUse`], with who has it.
+    pub fn claim(&self) -> Result<(), CatalogError> {
+        let (claim, fence) = Claim::take(self.pool.place())?;
+        self.pool.set_fence(fence);
+        let _ = self.claim.set(claim);
+        Ok(())
+    }
+
+    /// What the database is called in messages.
+    pub fn name(&self) -> &str {
+        self.pool.name()
+    }
+
+    /// Which folder has the files of its records; `None` where that was never said.
+    pub fn folder(&self) -> Result<Option<String>, CatalogError> {
+        self.pool.read(&async |link: &Link| only(&link.query("SELECT folder FROM catalogue", &[]).await?))
+    }
+
+    /// Notes which folder has the files of its records, unless that was said before. Gives which it is.
+    pub fn set_folder(&self, folder: &str) -> Result<String, CatalogError> {
+        let sql = "UPDATE catalogue SET folder = coalesce(folder, $1) RETURNING folder";
+        self.pool.write(&async |link: &Link| only(&link.query(sql, &[&folder]).await?))
     }
 
     /// So many numbers for chunks.
@@ -229,6 +260,10 @@ impl Catalog for PostgresCatalog {
 
     fn probe(&self) -> Result<(), CatalogError> {
         self.pool.write(&async |link: &Link| link.batch("UPDATE catalogue SET probed = now()").await)
+    }
+
+    fn is_taken_over(&self) -> bool {
+        self.claim.get().is_some_and(Claim::is_lost)
     }
 }
 

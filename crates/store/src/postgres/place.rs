@@ -69,6 +69,19 @@ impl Place {
         }
         Ok(Self { config, tls, connect, name })
     }
+
+    /// As it is, for a connection that says who has the database, and whose end the server notices soon.
+    pub(super) fn of_owner(&self) -> Self {
+        let mut config = self.config.clone();
+        let system = rustix::system::uname();
+        let host = system.nodename().to_string_lossy();
+        config.application_name(format!("cager {} on {host}", std::process::id()));
+        let options = config.get_options().unwrap_or_default();
+        let soon = "-ctcp_keepalives_idle=5 -ctcp_keepalives_interval=2 -ctcp_keepalives_count=3";
+        let options = format!("{options} {soon}");
+        config.options(options);
+        Self { config, tls: self.tls.clone(), connect: self.connect, name: self.name.clone() }
+    }
 }
 
 fn name(config: &Config) -> String {

@@ -1,10 +1,11 @@
 //! The connections of one process to a database.
 
+use super::claim::Fence;
 use super::link::Link;
 use super::place::Place;
 use super::trouble::Trouble;
 use crate::CatalogError;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// Most connections at once.
@@ -16,6 +17,8 @@ pub(super) struct Pool {
     place: Place,
     /// How long a statement may take.
     limit: Duration,
+    /// Set once this process has it for itself.
+    fence: OnceLock<Fence>,
     links: Mutex<Links>,
     freed: Condvar,
 }
@@ -31,11 +34,27 @@ impl Pool {
     /// Begins with a connection. `limit` is how long the database lets statements take.
     pub(super) fn new(place: Place, link: Link, limit: Duration) -> Self {
         let links = Links { idle: vec![link], taken: 0 };
-        Self { place, limit: limit.saturating_add(WAY), links: Mutex::new(links), freed: Condvar::new() }
+        Self {
+            place,
+            limit: limit.saturating_add(WAY),
+            fence: OnceLock::new(),
+            links: Mutex::new(links),
+            freed: Condvar::new(),
+        }
+    }
+
+    pub(super) fn place(&self) -> &Place {
+        &self.place
     }
 
     pub(super) fn name(&self) -> &str {
         &self.place.name
+    }
+
+    /// From now on nothing is changed after another process has taken it.
+    pub(super) fn set_fence(&self, fence: Fence) {
+        // There is one already where it was taken twice, which its owner does not do.
+        let _ = self.fence.set(fence);
     }
 
     pub(super) fn read<T>(&self, work: &impl AsyncFn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
@@ -44,7 +63,7 @@ impl Pool {
 
     /// Does `work` in a transaction.
     pub(super) fn write<T>(&self, work: &impl AsyncFn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
-        self.twice(|link| link.write(self.limit, work))
+        self.twice(|link| link.write(self.limit, self.fence.get(), work))
     }
 
     /// Calls once, and once more by a new connection where nothing was changed and that may help.

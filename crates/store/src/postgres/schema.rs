@@ -21,9 +21,8 @@ pub(super) fn prepare(link: &Link, limit: Duration) -> Result<(), Trouble> {
     if link.read(limit, &async |link: &Link| version(link, &schema).await)? == VERSION {
         return Ok(());
     }
-    link.write(limit, &async |link: &Link| {
-        let hash = crc32c::crc32c(schema.as_bytes()) as i32;
-        link.query("SELECT pg_advisory_xact_lock($1, $2)", &[&LOCK, &hash]).await?;
+    link.write(limit, None, &async |link: &Link| {
+        link.query("SELECT pg_advisory_xact_lock($1, $2)", &[&LOCK, &hash(&schema)]).await?;
         let found = link.query("SELECT to_regnamespace($1) IS NOT NULL", &[&schema]).await?;
         if !only::<bool>(&found)? {
             link.batch(&format!("CREATE SCHEMA {schema}")).await?;
@@ -37,8 +36,13 @@ pub(super) fn prepare(link: &Link, limit: Duration) -> Result<(), Trouble> {
     })
 }
 
+/// Distinguishes locks of this schema from those of others.
+pub(super) fn hash(schema: &str) -> i32 {
+    crc32c::crc32c(schema.as_bytes()) as i32
+}
+
 /// The name of the schema, which needs no quotes.
-async fn schema(link: &Link) -> Result<String, Trouble> {
+pub(super) async fn schema(link: &Link) -> Result<String, Trouble> {
     let path: String = only(&link.query("SELECT current_setting('search_path')", &[]).await?)?;
     let is_plain = !path.is_empty()
         && path.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_')

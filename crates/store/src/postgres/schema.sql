@@ -47,9 +47,12 @@ CREATE TABLE frames (
     PRIMARY KEY (record, frame)
 );
 
--- One row: the version of these tables, and when it was last tried to write.
+-- One row: the version of these tables, the folder with the files of its records, how often a process has taken it for itself, and when it was last tried
+-- to write.
 CREATE TABLE catalogue (
     version bigint NOT NULL,
+    folder text,
+    taken bigint NOT NULL DEFAULT 0,
     probed timestamptz NOT NULL DEFAULT now()
 );
 INSERT INTO catalogue (version) VALUES (1);

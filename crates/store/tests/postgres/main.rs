@@ -4,6 +4,8 @@
 #[path = "../conformance/mod.rs"]
 mod conformance;
 mod away;
+mod claim;
+mod copying;
 mod damage;
 mod figures;
 mod opening;

@@ -1,0 +1,91 @@
+//! The catalogue in a database, and how it and the data folder know each other: by a number that both have, or a service that lacks the folder would take
+//! its sessions for lost, and one that lacks the database their files for left-overs.
+
+use super::files::Files;
+use super::{CATALOG, StoreError, of_catalog};
+use cager_store::{Catalog, CatalogError, PostgresCatalog};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Has the number of the folder where its catalogue is in a database.
+const NUMBER: &str = "catalog.database";
+/// Longest file of that name.
+const LIMIT: u64 = 256;
+/// The catalogue's file once a database has all that it had.
+const MOVED: &str = "catalog.db.moved";
+
+/// Opens the catalogue in the database at `url` for this process alone, and takes over what the folder's own has. Gives what it is called too.
+pub(super) fn open(files: &Files, url: &str) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
+    let catalog = PostgresCatalog::open(url).map_err(|error| of_catalog(Path::new("the database"), "open", error))?;
+    let name = PathBuf::from(catalog.name());
+    let failed = |error| match error {
+        CatalogError::InUse(what) => StoreError::InUse { what },
+        error => of_catalog(&name, "open", error),
+    };
+    catalog.claim().map_err(failed)?;
+    match_folder(files, &catalog, &name)?;
+    take_over(files, &catalog, &name)?;
+    Ok((Arc::new(catalog), name))
+}
+
+/// Refuses a folder whose catalogue is in a database.
+pub(super) fn refuse(files: &Files) -> Result<(), StoreError> {
+    match files.exists(&files.root.join(NUMBER))? {
+        true => Err(StoreError::Elsewhere {
+            what: format!(
+                "what is known of the sessions in the data folder {} is in a database: name it by --catalog",
+                files.root.display()
+            ),
+        }),
+        false => Ok(()),
+    }
+}
+
+/// Sees that the database and the folder belong together; the first time they are made to.
+fn match_folder(files: &Files, catalog: &PostgresCatalog, name: &Path) -> Result<(), StoreError> {
+    let failed = |error| of_catalog(name, "open", error);
+    let path = files.root.join(NUMBER);
+    let known = catalog.folder().map_err(failed)?;
+    let number = files.read(&path, LIMIT)?.map(|bytes| String::from_utf8_lossy(&bytes).trim().to_owned());
+    let number = match (number, &known) {
+        (Some(number), _) => number,
+        (None, None) => {
+            let number = uuid::Uuid::now_v7().simple().to_string();
+            files.replace(&path, format!("{number}\n").as_bytes())?;
+            number
+        }
+        (None, Some(_)) => {
+            let what = format!(
+                "{} has the sessions of another data folder than {}, which is new: is the right one mounted, and named by --data?",
+                name.display(),
+                files.root.display()
+            );
+            return Err(StoreError::Elsewhere { what });
+        }
+    };
+    let known = catalog.set_folder(&number).map_err(failed)?;
+    if known == number {
+        return Ok(());
+    }
+    let what = format!(
+        "the data folder {} and {} do not belong together: name the right ones by --data and --catalog, or another schema in the address",
+        files.root.display(),
+        name.display()
+    );
+    Err(StoreError::Elsewhere { what })
+}
+
+/// Copies what the folder's own catalogue has, and puts its file aside.
+fn take_over(files: &Files, catalog: &PostgresCatalog, name: &Path) -> Result<(), StoreError> {
+    let path = files.root.join(CATALOG);
+    if !files.exists(&path)? {
+        return Ok(());
+    }
+    let own = files.disk.catalog(&path).map_err(|error| of_catalog(&path, "open", error))?;
+    let copied = cager_store::copy(&*own, catalog).map_err(|error| of_catalog(name, "write", error))?;
+    // What its log has is in the file then.
+    drop(own);
+    files.publish(&path, &files.root.join(MOVED))?;
+    tracing::info!(records = copied, to = %name.display(), "the folder's catalogue was copied; {MOVED} is no longer needed");
+    Ok(())
+}

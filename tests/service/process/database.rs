@@ -1,0 +1,167 @@
+//! What is known of sessions in a database: the service goes on with it as with its own file, a second one waits to take over, and what has been taken over
+//! changes nothing any more.
+
+use crate::support::{Capture, Database, OCTETS, TestApp, eventually, folder, service};
+use cager_proto::messages::SessionState;
+use reqwest::Method;
+use rustix::process::{Pid, Signal, kill_process};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+/// What a service that does not start says.
+fn refused(data: &std::path::Path, catalog: Option<&str>) -> String {
+    let mut command = service();
+    command.args(["--listen", "127.0.0.1:0", "--data"]).arg(data);
+    command.args(catalog.into_iter().flat_map(|url| ["--catalog", url]));
+    let done = command.output().expect("the service");
+    assert!(!done.status.success());
+    String::from_utf8(done.stderr).expect("text")
+}
+
+#[tokio::test]
+async fn sessions_in_a_database_go_on_after_a_kill_and_end_in_the_same_container() {
+    let Some(database) = Database::start() else { return };
+    let mut app = TestApp::on(&database, &[]);
+    let capture = Capture::small();
+    let session = app.ready(capture).await;
+    let first = app.upload(&session.id, 0, capture.raw(0..15)).await;
+    let cages = app.cages(&session.id).await;
+    app.kill();
+    let app = app.again();
+    assert_eq!(app.session(&session.id).await.frames.solved, 15);
+    assert_eq!(app.errors(&session.id).await, first);
+    assert!(app.cages(&session.id).await == cages);
+    app.upload(&session.id, 15, capture.raw(15..40)).await;
+    app.complete(&session.id, 40).await.expect(200);
+    assert!(app.container(&session.id).await == capture.encoded(40));
+    app.delete(&format!("/v1/sessions/{}", session.id)).await.expect(204);
+    eventually("that nothing is left of it", async || {
+        (database.sql("SELECT count(*) FROM chunks") == "0").then_some(())
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_second_service_waits_and_takes_over_when_the_first_one_ends() {
+    let Some(database) = Database::start() else { return };
+    let mut first = TestApp::on(&database, &[]);
+    let capture = Capture::small();
+    let session = first.ready(capture).await;
+    let told = first.upload(&session.id, 0, capture.raw(0..15)).await;
+    let waiting = first.beside();
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert!(waiting.log().contains("waits, to take over when that ends"), "{}", waiting.log());
+    first.kill();
+    let clock = Instant::now();
+    let second = tokio::task::spawn_blocking(|| waiting.ready()).await.expect("it starts");
+    println!("taken over in {:?}", clock.elapsed());
+    assert!(clock.elapsed() < Duration::from_secs(10));
+    assert_eq!(second.errors(&session.id).await, told);
+    second.upload(&session.id, 15, capture.raw(15..40)).await;
+    second.complete(&session.id, 40).await.expect(200);
+    assert!(second.container(&session.id).await == capture.encoded(40));
+}
+
+#[tokio::test]
+async fn a_service_that_was_taken_over_while_it_stood_still_changes_nothing_and_ends() {
+    let Some(database) = Database::start() else { return };
+    let mut first = TestApp::on(&database, &[]);
+    let capture = Capture::small();
+    let session = first.ready(capture).await;
+    first.upload(&session.id, 0, capture.raw(0..15)).await;
+    let waiting = first.beside();
+    let process = Pid::from_raw(first.id() as i32).expect("it runs");
+    kill_process(process, Signal::STOP).expect("it stands still");
+    // Its connections end, as they do where its machine is cut off.
+    database.sql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name LIKE 'cager%'");
+    let second = tokio::task::spawn_blocking(|| waiting.ready()).await.expect("it starts");
+    second.upload(&session.id, 15, capture.raw(15..20)).await;
+    kill_process(process, Signal::CONT).expect("it goes on");
+    let path = format!("/v1/sessions/{}/frames?first=20", session.id);
+    let sent = first.request(Method::POST, &path).header("content-type", OCTETS).body(capture.raw(20..25)).send().await;
+    // It may be gone already.
+    if let Ok(answer) = sent {
+        let said = answer.text().await.unwrap_or_default();
+        assert!(said.contains("storage-failed"), "{said}");
+    }
+    let (status, _) = first.ended().await;
+    assert!(!status.success());
+    assert!(first.log().contains("another process has taken over the database"), "{}", first.log());
+    assert_eq!(second.session(&session.id).await.frames.solved, 20);
+    second.upload(&session.id, 20, capture.raw(20..40)).await;
+    second.complete(&session.id, 40).await.expect(200);
+    assert!(second.container(&session.id).await == capture.encoded(40));
+}
+
+#[tokio::test]
+async fn while_the_database_is_away_the_service_says_so_and_it_goes_on_afterwards() {
+    let Some(database) = Database::start() else { return };
+    let app = TestApp::on(&database, &[]);
+    let capture = Capture::small();
+    let session = app.ready(capture).await;
+    let path = format!("/v1/sessions/{}/frames?first=0", session.id);
+    database.kill();
+    let problem = app.post(&path, OCTETS, capture.raw(0..15)).await;
+    assert!(problem.text().contains("storage-failed"), "{}", problem.text());
+    assert_eq!(app.get("/readyz").await.status, 503);
+    database.run();
+    eventually("that it is ready", async || (app.get("/readyz").await.status == 200).then_some(())).await;
+    app.upload(&session.id, 0, capture.raw(0..40)).await;
+    app.complete(&session.id, 40).await.expect(200);
+    assert!(app.container(&session.id).await == capture.encoded(40));
+}
+
+#[tokio::test]
+async fn a_folder_with_a_catalogue_of_its_own_is_taken_over_by_a_database() {
+    let Some(database) = Database::start() else { return };
+    let mut app = TestApp::start();
+    let capture = Capture::small();
+    let whole = app.completed(capture, 40).await;
+    let container = app.container(&whole.id).await;
+    let begun = app.ready(capture).await;
+    let told = app.upload(&begun.id, 0, capture.raw(0..15)).await;
+    app.terminate();
+    assert!(app.ended().await.0.success());
+    let mut moved = app.moved_to(&database);
+    assert!(moved.container(&whole.id).await == container);
+    assert_eq!(moved.session(&whole.id).await.state, SessionState::Completed);
+    assert_eq!(moved.errors(&begun.id).await, told);
+    moved.upload(&begun.id, 15, capture.raw(15..40)).await;
+    moved.kill();
+    // Without the database nothing of it is known.
+    let said = refused(&moved.data(), None);
+    assert!(said.contains("is in a database: name it by --catalog"), "{said}");
+    let moved = moved.again();
+    moved.complete(&begun.id, 40).await.expect(200);
+    assert!(moved.container(&begun.id).await == container);
+}
+
+#[tokio::test]
+async fn a_database_and_a_folder_that_do_not_belong_together_are_refused() {
+    let Some(database) = Database::start() else { return };
+    let mut app = TestApp::on(&database, &[]);
+    let capture = Capture::small();
+    let session = app.ready(capture).await;
+    app.kill();
+    let new = folder();
+    let said = refused(new.path(), Some(&database.url()));
+    assert!(said.contains("which is new: is the right one mounted"), "{said}");
+    let mut other = TestApp::on(&Database::start().expect("another one"), &[]);
+    other.kill();
+    let said = refused(&other.data(), Some(&database.url()));
+    assert!(said.contains("do not belong together"), "{said}");
+    let said = refused(new.path(), Some("postgres://nobody:secret@127.0.0.1:1/none"));
+    assert!(said.contains("cannot be reached") && !said.contains("secret"), "{said}");
+    let said = refused(new.path(), Some("mysql://somewhere"));
+    assert!(said.contains("it does not begin with postgres://"), "{said}");
+    assert_eq!(app.again().session(&session.id).await.frames.solved, 0);
+}
+
+#[test]
+fn the_password_of_a_database_is_not_shown() {
+    let mut command = service();
+    let done =
+        command.args(["--check-config", "--catalog", "postgres://me:secret@db/cager"]).stdin(Stdio::null()).output();
+    let said = String::from_utf8(done.expect("the program").stdout).expect("text");
+    assert!(said.contains("catalog = \"postgres://me:***@db/cager\"") && !said.contains("secret"), "{said}");
+}
