@@ -116,7 +116,7 @@ $(FARM): Makefile
 	target/farm/bin/pip install --quiet openjd-cli==0.8.0 opencue-pyoutline==1.37.0 packaging
 	@touch $@
 
-soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when
+soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when, CAGER_TEST_CATALOG=postgres where it keeps sessions
 	CAGER_SOAK_KILLS=$(or $(KILLS),100) $(if $(SEED),CAGER_SOAK_SEED=$(SEED)) \
 		$(CARGO) test --release --locked --test reliability -- --exact --nocapture soak::a_service_that_is_killed_keeps_what_it_said
 
@@ -138,11 +138,13 @@ lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard a
 	$(LINT)/bin/hadolint Dockerfile
 	$(LINT)/bin/yamllint --strict -d '{extends: default, rules: {line-length: {max: 140}, document-start: disable}}' deploy
 	$(LINT)/bin/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
-	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml))
+	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml deploy/kubernetes-standby/*.yaml))
 	$(LINT)/bin/python deploy/check_queries.py
 	@if command -v kubectl >/dev/null; then \
-		kubectl kustomize deploy/kubernetes >$(LINT)/together.yaml && \
-		$(LINT)/bin/kubernetes-validate --strict $(LINT)/together.yaml; \
+		for folder in deploy/kubernetes deploy/kubernetes-standby; do \
+			kubectl kustomize $$folder >$(LINT)/together.yaml && \
+			$(LINT)/bin/kubernetes-validate --strict $(LINT)/together.yaml || exit 1; \
+		done; \
 	else echo "kubectl is not here, so the kustomization is not built"; fi
 
 $(LINT)/bin/python: Makefile

@@ -29,7 +29,11 @@ impl Database {
 
     /// For a test that says nothing of a database: one where `CAGER_TEST_CATALOG=postgres` is set.
     pub(crate) fn of_all() -> Option<Self> {
-        (std::env::var(ALL).as_deref() == Ok("postgres")).then(|| Self::start().expect("PostgreSQL"))
+        Self::is_for_all().then(|| Self::start().expect("PostgreSQL"))
+    }
+
+    pub(crate) fn is_for_all() -> bool {
+        std::env::var(ALL).as_deref() == Ok("postgres")
     }
 
     pub(crate) fn url(&self) -> String {

@@ -17,6 +17,8 @@ pub(crate) struct Server {
     pub(crate) address: SocketAddr,
     /// From the start of the process until it said that it is ready.
     pub(crate) ready: Duration,
+    /// Ends after it.
+    _database: Option<Database>,
 }
 
 /// How a service is started.
@@ -68,7 +70,7 @@ impl Setup {
         let line = line.await.expect("a thread").expect("its first line");
         let address = line.trim().strip_prefix("listening on ").and_then(|a| a.parse().ok());
         let address: SocketAddr = address.unwrap_or_else(|| panic!("it said {line:?} instead of its address"));
-        let mut server = Server { child, address, ready: Duration::ZERO };
+        let mut server = Server { child, address, ready: Duration::ZERO, _database: self.database.clone() };
         while server.get("/readyz").await != Some(200) {
             assert!(clock.elapsed() < HANG, "it is not ready");
             tokio::time::sleep(Duration::from_millis(2)).await;

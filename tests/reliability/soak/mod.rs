@@ -6,7 +6,7 @@ mod posts;
 mod workers;
 
 use crate::capture::Reference;
-use crate::process::Setup;
+use crate::process::{HANG, Server, Setup};
 use fastrand::Rng;
 use ledger::{Ledger, PHASES, Phase};
 use std::collections::BTreeMap;
@@ -26,13 +26,22 @@ fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is no number: {text}")))
 }
 
-/// `CAGER_SOAK_KILLS` and `CAGER_SOAK_SEED` change how often and when.
+/// `CAGER_SOAK_KILLS` and `CAGER_SOAK_SEED` change how often and when. With `CAGER_TEST_CATALOG=postgres` the database is killed as well.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_service_that_is_killed_keeps_what_it_said() {
     let kills = number("CAGER_SOAK_KILLS").unwrap_or(8);
     let seed = number("CAGER_SOAK_SEED").unwrap_or_else(|| fastrand::u64(..));
     println!("soak: {kills} kills, CAGER_SOAK_SEED={seed}");
     soak(kills, seed).await;
+}
+
+/// Waits until a service whose database was away is ready.
+async fn within_ready(server: &Server) {
+    let clock = Instant::now();
+    while server.get("/readyz").await != Some(200) {
+        assert!(clock.elapsed() < HANG, "it is not ready although its database is back");
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
 }
 
 async fn soak(kills: u64, seed: u64) {
@@ -79,14 +88,30 @@ async fn soak(kills: u64, seed: u64) {
         let longest = if phase == Phase::Upload { 200_000 } else { 20_000 };
         tokio::time::sleep(Duration::from_micros(rng.u64(..longest))).await;
         ledger.active().for_each(|phase| *during.entry(phase).or_default() += 1);
-        server.kill();
-        if kill % 4 == 1 {
-            faults::check(&data, &ledger, &mut rng, &mut faults).await;
-        }
-        server = setup.start().await;
-        slowest = slowest.max(server.ready);
-        if server.ready > READY {
-            ledger.violation(format!("it took {:?} to be ready", server.ready));
+        match &setup.database {
+            // The database alone, and the service lives on.
+            Some(database) if kill % 4 == 3 => {
+                database.kill();
+                database.run();
+                within_ready(&server).await;
+            }
+            database => {
+                server.kill();
+                match database {
+                    // Both.
+                    Some(database) if kill % 4 == 1 => {
+                        database.kill();
+                        database.run();
+                    }
+                    None if kill % 4 == 1 => faults::check(&data, &ledger, &mut rng, &mut faults).await,
+                    _ => {}
+                }
+                server = setup.start().await;
+                slowest = slowest.max(server.ready);
+                if server.ready > READY {
+                    ledger.violation(format!("it took {:?} to be ready", server.ready));
+                }
+            }
         }
         ledger.check_some(&server, None, CHECKED).await;
         let aside = std::fs::read_dir(data.join("quarantine")).expect("quarantine").count();

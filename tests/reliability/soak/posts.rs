@@ -2,6 +2,7 @@
 
 use super::ledger::Ledger;
 use crate::capture::{Errors, Reference};
+use crate::database::Database;
 use cager_client::messages::{FrameResult, Problem};
 use cager_proto::record::{self, HEADER_BYTES, Kind};
 use fastrand::Rng;
@@ -132,6 +133,8 @@ impl<'a> Poster<'a> {
 fn expected(problem: &Problem) -> Result<(), String> {
     match problem.word() {
         "busy" | "stopping" | "not-ready" | "session-deleted" => Ok(()),
+        // While the database is away.
+        "storage-failed" if Database::is_for_all() => Ok(()),
         other => Err(format!("{other}: {}", problem.detail)),
     }
 }

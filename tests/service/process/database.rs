@@ -114,7 +114,7 @@ async fn while_the_database_is_away_the_service_says_so_and_it_goes_on_afterward
 #[tokio::test]
 async fn a_folder_with_a_catalogue_of_its_own_is_taken_over_by_a_database() {
     let Some(database) = Database::start() else { return };
-    let mut app = TestApp::start();
+    let mut app = TestApp::in_folder();
     let capture = Capture::small();
     let whole = app.completed(capture, 40).await;
     let container = app.container(&whole.id).await;

@@ -199,7 +199,7 @@ async fn a_session_whose_mark_of_completion_is_damaged_is_completed_again_and_hi
     let session = app.completed(capture, 15).await;
     let container = app.container(&session.id).await;
     app.kill();
-    app.set_record(&session.id, "completion = x'7b7d'");
+    app.set_bytes(&session.id, "completion", "7b7d");
     app = app.again();
     assert_eq!(app.session(&session.id).await.state, SessionState::Ready);
     let frames = format!("/v1/sessions/{}/frames?first=15", session.id);

@@ -98,6 +98,16 @@ impl TestApp {
         Waiting::spawn(Arc::new(folder()), flags, Vec::new(), Some(database.clone()), None).ready()
     }
 
+    /// Starts a service with its catalogue in its folder, wherever that of others is.
+    pub(crate) fn in_folder() -> Self {
+        Waiting::spawn(Arc::new(folder()), Vec::new(), Vec::new(), None, None).ready()
+    }
+
+    /// Address of the database with its catalogue, unless that is in its folder.
+    pub(crate) fn catalog(&self) -> Option<String> {
+        self.database.as_ref().map(Database::url)
+    }
+
     /// Starts the service again, on the same folder, with its catalogue in a database.
     pub(crate) fn moved_to(&self, database: &Database) -> Self {
         let (place, flags) = (Arc::clone(&self.place), self.flags.clone());
@@ -207,6 +217,11 @@ impl TestApp {
         let digest = blake3::hash(body.as_bytes()).to_hex();
         let text = format!("{{\"format\":1,\"kind\":\"{kind}\",\"blake3\":\"{digest}\",\"body\":{body}}}\n");
         let hex = text.bytes().fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"));
+        self.set_bytes(id, column, &hex);
+    }
+
+    /// Changes a column of what is stored of a session or job to these bytes, in hexadecimal.
+    pub(crate) fn set_bytes(&self, id: &str, column: &str, hex: &str) {
         let bytes = if self.database.is_some() { format!("'\\x{hex}'") } else { format!("x'{hex}'") };
         self.set_record(id, &format!("{column} = {bytes}"));
     }

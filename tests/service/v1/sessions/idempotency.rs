@@ -111,7 +111,8 @@ async fn a_key_of_a_version_with_other_fingerprints_still_answers() {
     app.kill();
     {
         let data = app.data();
-        let opened = Store::open(&data, Arc::new(LocalDisk), None).expect("a store");
+        let database = app.catalog();
+        let opened = Store::open(&data, Arc::new(LocalDisk), database.as_deref()).expect("a store");
         let mut meta = opened.sessions.first().expect("a session").clone();
         meta.idempotency = Some(Idempotency { key: "k".to_owned(), fingerprint: "0".repeat(64) });
         opened.store.delete(Kind::Session, &meta.id).expect("a deletion");
