@@ -11,6 +11,7 @@ mod decode;
 mod decode_layer;
 mod errors;
 mod events;
+mod exported;
 mod extract;
 mod frame_parser;
 mod frames;

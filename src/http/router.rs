@@ -5,8 +5,8 @@ use super::extract::Caller;
 use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
-    cage, cage_jobs, cages, container, coordinates, decode, errors, events, extract, frames, health, openapi, origin,
-    page, recoveries, sent, sessions, shape_spaces, transfers,
+    cage, cage_jobs, cages, container, coordinates, decode, errors, events, exported, extract, frames, health, openapi,
+    origin, page, recoveries, sent, sessions, shape_spaces, transfers,
 };
 use crate::problem::{self, ApiError, Kind};
 use crate::service::Service;
@@ -42,6 +42,7 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(events::get))
         .routes(routes!(cages::get))
         .routes(routes!(container::get))
+        .routes(routes!(exported::get))
         .routes(routes!(cage_jobs::jobs::list))
         .routes(routes!(cage_jobs::jobs::get, cage_jobs::jobs::delete))
         .routes(routes!(cage_jobs::events::get))

@@ -20,6 +20,11 @@ pub struct Spool {
 }
 
 impl Store {
+    /// Where nothing is yet, for what is needed for a moment; what is left there goes with the next start.
+    pub(crate) fn scratch(&self) -> PathBuf {
+        self.files().temporary("scratch")
+    }
+
     /// A new empty file for what arrives.
     pub fn spool(&self) -> Result<Spool, StoreError> {
         let path = self.files().temporary("spool");

@@ -6,6 +6,7 @@ mod coordinates;
 mod decode;
 mod delete;
 mod events;
+mod export;
 mod frames;
 mod handles;
 mod sent;
