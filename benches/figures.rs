@@ -12,6 +12,7 @@ use cager_core::maxvol::{self, maxvol};
 use cager_demo::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, write_model};
 use cager_geometry::linalg::svd::svd;
+use cager_geometry::linalg::to_single;
 use cager_geometry::mesh::{self, Model, Point, Polygons};
 use serde_json::{Value, json};
 use std::cell::RefCell;
@@ -94,7 +95,8 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
         "harmonic": quality(&Harmonic, &cage, points, &harmonic_found?),
     });
     let phi = mean_value.phi;
-    let gradient = timed(|| MeanValue.gradient(&cage, points, phi.as_ref(), phi.as_ref()));
+    let upstream = to_single(phi.as_ref(), phi.nrows());
+    let gradient = timed(|| MeanValue.gradient(&cage, points, upstream.as_ref()));
     let handles = maxvol(phi.as_ref(), maxvol::TOLERANCE)?;
     let maxvol_figure = timed(|| maxvol(phi.as_ref(), maxvol::TOLERANCE));
     let m = phi.ncols();

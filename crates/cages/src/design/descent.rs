@@ -49,7 +49,7 @@ impl<'a> Descent<'a> {
         // ∂E/∂Φ; the derivative through the cages vanishes where they are the best ones.
         let mut upstream = Mat::zeros(batch.points.len(), phi.ncols());
         accumulate_product(&mut upstream, Accum::Replace, fit.residual.as_ref(), fit.cages.transpose(), -2.0);
-        let gradient = MeanValue.gradient(&self.cage, &batch.points, phi.as_ref(), upstream.as_ref());
+        let gradient = MeanValue.gradient(&self.cage, &batch.points, upstream.as_ref());
         if gradient.iter().flatten().any(|g| !g.is_finite()) {
             return;
         }

@@ -5,7 +5,7 @@ use super::fit::{BLOCK_ROWS, Fit};
 use super::topology::{self, Collapse, OneRings};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_geometry::linalg::{solve_cholesky, solve_definite, transposed_product};
+use cager_geometry::linalg::{solve_cholesky, solve_definite, to_double, transposed_product};
 use cager_geometry::mesh::{Point, TriMesh};
 use faer::Mat;
 use glam::DVec3;
@@ -22,7 +22,7 @@ pub(super) struct Remeshing {
 pub(super) fn exchange(
     cage: &Cage,
     points: &[Point],
-    phi: &Mat<f64>,
+    phi: &Mat<f32>,
     fit: &Fit,
     obstacles: &Obstacles,
     share: f64,
@@ -89,19 +89,20 @@ pub(super) fn exchange(
 /// Splitting an edge leaves the surface as it is and adds one function `b` to those that the cage has, so the error falls by
 /// `‖bᵀ R‖²/‖b − Π b‖²`, with `R` the residual and `Π` the projection on the columns of `Φ`. All edges' functions come from one
 /// subdivision of the whole cage, whose functions have a somewhat smaller support.
-fn split_gains(cage: &Cage, points: &[Point], phi: &Mat<f64>, fit: &Fit) -> Vec<f64> {
+fn split_gains(cage: &Cage, points: &[Point], phi: &Mat<f32>, fit: &Fit) -> Vec<f64> {
     let m = cage.vertices().len();
     let Ok(fine) = Cage::new(topology::subdivided(cage)) else { return vec![0.0; cage.edges().len()] };
     let columns = MeanValue.smooth_coordinates(&fine, points);
     let b = columns.as_ref().subcols(m, cage.edges().len());
     let along = transposed_product(b, fit.residual.as_ref(), BLOCK_ROWS);
-    let overlap = transposed_product(phi.as_ref(), b, BLOCK_ROWS);
+    let overlap = to_double(transposed_product(phi.as_ref(), b, BLOCK_ROWS).as_ref());
     let mut solved = overlap.clone();
     solve_cholesky(fit.factor.as_ref(), &mut solved);
+    let square = |x: &mut dyn Iterator<Item = &f32>| x.map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
     let gains = (0..cage.edges().len()).map(|e| {
-        let own: f64 = (0..b.nrows()).map(|i| b[(i, e)] * b[(i, e)]).sum();
+        let own = square(&mut b.col(e).iter());
         let explained: f64 = (0..m).map(|j| overlap[(j, e)] * solved[(j, e)]).sum();
-        let gain: f64 = (0..along.ncols()).map(|c| along[(e, c)] * along[(e, c)]).sum();
+        let gain = square(&mut along.row(e).iter());
         gain / (own - explained).max(0.02 * own).max(f64::MIN_POSITIVE)
     });
     gains.collect()
@@ -118,8 +119,9 @@ fn removal_costs(mesh: &TriMesh, neighbours: &OneRings<'_>, fit: &Fit) -> Vec<f6
         let row: Vec<(usize, f64)> = std::iter::once((v, 1.0)).chain(weights.iter().map(|&(k, w)| (k, -w))).collect();
         let spread: f64 =
             row.iter().map(|&(i, x)| row.iter().map(|&(j, y)| x * y * inverse[(i, j)]).sum::<f64>()).sum();
-        let moved: f64 =
-            (0..fit.cages.ncols()).map(|c| row.iter().map(|&(i, x)| x * fit.cages[(i, c)]).sum::<f64>().powi(2)).sum();
+        let moved: f64 = (0..fit.cages.ncols())
+            .map(|c| row.iter().map(|&(i, x)| x * f64::from(fit.cages[(i, c)])).sum::<f64>().powi(2))
+            .sum();
         moved / spread.max(f64::MIN_POSITIVE)
     });
     costs.collect()

@@ -1,11 +1,11 @@
 //! Training and validation data of a design: sampled points with the non-affine part of their motion, and points and frames held back for evaluation.
 
-use super::fit::{BLOCK_ROWS, Fit};
+use super::fit::{BLOCK_ROWS, ridge_factor};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_geometry::linalg::{accumulate_product, gram};
+use cager_geometry::linalg::{accumulate_product, gram, solve_cholesky, to_double, to_single, transposed_product};
 use cager_geometry::mesh::{Model, Point, diagonal};
-use faer::{Accum, Mat};
+use faer::{Accum, Mat, MatRef};
 
 /// Maximum number of points sampled from a model.
 const MAX_POINTS: usize = 20_000;
@@ -21,9 +21,9 @@ const LARGE: usize = 1_000;
 pub(super) struct Samples {
     /// Rest positions, n.
     points: Vec<Point>,
-    /// Training motion, n × c: every frame minus its best affine image of the rest pose, which coordinates reproduce exactly, projected to the
+    /// Training motion, n × c, as fractions of the diagonal: every frame minus its best affine image of the rest pose, which coordinates reproduce exactly, projected to the
     /// principal components of all frames. A fit to these has the same sum of squared residuals as one to the frames, up to the truncation.
-    training: Mat<f64>,
+    training: Mat<f32>,
     /// Validation points and their motion: in training frames and, from column `held_back_from` on, in held-back frames.
     validation_points: Vec<Point>,
     validation_motion: Mat<f64>,
@@ -36,7 +36,7 @@ pub(super) struct Samples {
 pub(super) struct Batch {
     pub(super) points: Vec<Point>,
     /// n × c.
-    pub(super) motion: Mat<f64>,
+    pub(super) motion: Mat<f32>,
 }
 
 /// Least-squares errors of a cage over points and frames, as fractions of the diagonal.
@@ -64,7 +64,7 @@ impl Samples {
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {
             points: at(&used),
-            training: principal(&without_affine(&rest.points, &used, &designed)),
+            training: to_single(principal(&without_affine(&rest.points, &used, &designed)).as_ref(), used.len()),
             validation_points: at(&validation_points),
             validation_motion: without_affine(&rest.points, &validation_points, &[seen.as_slice(), &unseen].concat()),
             held_back_from: 3 * seen.len(),
@@ -82,12 +82,12 @@ impl Samples {
 
     /// Root mean square errors of a cage, as fractions of the diagonal; infinite where it has none.
     pub(super) fn evaluate(&self, cage: &Cage) -> Evaluation {
-        let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
-        let fit = Fit::new(phi.as_ref(), self.validation_motion.as_ref(), 1e-6);
+        let phi = to_double(MeanValue.smooth_coordinates(cage, &self.validation_points).as_ref());
+        let residual = least_squares_residual(phi.as_ref(), &self.validation_motion, 1e-6);
         let error = |first: usize, last: usize| {
-            let Some(fit) = &fit else { return f64::INFINITY };
-            let left = fit.residual.as_ref().subcols(first, last - first);
-            (left.squared_norm_l2() / (left.nrows() * left.ncols()) as f64 * 3.0).sqrt() / self.diagonal
+            let Some(residual) = &residual else { return f64::INFINITY };
+            let left = residual.as_ref().subcols(first, last - first);
+            (left.squared_norm_l2() / (left.nrows() * left.ncols()) as f64 * 3.0).sqrt()
         };
         Evaluation {
             training_error: error(0, self.held_back_from),
@@ -102,7 +102,8 @@ impl Samples {
             return None;
         }
         let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
-        let squares = gram(phi.as_ref(), BLOCK_ROWS).self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
+        let squares =
+            gram(to_double(phi.as_ref()).as_ref(), BLOCK_ROWS).self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
         Some(if squares[0] > 0.0 { (squares[squares.len() - 1] / squares[0]).sqrt() } else { f64::INFINITY })
     }
 }
@@ -127,11 +128,21 @@ fn principal(motion: &Mat<f64>) -> Mat<f64> {
     out
 }
 
-/// The motion of some points, less the best affine image of the rest pose.
+/// The motion of some points as fractions of the diagonal, less the best affine image of the rest pose.
 fn without_affine(rest: &[Point], rows: &[usize], frames: &[&[f64]]) -> Mat<f64> {
-    let motion = Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| frames[c / 3][3 * rows[i] + c % 3]);
-    let center: Point = std::array::from_fn(|k| rest.iter().map(|p| p[k]).sum::<f64>() / rest.len() as f64);
     let scale = diagonal(rest);
+    let motion = Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| frames[c / 3][3 * rows[i] + c % 3] / scale);
+    let center: Point = std::array::from_fn(|k| rest.iter().map(|p| p[k]).sum::<f64>() / rest.len() as f64);
     let basis = Mat::from_fn(rows.len(), 4, |i, k| if k < 3 { (rest[rows[i]][k] - center[k]) / scale } else { 1.0 });
-    Fit::new(basis.as_ref(), motion.as_ref(), 1e-12).map_or(motion, |fit| fit.residual)
+    least_squares_residual(basis.as_ref(), &motion, 1e-12).unwrap_or(motion)
+}
+
+/// `X − A C` with the C that minimises `‖X − A C‖² + ρ ‖C‖²`, `ρ` as in [`ridge_factor`].
+fn least_squares_residual(a: MatRef<'_, f64>, motion: &Mat<f64>, ridge: f64) -> Option<Mat<f64>> {
+    let factor = ridge_factor(gram(a, BLOCK_ROWS), ridge)?;
+    let mut solution = transposed_product(a, motion.as_ref(), BLOCK_ROWS);
+    solve_cholesky(factor.as_ref(), &mut solution);
+    let mut residual = motion.clone();
+    accumulate_product(&mut residual, Accum::Add, a, solution.as_ref(), -1.0);
+    residual.as_ref().squared_norm_l2().is_finite().then_some(residual)
 }

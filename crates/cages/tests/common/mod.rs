@@ -46,6 +46,15 @@ pub fn read_obj(path: &Path) -> Model {
     model
 }
 
+/// Frames of so many points each, from a NumPy file of single precision.
+pub fn read_npy(path: &Path, points: usize) -> Vec<Vec<f64>> {
+    let bytes = std::fs::read(path).unwrap();
+    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let values: Vec<f64> =
+        bytes[header..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()).into()).collect();
+    values.chunks_exact(3 * points).map(<[f64]>::to_vec).collect()
+}
+
 /// What another library says about a cage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verdict {

@@ -1,46 +1,86 @@
 //! A value for each of eight points, and their arithmetic.
 
 use cager_geometry::mesh::Point;
+use std::ops::{Add, Mul, Sub};
 
 /// Points or entries that one lane group holds.
 pub(crate) const LANES: usize = 8;
 
-/// One value for each point or entry of a lane group.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-pub(crate) struct Lanes(pub(crate) [f64; LANES]);
+macro_rules! lanes {
+    ($(#[$meta:meta])* $name:ident, $real:ident, $align:literal) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug)]
+        #[repr(align($align))]
+        pub(crate) struct $name(pub(crate) [$real; LANES]);
+
+        impl $name {
+            pub(crate) const ZERO: Self = Self([0.0; LANES]);
+
+            #[inline(always)]
+            pub(crate) fn splat(value: $real) -> Self {
+                Self([value; LANES])
+            }
+
+            #[inline(always)]
+            pub(crate) fn map(self, f: impl Fn($real) -> $real) -> Self {
+                let mut out = [0.0; LANES];
+                for l in 0..LANES {
+                    out[l] = f(self.0[l]);
+                }
+                Self(out)
+            }
+
+            #[inline(always)]
+            pub(crate) fn zip(self, other: Self, f: impl Fn($real, $real) -> $real) -> Self {
+                let mut out = [0.0; LANES];
+                for l in 0..LANES {
+                    out[l] = f(self.0[l], other.0[l]);
+                }
+                Self(out)
+            }
+
+            #[inline(always)]
+            pub(crate) fn sqrt(self) -> Self {
+                self.map($real::sqrt)
+            }
+        }
+        lanewise!($name, $real, Add, add, +);
+        lanewise!($name, $real, Sub, sub, -);
+        lanewise!($name, $real, Mul, mul, *);
+        lanewise!($name, $real, Div, div, /);
+    };
+}
+
+macro_rules! lanewise {
+    ($name:ident, $real:ident, $trait:ident, $method:ident, $op:tt) => {
+        impl std::ops::$trait for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                self.zip(other, |a, b| a $op b)
+            }
+        }
+        impl std::ops::$trait<$real> for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: $real) -> Self {
+                self.map(|a| a $op other)
+            }
+        }
+    };
+}
+
+lanes! {
+    /// One value for each point or entry of a lane group.
+    Lanes, f64, 64
+}
+
+lanes! {
+    /// The same in single precision.
+    Singles, f32, 32
+}
 
 impl Lanes {
-    pub(crate) const ZERO: Self = Self([0.0; LANES]);
-
-    #[inline(always)]
-    pub(crate) fn splat(value: f64) -> Self {
-        Self([value; LANES])
-    }
-
-    #[inline(always)]
-    pub(crate) fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        let mut out = [0.0; LANES];
-        for l in 0..LANES {
-            out[l] = f(self.0[l]);
-        }
-        Self(out)
-    }
-
-    #[inline(always)]
-    pub(crate) fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let mut out = [0.0; LANES];
-        for l in 0..LANES {
-            out[l] = f(self.0[l], other.0[l]);
-        }
-        Self(out)
-    }
-
-    #[inline(always)]
-    pub(crate) fn sqrt(self) -> Self {
-        self.map(f64::sqrt)
-    }
-
     /// Whether `f` holds for any pair of lanes.
     #[inline(always)]
     pub(crate) fn any(self, other: Self, f: impl Fn(f64, f64) -> bool) -> bool {
@@ -70,36 +110,17 @@ pub(crate) fn grouped(points: &[Point], beyond: Point) -> Vec<[Lanes; 3]> {
     points.chunks(LANES).map(|points| gather(|l| points.get(l).copied().unwrap_or(beyond))).collect()
 }
 
-macro_rules! lanewise {
-    ($trait:ident, $method:ident, $op:tt) => {
-        impl std::ops::$trait for Lanes {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                self.zip(other, |a, b| a $op b)
-            }
-        }
-        impl std::ops::$trait<f64> for Lanes {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, other: f64) -> Self {
-                self.map(|a| a $op other)
-            }
-        }
-    };
-}
-lanewise!(Add, add, +);
-lanewise!(Sub, sub, -);
-lanewise!(Mul, mul, *);
-lanewise!(Div, div, /);
+/// What dot and cross products take: a lane group of either precision.
+pub(crate) trait Arithmetic: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Arithmetic for T {}
 
 #[inline(always)]
-pub(crate) fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
+pub(crate) fn dot<T: Arithmetic>(a: &[T; 3], b: &[T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-pub(crate) fn cross(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
+pub(crate) fn cross<T: Arithmetic>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

@@ -3,11 +3,13 @@
 //! Nothing here uses fused multiply-add: the same source then gives the same bits on every machine, with or without AVX.
 
 mod angle;
+mod angle_ratio;
 mod dispatch;
 mod lanes;
 mod logarithm;
 
 pub(crate) use angle::angle;
+pub(crate) use angle_ratio::{half_angle_over_sine, half_angle_over_sine_slope};
 pub(crate) use dispatch::multiversion;
-pub(crate) use lanes::{LANES, Lanes, cross, dot, gather, grouped};
+pub(crate) use lanes::{LANES, Lanes, Singles, cross, dot, gather, grouped};
 pub(crate) use logarithm::ln_ratio;

@@ -17,7 +17,7 @@ pub use factors::{
 };
 pub use products::{
     BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
-    tall_product, to_single, transposed_product,
+    tall_product, to_double, to_single, transposed_product,
 };
 pub use rotation::nearest_rotation;
 pub use small::symmetric_eigen;

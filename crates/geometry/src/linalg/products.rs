@@ -3,6 +3,8 @@
 use super::zeros;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::traits::RealField;
+use faer::traits::math_utils::one;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
@@ -50,7 +52,7 @@ pub fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 
 /// `out = A · B`, sequentially.
 pub fn multiply<T: faer::traits::ComplexField>(out: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
-    matmul(out, Accum::Replace, a, b, faer::traits::math_utils::one(), Par::Seq);
+    matmul(out, Accum::Replace, a, b, one(), Par::Seq);
 }
 
 /// The given rows of a matrix, in the given order.
@@ -83,7 +85,13 @@ pub fn tall_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 }
 
 /// `out = α A B`, or what is added to it, of a matrix A with many rows, in blocks of these.
-pub fn accumulate_product(out: &mut Mat<f64>, accumulate: Accum, a: MatRef<'_, f64>, b: MatRef<'_, f64>, alpha: f64) {
+pub fn accumulate_product<T: RealField + Copy>(
+    out: &mut Mat<T>,
+    accumulate: Accum,
+    a: MatRef<'_, T>,
+    b: MatRef<'_, T>,
+    alpha: T,
+) {
     out.as_mut().par_row_chunks_mut(BLOCK_ROWS).enumerate().for_each(|(block, rows)| {
         let a = a.subrows(block * BLOCK_ROWS, rows.nrows());
         matmul(rows, accumulate, a, b, alpha, Par::Seq);
@@ -91,14 +99,23 @@ pub fn accumulate_product(out: &mut Mat<f64>, accumulate: Accum, a: MatRef<'_, f
 }
 
 /// `AᵀA`, its lower triangle and zeros above, summed over blocks of so many rows; a single block is computed by the calling thread.
-pub fn gram(a: MatRef<'_, f64>, block_rows: usize) -> Mat<f64> {
+pub fn gram<T: RealField + Copy>(a: MatRef<'_, T>, block_rows: usize) -> Mat<T> {
     let m = a.ncols();
     let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
     sum_over_blocks(a.nrows(), block_rows, (m, m), |first, count| {
         let (mut part, rows) = (Mat::zeros(m, m), a.subrows(first, count));
-        triangular::matmul(part.as_mut(), lower, Accum::Replace, rows.transpose(), full, rows, full, 1.0, Par::Seq);
+        triangular::matmul(part.as_mut(), lower, Accum::Replace, rows.transpose(), full, rows, full, one(), Par::Seq);
         part
     })
+}
+
+/// A matrix in double precision.
+pub fn to_double(a: MatRef<'_, f32>) -> Mat<f64> {
+    let mut out = zeros(a.nrows(), a.ncols());
+    out.as_mut().par_col_iter_mut().zip(a.par_col_iter()).for_each(|(out, a)| {
+        out.iter_mut().zip(a.iter()).for_each(|(out, &x)| *out = x.into());
+    });
+    out
 }
 
 /// A symmetric matrix from its lower triangle.
@@ -113,7 +130,7 @@ pub fn mirrored(mut a: Mat<f64>) -> Mat<f64> {
 }
 
 /// `AᵀB`, summed over blocks of so many rows.
-pub fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>, block_rows: usize) -> Mat<f64> {
+pub fn transposed_product<T: RealField + Copy>(a: MatRef<'_, T>, b: MatRef<'_, T>, block_rows: usize) -> Mat<T> {
     let shape = (a.ncols(), b.ncols());
     sum_over_blocks(a.nrows(), block_rows, shape, |first, count| {
         let mut part = Mat::zeros(shape.0, shape.1);
@@ -123,12 +140,12 @@ pub fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>, block_rows: us
 }
 
 /// Sums `part(first row, rows)` over blocks of rows, in their order.
-fn sum_over_blocks(
+fn sum_over_blocks<T: RealField + Copy>(
     rows: usize,
     block_rows: usize,
     shape: (usize, usize),
-    part: impl Fn(usize, usize) -> Mat<f64> + Sync,
-) -> Mat<f64> {
+    part: impl Fn(usize, usize) -> Mat<T> + Sync,
+) -> Mat<T> {
     if rows <= block_rows {
         return part(0, rows);
     }
@@ -136,7 +153,7 @@ fn sum_over_blocks(
     let blocks: Vec<usize> = (0..rows).step_by(block_rows).collect();
     let at_once = (MAX_PART_ENTRIES / (shape.0 * shape.1).max(1)).clamp(PARTS_AT_ONCE[0], PARTS_AT_ONCE[1]);
     for some in blocks.chunks(at_once) {
-        let parts: Vec<Mat<f64>> = some.par_iter().map(|&first| part(first, block_rows.min(rows - first))).collect();
+        let parts: Vec<Mat<T>> = some.par_iter().map(|&first| part(first, block_rows.min(rows - first))).collect();
         parts.iter().for_each(|part| sum += part);
     }
     sum

@@ -1,33 +1,32 @@
-//! Mean value coordinates as a function of the cage: values, and the derivative of any function of them by the cage's vertices in
-//! reverse mode.
+//! Mean value coordinates as a function of the cage, in single precision: values, and the derivative of any function of them by the
+//! cage's vertices in reverse mode.
 //!
 //! With `W` the unnormalised weights, `Φ = W/ΣW`, and per face `w_i = (g_i·m)/(det d_i)`, where `g_i = u_j × u_k`,
-//! `det = u_0·g_0` and `m = ½ Σ θ_e n_e`; all of it is smooth away from the cage's faces. A face that a point sees edge-on has
-//! weights of zero, their limit beside the face.
+//! `det = u_0·g_0` and `m = Σ f_e g_e`, `f = θ/(2 sin θ)` a function of the cosine; all of it is smooth away from the cage's faces. A face that a
+//! point sees edge-on has weights of zero, their limit beside the face.
 
-use super::{GRADIENT, MeanValue, store};
-use crate::cage::{Cage, Edge, Face};
-use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion};
+use super::MeanValue;
+use crate::cage::{Cage, Face};
+use crate::simd::{LANES, Singles, cross, dot, half_angle_over_sine, half_angle_over_sine_slope, multiversion};
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
-use faer::{Mat, MatRef};
+use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
 
 /// Points of one task: partial gradients are added up task by task, so that the sum does not depend on the number of threads.
 const TASK_POINTS: usize = 32 * LANES;
-/// Faces whose determinant is below this are seen edge-on.
-const EDGE_ON: f64 = 1e-11;
-/// Edges seen under a smaller sine take a series for the derivative.
-const NARROW: f64 = 1e-3;
-/// Edges seen under a smaller sine take the limit for the value too.
-const TOUCHING: f64 = 1e-12;
+/// Square of the sine under which faces are seen edge-on: from there the rounding of their derivatives outweighs what they add.
+const EDGE_ON: f32 = 1e-6;
+/// Least square of an edge's sine.
+const TOUCHING: f32 = 1e-12;
 
 impl MeanValue {
-    /// `Φ`, n × m, for points off the cage's surface: accurate to about 1e-9, without the special cases of [`coordinates`] for points at the surface
-    /// and thin cages. Runs on the current rayon pool; the result does not depend on it.
+    /// `Φ`, n × m, for points off the cage's surface: accurate to about 1e-4, mostly far better, without the special cases of [`coordinates`] for
+    /// points at the surface and thin cages. Runs on the current rayon pool; the result does not depend on it.
     ///
     /// [`coordinates`]: crate::coordinates::CoordinateSystem::coordinates
-    pub fn smooth_coordinates(self, cage: &Cage, points: &[Point]) -> Mat<f64> {
+    pub fn smooth_coordinates(self, cage: &Cage, points: &[Point]) -> Mat<f32> {
+        let vertices = Unit::of(cage).vertices(cage);
         let mut phi = zeros(points.len(), cage.vertices().len());
         phi.as_mut().par_row_chunks_mut(TASK_POINTS).enumerate().for_each_init(
             || Scratch::new(cage),
@@ -35,7 +34,8 @@ impl MeanValue {
                 let points = &points[task * TASK_POINTS..];
                 for start in (0..rows.nrows()).step_by(LANES) {
                     let filled = LANES.min(rows.nrows() - start);
-                    let scale = forward(cage, gather(|l| points[start + l.min(filled - 1)]), scratch);
+                    let x = Unit::of(cage).lanes(&points[start..start + filled]);
+                    let scale = forward(cage, &vertices, x, scratch);
                     store(rows.as_mut().subrows_mut(start, filled), &scratch.weights, scale);
                 }
             },
@@ -43,16 +43,11 @@ impl MeanValue {
         phi
     }
 
-    /// Gradient of `Σ_ij g_ij Φ_ij` by the cage's vertices, v × 3, where `upstream` holds `g`, n × m, and `phi` is what
-    /// [`Self::smooth_coordinates`] gives for the same points. Runs on the current rayon pool; the result does not depend on it.
-    pub fn gradient(
-        self,
-        cage: &Cage,
-        points: &[Point],
-        phi: MatRef<'_, f64>,
-        upstream: MatRef<'_, f64>,
-    ) -> Vec<Point> {
-        let m = cage.vertices().len();
+    /// Gradient of `Σ_ij g_ij Φ_ij` by the cage's vertices, v × 3, where `upstream` holds `g`, n × m, and `Φ` is [`Self::smooth_coordinates`]. Runs
+    /// on the current rayon pool; the result does not depend on it.
+    pub fn gradient(self, cage: &Cage, points: &[Point], upstream: MatRef<'_, f32>) -> Vec<Point> {
+        let unit = Unit::of(cage);
+        let vertices = unit.vertices(cage);
         let tasks = points.len().div_ceil(TASK_POINTS);
         let parts: Vec<Vec<Point>> = (0..tasks)
             .into_par_iter()
@@ -61,23 +56,23 @@ impl MeanValue {
                 |(scratch, adjoint), task| {
                     let first = task * TASK_POINTS;
                     let count = TASK_POINTS.min(points.len() - first);
-                    adjoint.total.fill([Lanes::ZERO; 3]);
+                    adjoint.total.fill([Singles::ZERO; 3]);
                     for start in (first..first + count).step_by(LANES) {
                         let filled = LANES.min(first + count - start);
-                        let scale = forward(cage, gather(|l| points[start + l.min(filled - 1)]), scratch);
-                        let rows = (phi.subrows(start, filled), upstream.subrows(start, filled));
-                        load(rows, scale, &scratch.nearness, &mut adjoint.weights);
+                        let x = unit.lanes(&points[start..start + filled]);
+                        let scale = forward(cage, &vertices, x, scratch);
+                        load(upstream.subrows(start, filled), scale, scratch, &mut adjoint.weights);
                         backward(cage, scratch, adjoint);
                     }
-                    adjoint.total.iter().map(|t| t.map(|c| c.0.iter().sum())).collect()
+                    adjoint.total.iter().map(|t| t.map(|c| c.0.iter().copied().map(f64::from).sum())).collect()
                 },
             )
             .collect();
-        let mut sum = vec![[0.0; 3]; m];
+        let mut sum = vec![[0.0; 3]; vertices.len()];
         for part in parts {
             for (total, value) in sum.iter_mut().zip(part) {
                 for k in 0..3 {
-                    total[k] += value[k];
+                    total[k] += value[k] * unit.scale;
                 }
             }
         }
@@ -85,59 +80,128 @@ impl MeanValue {
     }
 }
 
-/// Values of the forward pass: unit vectors `u`, reciprocal distances `1/d` and unnormalised weights `W`. Per edge: `c = u_a × u_b`; `f = θ/(2 sin θ)`, so
-/// that the mean-vector term is `f c`; and `(df/ds)/s`.
-type Scratch = super::Scratch<GRADIENT>;
+/// The unit in which positions fit single precision: differences from a vertex, as fractions of the cage's diagonal.
+#[derive(Clone, Copy)]
+struct Unit {
+    origin: Point,
+    scale: f64,
+}
+
+impl Unit {
+    fn of(cage: &Cage) -> Self {
+        Self { origin: cage.vertices()[0], scale: 1.0 / cage.diagonal() }
+    }
+
+    fn single(&self, p: Point) -> [f32; 3] {
+        std::array::from_fn(|k| ((p[k] - self.origin[k]) * self.scale) as f32)
+    }
+
+    fn vertices(&self, cage: &Cage) -> Vec<[f32; 3]> {
+        cage.vertices().iter().map(|&v| self.single(v)).collect()
+    }
+
+    /// A lane group of points; a last, partly filled one repeats its last point.
+    fn lanes(&self, points: &[Point]) -> [Singles; 3] {
+        let mut x = [Singles::ZERO; 3];
+        for l in 0..LANES {
+            let p = self.single(points[l.min(points.len() - 1)]);
+            for k in 0..3 {
+                x[k].0[l] = p[k];
+            }
+        }
+        x
+    }
+}
+
+/// Values of the forward pass; every entry holds one lane group.
+struct Scratch {
+    /// Unit vectors from the points to each cage vertex.
+    directions: Vec<[Singles; 3]>,
+    /// Reciprocal distances to each cage vertex.
+    nearness: Vec<Singles>,
+    edges: Vec<EdgeTerms>,
+    /// Unnormalised weights.
+    weights: Vec<Singles>,
+}
+
+#[derive(Clone, Copy)]
+struct EdgeTerms {
+    /// `c = u_a × u_b`, and its square.
+    cross: [Singles; 3],
+    square: Singles,
+    /// `f = θ/(2 sin θ)`: the mean-vector term is `f c`.
+    ratio: Singles,
+}
+
+impl Scratch {
+    fn new(cage: &Cage) -> Self {
+        let m = cage.vertices().len();
+        let edge = EdgeTerms { cross: [Singles::ZERO; 3], square: Singles::ZERO, ratio: Singles::ZERO };
+        Self {
+            directions: vec![[Singles::ZERO; 3]; m],
+            nearness: vec![Singles::ZERO; m],
+            edges: vec![edge; cage.edges().len()],
+            weights: vec![Singles::ZERO; m],
+        }
+    }
+}
 
 /// Accumulators of the backward pass.
 struct Adjoint {
     /// Derivative by each weight times the reciprocal distance, `∂E/∂W_j / d_j`.
-    weights: Vec<Lanes>,
+    weights: Vec<Singles>,
     /// Derivative by each unit vector.
-    directions: Vec<[Lanes; 3]>,
+    directions: Vec<[Singles; 3]>,
     /// Derivative by each edge's mean-vector term, then by its cross product where that enters on its own.
-    edges: Vec<[Lanes; 6]>,
+    edges: Vec<[Singles; 6]>,
     /// Derivative by the vertices, over all lane groups of a task.
-    total: Vec<[Lanes; 3]>,
+    total: Vec<[Singles; 3]>,
 }
 
 impl Adjoint {
     fn new(cage: &Cage) -> Self {
         let m = cage.vertices().len();
         Self {
-            weights: vec![Lanes::ZERO; m],
-            directions: vec![[Lanes::ZERO; 3]; m],
-            edges: vec![[Lanes::ZERO; 6]; cage.edges().len()],
-            total: vec![[Lanes::ZERO; 3]; m],
+            weights: vec![Singles::ZERO; m],
+            directions: vec![[Singles::ZERO; 3]; m],
+            edges: vec![[Singles::ZERO; 6]; cage.edges().len()],
+            total: vec![[Singles::ZERO; 3]; m],
+        }
+    }
+}
+
+/// Writes the coordinates of a lane group's points, one for each row.
+fn store(mut rows: MatMut<'_, f32>, weights: &[Singles], scale: Singles) {
+    let filled = rows.nrows();
+    for (column, &weight) in rows.as_mut().col_iter_mut().zip(weights) {
+        let values = (weight * scale).0;
+        match column.try_as_col_major_mut() {
+            Some(column) => column.as_slice_mut().copy_from_slice(&values[..filled]),
+            None => unreachable!("a matrix of its own has contiguous columns"),
         }
     }
 }
 
 /// Derivatives by the weights from those by their quotients: `(g_ij − Σ_k g_ik Φ_ik)/ΣW`, over the distances. Lanes that repeat the last point
 /// contribute zero.
-fn load(rows: (MatRef<'_, f64>, MatRef<'_, f64>), scale: Lanes, nearness: &[Lanes], out: &mut [Lanes]) {
-    let (phi, upstream) = rows;
-    let mut mean = Lanes::ZERO;
-    for j in 0..out.len() {
-        let mut value = Lanes::ZERO;
-        for l in 0..phi.nrows() {
-            value.0[l] = upstream[(l, j)];
-            mean.0[l] += upstream[(l, j)] * phi[(l, j)];
+fn load(upstream: MatRef<'_, f32>, scale: Singles, scratch: &Scratch, out: &mut [Singles]) {
+    let mut mean = Singles::ZERO;
+    for ((value, column), &weight) in out.iter_mut().zip(upstream.col_iter()).zip(&scratch.weights) {
+        *value = Singles::ZERO;
+        for (l, &g) in column.iter().enumerate() {
+            value.0[l] = g;
         }
-        out[j] = value;
+        mean = mean + *value * weight;
     }
-    let mut counted = Lanes::ZERO;
-    for l in 0..phi.nrows() {
-        counted.0[l] = scale.0[l];
-    }
-    for (value, &near) in out.iter_mut().zip(nearness) {
-        *value = (*value - mean) * counted * near;
+    mean = mean * scale;
+    for (value, &near) in out.iter_mut().zip(&scratch.nearness) {
+        *value = (*value - mean) * scale * near;
     }
 }
 
 multiversion! {
     /// Unnormalised weights of one lane group, left in the scratch; returns one over their sums.
-    fn forward(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Lanes = forward_generic;
+    fn forward(cage: &Cage, vertices: &[[f32; 3]], x: [Singles; 3], scratch: &mut Scratch) -> Singles = forward_generic;
 }
 
 multiversion! {
@@ -146,28 +210,37 @@ multiversion! {
 }
 
 #[inline(always)]
-fn forward_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Lanes {
-    for (j, v) in cage.vertices().iter().enumerate() {
-        let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
-        let inverse = dot(&r, &r).sqrt().map(|d| 1.0 / if d < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { d });
+fn forward_generic(cage: &Cage, vertices: &[[f32; 3]], x: [Singles; 3], scratch: &mut Scratch) -> Singles {
+    for (j, v) in vertices.iter().enumerate() {
+        let r = [Singles::splat(v[0]) - x[0], Singles::splat(v[1]) - x[1], Singles::splat(v[2]) - x[2]];
+        let square = dot(&r, &r).map(|d| if d < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { d });
+        let inverse = square.sqrt().map(|d| 1.0 / d);
         scratch.nearness[j] = inverse;
         let direction = &mut scratch.directions[j];
         direction[0] = r[0] * inverse;
         direction[1] = r[1] * inverse;
         direction[2] = r[2] * inverse;
-        scratch.weights[j] = Lanes::ZERO;
+        scratch.weights[j] = Singles::ZERO;
     }
     for (edge, out) in cage.edges().iter().zip(&mut scratch.edges) {
-        edge_term(edge, &scratch.directions, out);
+        let [a, b] = edge.vertices.map(|v| &scratch.directions[v as usize]);
+        // The difference keeps the relative accuracy where the edge is seen under a small angle.
+        let c = cross(a, &[b[0] - a[0], b[1] - a[1], b[2] - a[2]]);
+        let square = dot(&c, &c);
+        out.cross[0] = c[0];
+        out.cross[1] = c[1];
+        out.cross[2] = c[2];
+        out.square = square;
+        out.ratio = half_angle_over_sine(dot(a, b), inverse_sine(square));
     }
     for face in cage.faces() {
-        let seen = FaceTerms::new(face, &scratch.directions, &scratch.edges);
+        let seen = FaceTerms::new(face, scratch);
         for i in 0..3 {
             let weight = &mut scratch.weights[face.vertices[i] as usize];
             *weight = *weight + dot(&seen.mean, &seen.g[i]) * seen.inverse;
         }
     }
-    let mut total = Lanes::ZERO;
+    let mut total = Singles::ZERO;
     for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
         *weight = *weight * nearness;
         total = total + *weight;
@@ -176,61 +249,47 @@ fn forward_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Lanes {
 }
 
 #[inline(always)]
-fn edge_term(edge: &Edge, directions: &[[Lanes; 3]], out: &mut [Lanes; GRADIENT]) {
-    let [a, b] = edge.vertices.map(|v| &directions[v as usize]);
-    let c = cross(a, b);
-    let s = dot(&c, &c).sqrt();
-    let t = dot(a, b);
-    let theta = angle(s, t);
-    let inverse = s.map(|s| 1.0 / if s < TOUCHING { TOUCHING } else { s });
-    let touching = s.map(|s| if s < TOUCHING { 1.0 } else { 0.0 });
-    let ratio = theta * inverse * (Lanes::splat(1.0) - touching) + touching;
-    // (t s − θ)/s³, which cancels where θ is small: −2/3 − s²/5 + O(s⁴).
-    let series = s * s * -0.2 - Lanes::splat(2.0 / 3.0);
-    let narrow = s.zip(t, |s, t| if s < NARROW && t > 0.0 { 1.0 } else { 0.0 });
-    let slope = (t - ratio) * inverse * inverse * (Lanes::splat(1.0) - narrow) + series * narrow;
-    out[0] = c[0];
-    out[1] = c[1];
-    out[2] = c[2];
-    out[3] = ratio * 0.5;
-    out[4] = slope * 0.5;
+fn inverse_sine(square: Singles) -> Singles {
+    square.map(|s| if s < TOUCHING { TOUCHING } else { s }).sqrt().map(|s| 1.0 / s)
 }
 
 /// Terms of one face for the points of a lane group.
 struct FaceTerms {
     /// `u_j × u_k`, by the corner opposite.
-    g: [[Lanes; 3]; 3],
+    g: [[Singles; 3]; 3],
     /// Mean vector `m`.
-    mean: [Lanes; 3],
+    mean: [Singles; 3],
     /// `1/det`; 0 where the face is seen edge-on.
-    inverse: Lanes,
+    inverse: Singles,
 }
 
 impl FaceTerms {
     #[inline(always)]
-    fn new(face: &Face, directions: &[[Lanes; 3]], edges: &[[Lanes; GRADIENT]]) -> Self {
-        let [e0, e1, e2] = face.edges.map(|e| &edges[e as usize]);
-        let [s0, s1, s2] = face.signs;
-        let g0 = [e0[0] * s0, e0[1] * s0, e0[2] * s0];
-        let g1 = [e1[0] * s1, e1[1] * s1, e1[2] * s1];
-        let g2 = [e2[0] * s2, e2[1] * s2, e2[2] * s2];
+    fn new(face: &Face, scratch: &Scratch) -> Self {
+        let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
+        let [s0, s1, s2] = face.signs.map(|s| s as f32);
+        let g0 = [e0.cross[0] * s0, e0.cross[1] * s0, e0.cross[2] * s0];
+        let g1 = [e1.cross[0] * s1, e1.cross[1] * s1, e1.cross[2] * s1];
+        let g2 = [e2.cross[0] * s2, e2.cross[1] * s2, e2.cross[2] * s2];
         let mean = [
-            g0[0] * e0[3] + g1[0] * e1[3] + g2[0] * e2[3],
-            g0[1] * e0[3] + g1[1] * e1[3] + g2[1] * e2[3],
-            g0[2] * e0[3] + g1[2] * e1[3] + g2[2] * e2[3],
+            g0[0] * e0.ratio + g1[0] * e1.ratio + g2[0] * e2.ratio,
+            g0[1] * e0.ratio + g1[1] * e1.ratio + g2[1] * e2.ratio,
+            g0[2] * e0.ratio + g1[2] * e1.ratio + g2[2] * e2.ratio,
         ];
-        let det = dot(&directions[face.vertices[0] as usize], &g0);
-        let inverse = det.map(|d| if d.abs() > EDGE_ON { 1.0 / d } else { 0.0 });
+        let [u0, u1] = [0, 1].map(|i| &scratch.directions[face.vertices[i] as usize]);
+        let det = dot(&[u0[0] - u1[0], u0[1] - u1[1], u0[2] - u1[2]], &g0);
+        let least = e0.square * e1.square * EDGE_ON;
+        let inverse = det.zip(least, |d, least| if d * d > least { 1.0 / d } else { 0.0 });
         Self { g: [g0, g1, g2], mean, inverse }
     }
 }
 
 #[inline(always)]
 fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
-    adjoint.directions.fill([Lanes::ZERO; 3]);
-    adjoint.edges.fill([Lanes::ZERO; 6]);
+    adjoint.directions.fill([Singles::ZERO; 3]);
+    adjoint.edges.fill([Singles::ZERO; 6]);
     for face in cage.faces() {
-        let seen = FaceTerms::new(face, &scratch.directions, &scratch.edges);
+        let seen = FaceTerms::new(face, scratch);
         let vertices = face.vertices.map(|v| v as usize);
         let [a0, a1, a2] = vertices.map(|v| adjoint.weights[v] * seen.inverse);
         let [g0, g1, g2] = &seen.g;
@@ -242,7 +301,7 @@ fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
         ];
         let by_det = dot(&seen.mean, &by_mean) * seen.inverse;
         for (i, a) in [a0, a1, a2].into_iter().enumerate() {
-            let sign = face.signs[i];
+            let sign = face.signs[i] as f32;
             let edge = &mut adjoint.edges[face.edges[i] as usize];
             let own = a * sign;
             for k in 0..3 {
@@ -257,16 +316,10 @@ fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
     }
     for ((edge, term), by) in cage.edges().iter().zip(&scratch.edges).zip(&adjoint.edges) {
         let [a, b] = edge.vertices.map(|v| v as usize);
-        let c = [term[0], term[1], term[2]];
-        let along = by[0] * c[0] + by[1] * c[1] + by[2] * c[2];
-        let slope = along * term[4];
-        let by_c = [
-            by[3] + by[0] * term[3] + c[0] * slope,
-            by[4] + by[1] * term[3] + c[1] * slope,
-            by[5] + by[2] * term[3] + c[2] * slope,
-        ];
-        let by_t = along * -0.5;
         let (ua, ub) = (scratch.directions[a], scratch.directions[b]);
+        let slope = half_angle_over_sine_slope(dot(&ua, &ub), inverse_sine(term.square));
+        let by_t = (by[0] * term.cross[0] + by[1] * term.cross[1] + by[2] * term.cross[2]) * slope;
+        let by_c = [by[3] + by[0] * term.ratio, by[4] + by[1] * term.ratio, by[5] + by[2] * term.ratio];
         let (to_a, to_b) = (cross(&ub, &by_c), cross(&by_c, &ua));
         for k in 0..3 {
             adjoint.directions[a][k] = adjoint.directions[a][k] + to_a[k] + ub[k] * by_t;

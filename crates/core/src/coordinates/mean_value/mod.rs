@@ -68,30 +68,26 @@ fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
     )
 }
 
-/// Terms of an edge in the [`Scratch`] of the coordinates, and of their gradient.
-const FORWARD: usize = 4;
-const GRADIENT: usize = 5;
-
 /// Working memory of one task; every entry holds one lane group.
-struct Scratch<const EDGE: usize> {
+struct Scratch {
     /// Unit vectors from the points to each cage vertex.
     directions: Vec<[Lanes; 3]>,
     /// Reciprocal distances to each cage vertex.
     nearness: Vec<Lanes>,
-    /// Terms of each edge; of [`FORWARD`] ones three are half the mean-vector term `½ θ n`, and the fourth is the factor that turns it into
+    /// Terms of each edge; three are half the mean-vector term `½ θ n`, and the fourth is the factor that turns it into
     /// `u_a × u_b`.
-    edges: Vec<[Lanes; EDGE]>,
+    edges: Vec<[Lanes; 4]>,
     /// Unnormalised weights.
     weights: Vec<Lanes>,
 }
 
-impl<const EDGE: usize> Scratch<EDGE> {
+impl Scratch {
     fn new(cage: &Cage) -> Self {
         let m = cage.vertices().len();
         Self {
             directions: vec![[Lanes::ZERO; 3]; m],
             nearness: vec![Lanes::ZERO; m],
-            edges: vec![[Lanes::ZERO; EDGE]; cage.edges().len()],
+            edges: vec![[Lanes::ZERO; 4]; cage.edges().len()],
             weights: vec![Lanes::ZERO; m],
         }
     }
@@ -103,7 +99,7 @@ fn task_coordinates(
     points: &[Point],
     first: usize,
     mut rows: MatMut<'_, f64>,
-    scratch: &mut Scratch<FORWARD>,
+    scratch: &mut Scratch,
 ) -> Vec<u32> {
     let mut outsiders = Vec::new();
     let count = rows.nrows();
@@ -171,7 +167,7 @@ fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
 /// Computes the weights of lane l's point again, integrated for faces whose rounding matters; `total` is about the sum of all weights. Returns
 /// that sum.
 #[cold]
-fn accurate_weights(cage: &Cage, scratch: &mut Scratch<FORWARD>, x: Point, l: usize, total: f64) -> f64 {
+fn accurate_weights(cage: &Cage, scratch: &mut Scratch, x: Point, l: usize, total: f64) -> f64 {
     for weight in &mut scratch.weights {
         weight.0[l] = 0.0;
     }
@@ -186,7 +182,7 @@ fn accurate_weights(cage: &Cage, scratch: &mut Scratch<FORWARD>, x: Point, l: us
 }
 
 /// Weights of one face times the distances of its corners.
-fn face_weights(cage: &Cage, scratch: &Scratch<FORWARD>, face: &Face, x: Point, l: usize, total: f64) -> [f64; 3] {
+fn face_weights(cage: &Cage, scratch: &Scratch, face: &Face, x: Point, l: usize, total: f64) -> [f64; 3] {
     let vertices = face.vertices.map(|v| v as usize);
     let edges = face.edges.map(|e| scratch.edges[e as usize].map(|c| c.0[l]));
     let g = [0, 1, 2].map(|i| [0, 1, 2].map(|k| face.signs[i] * edges[i][k]));
@@ -214,11 +210,11 @@ fn is_inaccurate(loss2: f64, nearest: f64, total: f64) -> bool {
 
 multiversion! {
     /// Unnormalised weights of one lane group, left in the scratch; returns their sums.
-    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<FORWARD>) -> Sums = group_weights_generic;
+    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums = group_weights_generic;
 }
 
 #[inline(always)]
-fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch<FORWARD>) -> Sums {
+fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums {
     let mut on = [On::Nothing; LANES];
     let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
     for (j, v) in cage.vertices().iter().enumerate() {
