@@ -5,8 +5,8 @@ import { Color } from 'three';
 import { HOME, nearlySame, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
 import { resolvedColor } from '../style/resolvedColor';
-import { controls } from '../style/tokens';
-import { glyph } from '../viewer/glyphs';
+import { controls } from '../style/controls';
+import { glyphs } from '../style/glyphs';
 import { Quality } from '../viewer/quality';
 import { stageColors } from '../viewer/stageColors';
 import { DrawingScene, type Drawing, type DrawingColors } from './geometry/drawing';
@@ -81,9 +81,9 @@ export class Views extends LitElement {
   private readonly sizes = new ResizeObserver(() => this.ask());
 
   override render() {
-    if (this.problem !== '') return html`<p class="problem" role="alert">${this.problem}</p>`;
+    if (this.problem !== '') return html`<p class="notice" role="alert">${this.problem}</p>`;
     return html`
-      <div class="tools">
+      <div class="tools row fine">
         ${this.moments && this.moments.count > 1 ? this.slider(this.moments) : nothing}
         <button class="quiet" @click=${() => this.home()}>Reset view</button>
         <button class="quiet" aria-pressed=${String(this.isLarge)} @click=${() => (this.isLarge = !this.isLarge)}>
@@ -101,14 +101,14 @@ export class Views extends LitElement {
           this.views,
           (view) => view,
           ({ title, note, color }) =>
-            html`<figure>
+            html`<figure class="card">
               <canvas
                 tabindex="0"
                 role="img"
                 aria-label="${title}. ${note}. Arrow keys turn it, plus and minus zoom."
                 @keydown=${this.turn}
               ></canvas>
-              <figcaption>
+              <figcaption class="fine">
                 <b>${color === undefined ? nothing : html`<i .style=${`background:${color}`}></i>`}${title}</b
                 ><span class="figures">${note}</span>
               </figcaption>
@@ -176,7 +176,7 @@ export class Views extends LitElement {
 
   private slider({ count, name }: Moments) {
     return html`<button class="icon" aria-label=${this.isPlaying ? 'Pause' : 'Play'} @click=${() => this.play()}>
-        ${glyph(this.isPlaying ? 'pause' : 'play')}
+        ${glyphs[this.isPlaying ? 'pause' : 'play']}
       </button>
       <input
         type="range"
