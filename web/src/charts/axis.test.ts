@@ -6,6 +6,7 @@ describe('an axis', () => {
     expect(axisOf([0, 1.06], 5).ticks).toEqual([0, 0.5, 1]);
     expect(axisOf([0, 498], 6).ticks).toEqual([0, 100, 200, 300, 400]);
     expect(axisOf([1e-3, 2e4], 5, true).ticks).toEqual([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3, 1e4]);
+    expect(axisOf([0.03, 1.2], 5, true).ticks).toEqual([0.05, 0.1, 0.2, 0.5, 1]);
     expect(axisOf([120, 380], 4, true).ticks).toEqual([200, 300]);
   });
 

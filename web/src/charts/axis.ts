@@ -19,11 +19,14 @@ export function axisOf(ends: readonly [number, number], about: number, isLog = f
   };
 }
 
-/** Powers of ten between two exponents. */
+/** Powers of ten between two exponents; 2 and 5 times these, too, where there are few. */
 function powers(first: number, last: number, about: number): number[] {
   const step = Math.max(1, Math.ceil((last - first) / (2 * about)));
   const from = Math.ceil(first / step);
-  return Array.from({ length: Math.floor(last / step) - from + 1 }, (_, k) => 10 ** (step * (from + k)));
+  const found = Array.from({ length: Math.floor(last / step) - from + 1 }, (_, k) => 10 ** (step * (from + k)));
+  if (found.length > 2) return found;
+  const all = [10 ** (from - 1), ...found].flatMap((power) => [power, 2 * power, 5 * power]);
+  return all.filter((value) => Math.log10(value) >= first && Math.log10(value) <= last);
 }
 
 /** Multiples of 1, 2 or 5 times a power of ten. */

@@ -61,12 +61,12 @@ export class Chart extends LitElement {
           all.map(([at]) => at),
           x.cover ?? 'exact',
         ),
-      6,
+      8,
       x.cover === 'log',
     );
     const [low, high] = this.x.ends;
     const seen = all.flatMap(([at, value]) => (value !== null && at >= low && at <= high ? [value] : []));
-    this.y = axisOf(endsOf(seen, y.cover), 5, y.cover === 'log');
+    this.y = axisOf(endsOf(seen, y.cover), 6, y.cover === 'log');
   }
 
   override render() {

@@ -40,6 +40,7 @@ export const chartStyle = css`
     justify-self: center;
     padding: 0;
     writing-mode: vertical-rl;
+    text-orientation: sideways;
     rotate: 180deg;
     white-space: nowrap;
   }

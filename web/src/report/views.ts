@@ -2,7 +2,7 @@ import { html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
 import { repeat } from 'lit/directives/repeat.js';
 import { Color } from 'three';
-import { HOME, nearlySame, type CameraState } from '../render/camera';
+import { framed, HOME, nearlySame, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
 import { resolvedColor } from '../style/resolvedColor';
 import { controls } from '../style/controls';
@@ -10,7 +10,7 @@ import { glyphs } from '../style/glyphs';
 import { Quality } from '../viewer/quality';
 import { stageColors } from '../viewer/stageColors';
 import { DrawingScene, type Drawing, type DrawingColors } from './geometry/drawing';
-import { fitted, homeView, pictureShape } from './geometry/framing';
+import { homeView, pictureShape } from './geometry/framing';
 import { keyedCamera } from './geometry/keyedCamera';
 import { Painter } from './geometry/painter';
 import { saveSideBySide } from './savedSheet';
@@ -204,7 +204,7 @@ export class Views extends LitElement {
     const first = this.shown.values().next().value;
     const canvas = this.renderRoot.querySelector('canvas');
     if (!first || !canvas) return;
-    const camera = fitted(homeView(this.framed), this.framed, this.aspect(canvas));
+    const camera = framed(homeView(this.framed), this.framed, this.aspect(canvas));
     first.controls.go(camera, atOnce);
   }
 
@@ -266,8 +266,8 @@ export class Views extends LitElement {
         shown.scene.setColors(this.colors());
       } else if (shown.at !== place) shown.scene.show(shown.view.drawing(place));
       shown.at = place;
-      const { framed } = shown.view;
-      const camera = framed ? fitted(this.camera, framed, this.aspect(canvas)) : this.camera;
+      const own = shown.view.framed;
+      const camera = own ? framed(this.camera, own, this.aspect(canvas)) : this.camera;
       painter.paint(canvas, shown.scene, camera, width, height, share * Math.min(2, devicePixelRatio));
     }
   }

@@ -39,7 +39,7 @@ export const viewsStyle = css`
   .views.large {
     grid-template-columns: repeat(auto-fill, minmax(min(100%, 400px), 1fr));
   }
-  figure {
+  .views figure {
     display: flex;
     flex-direction: column;
     min-width: 0;

@@ -34,7 +34,8 @@ export const controls = css`
     font: inherit;
     color: inherit;
   }
-  :is(button, .button) {
+  button,
+  .button {
     display: inline-flex;
     align-items: center;
     justify-content: center;
@@ -50,20 +51,23 @@ export const controls = css`
     transition: var(--cager-fast);
     transition-property: background, border-color, color;
   }
-  :is(button, .button):hover:not(:disabled) {
+  button:hover:not(:disabled),
+  .button:hover {
     background: var(--cager-hover);
   }
   button:disabled {
     opacity: 0.45;
     cursor: default;
   }
-  :is(button, .button).primary {
+  button.primary,
+  .button.primary {
     border-color: transparent;
     background: var(--cager-accent);
     color: var(--cager-on-accent);
     font-weight: 600;
   }
-  :is(button, .button).primary:hover:not(:disabled) {
+  button.primary:hover:not(:disabled),
+  .button.primary:hover {
     background: color-mix(in srgb, var(--cager-accent) 86%, var(--cager-text));
   }
   button.danger {
@@ -158,7 +162,11 @@ export const controls = css`
   dialog header {
     display: flex;
     justify-content: space-between;
-    align-items: start;
+    align-items: center;
+    margin-bottom: var(--cager-space-3);
+  }
+  dialog header h2 {
+    margin: 0;
   }
   dialog::backdrop {
     background: rgb(0 0 0 / 0.45);

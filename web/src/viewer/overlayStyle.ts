@@ -106,6 +106,9 @@ export const overlayStyle = css`
     margin: 5px 0 3px;
     border-radius: 4px;
   }
+  .legend .spread {
+    gap: 0;
+  }
   .legend.comparison {
     width: min(300px, calc(100% - 84px));
     padding: var(--cager-space-3);
