@@ -107,6 +107,25 @@ describe.skipIf(missing !== null)('reports that are opened as files', { timeout:
     expect(await series.getAttribute('aria-pressed')).toBe('false');
   });
 
+  it('shows a part of a chart that is dragged across, and all of it again', async () => {
+    const page = await opened('compared.html');
+    const chart = page.locator('cager-chart').first();
+    const labels = () => chart.locator('.x').allTextContents();
+    const all = await labels();
+    const area = chart.getByRole('img');
+    await area.scrollIntoViewIfNeeded();
+    const { x, y, width, height } = (await area.boundingBox())!;
+    await page.mouse.move(x + 0.25 * width, y + height / 2);
+    await page.mouse.down();
+    await page.mouse.move(x + 0.5 * width, y + height / 2);
+    await page.mouse.up();
+    await expect.poll(labels).not.toEqual(all);
+    const [low, high] = [(await labels()).at(0), (await labels()).at(-1)].map(Number);
+    expect([low >= Number(all.at(0)), high < Number(all.at(-1))]).toEqual([true, true]);
+    await area.dblclick();
+    await expect.poll(labels).toEqual(all);
+  });
+
   it('fits a phone and the dark', async () => {
     const page = await opened('compared.html');
     await page.emulateMedia({ colorScheme: 'dark' });
