@@ -3,8 +3,16 @@ export type Vector = readonly [number, number, number];
 
 export const sub = (a: Vector, b: Vector): Vector => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 export const dot = (a: Vector, b: Vector): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+/** a + share · b. */
+export const plus = (a: Vector, b: Vector, share = 1): Vector => [
+  a[0] + share * b[0],
+  a[1] + share * b[1],
+  a[2] + share * b[2],
+];
 export const norm = (a: Vector): number => Math.sqrt(dot(a, a));
 export const scaled = (a: Vector, factor: number): Vector => [a[0] * factor, a[1] * factor, a[2] * factor];
+/** A vector of length 1; zero stays zero. */
+export const normalized = (a: Vector): Vector => scaled(a, 1 / (norm(a) || 1));
 export const cross = (a: Vector, b: Vector): Vector => [
   a[1] * b[2] - a[2] * b[1],
   a[2] * b[0] - a[0] * b[2],

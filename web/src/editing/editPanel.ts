@@ -1,15 +1,14 @@
 import { html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
-import { glyph } from '../viewer/glyphs';
+import { glyphs } from '../style/glyphs';
 import { picturePanelStyle } from '../style/picturePanel';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
 import { editNotes } from './editNotes';
 import { editRow } from './editRow';
 import { editPanelStyle } from './editPanelStyle';
 import type { CageEditor } from './editor';
 import type { EditSettings, Reach } from './editModel';
 import { exportEdited, obstacle, type ExportKind } from './exporter';
-import { drawing } from './drawings';
 import type { Keeping } from './keptEdits';
 import { TOOL_KEYS } from './keys';
 import { mouseAndKeys } from './mouseAndKeys';
@@ -63,18 +62,18 @@ export class EditPanel extends LitElement {
   override render() {
     const { model, said } = this.editor;
     const { edits } = model;
-    return html`<section class="panel" aria-label="Edit the cage" @keydown=${this.keepKey}>
+    return html`<section class="panel glass" aria-label="Edit the cage" @keydown=${this.keepKey}>
       <header>
-        <h2>Edit the cage</h2>
+        <h2 class="grow">Edit the cage</h2>
         ${this.action('undo', 'Undo (Ctrl Z)', !model.canUndo, () => model.undo())}
         ${this.action('redo', 'Redo (Ctrl Shift Z)', !model.canRedo, () => model.redo())}
         ${this.action('reset', 'Take all edits away', edits.length === 0, () => model.reset())}
-        <button class="quiet icon" title="Done (E)" aria-label="Done" @click=${this.leave}>${glyph('close')}</button>
+        <button class="quiet icon" title="Done (E)" aria-label="Done" @click=${this.leave}>${glyphs.close}</button>
       </header>
       <p class="visually-hidden" role="status">${said}</p>
       <div class="body">
         ${this.selectionRow()} ${this.toolRow()} ${this.settingRows(model.settings)}
-        <h3>Edits</h3>
+        <h3 class="setting fine">Edits</h3>
         ${
           edits.length === 0
             ? html`<p class="muted">None yet: drag a vertex of the cage.</p>`
@@ -102,7 +101,7 @@ export class EditPanel extends LitElement {
       this.requestUpdate();
     };
     return html`<div class="row">
-      <strong class="figures">${chosen}</strong>
+      <strong class="figures grow">${chosen}</strong>
       <button aria-pressed=${this.editor.addsToSelection} title="Clicks add vertices, as with Shift" @click=${toggle}>
         Several
       </button>
@@ -113,7 +112,7 @@ export class EditPanel extends LitElement {
   private toolRow() {
     const { editor } = this;
     const isAlone = editor.model.selection.length === 1 && editor.model.settings.radius === 0;
-    return html`<div class="segments tools" role="group" aria-label="What is done to them">
+    return html`<div class="segments" role="group" aria-label="What is done to them">
         ${TOOLS.map(
           ([tool, label]) =>
             html`<button
@@ -140,7 +139,7 @@ export class EditPanel extends LitElement {
     const percent = Math.round(100 * settings.radius);
     const planes = [null, ...AXES];
     return html`
-      <label class="setting" for="radius">
+      <label class="setting spread fine" for="radius">
         <span>Falloff</span><output class="figures">${percent === 0 ? 'off' : `${percent} % of the diagonal`}</output>
       </label>
       <div class="row">
@@ -162,11 +161,11 @@ export class EditPanel extends LitElement {
           <option value="space" .selected=${settings.measure === 'space'}>In space</option>
         </select>
       </div>
-      <div class="setting" id="symmetry">Symmetry</div>
+      <div class="setting fine" id="symmetry">Symmetry</div>
       <div class="segments" role="group" aria-labelledby="symmetry">
         ${planes.map((axis) => this.planeButton(axis, settings, () => set({ symmetry: axis })))}
       </div>
-      <div class="setting" id="reach">New edits reach</div>
+      <div class="setting fine" id="reach">New edits reach</div>
       <div class="segments" role="group" aria-labelledby="reach">
         ${REACHES.map(
           ([reach, label]) =>
@@ -197,7 +196,7 @@ export class EditPanel extends LitElement {
   private exportRow() {
     const { exporting } = this;
     if (exporting) {
-      return html`<footer>
+      return html`<footer class="row">
         <progress aria-label="Exporting" max="1" .value=${exporting.fraction}></progress>
         <button @click=${() => exporting.stop.abort()}>Stop</button>
       </footer>`;
@@ -209,10 +208,10 @@ export class EditPanel extends LitElement {
         ?disabled=${reason !== null}
         @click=${() => void this.export(kind)}
       >
-        ${drawing('save')} ${label}
+        ${glyphs.download} ${label}
       </button>`;
     };
-    return html`<footer aria-label="Export">
+    return html`<footer class="row" aria-label="Export">
       ${button('container', '.cager')} ${button('frames', 'Decoded frames')}
     </footer>`;
   }
@@ -242,7 +241,7 @@ export class EditPanel extends LitElement {
       ?disabled=${isDisabled}
       @click=${act}
     >
-      ${drawing(name)}
+      ${glyphs[name]}
     </button>`;
   }
 

@@ -1,6 +1,6 @@
 import { html, nothing } from 'lit';
 import type { CageEdit, FrameRange } from './cageEdit';
-import { drawing } from './drawings';
+import { glyphs } from '../style/glyphs';
 import type { CageEditor } from './editor';
 import { angleOf, type Motion } from './motion';
 import { degrees, timesAs } from './text';
@@ -21,7 +21,7 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
         .checked=${enabled}
         @change=${() => model.setEnabled(id, !enabled)}
       />
-      <button class="quiet name" aria-expanded=${isActive} @click=${activate}>
+      <button class="quiet name grow" aria-expanded=${isActive} @click=${activate}>
         <span>${name}<span class="muted">${amountOf(motion)}</span></span>
         <span class="muted figures">${range.first === range.last ? range.first : `${range.first}–${range.last}`}</span>
       </button>
@@ -31,7 +31,7 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
         title="Remove"
         @click=${() => model.remove(id)}
       >
-        ${drawing('remove')}
+        ${glyphs.trash}
       </button>
     </div>
     ${isActive ? rangeFields(editor, edit) : nothing}
@@ -48,7 +48,7 @@ function amountOf(motion: Motion): string {
 function rangeFields({ model, player }: CageEditor, { id, range }: CageEdit) {
   const frames = player.capture.frames;
   const field = (key: keyof FrameRange, label: string) =>
-    html`<label
+    html`<label class="muted"
       >${label}
       <input
         type="number"

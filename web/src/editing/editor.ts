@@ -10,7 +10,8 @@ import { keyCommand, keyMotion, type KeyCommand } from './keys';
 import type { Motion, MotionKind } from './motion';
 import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
-import { Projection, type Vector } from './projection';
+import type { Vector } from '../coordinates/vector';
+import { Projection } from './projection';
 import { degrees, timesAs } from './text';
 
 /** What the editor needs of the viewer around it. */
@@ -87,7 +88,7 @@ export class CageEditor extends EventTarget {
     const { stage } = this.player;
     const { clientWidth, clientHeight } = stage.canvas;
     if (this.stop.signal.aborted || clientWidth === 0) return;
-    this.projection = new Projection(stage.clipMatrix.elements, clientWidth, clientHeight);
+    this.projection = new Projection(stage.clipMatrix, clientWidth, clientHeight);
     this.places = placedVertices(this.projection, stage.cageVertices, this.model.graph.cage.triangles);
     const { selection } = this.model;
     this.gizmo = selection.length > 0 ? gizmoAt(this.projection, this.middle(), this.tool) : null;

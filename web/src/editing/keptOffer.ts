@@ -1,6 +1,6 @@
 import { css, html, LitElement } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
 import type { KeptEdits } from './keptEdits';
 
 /**
@@ -35,11 +35,6 @@ export class KeptOffer extends LitElement {
       }
       p {
         flex: 1 1 220px;
-        margin: 0;
-      }
-      div {
-        display: flex;
-        gap: var(--cager-space-2);
       }
       @container (max-width: 1000px) {
         :host {
@@ -64,7 +59,7 @@ export class KeptOffer extends LitElement {
     const what = edits.length === 1 ? 'An edit' : `${edits.length} edits`;
     return html`
       <p role="status">${what} from ${when} ${edits.length === 1 ? 'is' : 'are'} still in this browser.</p>
-      <div>
+      <div class="row">
         <button class="primary" @click=${() => this.dispatchEvent(new Event('takeup'))}>Restore</button>
         <button @click=${() => this.dispatchEvent(new Event('throwaway'))}>Discard</button>
       </div>

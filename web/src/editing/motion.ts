@@ -1,4 +1,5 @@
-import { cross, dot, length, normalized, plus, type Vector } from './projection';
+import { Quaternion as Turn, Vector3 } from 'three';
+import { norm, plus, sub, type Vector } from '../coordinates/vector';
 
 /** A rotation as a unit quaternion x y z w. Its sign counts: a negative w is a rotation by more than half a turn. */
 export type Quaternion = readonly [number, number, number, number];
@@ -13,9 +14,7 @@ export type MotionKind = Motion['kind'];
 
 /** A rotation about an axis, in radians, counter-clockwise where the axis points at the eye. */
 export function rotationAbout(axis: Vector, angle: number): Quaternion {
-  const [x, y, z] = normalized(axis);
-  const sine = Math.sin(angle / 2);
-  return [x * sine, y * sine, z * sine, Math.cos(angle / 2)];
+  return new Turn().setFromAxisAngle(new Vector3(...axis).normalize(), angle).toArray();
 }
 
 /** Angle of a rotation, from 0 to 2π. */
@@ -27,7 +26,7 @@ export function angleOf([x, y, z, w]: Quaternion): number {
 export function combined(first: Motion, second: Motion): Motion {
   if (first.kind === 'move' && second.kind === 'move') return { kind: 'move', by: plus(first.by, second.by) };
   if (first.kind === 'rotate' && second.kind === 'rotate') {
-    return { kind: 'rotate', rotation: product(second.rotation, first.rotation) };
+    return { kind: 'rotate', rotation: new Turn(...second.rotation).multiply(new Turn(...first.rotation)).toArray() };
   }
   if (first.kind === 'scale' && second.kind === 'scale') {
     const [a, b] = [first.factors, second.factors];
@@ -66,20 +65,7 @@ export function displacement(motion: Motion, part: number, arm: Vector): Vector 
     return [along(0), along(1), along(2)];
   }
   const [x, y, z] = motion.rotation;
-  if (length([x, y, z]) === 0) return [0, 0, 0];
-  const [qx, qy, qz, qw] = rotationAbout([x, y, z], part * angleOf(motion.rotation));
-  const axis: Vector = [qx, qy, qz];
-  const across = cross(axis, arm);
-  const twice = cross(axis, across);
-  return [2 * (qw * across[0] + twice[0]), 2 * (qw * across[1] + twice[1]), 2 * (qw * across[2] + twice[2])];
-}
-
-/** The rotation `b` and then `a`. */
-function product([ax, ay, az, aw]: Quaternion, [bx, by, bz, bw]: Quaternion): Quaternion {
-  const [a, b]: [Vector, Vector] = [
-    [ax, ay, az],
-    [bx, by, bz],
-  ];
-  const [x, y, z] = plus(plus(cross(a, b), b, aw), a, bw);
-  return [x, y, z, aw * bw - dot(a, b)];
+  if (norm([x, y, z]) === 0) return [0, 0, 0];
+  const turn = new Turn(...rotationAbout([x, y, z], part * angleOf(motion.rotation)));
+  return sub(new Vector3(...arm).applyQuaternion(turn).toArray(), arm);
 }

@@ -17,7 +17,7 @@ export const mouseAndKeys = html`<details>
     Drag a vertex, an arrow, a square or a ring. Shift and a click add a vertex, Shift and a drag choose all in a box;
     Shift while a ring or an arrow is dragged goes by steps of 15° or a tenth. A click beside the cage chooses none.
   </p>
-  <dl>
+  <dl class="keys">
     ${KEYS.map(
       ([key, text]) =>
         html`<dt><kbd>${key}</kbd></dt>

@@ -1,5 +1,6 @@
 import { css, html, LitElement, nothing, svg } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
+import { controls } from '../style/controls';
 import { weightAt, type FrameRange } from './cageEdit';
 import { draggedRange, partAt, type RangePart } from './rangeDrag';
 
@@ -23,87 +24,75 @@ const CURSORS: Readonly<Record<RangePart, string>> = {
  */
 @customElement('cager-range-strip')
 export class RangeStrip extends LitElement {
-  static override styles = css`
-    :host {
-      display: block;
-      position: relative;
-      height: 24px;
-      touch-action: none;
-      user-select: none;
-    }
-    svg,
-    i,
-    .ground {
-      position: absolute;
-      pointer-events: none;
-    }
-    .ground {
-      inset: 4px 0 3px;
-      border-radius: 3px;
-      background: color-mix(in srgb, var(--cager-muted) 14%, transparent);
-    }
-    svg {
-      inset: 4px 0 3px;
-      width: 100%;
-      height: 17px;
-      overflow: visible;
-      fill: color-mix(in srgb, var(--cager-cage) 38%, transparent);
-      stroke: var(--cager-cage);
-      stroke-width: 1.5;
-      stroke-linejoin: round;
-    }
-    i {
-      box-sizing: border-box;
-      background: var(--cager-cage);
-      border: 1.5px solid var(--cager-surface);
-      translate: -50% 0;
-    }
-    i.end {
-      bottom: 0;
-      width: 8px;
-      height: 14px;
-      border-radius: 3px;
-    }
-    i.ease {
-      top: 0;
-      width: 11px;
-      height: 11px;
-      border-radius: 50%;
-    }
-    i.held {
-      outline: 2px solid var(--cager-accent);
-    }
-    span {
-      position: absolute;
-      bottom: calc(100% + 2px);
-      padding: 3px 8px;
-      border-radius: var(--cager-radius-small);
-      background: var(--cager-text);
-      color: var(--cager-background);
-      font-size: var(--cager-size-small);
-      font-variant-numeric: tabular-nums;
-      white-space: nowrap;
-      translate: -50% 0;
-      pointer-events: none;
-      z-index: 3;
-    }
-    @media (pointer: coarse) {
+  static override styles = [
+    controls,
+    css`
       :host {
-        height: 36px;
+        display: block;
+        position: relative;
+        height: 24px;
+        touch-action: none;
+        user-select: none;
+      }
+      svg,
+      i,
+      .ground {
+        position: absolute;
+        pointer-events: none;
+      }
+      .ground {
+        inset: 4px 0 3px;
+        border-radius: 3px;
+        background: color-mix(in srgb, var(--cager-muted) 14%, transparent);
       }
       svg {
-        height: 29px;
+        inset: 4px 0 3px;
+        width: 100%;
+        height: 17px;
+        overflow: visible;
+        fill: color-mix(in srgb, var(--cager-cage) 38%, transparent);
+        stroke: var(--cager-cage);
+        stroke-width: 1.5;
+        stroke-linejoin: round;
+      }
+      i {
+        background: var(--cager-cage);
+        border: 1.5px solid var(--cager-surface);
+        translate: -50% 0;
       }
       i.end {
-        height: 20px;
-        width: 12px;
+        bottom: 0;
+        width: 8px;
+        height: 14px;
+        border-radius: 3px;
       }
       i.ease {
-        width: 16px;
-        height: 16px;
+        top: 0;
+        width: 11px;
+        height: 11px;
+        border-radius: 50%;
       }
-    }
-  `;
+      i.held {
+        outline: 2px solid var(--cager-accent);
+      }
+      @media (pointer: coarse) {
+        :host {
+          height: 36px;
+        }
+        svg {
+          height: 29px;
+        }
+        i.end {
+          height: 20px;
+          width: 12px;
+        }
+        i.ease {
+          width: 16px;
+          height: 16px;
+        }
+      }
+    `,
+  ];
 
   @property({ attribute: false }) range!: FrameRange;
   /** Frames there are. */
@@ -137,7 +126,7 @@ export class RangeStrip extends LitElement {
       ${handle('easeIn', 'ease', first + easeIn)} ${handle('easeOut', 'ease', last - easeOut)}
       ${
         held
-          ? html`<span .style=${`left: ${share(Math.round((first + last) / 2))}`}>
+          ? html`<span class="tip figures" .style=${`left: ${share(Math.round((first + last) / 2))}`}>
               ${first}–${last}, ease in ${easeIn}, out ${easeOut}
             </span>`
           : nothing

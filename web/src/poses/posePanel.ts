@@ -1,9 +1,9 @@
 import { css, html, LitElement, nothing, svg, type PropertyValues } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
 import { picturePanelStyle } from '../style/picturePanel';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
 import { numberAt, numberText } from '../viewer/frameNumbers';
-import { glyph } from '../viewer/glyphs';
+import { glyphs } from '../style/glyphs';
 import type { PoseView } from './poseView';
 import { cornerOf } from './weights';
 
@@ -34,13 +34,12 @@ export class PosePanel extends LitElement {
         width: 100%;
         height: 26px;
         margin: 0 0 4px;
-        border-radius: var(--cager-radius-small);
       }
       input[type='range']:focus-visible {
         outline-offset: -1px;
       }
       p {
-        margin: var(--cager-space-2) 0 0;
+        margin-bottom: var(--cager-space-2);
       }
       svg.pad {
         display: block;
@@ -64,23 +63,7 @@ export class PosePanel extends LitElement {
         text-anchor: middle;
         dominant-baseline: central;
       }
-      .pose {
-        display: flex;
-        align-items: center;
-        gap: var(--cager-space-2);
-      }
-      .pose span {
-        flex: 1;
-      }
       @container (max-width: 680px) {
-        :host {
-          left: var(--cager-space-2);
-          right: var(--cager-space-2);
-          top: auto;
-          bottom: calc(var(--deck-height, 120px) + var(--cager-space-2));
-          width: auto;
-          height: 38%;
-        }
         .panel {
           align-self: flex-end;
         }
@@ -106,16 +89,16 @@ export class PosePanel extends LitElement {
     const { view } = this;
     const { poses, failure } = view;
     const weights = poses.length > 1 ? view.weights : [];
-    return html`<section class="panel" aria-label="Blend poses" @keydown=${this.keepKey}>
+    return html`<section class="panel glass" aria-label="Blend poses" @keydown=${this.keepKey}>
       <header>
-        <h2>Blend poses</h2>
+        <h2 class="grow">Blend poses</h2>
         <button
           class="quiet icon"
           title="Close (N)"
           aria-label="Close"
           @click=${() => this.dispatchEvent(new Event('leave'))}
         >
-          ${glyph('close')}
+          ${glyphs.close}
         </button>
       </header>
       <div class="body">
@@ -124,15 +107,15 @@ export class PosePanel extends LitElement {
         ${poses.length === 2 ? this.slider() : poses.length > 2 ? this.pad() : nothing}
         ${poses.map(
           (frame, k) =>
-            html`<div class="pose">
-              <span>Frame ${this.numberOf(frame)}</span>
+            html`<div class="row">
+              <span class="grow">Frame ${this.numberOf(frame)}</span>
               <span class="figures muted">${k < weights.length ? `${Math.round(100 * weights[k])} %` : ''}</span>
               <button
                 class="quiet icon"
                 aria-label="Remove frame ${this.numberOf(frame)}"
                 @click=${() => view.choose(poses.filter((other) => other !== frame))}
               >
-                ${glyph('close')}
+                ${glyphs.close}
               </button>
             </div>`,
         )}

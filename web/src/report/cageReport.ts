@@ -1,12 +1,12 @@
 import { html, LitElement, nothing } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
 import { grouped } from '../viewer/text';
 import type { CageFigures, Report } from './data';
 import { footer } from './footer';
 import { joined, RestPose } from './geometry/modelInCage';
 import { reportStyle } from './reportStyle';
-import { table } from './table';
+import { table, viewsOf } from './table';
 import { condition, percents, seconds } from './text';
 import type { View } from './views';
 
@@ -16,8 +16,8 @@ export class CageReportPage extends LitElement {
   static override styles = [controls, reportStyle];
 
   @property({ attribute: false }) report: (Report & { kind: 'cage' }) | null = null;
-  private views: readonly View[] = [];
-  private framed: Float32Array = new Float32Array(0);
+  views: readonly View[] = [];
+  framed: Float32Array = new Float32Array(0);
 
   override willUpdate() {
     if (this.views.length > 0 || !this.report) return;
@@ -44,15 +44,13 @@ export class CageReportPage extends LitElement {
           ${grouped(geometry.mesh.of)} points.
         </p>
         ${(['warnings', 'findings', 'changes'] as const).map((name) => sentences(name, figures[name] ?? []))}
-        <report-views
-          class="large-views"
-          .views=${this.views}
-          .framed=${this.framed}
-          label="Model and cage"
-        ></report-views>
+        ${viewsOf('Model and cage', this, 'large-views')}
         <h2>Figures</h2>
-        ${table(['', ''], 1, counts(figures))} ${design(figures.design)}
-        ${footer(html`Written by <code>cager cage</code> ${program}.`)}
+        ${table(counts(figures), [
+          ['', ([name]) => name],
+          ['', ([, value]) => value],
+        ])}
+        ${design(figures.design)} ${footer(html`Written by <code>cager cage</code> ${program}.`)}
       </main>
     `;
   }
@@ -88,17 +86,13 @@ function design(found: CageFigures['design']) {
       ${found.style[0].toUpperCase()}${found.style.slice(1)} cage, designed from ${found.frames} frames and judged by as
       many others. Errors are mean distances in percent of the diagonal.
     </p>
-    ${table(
-      ['stage', 'vertices', 'error seen %', 'error not seen %', 'condition', 'after'],
-      1,
-      found.stages.map((stage) => [
-        stage.name,
-        grouped(stage.vertices),
-        percents(stage.designed_error, 4),
-        percents(stage.held_back_error, 4),
-        condition(stage.condition_number ?? null),
-        seconds(stage.seconds),
-      ]),
-    )}
+    ${table(found.stages, [
+      ['stage', (stage) => stage.name],
+      ['vertices', (stage) => grouped(stage.vertices)],
+      ['error seen %', (stage) => percents(stage.designed_error, 4)],
+      ['error not seen %', (stage) => percents(stage.held_back_error, 4)],
+      ['condition', (stage) => condition(stage.condition_number)],
+      ['after', (stage) => seconds(stage.seconds)],
+    ])}
   `;
 }

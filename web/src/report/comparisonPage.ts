@@ -1,7 +1,7 @@
 import { html, LitElement, nothing, type TemplateResult } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
 import { guard } from 'lit/directives/guard.js';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
 import { cages } from './comparison/cages';
 import { claims } from './comparison/claims';
 import { errors } from './comparison/errors';
@@ -82,8 +82,8 @@ export class ComparisonPage extends LitElement {
 
   /** Which coordinates the sections show. */
   private systemChoice(systems: readonly SystemReport[]) {
-    return html`<fieldset>
-      <legend>Coordinates</legend>
+    return html`<fieldset class="segments">
+      <legend class="visually-hidden">Coordinates</legend>
       ${systems.map(
         ({ name }, k) =>
           html`<label>

@@ -1,13 +1,13 @@
 import { html, LitElement, nothing } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
-import { controls } from '../style/tokens';
-import type { ChartOptions, Cover } from './chart';
+import { controls } from '../style/controls';
+import type { ChartOptions } from '../charts/chart';
 import type { Figure, Report } from './data';
 import { footer } from './footer';
 import { RestPose } from './geometry/modelInCage';
 import { methodColor } from './methods';
 import { reportStyle } from './reportStyle';
-import { table } from './table';
+import { charts, table, viewsOf } from './table';
 import { decimals } from './text';
 import type { Moments, View } from './views';
 
@@ -28,19 +28,10 @@ export class DemoReportPage extends LitElement {
     if (this.motion || !this.report) return;
     const { geometry, figures } = this.report;
     this.motion = motionOf(geometry);
+    const color = (handles: string, regularizer: string) => methodColor({ handles, regularizer });
     this.charts = [
-      errorChart(
-        'L2: root mean square over the points',
-        'L2, %',
-        methodColor({ handles: 'all', regularizer: 'none' }),
-        figures.l2,
-      ),
-      errorChart(
-        'L∞: largest over the points',
-        'L∞, %',
-        methodColor({ handles: 'maxvol', regularizer: 'laplacian' }),
-        figures.linf,
-      ),
+      errorChart('L2: root mean square over the points', 'L2, %', color('all', 'none'), figures.l2),
+      errorChart('L∞: largest over the points', 'L∞, %', color('maxvol', 'laplacian'), figures.linf),
       {
         title: 'Singular values of the coordinates of the points that are read',
         x: { label: 'singular value number' },
@@ -48,7 +39,7 @@ export class DemoReportPage extends LitElement {
         series: [
           {
             label: '',
-            color: methodColor({ handles: 'spread', regularizer: 'laplacian' }),
+            color: color('spread', 'laplacian'),
             mark: 'line',
             points: figures.singular_values.map((value, k) => [k + 1, value]),
           },
@@ -61,7 +52,7 @@ export class DemoReportPage extends LitElement {
   override render() {
     if (!this.report || !this.motion) return nothing;
     const { figures, geometry, program } = this.report;
-    const { views, moments, framed } = this.motion;
+    const { moments } = this.motion;
     const all = geometry.points.data === '' ? 0 : figures.l2.length;
     return html`
       <main>
@@ -70,30 +61,18 @@ export class DemoReportPage extends LitElement {
           A capture that <code>cager demo</code> makes was sent to a real service, encoded there, decoded again and
           measured anew. Errors are percentages of the diagonal of the rest pose's bounding box.
         </p>
-        <report-views
-          class="large-views"
-          .views=${views}
-          .moments=${moments}
-          .framed=${framed}
-          label="The decoded model and its cage"
-        ></report-views>
+        ${viewsOf('The decoded model and its cage', this.motion, 'large-views')}
         <p class="caption">
           <b>The decoded model, and its cage.</b> ${moments.count} of ${all}
           frames${moments.count < all ? ', evenly spaced; between them positions are interpolated' : ''}.
         </p>
-        <div class="charts">
-          ${this.charts.map((options) => html`<report-chart .options=${options}></report-chart>`)}
-        </div>
+        ${charts(...this.charts)}
         <h2>Sizes, errors and times</h2>
-        ${table(
-          ['', '', ''],
-          1,
-          figures.rows.map(({ name, value, note }) => [
-            name,
-            html`<span class="figures">${value}</span>`,
-            html`<span class="note-cell">${note}</span>`,
-          ]),
-        )}
+        ${table(figures.rows, [
+          ['', ({ name }) => name],
+          ['', ({ value }) => value],
+          ['', ({ note }) => html`<span class="note-cell muted">${note}</span>`],
+        ])}
         ${footer(html`Written by <code>cager demo</code> ${program}. The same folder holds the rest pose, the cage, the encoded capture and the decoded frames.`)}
       </main>
     `;
@@ -146,30 +125,17 @@ function blended(all: Float32Array, frames: number): (place: number) => Float32A
 }
 
 function errorChart(title: string, label: string, color: string, errors: readonly Figure[]): ChartOptions {
-  const known = errors.filter((error) => error !== null);
+  const known = errors.filter((error) => error !== null).map((error) => 100 * error);
   const positive = known.filter((error) => error > 0);
-  const largest = positive.reduce((a, b) => Math.max(a, b), 0);
-  const least = positive.reduce((a, b) => Math.min(a, b), Infinity);
-  const cover: Cover = largest > LINEAR_SPAN * least ? 'log' : 'zero';
-  const mean = known.length === 0 ? null : (100 * known.reduce((sum, error) => sum + error, 0)) / known.length;
-  const last = Math.max(0, errors.length - 1);
+  const isWide = Math.max(...positive) > LINEAR_SPAN * Math.min(...positive);
+  const mean = known.length === 0 ? null : known.reduce((sum, error) => sum + error, 0) / known.length;
   return {
     title,
     x: { label: 'frame' },
-    y: { label, cover },
+    y: { label, cover: isWide ? 'log' : 'zero' },
     series: [
-      {
-        label: 'of each frame',
-        color,
-        mark: 'line',
-        points: errors.map((error, frame) => [frame, error === null ? null : 100 * error]),
-      },
-      {
-        label: `mean ${decimals(mean, 3)} %`,
-        color,
-        mark: 'dashes',
-        points: errors.map((_, frame): [number, Figure] => [frame, mean]).slice(0, last + 1),
-      },
+      { label: 'of each frame', color, mark: 'line', points: errors.map((error, k) => [k, error && 100 * error]) },
+      { label: `mean ${decimals(mean, 3)} %`, color, mark: 'dashes', points: errors.map((_, k) => [k, mean]) },
     ],
   };
 }

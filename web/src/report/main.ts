@@ -1,5 +1,5 @@
 import { page, tokens } from '../style/tokens';
-import './chart';
+import '../charts/chart';
 import './views';
 import { CageReportPage } from './cageReport';
 import { ComparisonPage } from './comparisonPage';

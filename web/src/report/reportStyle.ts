@@ -1,7 +1,7 @@
 import { css } from 'lit';
-import { tableStyle } from './tableStyle';
 
-const pageStyle = css`
+/** Looks of a report: its text, tables, and where charts and views stand. */
+export const reportStyle = css`
   :host {
     display: block;
   }
@@ -11,7 +11,7 @@ const pageStyle = css`
     padding: var(--cager-space-6) var(--cager-space-5) var(--cager-space-7);
   }
   h1 {
-    margin: 0 0 var(--cager-space-2);
+    margin-bottom: var(--cager-space-2);
     font-size: 28px;
     line-height: 1.2;
     letter-spacing: -0.01em;
@@ -25,30 +25,32 @@ const pageStyle = css`
     scroll-margin-top: 96px;
     outline: none;
   }
-  h2 .system {
+  .system {
     margin-left: var(--cager-space-1);
     padding: 1px 8px;
     border-radius: 99px;
     background: var(--cager-accent-soft);
     color: var(--cager-accent);
-    font-size: var(--cager-size-small);
-    font-weight: 600;
+    font: 600 var(--cager-text-small);
     vertical-align: 3px;
   }
-  p {
+  :is(p, ul) {
     max-width: 82ch;
     margin: var(--cager-space-2) 0;
+  }
+  li {
+    margin-left: var(--cager-space-5);
+    list-style: disc;
   }
   .lead {
     color: var(--cager-muted);
   }
-  .lead b {
+  :is(.lead, .caption) b {
     color: var(--cager-text);
     font-weight: 600;
     overflow-wrap: anywhere;
   }
-  code,
-  pre {
+  :is(code, pre) {
     font-family: var(--cager-mono);
     font-size: 0.9em;
   }
@@ -61,21 +63,10 @@ const pageStyle = css`
   .card {
     min-width: 0;
     padding: var(--cager-space-4);
-    border: 1px solid var(--cager-line);
-    border-radius: var(--cager-radius-large);
-    background: var(--cager-surface);
-  }
-  .card h3 {
-    margin: 0;
-    color: var(--cager-muted);
-    font-size: var(--cager-size-small);
-    font-weight: 600;
   }
   .card .choice {
     margin: 2px 0 var(--cager-space-2);
-    font-size: var(--cager-size-large);
-    font-weight: 600;
-    line-height: 1.3;
+    font: 600 var(--cager-text-large);
   }
   .card pre {
     margin: var(--cager-space-3) 0;
@@ -98,7 +89,7 @@ const pageStyle = css`
     background: color-mix(in srgb, var(--cager-background) 94%, transparent);
     backdrop-filter: blur(8px);
   }
-  .bar nav {
+  nav {
     display: flex;
     gap: var(--cager-space-4);
     min-width: 0;
@@ -107,51 +98,29 @@ const pageStyle = css`
     white-space: nowrap;
     scrollbar-width: thin;
   }
-  .bar nav a {
+  nav a {
     padding: 6px 0;
+  }
+  nav a:not(:hover) {
     text-decoration: none;
   }
-  .bar nav a:hover {
-    text-decoration: underline;
-  }
-  fieldset {
-    display: flex;
+  .segments {
     flex: none;
-    align-items: center;
-    margin: 0;
-    padding: 2px;
-    border: 1px solid var(--cager-line);
-    border-radius: var(--cager-radius);
-    background: var(--cager-raised);
+    min-width: 0;
   }
-  fieldset legend {
-    position: absolute;
-    width: 1px;
-    height: 1px;
-    overflow: hidden;
-    clip-path: inset(50%);
-  }
-  fieldset label {
+  .segments label {
     position: relative;
     padding: 4px 10px;
-    border-radius: var(--cager-radius-small);
     font-size: var(--cager-size-small);
-    cursor: pointer;
   }
-  fieldset input {
+  .segments input {
     position: absolute;
     inset: 0;
     margin: 0;
     opacity: 0;
     cursor: pointer;
   }
-  fieldset label:has(:checked) {
-    background: var(--cager-surface);
-    color: var(--cager-accent);
-    box-shadow: 0 0 0 1px var(--cager-line);
-    font-weight: 600;
-  }
-  fieldset label:has(:focus-visible) {
+  .segments label:has(:focus-visible) {
     outline: 2px solid var(--cager-accent);
   }
   .charts {
@@ -166,11 +135,11 @@ const pageStyle = css`
   report-views {
     margin: var(--cager-space-5) 0 var(--cager-space-2);
   }
-  report-views.wide-view {
+  .wide-view {
     --report-view-width: 100%;
     max-width: 760px;
   }
-  report-views.large-views {
+  .large-views {
     --report-view-width: 340px;
     --report-view-fill: auto-fit;
   }
@@ -179,16 +148,8 @@ const pageStyle = css`
     color: var(--cager-muted);
     font-size: 13px;
   }
-  .caption b {
-    color: var(--cager-text);
-    font-weight: 600;
-  }
   .scale {
     display: inline-flex;
-    align-items: center;
-    gap: var(--cager-space-2);
-    font-size: var(--cager-size-small);
-    color: var(--cager-muted);
   }
   .scale i {
     width: 180px;
@@ -196,10 +157,8 @@ const pageStyle = css`
     border-radius: 3px;
   }
   .verdict {
-    font-weight: 600;
-  }
-  .verdict.holds {
     color: var(--cager-good);
+    font-weight: 600;
   }
   .verdict.in-part {
     color: var(--cager-warning);
@@ -207,13 +166,12 @@ const pageStyle = css`
   .verdict.fails {
     color: var(--cager-bad);
   }
-  .note {
-    padding: 2px 0 2px var(--cager-space-3);
+  .refused {
+    padding-left: var(--cager-space-3);
     border-left: 3px solid var(--cager-warning);
   }
-  details summary {
+  summary {
     color: var(--cager-accent);
-    cursor: pointer;
     font-size: 13px;
   }
   footer {
@@ -222,6 +180,53 @@ const pageStyle = css`
     border-top: 1px solid var(--cager-line);
     color: var(--cager-muted);
     font-size: 13px;
+  }
+  .wide {
+    margin: var(--cager-space-3) 0;
+    overflow-x: auto;
+  }
+  table {
+    font-size: 13px;
+    font-variant-numeric: tabular-nums;
+  }
+  :is(th, td) {
+    padding: 5px 10px;
+    border-bottom: 1px solid var(--cager-line);
+    text-align: right;
+    white-space: nowrap;
+  }
+  th {
+    font-weight: 600;
+    line-height: 1.3;
+    vertical-align: bottom;
+    white-space: normal;
+  }
+  .words {
+    text-align: left;
+  }
+  :is(th, td):first-child {
+    padding-left: 0;
+  }
+  .quiet td {
+    color: var(--cager-muted);
+  }
+  .sentence {
+    display: block;
+    min-width: 240px;
+    max-width: 400px;
+    white-space: normal;
+  }
+  .note-cell {
+    display: block;
+    text-align: left;
+  }
+  .dot {
+    display: inline-block;
+    width: 10px;
+    height: 10px;
+    margin-right: 8px;
+    border-radius: 2px;
+    vertical-align: -1px;
   }
   @media (max-width: 640px) {
     main {
@@ -232,23 +237,20 @@ const pageStyle = css`
     }
     .bar {
       flex-direction: column;
-      align-items: stretch;
+      align-items: start;
       margin-inline: calc(-1 * var(--cager-space-4));
       padding-inline: var(--cager-space-4);
     }
-    fieldset {
-      align-self: flex-start;
+    nav {
+      max-width: 100%;
     }
   }
   @media print {
     .bar {
       position: static;
     }
-    report-chart,
-    report-views {
+    :is(cager-chart, report-views) {
       break-inside: avoid;
     }
   }
 `;
-
-export const reportStyle = [tableStyle, pageStyle];

@@ -1,3 +1,5 @@
+import { save } from '../viewer/recording';
+
 /** Saves canvases of one size beside each other as one picture, on a ground of this colour. */
 export function saveSideBySide(canvases: readonly HTMLCanvasElement[], ground: string) {
   const [width, height] = [canvases[0].width, canvases[0].height];
@@ -8,12 +10,5 @@ export function saveSideBySide(canvases: readonly HTMLCanvasElement[], ground: s
   context.fillStyle = ground;
   context.fillRect(0, 0, sheet.width, sheet.height);
   canvases.forEach((canvas, k) => context.drawImage(canvas, (k % columns) * width, Math.floor(k / columns) * height));
-  sheet.toBlob((blob) => {
-    if (!blob) return;
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(blob);
-    link.download = 'cager.png';
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  });
+  sheet.toBlob((blob) => blob && save(blob, 'cager.png'));
 }

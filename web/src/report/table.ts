@@ -1,30 +1,34 @@
 import { html, type TemplateResult } from 'lit';
+import type { ChartOptions } from '../charts/chart';
 import type { Method } from './data';
 import { methodColor } from './methods';
+import type { Moments, View } from './views';
 
-type Cell = string | TemplateResult;
+export type Cell = string | TemplateResult;
+/** A column: its title, and what it has for a row. */
+export type Column<T> = readonly [title: Cell, cell: (row: T) => Cell];
 
-/** A table whose first `words` columns hold words, the others figures. */
-export function table(
-  headers: readonly Cell[],
-  words: number,
-  rows: readonly (readonly Cell[])[],
-  quietRows: readonly (readonly Cell[])[] = [],
-) {
+/**
+ * A table: a column holds words where `words` more of them follow, else figures.
+ *
+ * @param words how many columns hold words, from the left
+ * @param quiet rows at the end that are there to compare with
+ */
+export function table<T>(rows: readonly T[], columns: readonly Column<T>[], words = 1, quiet: readonly T[] = []) {
   const kind = (k: number) => (k < words ? 'words' : 'figures');
-  const row = (cells: readonly Cell[], name: string) =>
+  const row = (of: T, name: string) =>
     html`<tr class=${name}>
-      ${cells.map((cell, k) => html`<td class=${kind(k)}>${cell}</td>`)}
+      ${columns.map(([, cell], k) => html`<td class=${kind(k)}>${cell(of)}</td>`)}
     </tr>`;
   return html`<div class="wide" tabindex="0" role="region" aria-label="Table">
     <table>
-      <thead ?hidden=${headers.every((header) => header === '')}>
+      <thead ?hidden=${columns.every(([title]) => title === '')}>
         <tr>
-          ${headers.map((header, k) => html`<th class=${kind(k)} scope="col">${header}</th>`)}
+          ${columns.map(([title], k) => html`<th class=${kind(k)} scope="col">${title}</th>`)}
         </tr>
       </thead>
       <tbody>
-        ${rows.map((cells) => row(cells, ''))} ${quietRows.map((cells) => row(cells, 'quiet'))}
+        ${rows.map((of) => row(of, ''))} ${quiet.map((of) => row(of, 'quiet'))}
       </tbody>
     </table>
   </div>`;
@@ -38,6 +42,26 @@ export function folded(title: string, content: TemplateResult) {
   </details>`;
 }
 
+/** Charts beside each other. */
+export function charts(...all: readonly ChartOptions[]) {
+  return html`<div class="charts">${all.map((options) => html`<cager-chart .options=${options}></cager-chart>`)}</div>`;
+}
+
+/** Views beside each other; `look` is how large they are. */
+export function viewsOf(
+  label: string,
+  { views, framed, moments = null }: { views: readonly View[]; framed: Float32Array; moments?: Moments | null },
+  look: '' | 'wide-view' | 'large-views' = '',
+) {
+  return html`<report-views
+    class=${look}
+    .views=${views}
+    .framed=${framed}
+    .moments=${moments}
+    label=${label}
+  ></report-views>`;
+}
+
 /** A name with the colour that it has in all charts. */
 export function colored(color: string, name: string) {
   return html`<i class="dot" .style=${`background:${color}`}></i>${name}`;
@@ -48,11 +72,11 @@ export function methodName(method: Method) {
 }
 
 /** What stands below charts, views and tables: what is shown, how to read it, and the paper's figure. */
-export function caption(what: string, reading: string, paper: string) {
+export function caption(what: string, reading: Cell, paper = '') {
   return html`<p class="caption"><b>${what}</b> ${reading} <i>${paper}</i></p>`;
 }
 
 /** A legend of a colour map. */
 export function colorScale(low: string, high: string, gradient: string) {
-  return html`<div class="scale figures">${low}<i .style=${`background:${gradient}`}></i>${high}</div>`;
+  return html`<div class="scale row fine figures">${low}<i .style=${`background:${gradient}`}></i>${high}</div>`;
 }

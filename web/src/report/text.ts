@@ -2,41 +2,41 @@
 
 import type { Figure } from './data';
 
-const NOTHING = '–';
+type Known = Figure | undefined;
+
+const told = (value: Known, text: (value: number) => string) => (typeof value === 'number' ? text(value) : '–');
 
 /** A fraction as a percentage with so many decimals, without the sign. */
-export function percents(fraction: Figure, decimals: number): string {
-  return fraction === null ? NOTHING : (100 * fraction).toFixed(decimals);
+export function percents(fraction: Known, decimals: number): string {
+  return told(fraction, (x) => (100 * x).toFixed(decimals));
 }
 
 /** A fraction as a percentage of any size, without the sign. */
-export function anyPercents(fraction: Figure): string {
-  if (fraction === null) return NOTHING;
-  return fraction < 1 ? percents(fraction, 4) : (100 * fraction).toExponential(1);
+export function anyPercents(fraction: Known): string {
+  return told(fraction, (x) => (x < 1 ? percents(x, 4) : (100 * x).toExponential(1)));
 }
 
 /** A number with so many decimals. */
-export function decimals(value: Figure, count: number): string {
-  return value === null ? NOTHING : value.toFixed(count);
+export function decimals(value: Known, count: number): string {
+  return told(value, (x) => x.toFixed(count));
 }
 
 /** A condition number. */
-export function condition(value: Figure): string {
-  if (value === null) return NOTHING;
-  return value < 1e5 ? value.toFixed(1) : value.toExponential(1);
+export function condition(value: Known): string {
+  return told(value, (x) => (x < 1e5 ? x.toFixed(1) : x.toExponential(1)));
 }
 
 /** A singular value: four decimals, or a power of ten where it is small. */
-export function singular(value: Figure): string {
-  if (value === null) return NOTHING;
-  return value < 1e-3 ? value.toExponential(3) : value.toFixed(4);
+export function singular(value: Known): string {
+  return told(value, (x) => (x < 1e-3 ? x.toExponential(3) : x.toFixed(4)));
 }
 
 /** Seconds in a unit that people read. */
-export function seconds(value: Figure): string {
-  if (value === null) return NOTHING;
-  if (value < 1e-3) return `${(1e6 * value).toFixed(1)} µs`;
-  return value < 1 ? `${(1e3 * value).toFixed(1)} ms` : `${value.toFixed(2)} s`;
+export function seconds(value: Known): string {
+  return told(value, (x) => {
+    if (x < 1e-3) return `${(1e6 * x).toFixed(1)} µs`;
+    return x < 1 ? `${(1e3 * x).toFixed(1)} ms` : `${x.toFixed(2)} s`;
+  });
 }
 
 /** A word as a shell takes it. */

@@ -2,15 +2,15 @@ import { html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
 import { repeat } from 'lit/directives/repeat.js';
 import { Color } from 'three';
-import { HOME, nearlySame, type CameraState } from '../render/camera';
+import { framed, HOME, nearlySame, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
 import { resolvedColor } from '../style/resolvedColor';
-import { controls } from '../style/tokens';
-import { glyph } from '../viewer/glyphs';
+import { controls } from '../style/controls';
+import { glyphs } from '../style/glyphs';
 import { Quality } from '../viewer/quality';
 import { stageColors } from '../viewer/stageColors';
 import { DrawingScene, type Drawing, type DrawingColors } from './geometry/drawing';
-import { fitted, homeView, pictureShape } from './geometry/framing';
+import { homeView, pictureShape } from './geometry/framing';
 import { keyedCamera } from './geometry/keyedCamera';
 import { Painter } from './geometry/painter';
 import { saveSideBySide } from './savedSheet';
@@ -81,9 +81,9 @@ export class Views extends LitElement {
   private readonly sizes = new ResizeObserver(() => this.ask());
 
   override render() {
-    if (this.problem !== '') return html`<p class="problem" role="alert">${this.problem}</p>`;
+    if (this.problem !== '') return html`<p class="notice" role="alert">${this.problem}</p>`;
     return html`
-      <div class="tools">
+      <div class="tools row fine">
         ${this.moments && this.moments.count > 1 ? this.slider(this.moments) : nothing}
         <button class="quiet" @click=${() => this.home()}>Reset view</button>
         <button class="quiet" aria-pressed=${String(this.isLarge)} @click=${() => (this.isLarge = !this.isLarge)}>
@@ -101,14 +101,14 @@ export class Views extends LitElement {
           this.views,
           (view) => view,
           ({ title, note, color }) =>
-            html`<figure>
+            html`<figure class="card">
               <canvas
                 tabindex="0"
                 role="img"
                 aria-label="${title}. ${note}. Arrow keys turn it, plus and minus zoom."
                 @keydown=${this.turn}
               ></canvas>
-              <figcaption>
+              <figcaption class="fine">
                 <b>${color === undefined ? nothing : html`<i .style=${`background:${color}`}></i>`}${title}</b
                 ><span class="figures">${note}</span>
               </figcaption>
@@ -176,7 +176,7 @@ export class Views extends LitElement {
 
   private slider({ count, name }: Moments) {
     return html`<button class="icon" aria-label=${this.isPlaying ? 'Pause' : 'Play'} @click=${() => this.play()}>
-        ${glyph(this.isPlaying ? 'pause' : 'play')}
+        ${glyphs[this.isPlaying ? 'pause' : 'play']}
       </button>
       <input
         type="range"
@@ -204,7 +204,7 @@ export class Views extends LitElement {
     const first = this.shown.values().next().value;
     const canvas = this.renderRoot.querySelector('canvas');
     if (!first || !canvas) return;
-    const camera = fitted(homeView(this.framed), this.framed, this.aspect(canvas));
+    const camera = framed(homeView(this.framed), this.framed, this.aspect(canvas));
     first.controls.go(camera, atOnce);
   }
 
@@ -266,8 +266,8 @@ export class Views extends LitElement {
         shown.scene.setColors(this.colors());
       } else if (shown.at !== place) shown.scene.show(shown.view.drawing(place));
       shown.at = place;
-      const { framed } = shown.view;
-      const camera = framed ? fitted(this.camera, framed, this.aspect(canvas)) : this.camera;
+      const own = shown.view.framed;
+      const camera = own ? framed(this.camera, own, this.aspect(canvas)) : this.camera;
       painter.paint(canvas, shown.scene, camera, width, height, share * Math.min(2, devicePixelRatio));
     }
   }

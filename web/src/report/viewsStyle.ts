@@ -1,19 +1,16 @@
 import { css } from 'lit';
 
+/** Looks of a group of views. */
 export const viewsStyle = css`
   :host {
     display: block;
   }
   .tools {
-    display: flex;
     flex-wrap: wrap;
-    align-items: center;
     gap: var(--cager-space-1);
     margin-bottom: var(--cager-space-2);
-    font-size: var(--cager-size-small);
-    color: var(--cager-muted);
   }
-  .tools input[type='range'] {
+  .tools input {
     flex: 0 1 260px;
     min-width: 100px;
   }
@@ -21,7 +18,7 @@ export const viewsStyle = css`
     min-width: 7em;
     color: var(--cager-text);
   }
-  .tools button.quiet {
+  .tools .quiet {
     min-height: 28px;
     padding: 0 var(--cager-space-2);
   }
@@ -42,12 +39,10 @@ export const viewsStyle = css`
   .views.large {
     grid-template-columns: repeat(auto-fill, minmax(min(100%, 400px), 1fr));
   }
-  figure {
+  .views figure {
     display: flex;
     flex-direction: column;
-    margin: 0;
     min-width: 0;
-    border: 1px solid var(--cager-line);
     border-radius: var(--cager-radius);
     overflow: hidden;
     background: linear-gradient(var(--cager-stage-top), var(--cager-stage));
@@ -70,11 +65,11 @@ export const viewsStyle = css`
     padding: var(--cager-space-2);
     background: var(--cager-surface);
     border-top: 1px solid var(--cager-line);
-    font-size: var(--cager-size-small);
     line-height: 1.35;
   }
   figcaption b {
     display: block;
+    color: var(--cager-text);
     font-weight: 600;
   }
   figcaption i {
@@ -83,14 +78,5 @@ export const viewsStyle = css`
     height: 9px;
     margin-right: 6px;
     border-radius: 2px;
-  }
-  figcaption span {
-    color: var(--cager-muted);
-  }
-  .problem {
-    margin: 0;
-    padding: var(--cager-space-3);
-    border-radius: var(--cager-radius);
-    background: var(--cager-bad-soft);
   }
 `;

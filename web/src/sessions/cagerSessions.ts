@@ -5,13 +5,12 @@ import type { Session } from '../service/messages';
 import { ServiceProblem, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
-import { dialogStyle } from '../style/dialog';
-import { pageLayout } from '../style/pageLayout';
-import { controls, tokens } from '../style/tokens';
+import { controls, pageLayout } from '../style/controls';
+import { tokens } from '../style/tokens';
 import { cardsStyle } from './cardsStyle';
 import { downloadContainer } from './download';
-import { deleteDialog, deleteDialogStyle } from './deleteDialog';
-import { emptyList, emptyListStyle } from './emptyList';
+import { deleteDialog } from './deleteDialog';
+import { emptyList } from './emptyList';
 import { FigureLoader } from './figures';
 import { isFiltering, matches, type StateFilter } from './filter';
 import { filterBar } from './filterBar';
@@ -32,16 +31,7 @@ const STREAMS = 2;
  */
 @customElement('cager-sessions')
 export class Sessions extends LitElement {
-  static override styles = [
-    tokens,
-    controls,
-    pageLayout,
-    dialogStyle,
-    sessionsStyle,
-    cardsStyle,
-    emptyListStyle,
-    deleteDialogStyle,
-  ];
+  static override styles = [tokens, controls, pageLayout, sessionsStyle, cardsStyle];
 
   readonly #service = new Service();
   readonly #list = new SessionList(this.#service);
@@ -123,14 +113,14 @@ export class Sessions extends LitElement {
 
   #table(sessions: readonly Session[]) {
     if (!this.#list.loaded) {
-      return html`<div class="list" aria-busy="true">
+      return html`<div class="list card" aria-busy="true">
         ${[1, 2, 3].map(() => html`<div class="placeholder"></div>`)}
       </div>`;
     }
     const { rows, first, matching, isWhole } = this.#shown(sessions);
     const now = Date.now() / 1000;
     return html`
-      <div class="list">
+      <div class="list card">
         <table role="table" aria-label="Sessions, newest first">
           ${tableHead}
           ${repeat(
@@ -152,7 +142,7 @@ export class Sessions extends LitElement {
       </div>
       ${
         matching > rows.length || !isWhole
-          ? html`<nav class="pager" aria-label="Pages">
+          ? html`<nav class="pager row muted" aria-label="Pages">
               <span class="figures">${first + 1}–${first + rows.length} of ${matching}${isWhole ? '' : '+'}</span>
               <button type="button" ?disabled=${first === 0} @click=${() => this.#turn(-1)}>Newer</button>
               <button

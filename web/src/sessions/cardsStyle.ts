@@ -3,9 +3,6 @@ import { css } from 'lit';
 /** Looks of the list on narrow screens: a card for each session, in place of the table's rows. */
 export const cardsStyle = css`
   @media (max-width: 860px) {
-    .page {
-      padding: var(--cager-space-4) var(--cager-space-3) var(--cager-space-6);
-    }
     thead {
       position: absolute;
       display: block;
@@ -15,50 +12,44 @@ export const cardsStyle = css`
       overflow: hidden;
       clip-path: inset(50%);
     }
-    table,
-    tbody {
+    :is(table, tbody, .more, .more td) {
       display: block;
     }
-    tr.session {
+    .session {
       display: flex;
       flex-wrap: wrap;
       align-items: start;
       gap: 3px var(--cager-space-4);
       padding: var(--cager-space-3) var(--cager-space-4);
     }
-    tr.session td {
+    .session td {
       order: 1;
       padding: 0;
       text-align: left;
       font-size: var(--cager-size-small);
     }
-    tr.session td.title {
+    .session td.title {
       order: 0;
       flex: 1 1 calc(100% - 100px);
       min-width: 0;
       font-size: var(--cager-size);
     }
-    tr.session td.title a {
+    .name {
       max-width: none;
     }
-    tr.session td.tools {
+    .session td.tools {
       order: 0;
       margin: -4px -8px 0 0;
     }
-    tr.session td:empty {
+    .session td:empty {
       display: none;
     }
-    tr.session td[data-label]::before {
+    .session td[data-label]::before {
       content: attr(data-label) ' ';
       color: var(--cager-muted);
     }
-    tr.more {
-      display: block;
-      padding: 0 var(--cager-space-4) var(--cager-space-2);
-    }
-    tr.more td {
-      display: block;
-      padding-left: 0;
+    .more td {
+      padding: 0 var(--cager-space-4) var(--cager-space-4);
     }
     .search {
       max-width: none;
@@ -67,9 +58,8 @@ export const cardsStyle = css`
     .states {
       flex: 1;
     }
-    .states button {
-      flex: 1;
-      padding: 0 var(--cager-space-2);
+    .ways li {
+      padding: var(--cager-space-4);
     }
   }
 `;

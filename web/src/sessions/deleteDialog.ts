@@ -1,6 +1,6 @@
-import { css, html, nothing } from 'lit';
+import { html, nothing } from 'lit';
 import type { Session } from '../service/messages';
-import * as glyphs from './glyphs';
+import { glyphs } from '../style/glyphs';
 import { nameOf } from './row';
 import { isUnfinished } from './sessionList';
 
@@ -35,23 +35,3 @@ export function deleteDialog(session: Session, dialog: DeleteDialog) {
     </dialog>
   `;
 }
-
-/** Its looks, beside {@link dialogStyle}. */
-export const deleteDialogStyle = css`
-  dialog {
-    max-width: min(460px, calc(100vw - 32px));
-  }
-  dialog h2 {
-    margin: 0 0 var(--cager-space-2);
-    font-size: var(--cager-size-large);
-    overflow-wrap: anywhere;
-  }
-  dialog p {
-    margin: 0 0 var(--cager-space-5);
-  }
-  dialog .buttons {
-    display: flex;
-    justify-content: flex-end;
-    gap: var(--cager-space-2);
-  }
-`;

@@ -1,6 +1,6 @@
 import { html } from 'lit';
 import type { Filter, StateFilter } from './filter';
-import * as glyphs from './glyphs';
+import { glyphs } from '../style/glyphs';
 
 const STATES: readonly (readonly [StateFilter, string])[] = [
   ['all', 'All'],
@@ -23,7 +23,7 @@ export function filterBar({ text, state: chosen }: Filter, onFilter: (filter: Fi
           @input=${(event: InputEvent) => onFilter({ text: (event.target as HTMLInputElement).value, state: chosen })}
         />
       </div>
-      <div class="states" role="group" aria-label="State">
+      <div class="states segments" role="group" aria-label="State">
         ${STATES.map(
           ([state, word]) =>
             html`<button

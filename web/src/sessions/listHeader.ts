@@ -3,7 +3,7 @@ import type { Session } from '../service/messages';
 import { sentenceOf } from '../service/problem';
 import { pageToken } from '../service/token';
 import { currentJob } from '../upload/currentJob';
-import * as glyphs from './glyphs';
+import { glyphs } from '../style/glyphs';
 import { isUnfinished, type SessionList } from './sessionList';
 import { counted } from './text';
 
@@ -20,8 +20,8 @@ export function listHeader(sessions: readonly Session[], hasOlder: boolean) {
   return html`
     <header>
       <h1>Sessions</h1>
-      <span class="summary">${sessions.length > 0 ? summary.filter(Boolean).join(' · ') : nothing}</span>
-      <span class="spacer"></span>
+      <span class="muted">${sessions.length > 0 ? summary.filter(Boolean).join(' · ') : nothing}</span>
+      <span class="grow"></span>
       ${
         pageToken.token === null
           ? nothing
@@ -46,7 +46,9 @@ export function listNotices(
       trouble
         ? html`<div class="notice" role="alert">
             ${glyphs.alert}
-            <p>${sentenceOf(trouble.problem)} ${trouble.retryAt === null ? '' : 'Retrying automatically.'}</p>
+            <p class="grow">
+              ${sentenceOf(trouble.problem)} ${trouble.retryAt === null ? '' : 'Retrying automatically.'}
+            </p>
             <button type="button" @click=${onRetry}>Retry now</button>
           </div>`
         : nothing
@@ -55,8 +57,8 @@ export function listNotices(
       failure
         ? html`<div class="notice" role="alert">
             ${glyphs.alert}
-            <p>${failure}</p>
-            <button type="button" class="quiet icon" aria-label="Close" @click=${onClose}>${glyphs.cross}</button>
+            <p class="grow">${failure}</p>
+            <button type="button" class="quiet icon" aria-label="Close" @click=${onClose}>${glyphs.close}</button>
           </div>`
         : nothing
     }

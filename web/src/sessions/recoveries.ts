@@ -2,7 +2,7 @@ import { LitElement, css, html, nothing } from 'lit';
 import { customElement, state } from 'lit/decorators.js';
 import type { Recovery } from '../service/messages';
 import { patiently, Service } from '../service/service';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
 import { counted } from './text';
 
 const POLL_SECONDS = 5;
@@ -15,12 +15,6 @@ export class Recoveries extends LitElement {
     css`
       h2 {
         margin: var(--cager-space-5) 0 var(--cager-space-2);
-        font-size: 17px;
-      }
-      ul {
-        margin: 0;
-        padding: 0;
-        list-style: none;
       }
       li {
         display: flex;

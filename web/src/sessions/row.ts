@@ -2,7 +2,7 @@ import { html, nothing, type TemplateResult } from 'lit';
 import type { Session } from '../service/messages';
 import { problemFrom, sentenceOf } from '../service/problem';
 import type { Figures } from './figures';
-import * as glyphs from './glyphs';
+import { glyphs } from '../style/glyphs';
 import * as text from './text';
 
 /** What a row shows, and what its buttons do. */
@@ -62,8 +62,8 @@ export function row(row: Row): TemplateResult {
     <tbody role="rowgroup" data-id=${session.id}>
       <tr class="session" role="row">
         <td class="title" role="cell">
-          <a class="name" href="#/session/${encodeURIComponent(session.id)}" title=${name}>${name}</a>
-          <div class="facts">${facts(session)}</div>
+          <a class="name clip" href="#/session/${encodeURIComponent(session.id)}" title=${name}>${name}</a>
+          <div class="facts fine clip">${facts(session)}</div>
         </td>
         <td role="cell">${state(session, row.rate)}</td>
         <td role="cell">${frames(session)}</td>
@@ -75,7 +75,7 @@ export function row(row: Row): TemplateResult {
             >${text.age(session.created, now)}</time
           >
         </td>
-        <td class="tools" role="cell"><div class="actions">${download(row, name)}${remove(row, name)}</div></td>
+        <td class="tools" role="cell"><div class="actions row">${download(row, name)}${remove(row, name)}</div></td>
       </tr>
       ${remarks(session)}
     </tbody>
@@ -125,7 +125,7 @@ function frames(session: Session) {
       >${solved === known ? text.counted(solved, 'frame') : `${text.count(solved)} of ${text.count(known)} frames`}</span
     >
     ${solved === known ? nothing : html`<progress aria-label="Frames solved" max=${known} value=${solved}></progress>`}
-    ${remarks.length > 0 ? html`<div class="small">${remarks.join(' · ')}</div>` : nothing}
+    ${remarks.length > 0 ? html`<div class="fine">${remarks.join(' · ')}</div>` : nothing}
   `;
 }
 
@@ -134,7 +134,7 @@ function sizes(session: Session, figures: Figures | null) {
   const bytes = figures?.bytes ?? null;
   if (!figures || bytes === null) return nothing;
   const ratio =
-    figures.ratio === null ? nothing : html` <span class="small">${text.ratio(figures.ratio)} smaller</span>`;
+    figures.ratio === null ? nothing : html` <span class="fine">${text.ratio(figures.ratio)} smaller</span>`;
   return html`${text.size(bytes)}${ratio}`;
 }
 
@@ -151,7 +151,7 @@ function download(row: Row, name: string) {
       ?disabled=${downloaded !== null}
       @click=${row.onDownload}
     >
-      ${downloaded === null ? glyphs.download : html`<span class="small">${Math.round(100 * downloaded)}%</span>`}
+      ${downloaded === null ? glyphs.download : html`<span class="fine">${Math.round(100 * downloaded)}%</span>`}
     </button>
   `;
 }

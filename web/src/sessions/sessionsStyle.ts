@@ -1,29 +1,20 @@
 import { css } from 'lit';
 
-/** Looks of the list as a table, and of what is around it, beside {@link pageLayout}. */
+/** Looks of the list as a table, of what is there instead while it is empty, and of the question before something is deleted. */
 export const sessionsStyle = css`
   .page {
     max-width: 1280px;
   }
-  header {
-    flex-wrap: wrap;
-    margin-bottom: var(--cager-space-5);
-  }
-  .summary {
-    display: flex;
-    align-items: center;
-    gap: var(--cager-space-2);
-    color: var(--cager-muted);
-  }
-  .spacer {
-    flex: 1;
-  }
+  header,
   .bar {
     display: flex;
     flex-wrap: wrap;
     align-items: center;
     gap: var(--cager-space-3);
     margin-bottom: var(--cager-space-3);
+  }
+  header {
+    margin-bottom: var(--cager-space-5);
   }
   .search {
     position: relative;
@@ -32,9 +23,8 @@ export const sessionsStyle = css`
   }
   .search svg {
     position: absolute;
-    left: 10px;
-    top: 50%;
-    translate: 0 -50%;
+    inset: 0 auto 0 10px;
+    margin: auto;
     color: var(--cager-muted);
     pointer-events: none;
   }
@@ -42,66 +32,26 @@ export const sessionsStyle = css`
     width: 100%;
     padding-left: 36px !important;
   }
-  .states {
-    display: flex;
-    gap: 2px;
-    padding: 2px;
-    margin: 0;
-    border: 1px solid var(--cager-line);
-    border-radius: var(--cager-radius);
-    background: var(--cager-surface);
-  }
-  .states button {
-    min-height: calc(var(--cager-control) - 6px);
-    border-color: transparent;
-    border-radius: 6px;
-    background: transparent;
-  }
-  .states button[aria-pressed='true'] {
-    background: var(--cager-accent-soft);
-    font-weight: 600;
-  }
   .notice {
-    display: flex;
     align-items: center;
-    gap: var(--cager-space-3);
     margin-bottom: var(--cager-space-3);
-    padding: var(--cager-space-3) var(--cager-space-4);
-    border-radius: var(--cager-radius);
-    background: var(--cager-bad-soft);
-  }
-  .notice svg {
-    color: var(--cager-bad);
-  }
-  .notice p {
-    flex: 1;
-    margin: 0;
   }
   .list {
     overflow: hidden;
-    border: 1px solid var(--cager-line);
-    border-radius: var(--cager-radius-large);
-    background: var(--cager-surface);
   }
   table {
     width: 100%;
-    border-collapse: collapse;
   }
   th {
     padding: var(--cager-space-2) var(--cager-space-3);
     border-bottom: 1px solid var(--cager-line);
-    color: var(--cager-muted);
-    font-size: var(--cager-size-small);
-    font-weight: 500;
-    text-align: left;
+    font: 500 var(--cager-text-small);
     white-space: nowrap;
   }
   td {
     padding: 10px var(--cager-space-3);
-    vertical-align: middle;
   }
-  th:first-child,
-  td:first-child {
+  :is(th, td):first-child {
     padding-left: var(--cager-space-4);
   }
   .number {
@@ -109,7 +59,7 @@ export const sessionsStyle = css`
     white-space: nowrap;
     font-variant-numeric: tabular-nums;
   }
-  tbody tr.session {
+  tr.session {
     position: relative;
     transition: background var(--cager-fast);
   }
@@ -119,39 +69,30 @@ export const sessionsStyle = css`
   tbody:hover {
     background: color-mix(in srgb, var(--cager-raised) 55%, transparent);
   }
-  a.name {
-    display: block;
-    overflow: hidden;
+  :is(.name, .facts) {
     max-width: 340px;
+  }
+  .name {
+    display: block;
     color: var(--cager-text);
     font-weight: 600;
     text-decoration: none;
-    text-overflow: ellipsis;
-    white-space: nowrap;
   }
-  a.name::after {
+  .name::after {
     content: '';
     position: absolute;
     inset: 0;
   }
-  a.name:focus-visible {
+  .name:focus-visible {
     outline: none;
   }
-  a.name:focus-visible::after {
+  .name:focus-visible::after {
     outline: 2px solid var(--cager-accent);
     outline-offset: -2px;
     border-radius: var(--cager-radius-small);
   }
-  tbody:hover a.name {
+  tbody:hover .name {
     color: var(--cager-accent);
-  }
-  .facts {
-    overflow: hidden;
-    max-width: 340px;
-    color: var(--cager-muted);
-    font-size: var(--cager-size-small);
-    text-overflow: ellipsis;
-    white-space: nowrap;
   }
   .state {
     display: inline-flex;
@@ -183,34 +124,18 @@ export const sessionsStyle = css`
     background: var(--cager-bad);
     border-radius: 2px;
   }
-  @media (prefers-reduced-motion: no-preference) {
-    .dot.running {
-      animation: pulse 1.6s ease-in-out infinite;
-    }
-  }
-  @keyframes pulse {
-    50% {
-      opacity: 0.35;
-    }
-  }
   progress {
     width: 120px;
     height: 4px;
     margin-top: 5px;
   }
-  .small {
-    color: var(--cager-muted);
-    font-size: var(--cager-size-small);
-  }
   .actions {
     position: relative;
     z-index: 1;
-    display: flex;
     justify-content: flex-end;
     gap: 2px;
   }
-  .actions button,
-  .actions .button {
+  .actions button {
     min-height: 32px;
     width: 32px;
     padding: 0;
@@ -218,25 +143,16 @@ export const sessionsStyle = css`
     background: transparent;
     color: var(--cager-muted);
   }
-  .actions button:hover:not(:disabled),
-  .actions .button:hover {
+  .actions button:hover:not(:disabled) {
     background: var(--cager-hover);
     color: var(--cager-text);
   }
-  .actions button.remove:hover:not(:disabled) {
+  .actions .remove:hover:not(:disabled) {
     color: var(--cager-bad);
   }
-  tr.more td {
+  .more td {
     padding-top: 0;
     padding-bottom: var(--cager-space-3);
-  }
-  @media (min-width: 861px) {
-    .session:has(+ .more) td {
-      padding-bottom: 6px;
-    }
-  }
-  details[open] .problem {
-    padding-top: var(--cager-space-2);
   }
   details {
     position: relative;
@@ -247,28 +163,21 @@ export const sessionsStyle = css`
   summary {
     color: var(--cager-warning);
     font-size: var(--cager-size-small);
-    cursor: pointer;
   }
   .problem {
     display: flex;
     gap: var(--cager-space-2);
     max-width: 90ch;
-    margin: 0;
     color: var(--cager-bad);
   }
   .problem.mild {
+    padding-top: var(--cager-space-2);
     color: var(--cager-warning);
   }
-  .problem svg {
-    margin-top: 1px;
-  }
   .pager {
-    display: flex;
-    align-items: center;
     justify-content: flex-end;
     gap: var(--cager-space-3);
     margin-top: var(--cager-space-3);
-    color: var(--cager-muted);
   }
   .nothing {
     padding: var(--cager-space-7) var(--cager-space-5);
@@ -278,10 +187,61 @@ export const sessionsStyle = css`
     height: 58px;
     border-bottom: 1px solid var(--cager-line);
   }
+  dialog {
+    max-width: min(460px, calc(100vw - 32px));
+  }
+  dialog p {
+    margin-bottom: var(--cager-space-5);
+  }
+  dialog .buttons {
+    justify-content: flex-end;
+  }
+  .first {
+    display: grid;
+    gap: var(--cager-space-5);
+    max-width: 680px;
+    margin: var(--cager-space-6) auto 0;
+  }
+  .first p {
+    color: var(--cager-muted);
+  }
+  .ways {
+    display: grid;
+    gap: var(--cager-space-3);
+  }
+  .ways li {
+    display: grid;
+    grid-template-columns: 1fr auto;
+    gap: var(--cager-space-2) var(--cager-space-4);
+    align-items: center;
+    padding: var(--cager-space-4) var(--cager-space-5);
+  }
+  .command {
+    grid-column: 1 / -1;
+  }
+  code {
+    padding: var(--cager-space-2) var(--cager-space-3);
+    border-radius: var(--cager-radius-small);
+    background: var(--cager-raised);
+    font: var(--cager-size-small) / 1.6 var(--cager-mono);
+    overflow-wrap: anywhere;
+  }
+  @media (min-width: 861px) {
+    .session:has(+ .more) td {
+      padding-bottom: 6px;
+    }
+  }
   @media (prefers-reduced-motion: no-preference) {
+    :is(.dot.running, .placeholder) {
+      animation: pulse 1.6s ease-in-out infinite;
+    }
     .placeholder {
-      animation: pulse 1.8s ease-in-out infinite;
       background: var(--cager-raised);
+    }
+  }
+  @keyframes pulse {
+    50% {
+      opacity: 0.35;
     }
   }
 `;

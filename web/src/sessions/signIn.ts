@@ -1,6 +1,7 @@
 import { LitElement, css, html, nothing } from 'lit';
 import { customElement, query, state } from 'lit/decorators.js';
-import { controls, tokens } from '../style/tokens';
+import { controls } from '../style/controls';
+import { tokens } from '../style/tokens';
 import { pageToken } from '../service/token';
 
 /**
@@ -21,26 +22,6 @@ export class SignIn extends LitElement {
         max-width: 440px;
         margin: var(--cager-space-7) auto;
         padding: var(--cager-space-6);
-        border: 1px solid var(--cager-line);
-        border-radius: var(--cager-radius-large);
-        background: var(--cager-surface);
-      }
-      h2 {
-        margin: 0;
-        font-size: var(--cager-size-large);
-      }
-      p {
-        margin: 0;
-      }
-      .field {
-        display: grid;
-        gap: var(--cager-space-1);
-      }
-      .check {
-        display: flex;
-        align-items: center;
-        gap: var(--cager-space-2);
-        min-height: 24px;
       }
       .error {
         color: var(--cager-bad);
@@ -57,7 +38,7 @@ export class SignIn extends LitElement {
     const refused = pageToken.token !== null ? 'The service refused the token. Check it, or ask for another one.' : '';
     const error = this.wrong || refused;
     return html`
-      <form @submit=${this.#submit}>
+      <form class="card" @submit=${this.#submit}>
         <h2>Sign in</h2>
         <p class="muted">This service needs an access token. Ask your administrator for one.</p>
         <div class="field">
@@ -74,7 +55,7 @@ export class SignIn extends LitElement {
           />
           <p class="error" id="error" role="alert" ?hidden=${!error}>${error}</p>
         </div>
-        <label class="check"><input type="checkbox" checked /> Stay signed in until this tab is closed</label>
+        <label class="row"><input type="checkbox" checked /> Stay signed in until this tab is closed</label>
         <button class="primary" type="submit">Sign in</button>
       </form>
     `;

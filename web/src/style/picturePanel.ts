@@ -19,10 +19,8 @@ export const picturePanelStyle = css`
     max-height: 100%;
     display: flex;
     flex-direction: column;
+    backdrop-filter: none;
     background: color-mix(in srgb, var(--cager-surface) 95%, transparent);
-    border: 1px solid color-mix(in srgb, var(--cager-line) 75%, transparent);
-    border-radius: var(--cager-radius-large);
-    box-shadow: var(--cager-shadow);
     font-size: 13px;
   }
   header {
@@ -32,14 +30,18 @@ export const picturePanelStyle = css`
     border-bottom: 1px solid var(--cager-line);
   }
   h2 {
-    flex: 1;
-    margin: 0;
-    font-size: 14px;
-    font-weight: 650;
+    font: 650 14px/1.45 var(--cager-font);
   }
   .body {
     overflow: hidden auto;
     padding: var(--cager-space-2) var(--cager-space-3) var(--cager-space-3);
     min-height: 0;
+  }
+  @container (max-width: 680px) {
+    :host {
+      inset: auto var(--cager-space-2) calc(var(--deck-height, 120px) + var(--cager-space-2));
+      width: auto;
+      height: 37%;
+    }
   }
 `;

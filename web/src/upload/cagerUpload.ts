@@ -3,10 +3,11 @@ import { customElement, state } from 'lit/decorators.js';
 import { ServiceProblem, problemBehind, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
-import * as glyphs from '../sessions/glyphs';
+import { glyphs } from '../style/glyphs';
 import '../sessions/signIn';
-import { pageLayout } from '../style/pageLayout';
-import { controls, tokens } from '../style/tokens';
+import { plotStyle } from '../charts/plot';
+import { controls, pageLayout } from '../style/controls';
+import { tokens } from '../style/tokens';
 import { captureName, jobOf, newUpload } from './beginning';
 import { type Dropped, type Item, type Role, classify, reassigned } from './classify';
 import { currentJob, setCurrentJob } from './currentJob';
@@ -36,7 +37,7 @@ import { uploadStyle } from './uploadStyle';
  */
 @customElement('cager-upload')
 export class Upload extends LitElement {
-  static override styles = [tokens, controls, pageLayout, uploadStyle];
+  static override styles = [tokens, controls, pageLayout, plotStyle, uploadStyle];
 
   readonly #service = new Service();
 

@@ -2,7 +2,7 @@ import { html, nothing } from 'lit';
 import { unsolved } from '../service/messages';
 import { ServiceProblem, problemBehind } from '../service/problem';
 import type { Service } from '../service/service';
-import * as glyphs from '../sessions/glyphs';
+import { glyphs } from '../style/glyphs';
 import { age, count, counted } from '../sessions/text';
 import { type FileMark, type FileMarks, difference, shareNames } from './fileMarks';
 import { type KeptUpload, unfinishedUploads } from './keptUpload';

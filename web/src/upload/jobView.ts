@@ -1,5 +1,5 @@
 import { html, nothing } from 'lit';
-import * as glyphs from '../sessions/glyphs';
+import { glyphs } from '../style/glyphs';
 import type { Figures } from '../sessions/figures';
 import { count, counted, fraction, perSecond, ratio as times, size, span } from '../sessions/text';
 import { errorChart } from './errorChart';

@@ -88,7 +88,7 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
           ${option('accuracy', 'preview', 'Preview: small, cages only')}
           ${option('accuracy', 'cages', 'Cages only, no error limit')}
         </select>
-        <span class="hint" id="accuracy-hint">
+        <span class="fine" id="accuracy-hint">
           ${isCoded ? 'Frames are coded in groups, and the container is small.' : 'Cages are kept exactly; details that they cannot follow are lost.'}
         </span>
       </div>
@@ -137,7 +137,7 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
             ${option('coordinates', 'mvc', 'Mean value')} ${option('coordinates', 'harmonic', 'Harmonic')}
             ${option('coordinates', 'green', 'Green')} ${option('coordinates', 'green-free', 'Green, free normals')}
           </select>
-          <span class="hint" id="coordinates-hint">
+          <span class="fine" id="coordinates-hint">
             ${isDesigned ? 'Cages are designed for mean value coordinates.' : 'How points follow the cage.'}
           </span>
         </div>
@@ -174,7 +174,7 @@ function cageFields(choices: Choices, set: Set, option: Option) {
       <select id="cage" aria-describedby="cage-hint" @change=${set('cage')}>
         ${option('cage', 'rest', 'Made around the rest pose')} ${option('cage', 'motion', 'Designed from the motion')}
       </select>
-      <span class="hint" id="cage-hint">
+      <span class="fine" id="cage-hint">
         ${isDesigned ? 'Several times more accurate; it takes about a minute more.' : 'Ready within seconds.'}
       </span>
     </div>

@@ -1,5 +1,5 @@
 import { html, nothing } from 'lit';
-import * as glyphs from '../sessions/glyphs';
+import { glyphs } from '../style/glyphs';
 import { counted, size } from '../sessions/text';
 import type { Item, Role } from './classify';
 import type { Choices } from './optionsForm';
@@ -41,12 +41,16 @@ export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder,
     ${
       isFirst
         ? html`<ul class="kinds">
-            <li><b>Rest pose</b><span>The mesh that moves: .obj, .ply, .off, .stl or .glb</span></li>
-            <li>
-              <b>Frames</b><span>.npy (frames × points × 3), .pc2, .mdd, or a folder with one .obj per frame</span>
+            <li class="card">
+              <b>Rest pose</b><span class="fine">The mesh that moves: .obj, .ply, .off, .stl or .glb</span>
             </li>
-            <li>
-              <b>Cage, if you have one</b><span>A coarse closed mesh around the rest pose; otherwise one is made</span>
+            <li class="card">
+              <b>Frames</b
+              ><span class="fine">.npy (frames × points × 3), .pc2, .mdd, or a folder with one .obj per frame</span>
+            </li>
+            <li class="card">
+              <b>Cage, if you have one</b
+              ><span class="fine">A coarse closed mesh around the rest pose; otherwise one is made</span>
             </li>
           </ul>`
         : nothing
@@ -59,7 +63,7 @@ export function itemRow(item: Item, onRole: (role: Role) => void) {
   const bytes = item.files.reduce((sum, file) => sum + file.size, 0);
   return html`
     <li>
-      <span class="title ${item.role === 'unused' ? 'unused' : ''}" title=${item.name}>${item.name}</span>
+      <span class="title clip ${item.role === 'unused' ? 'unused' : ''}" title=${item.name}>${item.name}</span>
       <span class="muted figures">${size(bytes)}</span>
       ${
         item.choices.length > 1
@@ -72,7 +76,7 @@ export function itemRow(item: Item, onRole: (role: Role) => void) {
             </select>`
           : html`<span class="muted">${ROLE_WORDS[item.role]}</span>`
       }
-      ${item.remark ? html`<span class="remark">${item.remark}</span>` : nothing}
+      ${item.remark ? html`<span class="remark fine">${item.remark}</span>` : nothing}
     </li>
   `;
 }

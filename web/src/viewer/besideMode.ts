@@ -4,7 +4,7 @@ import type { Dropped } from '../upload/classify';
 import { Beside } from './beside';
 import { paintCorrespondence } from './correspondence';
 import { numberAt, numberText } from './frameNumbers';
-import { glyph } from './glyphs';
+import { glyphs } from '../style/glyphs';
 import { openFile } from './opener';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
@@ -133,22 +133,22 @@ export class BesideMode {
     const progress = pair?.player.progress;
     return html`<div class="pane second">
       ${this.marks?.template ?? nothing}
-      <section class="caption glass" aria-label="Capture beside">
-        <h2 title=${this.host.beside.name}>${this.host.beside.name}</h2>
+      <section class="caption corner glass" aria-label="Capture beside">
+        <h2 class="heading clip" title=${this.host.beside.name}>${this.host.beside.name}</h2>
         <button
           class="quiet icon"
           title="Show the first capture alone"
           aria-label="Show the first capture alone"
           @click=${() => this.leave()}
         >
-          ${glyph('close')}
+          ${glyphs.close}
         </button>
-        <p class="figures">
+        <p class="figures fine">
           <i class="dashes" title="Dashed in the timeline"></i
           >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
           <span data-beside ?hidden=${Boolean(progress)}></span>
         </p>
-        ${this.isPainted ? html`<p>Places of one colour correspond</p>` : nothing}
+        ${this.isPainted ? html`<p class="fine">Places of one colour correspond</p>` : nothing}
       </section>
     </div>`;
   }

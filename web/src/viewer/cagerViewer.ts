@@ -2,20 +2,19 @@ import type { Capture } from '../capture';
 import { html, nothing, type PropertyValues } from 'lit';
 import { customElement, property, query, state } from 'lit/decorators.js';
 import { EditMode } from '../editing/editMode';
-import { controls, tokens } from '../style/tokens';
+import { controls } from '../style/controls';
+import { tokens } from '../style/tokens';
 import { isContainer, type Dropped } from '../upload/classify';
 import { perform, stem } from './actions';
 import { BesideMode } from './besideMode';
-import { besideStyle } from './besideStyle';
 import { CaptureElement } from './captureElement';
 import { divider } from './comparisonParts';
-import { comparisonStyle } from './comparisonStyle';
 import { figuresPanel } from './figuresPanel';
 import { IncomingFiles } from './incomingFiles';
 import { Layout } from './layout';
 import { LiveBadge } from './liveBadge';
 import { emptyState, notice, progressBox } from './messages';
-import { panelStyle } from './panelStyle';
+import { overlayStyle } from './overlayStyle';
 import { deck, helpSheet, legend, titleBox, toolbar } from './parts';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
@@ -27,7 +26,6 @@ import { actionOfKey, type Action } from './shortcuts';
 import { followLooks, stageColors } from './stageColors';
 import { sentence } from './text';
 import type { Timeline } from './timeline';
-import { viewerSizesStyle } from './viewerSizesStyle';
 import { viewerStyle } from './viewerStyle';
 
 /**
@@ -49,7 +47,7 @@ import { viewerStyle } from './viewerStyle';
  */
 @customElement('cager-viewer')
 export class CagerViewer extends CaptureElement {
-  static override styles = [tokens, controls, viewerStyle, viewerSizesStyle, besideStyle, panelStyle, comparisonStyle];
+  static override styles = [tokens, controls, viewerStyle, overlayStyle];
 
   @state() figures = false;
   @state() recording: AbortController | null = null;
@@ -65,7 +63,6 @@ export class CagerViewer extends CaptureElement {
   private readonly layout = new Layout(this);
   private marks: PointMarks | null = null;
   private removed = new AbortController();
-  private look = 0;
   private readonly sizes = new ResizeObserver(() => this.resize());
 
   /** Takes the frames that the capture was encoded from, or the surfaces that it was recovered from, and shows how far it is from them. */
@@ -199,7 +196,7 @@ export class CagerViewer extends CaptureElement {
     const act = (action: Action) => perform(action, this);
     const opening = this.opener.name;
     return html`
-      <div class="lead">
+      <div class="lead corner">
         <slot name="lead"></slot>
         ${titleBox(this.heading, player, this.editing.hasEdits)}
         ${capture.complete ? nothing : this.live.template(player)}
@@ -230,7 +227,6 @@ export class CagerViewer extends CaptureElement {
       ${deck(player, act, {
         besideErrors: this.pair.errors,
         range: this.editing.range,
-        look: this.look,
       })}
     `;
   }
@@ -284,7 +280,6 @@ export class CagerViewer extends CaptureElement {
   }
 
   applyColors() {
-    this.look++;
     const colors = stageColors(this);
     for (const player of [this.player, this.pair.player]) {
       player?.stage.setColors(colors);

@@ -4,9 +4,8 @@ import type { Session } from '../service/messages';
 import { problemBehind, sentenceOf, ServiceProblem } from '../service/problem';
 import type { Service } from '../service/service';
 import { nameOf } from '../sessions/row';
-import { controls } from '../style/tokens';
-import { dialogStyle } from '../style/dialog';
-import { glyph } from './glyphs';
+import { controls } from '../style/controls';
+import { glyphs } from '../style/glyphs';
 import { pressLabel } from './messages';
 import { grouped } from './text';
 
@@ -22,52 +21,25 @@ export type CompareChoice = { readonly session: string } | { readonly file: File
 export class CompareDialog extends LitElement {
   static override styles = [
     controls,
-    dialogStyle,
     css`
       dialog {
         width: min(520px, calc(100vw - 24px));
-        max-height: calc(100dvh - 24px);
-      }
-      header {
-        display: flex;
-        justify-content: space-between;
-        align-items: center;
-        margin-bottom: var(--cager-space-3);
-      }
-      h2 {
-        margin: 0;
-        font-size: 19px;
       }
       input[type='search'] {
         width: 100%;
       }
       ul {
         margin: var(--cager-space-2) 0;
-        padding: 0;
-        list-style: none;
         max-height: min(46dvh, 360px);
         overflow: auto;
       }
       li button {
-        display: grid;
-        grid-template-columns: minmax(0, 1fr) auto;
-        justify-content: stretch;
+        justify-content: space-between;
         width: 100%;
         min-height: 44px;
-        text-align: left;
-      }
-      li span {
-        overflow: hidden;
-        text-overflow: ellipsis;
-      }
-      small {
-        color: var(--cager-muted);
-        font-size: var(--cager-size-small);
       }
       footer {
-        display: flex;
-        flex-wrap: wrap;
-        gap: var(--cager-space-2);
+        margin-top: var(--cager-space-3);
       }
     `,
   ];
@@ -104,7 +76,7 @@ export class CompareDialog extends LitElement {
     return html`<dialog aria-labelledby="compare-title">
       <header>
         <h2 id="compare-title">Compare with</h2>
-        <button class="quiet icon" aria-label="Close" @click=${() => this.dialog.close()}>${glyph('close')}</button>
+        <button class="quiet icon" aria-label="Close" @click=${() => this.dialog.close()}>${glyphs.close}</button>
       </header>
       <input
         type="search"
@@ -120,8 +92,8 @@ export class CompareDialog extends LitElement {
           (session) =>
             html`<li>
               <button class="quiet" @click=${() => this.choose({ session: session.id })}>
-                <span>${nameOf(session)}</span>
-                <small class="figures"
+                <span class="clip">${nameOf(session)}</span>
+                <small class="figures fine"
                   >${grouped(session.points ?? 0)} points, ${grouped(session.frames.solved)} frames</small
                 >
               </button>
@@ -139,10 +111,10 @@ export class CompareDialog extends LitElement {
                 </p>`
               : nothing
       }
-      <footer>
+      <footer class="buttons">
         ${next !== null ? html`<button @click=${() => void this.load()}>More sessions</button>` : nothing}
         <label class="button" tabindex="0" @keydown=${pressLabel}>
-          ${glyph('file')} Open a file
+          ${glyphs.file} Open a file
           <input class="visually-hidden" type="file" accept=".cager" tabindex="-1" @change=${this.takeFile} />
         </label>
       </footer>

@@ -3,7 +3,7 @@ import { heatGradient } from '../render/colorMap';
 import type { Side } from '../render/drawn';
 import type { Dropped } from '../upload/classify';
 import { pickedFiles } from '../upload/drop';
-import { glyph } from './glyphs';
+import { glyphs } from '../style/glyphs';
 import type { HeatRange, MeasuredFrame } from './heatMap';
 import { pressLabel } from './messages';
 import type { Player } from './player';
@@ -44,14 +44,14 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
   const sides = Object.keys(SIDE_NAMES) as Side[];
   const showsErrors = heatMap.kind === 'error' && measured !== null;
   return html`
-    <div class="source">
-      <span title=${compared.name}>${showsErrors ? what : compared.name}</span>
+    <div class="source row">
+      <span class="grow clip" title=${compared.name}>${showsErrors ? what : compared.name}</span>
       <button class="quiet icon" aria-label="Put the original away" title="Put the original away" @click=${acts.close}>
-        ${glyph('close')}
+        ${glyphs.close}
       </button>
     </div>
     ${showsErrors ? [errorFigures(player, measured), surfaces ? nothing : rangeChoice(player)] : nothing}
-    <div class="sides" role="group" aria-label="What is shown">
+    <div class="segments" role="group" aria-label="What is shown">
       ${sides.map(
         (side) =>
           html`<button aria-pressed=${String(comparison.side === side)} @click=${() => (comparison.side = side)}>
@@ -67,7 +67,7 @@ const RANGE_NAMES: Readonly<Record<HeatRange, string>> = { clip: 'Whole clip', f
 /** Which points the warm end of the colours is of: 99 of 100 stay below it. */
 export function rangeChoice(player: Player) {
   const { kind, range } = player.heatMap;
-  return html`<div class="sides two" role="group" aria-label="What 99 of 100 points stay below, over">
+  return html`<div class="segments" role="group" aria-label="What 99 of 100 points stay below, over">
     ${(Object.keys(RANGE_NAMES) as HeatRange[]).map(
       (each) =>
         html`<button aria-pressed=${String(each === range)} @click=${() => player.setHeat(kind, each)}>
@@ -81,11 +81,11 @@ function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, 
   const { diagonal, precision } = stage.decoder;
   const more = heatMap.largest < largest ? ' and more' : '';
   return html`<div class="bar" .style=${`background: ${heatGradient()}`}></div>
-    <div class="ends figures">
+    <div class="spread muted figures">
       <span>0</span
       ><span>${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})${more}</span>
     </div>
-    <dl class="figures">
+    <dl class="pairs">
       <dt>Worst point, ${grouped(worst)}</dt>
       <dd>${percent(largest)} (${threeDigits(largest * diagonal)})</dd>
       <dt>Root mean square</dt>
@@ -93,12 +93,12 @@ function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, 
     </dl>
     ${
       l2 > UNLIKELY_ERROR
-        ? html`<p class="remark">
+        ? html`<p class="muted">
             That is far off: the files may have another unit, or
             ${comparison.surfaces ? 'be other frames' : 'their points in another order'}.
           </p>`
         : precision.error > TELLING_PART * largest
-          ? html`<p class="remark">Up to ${percent(precision.error)} of it is the rounding of this picture.</p>`
+          ? html`<p class="muted">Up to ${percent(precision.error)} of it is the rounding of this picture.</p>`
           : nothing
     }`;
 }
@@ -109,7 +109,7 @@ function chooser(label: string, acts: ComparisonActs) {
     if (files && files.length > 0) acts.open(pickedFiles(files));
   };
   return html`<label class="button" tabindex="0" @keydown=${pressLabel}>
-    ${glyph('file')} ${label}
+    ${glyphs.file} ${label}
     <input class="visually-hidden" type="file" multiple accept=".npy,.pc2,.obj,.ply" tabindex="-1" @change=${take} />
   </label>`;
 }

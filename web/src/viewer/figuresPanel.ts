@@ -1,5 +1,5 @@
 import { html, nothing } from 'lit';
-import { glyph } from './glyphs';
+import { glyphs } from '../style/glyphs';
 import type { Player } from './player';
 import { bitrate, grouped, percent, SYSTEM_NAMES } from './text';
 
@@ -17,30 +17,30 @@ export function figuresPanel(player: Player, close: () => void) {
   const { bits, error } = decoder.precision;
   const { live = null } = player.capture;
   return html`<aside class="panel glass" aria-label="Figures">
-    <header>
+    <header class="spread">
       <h2>Capture</h2>
-      <button class="quiet icon" title="Close" aria-label="Close the figures" @click=${close}>${glyph('close')}</button>
+      <button class="quiet icon" title="Close" aria-label="Close the figures" @click=${close}>${glyphs.close}</button>
     </header>
-    <dl>
+    <dl class="pairs">
       ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
       ${row('Frames', grouped(frames))}
       ${row('Frames per second', `${player.transport.rate}${part.frameRate === null ? ' (assumed)' : ''}`)}
     </dl>
     <h2>Cage</h2>
-    <dl>
+    <dl class="pairs">
       ${row('Vertices', grouped(part.cage.positions.length / 3))}
       ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
     </dl>
     <p class="muted">${SYSTEM_NAMES[part.system]}</p>
     <h2>Bandwidth</h2>
-    <dl>
+    <dl class="pairs">
       ${fileRate === null ? nothing : row('Frames of this file', bitrate(fileRate))}
       ${row('Cages before compression', bitrate(cageRate))} ${row('All points, not compressed', bitrate(rawRate))}
     </dl>
     ${
       live
         ? html`<h2>Live</h2>
-            <dl>
+            <dl class="pairs">
               ${row('Behind the service', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
               ${row('Arriving', bitrate(live.bitsPerSecond / 8))}
               ${row('Frames arriving per second', live.framesPerSecond.toFixed(1))}
@@ -51,7 +51,7 @@ export function figuresPanel(player: Player, close: () => void) {
         : nothing
     }
     <h2>This browser</h2>
-    <dl>
+    <dl class="pairs">
       ${row('FPS', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
       ${row('Dropped frames', grouped(player.playback.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
       ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}

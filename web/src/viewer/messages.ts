@@ -1,13 +1,13 @@
-import { html, nothing, type TemplateResult } from 'lit';
+import { html, type TemplateResult } from 'lit';
 import type { Dropped } from '../upload/classify';
 import { pickedFiles } from '../upload/drop';
-import { glyph } from './glyphs';
+import { glyphs } from '../style/glyphs';
 
 /** A sentence about something that went wrong, while the capture can still be looked at. */
 export function notice(problem: string, close: () => void): TemplateResult {
-  return html`<div class="notice glass" role="alert">
+  return html`<div class="toast glass row" role="alert">
     <span>${problem}</span>
-    <button class="quiet icon" aria-label="Close this message" @click=${close}>${glyph('close')}</button>
+    <button class="quiet icon" aria-label="Close this message" @click=${close}>${glyphs.close}</button>
   </div>`;
 }
 
@@ -23,7 +23,7 @@ export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside'
   >
     <form method="dialog">
       <h2 id="question-title">Open ${name}?</h2>
-      <div class="choices">
+      <div class="buttons">
         <button class="primary" value="instead" autofocus>Open instead</button>
         <button value="beside">Show beside</button>
         <button class="quiet" value="">Cancel</button>
@@ -42,18 +42,10 @@ export function dropHint(isShowing: boolean): TemplateResult {
 /** What is being done, and how much of it is done where somebody knows. */
 export function progressBox(doing: string, fraction: number | null): TemplateResult {
   return html`<div class="progress glass" role="status">
-    <div class="figures">
+    <div class="spread figures">
       <span>${doing}</span><span>${fraction === null ? '' : `${Math.round(100 * fraction)} %`}</span>
     </div>
-    <div
-      class="bar"
-      role="progressbar"
-      aria-label=${doing}
-      aria-valuenow=${fraction === null ? nothing : Math.round(100 * fraction)}
-      ?hidden=${fraction === null}
-    >
-      <div .style=${`transform: scaleX(${fraction ?? 0})`}></div>
-    </div>
+    <progress aria-label=${doing} max="1" .value=${fraction ?? 0} ?hidden=${fraction === null}></progress>
   </div>`;
 }
 
@@ -75,15 +67,15 @@ export function emptyState(
   };
   return html`<div class="empty">
     <div class="lead"><slot name="lead"></slot></div>
-    ${glyph('cage')}
+    ${glyphs.cage}
     <h1>${failure === null ? 'Drop a capture here' : 'This cannot be shown'}</h1>
     ${
       failure === null
         ? html`<p>A .cager file plays in this page. It is not sent anywhere.</p>`
-        : html`<p class="failure" role="alert">${failure}</p>`
+        : html`<p class="notice" role="alert">${failure}</p>`
     }
     <label class="button primary" tabindex="0" @keydown=${pressLabel}>
-      ${glyph('file')} Choose a file
+      ${glyphs.file} Choose a file
       <input class="visually-hidden" type="file" accept=".cager,.json" multiple tabindex="-1" @change=${take} />
     </label>
   </div>`;

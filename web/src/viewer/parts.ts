@@ -5,7 +5,7 @@ import type { FrameRange } from '../editing/cageEdit';
 import type { Layers } from '../render/drawn';
 import { comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
 import { numberAt, numberText } from './frameNumbers';
-import { glyph, type GlyphName } from './glyphs';
+import { glyphs, type GlyphName } from '../style/glyphs';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
 import { isLost } from './reports';
@@ -43,7 +43,7 @@ function tool(action: Action, name: GlyphName, label: string, act: Act, pressed?
     aria-pressed=${pressed === undefined ? nothing : String(pressed)}
     @click=${() => act(action)}
   >
-    ${glyph(name)}
+    ${glyphs[name]}
   </button>`;
 }
 
@@ -100,8 +100,8 @@ export function titleBox(heading: string, { capture }: Player, isEdited: boolean
   const [first, last] = [0, Math.max(0, frames - 1)].map((frame) => numberText(numberAt(frameNumbers, frame)));
   const lost = tracking?.outcomes.filter((_, frame) => isLost(tracking, frame)).length ?? 0;
   return html`<div class="title glass">
-    <h1 title=${heading}>${heading}</h1>
-    <p class="figures">
+    <h1 class="heading clip" title=${heading}>${heading}</h1>
+    <p class="figures fine clip">
       ${grouped(part.rest.length / 3)} points, ${grouped(frames)}
       frames${frames > 1 ? ` (${first}–${last})` : nothing}<span class="more"
         >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
@@ -110,15 +110,14 @@ export function titleBox(heading: string, { capture }: Player, isEdited: boolean
   </div>`;
 }
 
-/** What the timeline shows beside the capture's own errors: those of a second capture, the range of an edit; `look` changes when colours do. */
+/** What the timeline shows beside the capture's own errors: those of a second capture, the range of an edit. */
 interface TimelineParts {
   readonly besideErrors: FrameErrors | null;
   readonly range: FrameRange | null;
-  readonly look: number;
 }
 
 /** The transport above the timeline. */
-export function deck(player: Player, act: Act, { besideErrors, range, look }: TimelineParts) {
+export function deck(player: Player, act: Act, { besideErrors, range }: TimelineParts) {
   const { capture, transport } = player;
   const figures = capture.tracking ? scoreFigure : capture.errors.linf.some(Number.isFinite) ? errorFigures : null;
   return html`<div class="deck glass">
@@ -130,7 +129,6 @@ export function deck(player: Player, act: Act, { besideErrors, range, look }: Ti
       .tracking=${capture.tracking}
       .frameNumbers=${capture.frameNumbers}
       .range=${range}
-      .look=${look}
       .position=${transport.position}
       @seek=${(event: CustomEvent<number>) => (player.transport = sought(player.transport, event.detail))}
     ></cager-timeline>
@@ -140,14 +138,14 @@ export function deck(player: Player, act: Act, { besideErrors, range, look }: Ti
 /** Play, step, speed, place and errors. */
 function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, figures: TemplateResult | null) {
   const { transport } = player;
-  return html`<div class="transport">
+  return html`<div class="transport row">
     <button
       class="primary play"
       title="${transport.playing ? 'Pause' : 'Play'} (${keyLabel('play')})"
       aria-label=${transport.playing ? 'Pause' : 'Play'}
       @click=${() => act('play')}
     >
-      ${glyph(transport.playing ? 'pause' : 'play')}
+      ${glyphs[transport.playing ? 'pause' : 'play']}
     </button>
     ${tool('previous', 'previous', 'Previous frame', act)} ${tool('next', 'next', 'Next frame', act)}
     ${tool('loop', 'loop', 'Loop', act, transport.loop)}
@@ -160,27 +158,27 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
     >
       ${SPEEDS.map((speed) => html`<option value=${speed} .selected=${speed === transport.speed}>${speed}×</option>`)}
     </select>
-    <div class="place figures"><span data-place></span><span class="clock muted" data-clock></span></div>
+    <div class="place row figures"><span data-place></span><span class="clock muted" data-clock></span></div>
     ${figures ?? nothing}
   </div>`;
 }
 
-const errorFigures = html`<dl class="errors figures">
-  <div title="Root mean square of the distances of all points, as part of the diagonal">
-    <dt><i></i></dt>
+const errorFigures = html`<dl class="errors row figures">
+  <div class="row" title="Root mean square of the distances of all points, as part of the diagonal">
+    <dt><i class="key"></i></dt>
     <dt>L2</dt>
     <dd data-l2></dd>
   </div>
-  <div class="linf" title="Largest distance of a point, as part of the diagonal">
-    <dt><i></i></dt>
+  <div class="row" title="Largest distance of a point, as part of the diagonal">
+    <dt><i class="key linf"></i></dt>
     <dt>L∞</dt>
     <dd data-linf></dd>
   </div>
 </dl>`;
 
-const scoreFigure = html`<dl class="errors figures">
-  <div title="How well the template lies on the surface, as part of the diagonal: less is better">
-    <dt><i></i></dt>
+const scoreFigure = html`<dl class="errors row figures">
+  <div class="row" title="How well the template lies on the surface, as part of the diagonal: less is better">
+    <dt><i class="key"></i></dt>
     <dt>Score</dt>
     <dd data-score></dd>
   </div>
@@ -197,7 +195,7 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
       isMotion
         ? html`Movement from frame to frame
             <div class="bar" .style=${`background: ${heatGradient()}`}></div>
-            <div class="ends figures">
+            <div class="spread muted figures">
               <span>0</span><span>${percent(heatMap.largest)} of the diagonal and more</span>
             </div>
             ${rangeChoice(player)}`
@@ -216,14 +214,14 @@ export function helpSheet(close: () => void) {
   >
     <header>
       <h2 id="help-title">Keyboard shortcuts</h2>
-      <button class="quiet icon" aria-label="Close" @click=${close}>${glyph('close')}</button>
+      <button class="quiet icon" aria-label="Close" @click=${close}>${glyphs.close}</button>
     </header>
     <div class="columns">
       ${SHORTCUTS.map(
         ({ title, entries }) =>
           html`<section>
-            <h3>${title}</h3>
-            <dl>
+            <h3 class="fine">${title}</h3>
+            <dl class="keys">
               ${entries.map(
                 ({ action, label }) =>
                   html`<dt><kbd>${keyLabel(action)}</kbd></dt>

@@ -12,10 +12,10 @@ export class PointMarks {
 
   /** The marks; {@link place} puts them where they belong. */
   readonly template = html`<div class="mark worst" hidden>
-      <i></i><span><b></b><data></data></span>
+      <i></i><span class="figures"><b></b><data></data></span>
     </div>
     <div class="mark probe" hidden>
-      <i></i><span><b></b><data></data></span>
+      <i></i><span class="figures"><b></b><data></data></span>
     </div>`;
 
   constructor(private readonly root: ParentNode) {}

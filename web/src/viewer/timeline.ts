@@ -1,19 +1,19 @@
-import { html, LitElement, unsafeCSS, type PropertyValues } from 'lit';
+import { html, LitElement } from 'lit';
 import { customElement, property, query } from 'lit/decorators.js';
-import type uPlot from 'uplot';
-import uPlotStyle from 'uplot/dist/uPlot.min.css?inline';
+import { axisOf } from '../charts/axis';
+import { plot, plotStyle, thinned, type Series } from '../charts/plot';
 import type { FrameErrors, Tracking } from '../capture';
 import type { FrameRange } from '../editing/cageEdit';
-import { errorsChart } from './errorsChart';
 import { numberAt, numberText, placeOf, type FrameNumbers } from './frameNumbers';
 import { isLost, lostRuns } from './reports';
 import { percent } from './text';
-import { resolvedColor } from '../style/resolvedColor';
 import { timelineStyle } from './timelineStyle';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
 
-/** Space beside the chart for half a thumb. */
-const MARGIN = 12;
+/** Space beside the chart for half a thumb, and on its left for labels. */
+const [MARGIN, GUTTER] = [12, 58];
+/** Places along the chart; frames that share one are shown by the worst of them. */
+const COLUMNS = 600;
 
 /**
  * The timeline: a bar to scrub on and, where errors are known, their chart above it.
@@ -22,7 +22,7 @@ const MARGIN = 12;
  */
 @customElement('cager-timeline')
 export class Timeline extends LitElement {
-  static override styles = [controls, unsafeCSS(uPlotStyle), timelineStyle];
+  static override styles = [controls, plotStyle, timelineStyle];
 
   /** Frames there are. */
   @property({ type: Number }) frames = 0;
@@ -35,15 +35,11 @@ export class Timeline extends LitElement {
   @property({ attribute: false }) frameNumbers: FrameNumbers = null;
   /** Frames that an edit is kept over, shown below to be dragged. */
   @property({ attribute: false }) range: FrameRange | null = null;
-  /** Changes when colours do: the chart is drawn anew. */
-  @property({ type: Number }) look = 0;
   @query('.chart') private readonly chartPlace!: HTMLElement | null;
   @query('.slider') private readonly slider!: HTMLElement;
   private place = 0;
   private hovered: number | null = null;
-  private chart: uPlot | null = null;
-  private gutter = MARGIN;
-  private readonly sizes = new ResizeObserver(() => this.resize());
+  private readonly sizes = new ResizeObserver(() => this.placeTrack());
 
   /** The place in the capture that is shown, between two frames too. */
   get position(): number {
@@ -76,7 +72,7 @@ export class Timeline extends LitElement {
         @pointermove=${this.move}
         @pointerleave=${this.leave}
       >
-        ${measured ? html`<div class="chart"></div>` : null}
+        ${measured ? html`<div class="chart">${this.chart()}</div>` : null}
         <div class="needle" ?hidden=${!measured}></div>
         <div class="hover" hidden></div>
         <div class="tip figures" hidden></div>
@@ -108,15 +104,10 @@ export class Timeline extends LitElement {
   override disconnectedCallback() {
     super.disconnectedCallback();
     this.sizes.disconnect();
-    this.chart?.destroy();
-    this.chart = null;
   }
 
-  protected override updated(changed: PropertyValues) {
-    if (changed.has('look') || !this.chartPlace || !this.chart) this.drawChart();
-    else if (['errors', 'besideErrors', 'tracking', 'frames', 'frameNumbers'].some((name) => changed.has(name)))
-      this.chart.setData(this.chartData());
-    this.resize();
+  protected override updated() {
+    this.placeTrack();
   }
 
   /** A mark of lost frames. */
@@ -131,50 +122,25 @@ export class Timeline extends LitElement {
     return this.frames > 1 && (isKnown(this.errors) || isKnown(this.besideErrors));
   }
 
-  private drawChart() {
-    this.chart?.destroy();
-    this.chart = null;
-    if (!this.chartPlace) return;
-    const style = getComputedStyle(this);
-    const color = (name: string) => resolvedColor(this.renderRoot, style.getPropertyValue(`--cager-${name}`));
-    const look = {
-      worst: color('cage'),
-      mean: color('accent'),
-      text: color('muted'),
-      line: color('line'),
-      font: `11px ${style.getPropertyValue('--cager-font')}`,
-      margin: MARGIN,
-    };
-    const onDraw = (gutter: number) => {
-      this.gutter = gutter;
-      this.placeTrack();
-    };
-    this.chart = errorsChart(this.chartPlace, this.chartData(), look, onDraw);
-  }
-
-  private chartData(): uPlot.AlignedData {
-    const frames = Array.from({ length: this.frames }, (_, k) => k);
-    const series = (values: Float32Array | undefined) =>
-      frames.map((k) => (values && Number.isFinite(values[k]) ? values[k] : null));
+  /** L∞ and L2 of all frames, then those of a second capture, dashed. */
+  private chart() {
     const { errors, besideErrors, tracking } = this;
-    return [
-      frames.map((frame) => this.shareOf(frame)),
-      series(tracking ? undefined : errors?.linf),
-      series(tracking?.scores ?? errors?.l2),
-      series(besideErrors?.linf),
-      series(besideErrors?.l2),
+    const lines: [string, Series['mark'], ArrayLike<number> | undefined][] = [
+      ['cage', 'line', tracking ? undefined : errors?.linf],
+      ['accent', 'line', tracking?.scores ?? errors?.l2],
+      ['cage', 'dashes', besideErrors?.linf],
+      ['accent', 'dashes', besideErrors?.l2],
     ];
-  }
-
-  private resize() {
-    const width = this.clientWidth;
-    if (width === 0) return;
-    if (this.chart && this.chartPlace) this.chart.setSize({ width, height: this.chartPlace.clientHeight });
-    this.placeTrack();
+    const series = lines.map(([color, mark, values]): Series => {
+      const points = thinned(values ?? [], (frame) => this.shareOf(frame), COLUMNS);
+      return { label: '', color: `var(--cager-${color})`, mark, points };
+    });
+    const top = Math.max(1e-9, ...series.flatMap(({ points }) => points.map(([, value]) => value ?? 0)));
+    return plot({ x: axisOf([0, 1], 0), y: axisOf([0, 1.08 * top], 2), series, text: percent });
   }
 
   private placeTrack() {
-    for (const { style } of this.renderRoot.querySelectorAll<HTMLElement>('.track, cager-range-strip')) {
+    for (const { style } of this.renderRoot.querySelectorAll<HTMLElement>('.chart, .track, cager-range-strip')) {
       style.marginLeft = `${this.left()}px`;
       style.marginRight = `${MARGIN}px`;
     }
@@ -182,7 +148,7 @@ export class Timeline extends LitElement {
   }
 
   private left(): number {
-    return this.chartPlace?.clientHeight ? this.gutter : MARGIN;
+    return this.chartPlace?.clientHeight ? GUTTER : MARGIN;
   }
 
   /** Where a place is between the first frame and the last one, by their numbers. */

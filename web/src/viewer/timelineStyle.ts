@@ -13,23 +13,18 @@ export const timelineStyle = css`
     border-radius: var(--cager-radius-small);
   }
   .chart {
-    height: 58px;
+    position: relative;
+    height: 44px;
+    margin-block: 6px 8px;
     pointer-events: none;
-  }
-  .u-wrap {
-    font-family: var(--cager-font);
   }
   .track {
     position: relative;
     height: 18px;
   }
-  .rail,
-  .done {
+  :is(.rail, .done) {
     position: absolute;
-    top: 7px;
-    left: 0;
-    height: 4px;
-    width: 100%;
+    inset: 7px 0;
     border-radius: 2px;
     background: color-mix(in srgb, var(--cager-muted) 32%, transparent);
   }
@@ -39,8 +34,7 @@ export const timelineStyle = css`
   }
   .lost {
     position: absolute;
-    top: 2px;
-    height: 14px;
+    inset-block: 2px;
     margin-left: -1.5px;
     box-sizing: content-box;
     padding-right: 3px;
@@ -63,11 +57,9 @@ export const timelineStyle = css`
   .slider:hover .thumb {
     scale: 1.2;
   }
-  .needle,
-  .hover {
+  :is(.needle, .hover) {
     position: absolute;
-    top: 0;
-    bottom: 12px;
+    inset-block: 0 12px;
     width: 1px;
     background: var(--cager-accent);
     pointer-events: none;
@@ -75,28 +67,13 @@ export const timelineStyle = css`
   .hover {
     background: var(--cager-line-strong);
   }
-  .tip {
-    position: absolute;
-    bottom: calc(100% + 2px);
-    padding: 3px 8px;
-    border-radius: var(--cager-radius-small);
-    background: var(--cager-text);
-    color: var(--cager-background);
-    font-size: var(--cager-size-small);
-    white-space: nowrap;
-    translate: -50% 0;
-    pointer-events: none;
-    z-index: 2;
-  }
   @media (max-height: 520px), (max-width: 560px) {
     .chart {
-      height: 44px;
+      height: 30px;
     }
   }
   @container (max-width: 320px) or (max-height: 220px) {
-    .chart,
-    .needle,
-    .hover {
+    :is(.chart, .needle, .hover) {
       display: none;
     }
   }

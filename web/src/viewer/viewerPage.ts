@@ -5,7 +5,8 @@ import { problemBehind, ServiceProblem } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import '../sessions/signIn';
-import { controls } from '../style/tokens';
+import { controls } from '../style/controls';
+import { glyphs } from '../style/glyphs';
 import type { Dropped } from '../upload/classify';
 import './cagerViewer';
 import type { CagerViewer } from './cagerViewer';
@@ -28,13 +29,8 @@ export class ViewerPage extends LitElement {
         height: 100%;
       }
       .back {
-        width: 36px;
-        min-height: 36px;
-        padding: 0;
-        border-radius: 50%;
         background: var(--cager-glass);
         box-shadow: var(--cager-shadow);
-        color: var(--cager-text);
       }
       .sign-in {
         position: fixed;
@@ -49,13 +45,11 @@ export class ViewerPage extends LitElement {
         place-content: center;
         justify-items: center;
         gap: var(--cager-space-4);
-        height: 100%;
         padding: var(--cager-space-5);
         text-align: center;
       }
       .message p {
         max-width: 36em;
-        margin: 0;
         text-wrap: balance;
       }
     `,
@@ -135,9 +129,7 @@ export class ViewerPage extends LitElement {
         @besidewanted=${this.askBeside}
         @besideclosed=${() => this.setBeside(null)}
       >
-        <a class="button back" slot="lead" href="#/" aria-label="All sessions" title="All sessions">
-          <svg class="glyph" viewBox="0 0 24 24" aria-hidden="true"><path d="M14.5 6 8.500 12l6 6" /></svg>
-        </a>
+        <a class="button back" slot="lead" href="#/" aria-label="All sessions" title="All sessions"> ${glyphs.back} </a>
       </cager-viewer>
       <cager-compare-dialog @compare=${this.compare}></cager-compare-dialog>
       ${

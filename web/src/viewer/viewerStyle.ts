@@ -1,6 +1,6 @@
 import { css } from 'lit';
 
-/** Layout of the viewer: the picture fills it, everything else floats above. */
+/** Layout of the viewer: one picture or two fill it, everything else floats above. */
 export const viewerStyle = css`
   :host {
     position: relative;
@@ -11,18 +11,31 @@ export const viewerStyle = css`
     background: var(--cager-stage);
     container-type: size;
     -webkit-tap-highlight-color: transparent;
+    --above-deck: calc(var(--deck-height, 120px) + 2 * var(--cager-space-3));
   }
-  .pane {
+  :is(.pane, canvas) {
     position: absolute;
     inset: 0;
     overflow: hidden;
   }
+  :host([pictures='columns']) .pane {
+    right: 50%;
+  }
+  :host([pictures='columns']) .pane.second {
+    inset: 0 0 0 50%;
+    box-shadow: -1px 0 var(--cager-line-strong);
+  }
+  :host([pictures='rows']) .pane {
+    bottom: calc((100% + var(--covered-height)) / 2);
+  }
+  :host([pictures='rows']) .pane.second {
+    top: calc((100% - var(--covered-height)) / 2);
+    bottom: var(--covered-height);
+    box-shadow: 0 -1px var(--cager-line-strong);
+  }
   canvas {
-    position: absolute;
-    inset: 0;
     width: 100%;
     height: 100%;
-    display: block;
     cursor: grab;
     touch-action: none;
   }
@@ -32,22 +45,17 @@ export const viewerStyle = css`
   canvas:focus-visible {
     outline-offset: -3px;
   }
-  .glass {
-    background: var(--cager-glass);
-    border: 1px solid color-mix(in srgb, var(--cager-line) 75%, transparent);
-    border-radius: var(--cager-radius-large);
-    box-shadow: var(--cager-shadow);
-    backdrop-filter: blur(14px) saturate(1.3);
-  }
   :host([plain]) .glass {
     backdrop-filter: none;
     background: color-mix(in srgb, var(--cager-surface) 94%, transparent);
   }
-  .lead {
+  .corner {
     position: absolute;
     top: var(--cager-space-3);
     left: var(--cager-space-3);
     max-width: calc(100% - 92px);
+  }
+  .lead {
     display: flex;
     align-items: flex-start;
     gap: var(--cager-space-2);
@@ -57,27 +65,27 @@ export const viewerStyle = css`
     pointer-events: auto;
   }
   .title {
-    display: flex;
-    flex-direction: column;
     min-width: 0;
     padding: 7px var(--cager-space-3) 8px;
   }
-  h1 {
-    margin: 0;
-    font-size: 15px;
-    font-weight: 650;
-    line-height: 1.3;
-    overflow: hidden;
-    text-overflow: ellipsis;
-    white-space: nowrap;
+  .title .lost {
+    color: var(--cager-bad);
   }
-  .title p {
-    margin: 0;
-    font-size: var(--cager-size-small);
-    color: var(--cager-muted);
-    overflow: hidden;
-    text-overflow: ellipsis;
-    white-space: nowrap;
+  .caption {
+    display: grid;
+    grid-template-columns: minmax(0, 1fr) auto;
+    padding: 7px 4px 8px var(--cager-space-3);
+  }
+  .caption button {
+    grid-row: span 2;
+    margin-left: var(--cager-space-2);
+  }
+  .dashes {
+    display: inline-block;
+    width: 16px;
+    height: 2px;
+    margin: 0 6px 4px 0;
+    background: repeating-linear-gradient(90deg, currentColor 0 4px, transparent 4px 6px);
   }
   .live {
     display: inline-flex;
@@ -90,8 +98,7 @@ export const viewerStyle = css`
     border: 0;
     background: var(--cager-live);
     color: light-dark(#ffffff, #2b0509);
-    font-size: var(--cager-size-small);
-    font-weight: 700;
+    font: 700 var(--cager-text-small);
     letter-spacing: 0.04em;
   }
   .live.behind,
@@ -107,8 +114,10 @@ export const viewerStyle = css`
     border-radius: 50%;
     background: currentColor;
   }
-  .live:not(.behind)::before {
-    animation: pulse 1.6s ease-in-out infinite;
+  @media not (prefers-reduced-motion: reduce) {
+    .live:not(.behind)::before {
+      animation: pulse 1.6s ease-in-out infinite;
+    }
   }
   @keyframes pulse {
     50% {
@@ -127,90 +136,37 @@ export const viewerStyle = css`
     overflow: hidden auto;
     scrollbar-width: none;
   }
-  .tools hr {
+  .tools > * {
     flex: none;
+  }
+  .tools hr {
     width: 22px;
     height: 1px;
     margin: 3px auto;
     border: 0;
     background: var(--cager-line);
   }
-  .tools button {
-    flex: none;
-  }
   .deck {
     position: absolute;
-    left: var(--cager-space-3);
-    right: var(--cager-space-3);
-    bottom: var(--cager-space-3);
+    inset: auto var(--cager-space-3) var(--cager-space-3);
     padding: var(--cager-space-2) var(--cager-space-2) 2px;
   }
   .transport {
-    display: flex;
-    align-items: center;
     gap: 2px;
     min-width: 0;
   }
-  .title .lost {
-    color: var(--cager-bad);
-  }
-  .transport .play {
+  .play {
     width: 42px;
     height: 42px;
-    min-height: 0;
+    padding: 0;
     margin: 0 4px;
     border-radius: 50%;
   }
-  .transport .play svg {
+  .play svg {
     width: 22px;
     height: 22px;
   }
-  .place {
-    display: flex;
-    gap: var(--cager-space-3);
-    margin-left: var(--cager-space-2);
-    white-space: nowrap;
-  }
-  .place [data-place] {
-    font-weight: 600;
-  }
-  .errors {
-    margin-left: auto;
-    display: flex;
-    gap: var(--cager-space-4);
-    padding: 0 var(--cager-space-3);
-    font-size: var(--cager-size-small);
-    white-space: nowrap;
-  }
-  .errors dl,
-  .errors div {
-    margin: 0;
-    display: flex;
-    align-items: center;
-    gap: 6px;
-  }
-  .errors dt {
-    color: var(--cager-muted);
-  }
-  .errors dd {
-    margin: 0;
-    min-width: 4.2em;
-  }
-  .errors i {
-    display: block;
-    width: 12px;
-    height: 3px;
-    border-radius: 2px;
-    background: var(--cager-accent);
-  }
-  .errors .linf i {
-    background: var(--cager-cage);
-  }
-  .spacer {
-    margin-left: auto;
-  }
   .transport select {
-    min-height: var(--cager-control);
     field-sizing: content;
     padding: 0 2px 0 8px;
     border-color: transparent;
@@ -224,71 +180,76 @@ export const viewerStyle = css`
     background: var(--cager-surface);
     color: var(--cager-text);
   }
-  .legend {
-    position: absolute;
-    left: var(--cager-space-3);
-    bottom: calc(var(--deck-height, 120px) + 2 * var(--cager-space-3));
-    width: min(260px, 60%);
-    padding: var(--cager-space-2) var(--cager-space-3);
+  .place {
+    gap: var(--cager-space-3);
+    margin-left: var(--cager-space-2);
+    white-space: nowrap;
+  }
+  [data-place] {
+    font-weight: 600;
+  }
+  .errors {
+    margin-left: auto;
+    gap: var(--cager-space-4);
+    padding: 0 var(--cager-space-3);
     font-size: var(--cager-size-small);
+    white-space: nowrap;
   }
-  .legend .bar {
-    height: 8px;
-    margin: 5px 0 3px;
-    border-radius: 4px;
-  }
-  .legend .ends {
-    display: flex;
-    justify-content: space-between;
+  .errors dt {
     color: var(--cager-muted);
   }
-  .notice,
-  .progress {
-    position: absolute;
-    left: 50%;
-    bottom: calc(var(--deck-height, 120px) + 2 * var(--cager-space-3));
-    translate: -50% 0;
-    width: max-content;
-    max-width: min(560px, calc(100% - 24px));
-    padding: var(--cager-space-2) var(--cager-space-3);
+  .errors dd {
+    min-width: 4.2em;
   }
-  .notice {
-    display: flex;
-    align-items: center;
-    gap: var(--cager-space-2);
-    border-color: color-mix(in srgb, var(--cager-bad) 60%, transparent);
-    background: var(--cager-surface);
-    z-index: 3;
+  @container (max-width: 680px) {
+    :is(.errors, .title .more, .caption p:has(+ p)) {
+      display: none;
+    }
+    .place {
+      margin-left: auto;
+      padding-right: var(--cager-space-2);
+    }
+    .deck {
+      inset: auto var(--cager-space-2) max(var(--cager-space-2), env(safe-area-inset-bottom));
+    }
   }
-  .notice::before {
-    content: '';
-    flex: none;
-    width: 4px;
-    align-self: stretch;
-    border-radius: 2px;
-    background: var(--cager-bad);
+  @container (max-width: 680px) and (max-height: 700px) {
+    .tools button {
+      min-height: 36px;
+    }
   }
-  .progress {
-    width: 250px;
-    font-size: var(--cager-size-small);
+  @container (max-width: 400px) {
+    .clock {
+      display: none;
+    }
   }
-  .progress div {
-    display: flex;
-    justify-content: space-between;
-    gap: var(--cager-space-3);
+  @container (max-width: 320px) or (max-height: 220px) {
+    :is(.tools, .title, .legend, .place, .transport select, .transport button:not(.play)) {
+      display: none;
+    }
+    .deck {
+      inset: auto 4px 4px;
+      display: flex;
+      align-items: center;
+      padding: 2px 4px;
+    }
+    cager-timeline {
+      flex: 1;
+      min-width: 0;
+    }
+    .play {
+      width: 28px;
+      height: 28px;
+      min-height: 0;
+    }
+    .play svg {
+      width: 16px;
+      height: 16px;
+    }
   }
-  .progress .bar {
-    display: block;
-    height: 4px;
-    margin-top: 6px;
-    border-radius: 2px;
-    overflow: hidden;
-    background: var(--cager-line);
-  }
-  .progress .bar div {
-    display: block;
-    height: 100%;
-    background: var(--cager-accent);
-    transform-origin: left;
+  @media (pointer: coarse) {
+    [data-action='help'] {
+      display: none;
+    }
   }
 `;

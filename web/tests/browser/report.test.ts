@@ -70,7 +70,7 @@ describe.skipIf(missing !== null)('reports that are opened as files', { timeout:
     }
     expect(await page.locator('.lead').textContent()).toContain(HOSTILE);
     expect(await page.locator('b:text("walk.npy")').count()).toBe(1);
-    await allDrawn(page.locator('report-chart .plot canvas'), 14);
+    await charted(page, 14);
     await allDrawn(page.locator('report-views canvas'), 30);
     expect(asked.filter((url) => url !== page.url() && !url.startsWith('data:'))).toEqual([]);
     expect(await seriousFindings(page)).toEqual([]);
@@ -98,8 +98,8 @@ describe.skipIf(missing !== null)('reports that are opened as files', { timeout:
     await page.keyboard.press('Home');
     expect(await group.locator('output').textContent()).toBe('frame 0');
 
-    const chart = page.locator('report-chart').first();
-    await chart.locator('.plot').focus();
+    const chart = page.locator('cager-chart').first();
+    await chart.getByRole('img').focus();
     await page.keyboard.press('ArrowRight');
     await expect.poll(() => chart.locator('.reading').textContent()).toMatch(/^frame 0 · /);
     const series = chart.getByRole('button', { name: 'all points, data alone' });
@@ -107,11 +107,30 @@ describe.skipIf(missing !== null)('reports that are opened as files', { timeout:
     expect(await series.getAttribute('aria-pressed')).toBe('false');
   });
 
+  it('shows a part of a chart that is dragged across, and all of it again', async () => {
+    const page = await opened('compared.html');
+    const chart = page.locator('cager-chart').first();
+    const labels = () => chart.locator('.x').allTextContents();
+    const all = await labels();
+    const area = chart.getByRole('img');
+    await area.scrollIntoViewIfNeeded();
+    const { x, y, width, height } = (await area.boundingBox())!;
+    await page.mouse.move(x + 0.25 * width, y + height / 2);
+    await page.mouse.down();
+    await page.mouse.move(x + 0.5 * width, y + height / 2);
+    await page.mouse.up();
+    await expect.poll(labels).not.toEqual(all);
+    const [low, high] = [(await labels()).at(0), (await labels()).at(-1)].map(Number);
+    expect([low >= Number(all.at(0)), high < Number(all.at(-1))]).toEqual([true, true]);
+    await area.dblclick();
+    await expect.poll(labels).toEqual(all);
+  });
+
   it('fits a phone and the dark', async () => {
     const page = await opened('compared.html');
     await page.emulateMedia({ colorScheme: 'dark' });
     await page.setViewportSize({ width: 390, height: 844 });
-    await allDrawn(page.locator('report-chart .plot canvas').first(), 1);
+    await charted(page, 1);
     expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBeLessThanOrEqual(390);
     expect(await seriousFindings(page)).toEqual([]);
   });
@@ -120,7 +139,7 @@ describe.skipIf(missing !== null)('reports that are opened as files', { timeout:
     const page = await opened('demo/report.html');
     const [model] = await page.locator('report-views canvas').all();
     await allDrawn(page.locator('report-views canvas'), 2);
-    await allDrawn(page.locator('report-chart .plot canvas'), 3);
+    await charted(page, 3);
     const before = await pixels(model);
     await page.getByRole('button', { name: 'Play' }).click();
     await expect.poll(() => pixels(model)).not.toBe(before);
@@ -153,13 +172,19 @@ async function allDrawn(canvases: Locator, least: number) {
   const all = await canvases.all();
   expect(all.length).toBeGreaterThanOrEqual(least);
   for (const canvas of all) {
-    // A chart that is drawn anew has another canvas.
     const colors = async () => {
       await canvas.scrollIntoViewIfNeeded();
       return canvas.evaluate(colorCount);
     };
     await expect.poll(colors, { timeout: 20_000 }).toBeGreaterThan(5);
   }
+}
+
+/** Whether there are so many charts, each with a line or a mark within it. */
+async function charted(page: Page, least: number) {
+  const charts = await page.locator('cager-chart svg.plot').all();
+  expect(charts.length).toBeGreaterThanOrEqual(least);
+  for (const chart of charts) expect(await chart.locator('path:not(.grid)[d^=M]').count()).toBeGreaterThan(0);
 }
 
 function colorCount(canvas: Element): number {

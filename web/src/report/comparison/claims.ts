@@ -1,6 +1,6 @@
 import { html } from 'lit';
 import type { Claim } from '../data';
-import { table } from '../table';
+import { table, type Column } from '../table';
 import type { ComparisonReport, SystemReport } from './system';
 
 const VERDICTS: Readonly<Record<Claim['verdict'], string>> = {
@@ -11,25 +11,22 @@ const VERDICTS: Readonly<Record<Claim['verdict'], string>> = {
 
 /** The paper's claims: what became of each with every system, and what was measured with the chosen one. */
 export function claims({ figures, systems }: ComparisonReport, chosen: SystemReport) {
-  const names = systems.map(({ name }) => name);
-  const statements = [...new Set(figures.claims.map(({ statement }) => statement))];
-  const found = (statement: string, system: string) =>
+  const first = figures.claims.filter((claim, k, all) => all.findIndex((c) => c.statement === claim.statement) === k);
+  const found = ({ statement }: Claim, system: string) =>
     figures.claims.find((claim) => claim.statement === statement && claim.system === system);
   const verdict = (claim: Claim | undefined) =>
     claim ? html`<span class="verdict ${claim.verdict}">${VERDICTS[claim.verdict]}</span>` : '–';
+  const sentence = (text: string) => html`<span class="sentence">${text}</span>`;
   return html`
     ${table(
-      [...names, 'claim', 'where', `measured with ${chosen.name}`],
-      3 + names.length,
-      statements.map((statement) => {
-        const [first] = figures.claims.filter((claim) => claim.statement === statement);
-        return [
-          ...names.map((name) => verdict(found(statement, name))),
-          html`<span class="sentence">${statement}</span>`,
-          first.source,
-          html`<span class="sentence">${found(statement, chosen.name)?.measured ?? '–'}</span>`,
-        ];
-      }),
+      first,
+      [
+        ...systems.map(({ name }): Column<Claim> => [name, (claim) => verdict(found(claim, name))]),
+        ['claim', ({ statement }) => sentence(statement)],
+        ['where', ({ source }) => source],
+        [`measured with ${chosen.name}`, (claim) => sentence(found(claim, chosen.name)?.measured ?? '–')],
+      ],
+      3 + systems.length,
     )}
     <p class="caption">
       Verdicts are computed: differences below 2 % do not count, and a claim with two halves of which one holds does so

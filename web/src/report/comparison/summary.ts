@@ -75,7 +75,7 @@ function card(capture: Comparison['capture'], title: string, choice: Choice, why
     );
   };
   return html`<article class="card">
-    <h3>${title}</h3>
+    <h3 class="fine">${title}</h3>
     <p class="choice">${choice.system}: ${choice.method}</p>
     <p>${why}</p>
     <pre tabindex="0"><code>${command}</code></pre>
@@ -87,5 +87,5 @@ function card(capture: Comparison['capture'], title: string, choice: Choice, why
 export function refused({ systems }: Comparison) {
   return systems
     .filter((system) => system.refused !== null)
-    .map(({ name, refused }) => html`<p class="note"><b>${name}</b>: ${refused}.</p>`);
+    .map(({ name, refused }) => html`<p class="refused"><b>${name}</b>: ${refused}.</p>`);
 }

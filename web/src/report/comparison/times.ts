@@ -1,8 +1,8 @@
 import { html } from 'lit';
 import { grouped } from '../../viewer/text';
-import { folded, methodName, table } from '../table';
+import { folded, methodName, table, type Column } from '../table';
 import { percents, seconds } from '../text';
-import type { ComparisonReport } from './system';
+import { methodOf, ofAll, type ComparisonReport } from './system';
 
 /** The paper's Table 1: points, cage, frames, preparation, one frame and total in milliseconds, and where the text gives it the mean L2 in percent. */
 const PAPER = [
@@ -13,12 +13,13 @@ const PAPER = [
   ['Fig. 14, 5th row (horse)', 8_431, '348 / 692', 48, 5_029, 748, 40_933, '0.19'],
 ] as const;
 
+const TITLES =
+  'input|points|cage #V / #T|frames|coordinates|maxvol + SVD|one frame|inverting all|mean L2 %|mean L∞ %'.split('|');
+
 /** Times, in the form of the paper's Table 1. */
 export function times({ figures: { capture }, systems }: ComparisonReport) {
   const ours = systems.map(({ name, figures }) => {
-    const usual = figures.methods.find(
-      (m) => m.handles === 'maxvol' && m.regularizer === 'laplacian' && m.curve,
-    )?.totals;
+    const usual = methodOf(figures, 'maxvol', 'laplacian')?.totals;
     const { coordinates, maxvol, svd, per_frame } = figures.seconds;
     return [
       `${capture.source}, ${name}`,
@@ -29,36 +30,20 @@ export function times({ figures: { capture }, systems }: ComparisonReport) {
       seconds(maxvol !== null && svd !== null ? maxvol + svd : null),
       seconds(per_frame),
       seconds(per_frame === null ? null : per_frame * capture.frames),
-      percents(usual?.l2_mean ?? null, 3),
-      percents(usual?.linf_mean ?? null, 3),
+      percents(usual?.l2_mean, 3),
+      percents(usual?.linf_mean, 3),
     ];
   });
   const theirs = PAPER.map(([input, points, cage, frames, prepare, frame, total, l2]) => [
-    `the paper: ${input}`,
-    grouped(points),
-    cage,
-    String(frames),
-    '–',
+    ...[`the paper: ${input}`, grouped(points), cage, String(frames), '–'],
     ...[prepare, frame, total].map((milliseconds) => seconds(milliseconds / 1e3)),
-    l2,
-    '–',
+    ...[l2, '–'],
   ]);
   return html`
     ${table(
-      [
-        'input',
-        'points',
-        'cage #V / #T',
-        'frames',
-        'coordinates',
-        'maxvol + SVD',
-        'one frame',
-        'inverting all',
-        'mean L2 %',
-        'mean L∞ %',
-      ],
-      1,
       ours,
+      TITLES.map((title, k): Column<string[]> => [title, (row) => row[k]]),
+      1,
       theirs,
     )}
     <p class="caption">
@@ -73,11 +58,13 @@ export function times({ figures: { capture }, systems }: ComparisonReport) {
     ${folded(
       'One inversion by every method',
       table(
-        ['system', 'method', 'one frame'],
+        ofAll(systems, ({ methods }) => methods),
+        [
+          ['system', (row) => row.system],
+          ['method', methodName],
+          ['one frame', (row) => seconds(row.frame_seconds)],
+        ],
         2,
-        systems.flatMap(({ name, figures }) =>
-          figures.methods.map((method) => [name, methodName(method), seconds(method.frame_seconds)]),
-        ),
       ),
     )}
   `;

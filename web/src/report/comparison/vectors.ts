@@ -2,10 +2,10 @@ import { html } from 'lit';
 import { signedGradient } from '../../render/colorMap';
 import { floats } from '../geometry/numbers';
 import { methodColor } from '../methods';
-import { caption, colorScale, table } from '../table';
+import { caption, charts, colorScale, table, viewsOf } from '../table';
 import { decimals } from '../text';
 import type { View } from '../views';
-import type { ComparisonReport, SystemReport } from './system';
+import { ofAll, type ComparisonReport, type SystemReport } from './system';
 
 /** Vectors on fewer unknowns than this are marked by dots. */
 const FEW = 12;
@@ -14,50 +14,39 @@ const FEW = 12;
 export function vectors({ systems, rest }: ComparisonReport, system: SystemReport) {
   const { spread } = system.figures.vectors;
   return html`
-    <report-views
-      .views=${vectorViews(rest, system)}
-      .framed=${rest.cageVertices}
-      label="Singular vectors on the cage"
-    ></report-views>
+    ${viewsOf('Singular vectors on the cage', { views: vectorViews(rest, system), framed: rest.cageVertices })}
     ${colorScale('largest negative', 'largest positive', signedGradient())}
     ${caption(
       'A few of the first and the last right singular vectors of Φ□, painted on the rest cage.',
       'Each has its own scale about zero, on which small values are raised so that they are seen. The first move the whole cage, and the points say clearly how far; the last are concentrated on a few vertices, marked by dots, that hardly influence any point, so smoothing them costs little accuracy. (Of systems with unknowns on faces, the vertices’ part is shown.)',
       'Paper: Figs. 11 and 15.',
     )}
-    <div class="charts">
-      <report-chart
-        .options=${{
-          title: 'How widely vectors are spread',
-          x: { label: 'singular vector number' },
-          y: { label: 'unknowns it lives on', cover: 'zero' },
-          series: [
-            {
-              label: '',
-              color: methodColor({ handles: 'maxvol', regularizer: 'laplacian' }),
-              mark: 'line',
-              points: spread.map((value, k) => [k + 1, value]),
-            },
-          ],
-        }}
-      ></report-chart>
-    </div>
+    ${charts({
+      title: 'How widely vectors are spread',
+      x: { label: 'singular vector number' },
+      y: { label: 'unknowns it lives on', cover: 'zero' },
+      series: [
+        {
+          label: '',
+          color: methodColor({ handles: 'maxvol', regularizer: 'laplacian' }),
+          mark: 'line',
+          points: spread.map((value, k) => [k + 1, value]),
+        },
+      ],
+    })}
     ${caption(
       'The number of unknowns on which each right singular vector of Φ□ lives.',
       'Measured by 1 / Σ v⁴: all unknowns for a vector spread evenly, one for a vector on a single unknown. Where the curve is low at the right end, regularising the last directions acts locally.',
       'Paper: Figs. 11 and 15, as a measure.',
     )}
     ${table(
-      ['system', 'vector', 'singular value', 'lives on so many unknowns'],
-      1,
-      systems.flatMap(({ name, figures }) =>
-        figures.vectors.painted.map((k) => [
-          name,
-          `${k + 1} of ${figures.unknowns}`,
-          decimals(figures.spectra.handles[k] ?? null, 4),
-          decimals(figures.vectors.spread[k] ?? null, 1),
-        ]),
-      ),
+      ofAll(systems, (figures) => figures.vectors.painted.map((k) => ({ k, figures }))),
+      [
+        ['system', (row) => row.system],
+        ['vector', ({ k, figures }) => `${k + 1} of ${figures.unknowns}`],
+        ['singular value', ({ k, figures }) => decimals(figures.spectra.handles[k], 4)],
+        ['lives on so many unknowns', ({ k, figures }) => decimals(figures.vectors.spread[k], 1)],
+      ],
     )}
   `;
 }

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { axesOf, eyeOf, FIELD_OF_VIEW } from '../../render/camera';
-import { fitted, homeView, pictureShape } from './framing';
+import { axesOf, eyeOf, FIELD_OF_VIEW, framed } from '../../render/camera';
+import { homeView, pictureShape } from './framing';
 
 /** Corners of a box around a point. */
 function corners([x, y, z]: readonly number[], width: number, height: number, depth: number): Float32Array {
@@ -18,7 +18,7 @@ describe('the camera of a group of views', () => {
   ])('shows all of a box of %d × %d × %d', (width, height, depth) => {
     const positions = corners([4, -2, 1], width, height, depth);
     const aspect = pictureShape(positions);
-    const camera = fitted(homeView(positions), positions, aspect);
+    const camera = framed(homeView(positions), positions, aspect);
     const [eye, { right, up, back }] = [eyeOf(camera), axesOf(camera)];
     const slope = Math.tan(FIELD_OF_VIEW / 2);
     let most = 0;
@@ -34,7 +34,7 @@ describe('the camera of a group of views', () => {
   });
 
   it('looks from somewhere at nothing, too', () => {
-    const camera = fitted(homeView(new Float32Array(0)), new Float32Array(0), 1);
+    const camera = framed(homeView(new Float32Array(0)), new Float32Array(0), 1);
     expect(eyeOf(camera).every(Number.isFinite)).toBe(true);
     expect(pictureShape(new Float32Array(0))).toBe(1);
   });

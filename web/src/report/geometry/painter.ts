@@ -1,5 +1,5 @@
 import { Color, PerspectiveCamera, Vector3, WebGLRenderer } from 'three';
-import { eyeOf, FIELD_OF_VIEW, type CameraState } from '../../render/camera';
+import { aim, FIELD_OF_VIEW, type CameraState } from '../../render/camera';
 import type { DrawingScene } from './drawing';
 
 /**
@@ -47,12 +47,7 @@ export class Painter {
       renderer.setSize(width, height, false);
     }
     camera.aspect = width / height;
-    camera.position.set(...eyeOf(state));
-    camera.lookAt(...state.target);
-    camera.near = state.distance * 0.02;
-    camera.far = state.distance + 40;
-    camera.updateProjectionMatrix();
-    camera.updateMatrixWorld();
+    aim(camera, state);
     const pixelsPerUnit = (height * ratio) / (2 * Math.tan(FIELD_OF_VIEW / 2));
     drawing.setView(new Vector3(0, 1, 0).transformDirection(camera.matrixWorldInverse), pixelsPerUnit, ratio);
     renderer.render(drawing.scene, camera);

@@ -1,4 +1,4 @@
-import { html, svg, type SVGTemplateResult, type TemplateResult } from 'lit';
+import { html, svg, type TemplateResult } from 'lit';
 
 /** Line drawings on a field of 24 × 24. */
 const DRAWINGS = {
@@ -28,11 +28,25 @@ const DRAWINGS = {
   edit: svg`<path d="M4.500 17.500 12 4.500l7.500 13z"/><path d="M12 11.500v7M12 11.500l-2 2.500M12 11.500l2 2.500" opacity=".55"/><g fill="currentColor" stroke="none"><circle cx="12" cy="4.500" r="2.400"/><circle cx="4.500" cy="17.500" r="2"/><circle cx="19.500" cy="17.500" r="2"/></g>`,
   close: svg`<path d="m6 6 12 12M18 6 6 18"/>`,
   file: svg`<path d="M13 3.5H7A1.5 1.5 0 0 0 5.5 5v14A1.5 1.5 0 0 0 7 20.5h10a1.5 1.5 0 0 0 1.5-1.5V9zM13 3.5V9h5.5"/>`,
-} satisfies Record<string, SVGTemplateResult>;
+  search: svg`<circle cx="11" cy="11" r="6.5"/><path d="m16 16 4.5 4.5"/>`,
+  upload: svg`<path d="M12 16V4m0 0L7 9m5-5 5 5M4 16v4h16v-4"/>`,
+  download: svg`<path d="M12 4v12m0 0 5-5m-5 5-5-5M4 17v3h16v-3"/>`,
+  trash: svg`<path d="M4 7h16M9 7V4h6v3M6 7l1 13h10l1-13M10 11v5M14 11v5"/>`,
+  alert: svg`<circle cx="12" cy="12" r="8.5"/><path d="M12 7.5v5.5M12 16.2v.3"/>`,
+  copy: svg`<rect x="9" y="9" width="11" height="11" rx="2"/><path d="M15 9V4H4v11h5"/>`,
+  check: svg`<path d="m5 12.5 4.5 4.5L19 7"/>`,
+  back: svg`<path d="M14.5 6 8.5 12l6 6"/>`,
+  undo: svg`<path d="M8.5 5 4.500 9l4 4M5 9h9a5.500 5.500 0 0 1 0 11h-4"/>`,
+  redo: svg`<path d="m15.500 5 4 4-4 4M19 9h-9a5.500 5.500 0 0 0 0 11h4"/>`,
+  reset: svg`<path d="M4.500 12a7.500 7.500 0 1 0 2.400-5.500M4.500 4.500v4h4M12 8.500v4l2.500 1.500"/>`,
+};
 
 export type GlyphName = keyof typeof DRAWINGS;
 
-/** A drawing beside or instead of a text; screen readers pass over it. */
-export function glyph(name: GlyphName): TemplateResult {
-  return html`<svg class="glyph" viewBox="0 0 24 24" aria-hidden="true">${DRAWINGS[name]}</svg>`;
-}
+/** Drawings beside or instead of a text; screen readers pass over them, a button that has nothing else has a label. */
+export const glyphs = Object.fromEntries(
+  Object.entries(DRAWINGS).map(([name, drawing]) => [
+    name,
+    html`<svg class="glyph" viewBox="0 0 24 24" aria-hidden="true">${drawing}</svg>`,
+  ]),
+) as Readonly<Record<GlyphName, TemplateResult>>;
