@@ -138,6 +138,8 @@ export interface Capture {
   hasFinal?(frame: number): boolean;
   /** Φ, points × columns, from the service; for coordinate systems that the page does not compute itself. */
   coordinates?(onProgress?: (fraction: number) => void, signal?: AbortSignal): Promise<Float32Array>;
+  /** Φ, points × columns, where decoding cages computes it anyway. */
+  phi?(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array>;
   /** Point numbers of the handles, where they are known. */
   handles?(signal?: AbortSignal): Promise<Uint32Array>;
   /** The container that holds the capture, for copies of it with edited cages. */
