@@ -34,8 +34,6 @@ export interface StaticPart {
   readonly rowsPerFrame: number;
   /** Frames per second, if the file or session says. */
   readonly frameRate: number | null;
-  /** How many of the most unstable directions of Φ kept the shape of the rest cage, as far as known. */
-  readonly spectrum?: number;
   /** Figures about the encoding (`Report` in proto/src/report.rs), as far as known. */
   readonly report: Readonly<Record<string, unknown>> | null;
   /** Boundary elements that harmonic coordinates were solved on (`ELEM` in docs/FORMAT.md), where the file has them. */
