@@ -11,6 +11,16 @@ export const cross = (a: Vector, b: Vector): Vector => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
+/** a + share · b. */
+export function plus(a: Vector, b: Vector, share = 1): Vector {
+  return [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]];
+}
+
+/** The same direction with the length one; zero stays. */
+export function normalized(a: Vector): Vector {
+  return scaled(a, 1 / (norm(a) || 1));
+}
+
 /** Point `index` of a list of coordinates. */
 export function pointAt(positions: ArrayLike<number>, index: number): Vector {
   return [positions[3 * index], positions[3 * index + 1], positions[3 * index + 2]];

@@ -2,7 +2,7 @@ import { beforeEach, describe, expect, it } from 'vitest';
 import { editedRows } from './cageEdit';
 import { EditModel, rangeAround } from './editModel';
 import { angleOf, rotationAbout } from './motion';
-import type { Vector } from './projection';
+import type { Vector } from '../coordinates/vector';
 
 /** An octahedron. */
 const cage = {

@@ -3,7 +3,7 @@ import { constraintAt, type Constraint } from './gizmo';
 import { motionOf } from './gizmoDrag';
 import type { Motion, MotionKind } from './motion';
 import { vertexAt, verticesWithin, type Rectangle } from './picking';
-import type { Vector } from './projection';
+import type { Vector } from '../coordinates/vector';
 
 /** Pixels around a vertex that count as it, for a mouse and for a finger. */
 const [MOUSE_REACH, TOUCH_REACH] = [14, 24];

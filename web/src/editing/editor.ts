@@ -10,7 +10,8 @@ import { keyCommand, keyMotion, type KeyCommand } from './keys';
 import type { Motion, MotionKind } from './motion';
 import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
-import { Projection, type Vector } from './projection';
+import type { Vector } from '../coordinates/vector';
+import { Projection } from './projection';
 import { degrees, timesAs } from './text';
 
 /** What the editor needs of the viewer around it. */

@@ -1,6 +1,7 @@
 import { RING, UNITS, type Constraint } from './gizmo';
 import { rotationAbout, type Motion, type MotionKind } from './motion';
-import { cross, dot, length, minus, normalized, plus, type Projection, type Vector } from './projection';
+import { cross, dot, norm, sub, normalized, plus, type Vector } from '../coordinates/vector';
+import type { Projection } from './projection';
 
 /** A place in the picture. */
 export interface Point {
@@ -60,7 +61,7 @@ export function motionOf(projection: Projection, drag: Drag, before = 0, isStepp
   }
   const [x, y, z] = draggedBy(projection, at, constraint, from, to);
   const by: Vector = [x * diagonal, y * diagonal, z * diagonal];
-  return { motion: { kind, by }, amount: length(by) };
+  return { motion: { kind, by }, amount: norm(by) };
 }
 
 /** The angle about an axis, or clockwise about the line of sight, from one place to another; −π to π. */
@@ -76,7 +77,7 @@ function angleBy(projection: Projection, at: Vector, constraint: Constraint, fro
   if (Math.abs(dot(axis, sight)) > EDGE_ON) {
     const [a, b] = [from, to].map((place) => whereOnPlane(projection, at, axis, place));
     if (!a || !b) return 0;
-    const [start, end] = [minus(a, at), minus(b, at)];
+    const [start, end] = [sub(a, at), sub(b, at)];
     return Math.atan2(dot(axis, cross(start, end)), dot(start, end));
   }
   // The point of the ring that is next to the eye moves this way in the picture.
@@ -102,7 +103,7 @@ function factorBy(projection: Projection, at: Vector, constraint: Constraint, fr
 export function draggedBy(projection: Projection, at: Vector, constraint: Constraint, from: Point, to: Point): Vector {
   if (constraint.kind === 'axis') {
     const axis = UNITS[constraint.axis];
-    const sight = normalized(minus(at, projection.ray(from.x, from.y).origin));
+    const sight = normalized(sub(at, projection.ray(from.x, from.y).origin));
     // The plane through the axis that faces the eye the most.
     const normal = cross(axis, cross(sight, axis));
     const way = onPlane(projection, at, normal, from, to);
@@ -116,13 +117,13 @@ export function draggedBy(projection: Projection, at: Vector, constraint: Constr
 /** From where one ray meets a plane to where another one does; nothing where one of them does not. */
 function onPlane(projection: Projection, at: Vector, normal: Vector, from: Point, to: Point): Vector {
   const [start, end] = [from, to].map((place) => whereOnPlane(projection, at, normal, place));
-  return start && end ? minus(end, start) : [0, 0, 0];
+  return start && end ? sub(end, start) : [0, 0, 0];
 }
 
 /** Where the ray behind a place meets a plane; null where it does not. */
 function whereOnPlane(projection: Projection, at: Vector, normal: Vector, { x, y }: Point): Vector | null {
   const { origin, direction } = projection.ray(x, y);
-  const slope = dot(direction, normal) / (length(normal) || 1);
-  const distance = dot(minus(at, origin), normal) / (slope * (length(normal) || 1));
+  const slope = dot(direction, normal) / (norm(normal) || 1);
+  const distance = dot(sub(at, origin), normal) / (slope * (norm(normal) || 1));
   return Math.abs(slope) > 1e-3 && distance > 0 ? plus(origin, direction, distance) : null;
 }

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { CageGraph, falloffWeights } from './falloff';
 import { displace, gripOf, type Grip } from './grip';
 import { rotationAbout, type Motion } from './motion';
-import type { Vector } from './projection';
+import type { Vector } from '../coordinates/vector';
 import { mirrorOf } from './symmetry';
 
 /** A row of squares along x, bent to a U, whose ends are near each other in space and far on the surface. */

@@ -1,6 +1,6 @@
 import { falloffWeights, type CageGraph, type FalloffMeasure } from './falloff';
 import { displacement, mirrored, type Motion } from './motion';
-import type { Vector } from './projection';
+import type { Vector } from '../coordinates/vector';
 import type { Mirror } from './symmetry';
 
 /** What follows when vertices are moved. */

@@ -1,5 +1,6 @@
 import { rotationAbout, type Motion, type MotionKind } from './motion';
-import { plus, type Projection, type Vector } from './projection';
+import { plus, type Vector } from '../coordinates/vector';
+import type { Projection } from './projection';
 
 /** What a key press asks for while a cage is edited. Directions are those of the picture. */
 export type KeyCommand =

@@ -1,4 +1,4 @@
-import { cross, dot, length, normalized, plus, type Vector } from './projection';
+import { cross, dot, norm, normalized, plus, type Vector } from '../coordinates/vector';
 
 /** A rotation as a unit quaternion x y z w. Its sign counts: a negative w is a rotation by more than half a turn. */
 export type Quaternion = readonly [number, number, number, number];
@@ -66,7 +66,7 @@ export function displacement(motion: Motion, part: number, arm: Vector): Vector 
     return [along(0), along(1), along(2)];
   }
   const [x, y, z] = motion.rotation;
-  if (length([x, y, z]) === 0) return [0, 0, 0];
+  if (norm([x, y, z]) === 0) return [0, 0, 0];
   const [qx, qy, qz, qw] = rotationAbout([x, y, z], part * angleOf(motion.rotation));
   const axis: Vector = [qx, qy, qz];
   const across = cross(axis, arm);

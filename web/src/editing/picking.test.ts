@@ -6,7 +6,8 @@ import { keyCommand, TOOL_KEYS } from './keys';
 import { angleOf } from './motion';
 import { SHORTCUTS } from '../viewer/shortcuts';
 import { placedVertices, vertexAt, verticesWithin, vertexTowards } from './picking';
-import { dot, length, minus, plus, Projection, type Vector } from './projection';
+import { dot, norm, sub, plus, type Vector } from '../coordinates/vector';
+import { Projection } from './projection';
 
 const [WIDTH, HEIGHT] = [800, 600];
 
@@ -27,18 +28,18 @@ describe('projection', () => {
   it('goes to the picture and back', () => {
     const view = projection();
     const point: Vector = [0.3, -0.2, 0.4];
-    expect(length(minus(view.point(view.place(point)!), point))).toBeLessThan(1e-9);
+    expect(norm(sub(view.point(view.place(point)!), point))).toBeLessThan(1e-9);
     const { origin, direction } = view.ray(view.place(point)!.x, view.place(point)!.y);
-    const along = dot(minus(point, origin), direction);
-    expect(length(minus(plus(origin, direction, along), point))).toBeLessThan(1e-9);
+    const along = dot(sub(point, origin), direction);
+    expect(norm(sub(plus(origin, direction, along), point))).toBeLessThan(1e-9);
     expect(view.place([4, 3, 9])).toBeNull();
   });
 
   it('knows right, up and away', () => {
     const { right, up, away } = projection([0, 0, 3]).axes([0, 0, 0]);
-    expect(length(minus(right, [1, 0, 0]))).toBeLessThan(1e-9);
-    expect(length(minus(up, [0, 1, 0]))).toBeLessThan(1e-9);
-    expect(length(minus(away, [0, 0, -1]))).toBeLessThan(1e-9);
+    expect(norm(sub(right, [1, 0, 0]))).toBeLessThan(1e-9);
+    expect(norm(sub(up, [0, 1, 0]))).toBeLessThan(1e-9);
+    expect(norm(sub(away, [0, 0, -1]))).toBeLessThan(1e-9);
   });
 });
 
@@ -81,7 +82,7 @@ describe('the gizmo', () => {
     expect(constraintAt(gizmo, (tip.x + from.x) / 2, (tip.y + from.y) / 2)).toEqual({ kind: 'axis', axis });
     const way = draggedBy(view, [0.1, 0.2, 0], { kind: 'axis', axis }, from, tip);
     [0, 1, 2].filter((k) => k !== axis).forEach((k) => expect(way[k]).toBe(0));
-    const moved = view.place(plus(plus([0.1, 0.2, 0], way), minus(view.point(from), [0.1, 0.2, 0])))!;
+    const moved = view.place(plus(plus([0.1, 0.2, 0], way), sub(view.point(from), [0.1, 0.2, 0])))!;
     expect(Math.hypot(moved.x - tip.x, moved.y - tip.y)).toBeLessThan(1.5);
   });
 
@@ -93,7 +94,7 @@ describe('the gizmo', () => {
       expect(constraintAt(gizmo, x, y)).toEqual({ kind: 'plane', axis });
       const way = draggedBy(view, [0.1, 0.2, 0], { kind: 'plane', axis }, { x, y }, { x: x + 20, y: y - 9 });
       expect(Math.abs(way[axis])).toBeLessThan(1e-9);
-      expect(length(way)).toBeGreaterThan(0.01);
+      expect(norm(way)).toBeGreaterThan(0.01);
     }
     const { middle } = gizmo;
     expect(constraintAt(gizmo, middle.x + 3, middle.y)).toEqual({ kind: 'picture' });

@@ -1,4 +1,5 @@
-import { cross, dot, minus, normalized, type Place, type Projection, type Vector } from './projection';
+import { cross, dot, sub, normalized, type Vector } from '../coordinates/vector';
+import type { Place, Projection } from './projection';
 
 /** A vertex of the cage in the picture. */
 export interface PlacedVertex extends Place {
@@ -20,7 +21,7 @@ export function placedVertices(
   const normals = new Float64Array(3 * vertices);
   for (let f = 0; f < triangles.length; f += 3) {
     const [a, b, c] = [at(triangles[f]), at(triangles[f + 1]), at(triangles[f + 2])];
-    const normal = cross(minus(b, a), minus(c, a));
+    const normal = cross(sub(b, a), sub(c, a));
     for (let corner = f; corner < f + 3; corner++) {
       for (let k = 0; k < 3; k++) normals[3 * triangles[corner] + k] += normal[k];
     }

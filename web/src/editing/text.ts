@@ -1,4 +1,4 @@
-import type { Vector } from './projection';
+import type { Vector } from '../coordinates/vector';
 
 /** An angle in radians, in degrees. */
 export function degrees(angle: number): string {
