@@ -30,7 +30,7 @@ export class Projection {
     readonly width: number,
     readonly height: number,
   ) {
-    this.matrix = new Matrix4().fromArray(matrix as number[]);
+    this.matrix = new Matrix4().fromArray(matrix);
     this.inverse = this.matrix.clone().invert();
   }
 
