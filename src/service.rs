@@ -42,6 +42,8 @@ const UPLOAD_PIECE: u64 = 64 << 10;
 
 /// How long the result of a disk probe is valid.
 const PROBE_VALIDITY: std::time::Duration = std::time::Duration::from_secs(1);
+/// Sessions written as files of other programs at a time.
+const MAX_CONCURRENT_EXPORTS: u64 = 2;
 /// How often it is looked whether another process has the database.
 const TAKEN_OVER_CHECK: std::time::Duration = std::time::Duration::from_millis(200);
 
@@ -78,6 +80,8 @@ pub struct Service {
     pub(crate) container_writers: Arc<rayon::ThreadPool>,
     /// Groups of frames being coded or decoded.
     pub(crate) coding: Arc<Budget>,
+    /// Sessions being written as files of other programs.
+    pub(crate) exporting: Arc<Budget>,
     /// Threads that code and decode them.
     pub(crate) coders: Arc<rayon::ThreadPool>,
     /// Frames and cages between arrival and solving.
@@ -190,6 +194,7 @@ impl Service {
             completing: config.budget(MAX_CONCURRENT_COMPLETIONS),
             container_writers: Arc::new(container_writers.map_err(StartError::Threads)?),
             coding: config.budget(codings(&coders)),
+            exporting: config.budget(MAX_CONCURRENT_EXPORTS),
             coders: Arc::new(coders),
             queued_frames: config.budget(config.max_queue_frames as u64),
             frame_memory: config.budget(config.frame_bytes),

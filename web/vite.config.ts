@@ -75,8 +75,8 @@ export default defineConfig(({ mode }) => ({
   ...(mode === 'report' ? report : page),
   test: {
     environment: 'node',
-    testTimeout: 20_000,
-    expect: { poll: { timeout: 10_000 } },
+    testTimeout: 60_000,
+    expect: { poll: { timeout: 20_000 } },
     projects: [
       { extends: true, test: { name: 'unit', include: ['src/**/*.test.ts'] } },
       // One browser that draws in software, for all files: two at once would wait for each other until they time out.

@@ -57,7 +57,7 @@ pub(crate) async fn run_until(
     let tls = config.tls().map(|tls| tls_config(&tls)).transpose()?;
     let scheme = if tls.is_some() { "https" } else { "http" };
     // What waits for a database that another process has listens to nobody, so that nobody is sent here.
-    let service = start(config.clone(), &stop).await?;
+    let Some(service) = start(config.clone(), &stop).await? else { return Ok(()) };
     let listener = TcpListener::bind(config.listen)
         .await
         .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))?;
@@ -89,8 +89,8 @@ pub(crate) async fn run_until(
     Ok(())
 }
 
-/// Opens the data folder. While another process has its database, waits for the end of that one.
-async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Arc<Service>> {
+/// Opens the data folder. While another process has its database, waits for the end of that one; `None` where this one is stopped meanwhile.
+async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Option<Arc<Service>>> {
     let mut is_told = false;
     loop {
         let (config, own) = (config.clone(), stop.clone());
@@ -98,15 +98,15 @@ async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Arc<Serv
         let what = match started {
             Err(StartError::Store(StoreError::InUse { what })) => what,
             // Who waits does so through restarts of the database too.
-            Err(StartError::Store(StoreError::Catalog { what, .. })) if is_told => what,
-            started => return Ok(started?),
+            Err(StartError::Store(StoreError::Catalog { what, action: "reach", .. })) if is_told => what,
+            started => return Ok(Some(started?)),
         };
         if !std::mem::replace(&mut is_told, true) {
             tracing::warn!("waits, to take over when that ends: {what}");
         }
         tokio::select! {
             () = tokio::time::sleep(TAKEOVER_PAUSE) => {}
-            () = stop.cancelled() => bail!("stopped while it waited for the database: {what}"),
+            () = stop.cancelled() => return Ok(None),
         }
     }
 }

@@ -36,7 +36,11 @@ fn without_password(address: &str) -> String {
         let (name, _) = user.split_once(':')?;
         Some(format!("{scheme}://{name}:***@{host}"))
     });
-    shown.unwrap_or_else(|| address.to_owned())
+    let shown = shown.unwrap_or_else(|| address.to_owned());
+    match shown.split_once("password=") {
+        Some((before, _)) => format!("{before}password=***"),
+        None => shown,
+    }
 }
 
 /// A value as TOML has it. Texts are escaped as in JSON, which TOML understands.

@@ -2,7 +2,7 @@
 
 use super::extract::{Query, RequestedSession};
 use super::openapi;
-use super::ranged::Immutable;
+use super::ranged::{Immutable, is_known};
 use crate::admission::Held;
 use crate::decode::{Decoding, Layer, decode};
 use crate::memory::Memory;
@@ -13,10 +13,10 @@ use crate::store::Completion;
 use crate::tasks::blocking;
 use crate::timing::Timing;
 use axum::extract::State;
-use axum::response::Response;
+use axum::response::{IntoResponse as _, Response};
 use cager_formats::{MorphOptions, Target};
-use http::header::CONTENT_DISPOSITION;
-use http::{HeaderMap, HeaderValue};
+use http::header::{CONTENT_DISPOSITION, ETAG};
+use http::{HeaderMap, HeaderValue, StatusCode};
 use serde::Deserialize;
 use std::fs::File;
 use std::ops::Range;
@@ -98,6 +98,10 @@ pub(crate) async fn get(
             "files are written of completed sessions; post {\"frames\": F} to complete, or decode cages as they come";
         return Err(ApiError::new(problem::NOT_COMPLETED, detail));
     };
+    let etag = format!("{}-{}", completion.container_digest, format.extension());
+    if is_known(&headers, &format!("\"{etag}\"")) {
+        return Ok((StatusCode::NOT_MODIFIED, [(ETAG, format!("\"{etag}\""))]).into_response());
+    }
     let name = file_name(session.meta.options.name.as_deref(), format.extension());
     let (file, length, space) = made(&service, &session, &tenant.name, &completion, (format, &name)).await?;
     let read = move |range: Range<u64>| {
@@ -109,7 +113,7 @@ pub(crate) async fn get(
     };
     let mut response = Immutable {
         length,
-        etag: format!("{}-{}", completion.container_digest, format.extension()),
+        etag,
         media_type: format.media_type(),
         public: !service.access.is_guarded(),
         room: service.download_memory.nothing(&tenant.name),
@@ -132,17 +136,26 @@ async fn made(
     let facts = session.facts().ok_or_else(|| ApiError::internal(&"a completed session without facts"))?;
     let (points, frames) = (u64::from(facts.points), u64::from(completion.frames));
     let positions = 12 * points * frames;
+    let bytes = positions + FACE_BYTES * 2 * points + FILE_BYTES;
+    // Principal components are found of all frames at once.
+    let kept = if format == Format::Glb { 2 * positions } else { 0 };
+    let fits = bytes <= service.spool_space.most().min(service.store.free_bytes() / 2);
+    if !fits || kept > service.decoding_memory.most() {
+        let detail = format!(
+            "its {frames} frames of {points} points make a file that is too large to be written here; download capture.cager and decode it: cager decode capture.cager -o FILE.{}",
+            format.extension()
+        );
+        return Err(ApiError::new(problem::TOO_LARGE, detail));
+    }
     let mut space = service.spool_space.nothing(tenant);
-    space.grow(positions + FACE_BYTES * 2 * points + FILE_BYTES).map_err(|full| {
+    space.grow(bytes).map_err(|full| {
         service.rejected("spool_space");
         full.refusal("disk space for files on their way")
     })?;
     let coordinates = 4 * points * u64::from(facts.unknowns);
-    // Principal components are found of all frames at once.
-    let kept = if format == Format::Glb { 2 * positions } else { 0 };
     let working = async {
         let memory = service.decoding_memory.take(tenant, coordinates + kept + BUFFERS).await;
-        (service.coding.take(tenant, 1).await, memory)
+        (service.exporting.take(tenant, 1).await, memory)
     };
     let places = tokio::select! {
         places = working => places,
@@ -154,14 +167,15 @@ async fn made(
     let (folder, name) = (service.store.scratch(), name.to_owned());
     let (coders, of) = (Arc::clone(&service.coders), Arc::clone(session));
     let written = blocking(move || {
+        // Disk and memory are held until it is done, also where nobody waits any more.
         let _places = places;
-        coders.install(|| write(&container, &folder, &name)).map_err(|error| {
+        let written = coders.install(|| write(&container, &folder, &name)).map_err(|error| {
             tracing::error!(session = %of.meta.id, %error, "a file of its frames could not be written");
             if of.is_going() { crate::session::gone() } else { refused(&error) }
-        })
+        });
+        written.map(|(file, length)| (file, length, space))
     });
-    let (file, length) = written.await??;
-    Ok((file, length, space))
+    written.await?
 }
 
 fn write(container: &Path, folder: &Path, name: &str) -> anyhow::Result<(File, u64)> {

@@ -42,7 +42,6 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(events::get))
         .routes(routes!(cages::get))
         .routes(routes!(container::get))
-        .routes(routes!(exported::get))
         .routes(routes!(cage_jobs::jobs::list))
         .routes(routes!(cage_jobs::jobs::get, cage_jobs::jobs::delete))
         .routes(routes!(cage_jobs::events::get))
@@ -69,7 +68,7 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
 
 /// Routes that take as long as their work.
 fn completing() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(sessions::complete))
+    OpenApiRouter::new().routes(routes!(sessions::complete)).routes(routes!(exported::get))
 }
 
 /// Routes that stream their request bodies.

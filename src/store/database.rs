@@ -2,6 +2,7 @@
 //! its sessions for lost, and one that lacks the database their files for left-overs.
 
 use super::files::Files;
+use super::import::is_without_records;
 use super::{CATALOG, StoreError, of_catalog};
 use cager_store::{Catalog, CatalogError, PostgresCatalog};
 use std::path::{Path, PathBuf};
@@ -16,11 +17,11 @@ const MOVED: &str = "catalog.db.moved";
 
 /// Opens the catalogue in the database at `url` for this process alone, and takes over what the folder's own has. Gives what it is called too.
 pub(super) fn open(files: &Files, url: &str) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
-    let catalog = PostgresCatalog::open(url).map_err(|error| of_catalog(Path::new("the database"), "open", error))?;
+    let catalog = PostgresCatalog::open(url).map_err(|error| of_catalog(Path::new("the database"), "reach", error))?;
     let name = PathBuf::from(catalog.name());
     let failed = |error| match error {
         CatalogError::InUse(what) => StoreError::InUse { what },
-        error => of_catalog(&name, "open", error),
+        error => of_catalog(&name, "reach", error),
     };
     catalog.claim().map_err(failed)?;
     match_folder(files, &catalog, &name)?;
@@ -48,6 +49,15 @@ fn match_folder(files: &Files, catalog: &PostgresCatalog, name: &Path) -> Result
     let known = catalog.folder().map_err(failed)?;
     let number = files.read(&path, LIMIT)?.map(|bytes| String::from_utf8_lossy(&bytes).trim().to_owned());
     let number = match (number, &known) {
+        // Another database may have what is known of it.
+        (Some(_), None) if !files.exists(&files.root.join(CATALOG))? && is_without_records(files)? => {
+            let what = format!(
+                "{} is empty, and the data folder {} has sessions: name the database and the schema that know of them, or restore it",
+                name.display(),
+                files.root.display()
+            );
+            return Err(StoreError::Elsewhere { what });
+        }
         (Some(number), _) => number,
         (None, None) => {
             let number = uuid::Uuid::now_v7().simple().to_string();
@@ -86,6 +96,6 @@ fn take_over(files: &Files, catalog: &PostgresCatalog, name: &Path) -> Result<()
     // What its log has is in the file then.
     drop(own);
     files.publish(&path, &files.root.join(MOVED))?;
-    tracing::info!(records = copied, to = %name.display(), "the folder's catalogue was copied; {MOVED} is no longer needed");
+    tracing::info!(records = copied, to = %name.display(), "the folder's catalogue was copied; its file is {MOVED} now");
     Ok(())
 }

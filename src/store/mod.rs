@@ -20,6 +20,7 @@
 //! everything in `sessions`, `cages`, `recoveries`, `transfers`, `contents` and `prepared` is complete, but for frames that wait to be coded,
 //! whose digests the catalogue has. A record is there before its folder and after it: what it says of its phase decides.
 
+use crate::store::fenced::FencedDisk;
 use crate::store::files::Files;
 use cager_store::{Catalog, CatalogError};
 use std::fs::File;
@@ -36,6 +37,7 @@ mod error;
 #[cfg(test)]
 #[path = "../../tests/faults/mod.rs"]
 mod faults;
+mod fenced;
 mod files;
 mod frames;
 mod groups;
@@ -134,16 +136,12 @@ impl Store {
             let lock = disk.lock(&lock_path).map_err(|e| StoreError::of(&lock_path, "lock", e))?;
             lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })
         };
-        // Where machines share the folder, a lock of one that is gone may stay for long; the database knows better.
-        let lock = database.is_none().then(lock).transpose()?;
-        let files = Files::new(root, disk);
+        // Where machines share the folder, a lock of one that is gone may stay for long; the database knows better once it has all.
+        let is_own = database.is_none() || root.join(CATALOG).exists();
+        let lock = is_own.then(lock).transpose()?;
+        let (files, in_database) = open_folder(root, disk, database)?;
         let own = [&files.sessions, &files.cages, &files.recoveries, &files.transfers, &files.contents];
         let kept = [&files.trash, &files.prepared].into_iter().chain(own);
-        for folder in kept.clone().chain([&files.quarantine, &files.tmp]) {
-            make_folder(&*files.disk, folder)?;
-        }
-        // Before anything is removed: it is another process's folder where the database is.
-        let in_database = database.map(|url| database::open(&files, url)).transpose()?;
         // They may be so on purpose: whoever made them decides.
         let is_open = |folder: &Path| disk::is_open_to_all(folder).unwrap_or(false);
         if is_open(root) && own.into_iter().any(|folder| is_open(folder)) {
@@ -222,9 +220,28 @@ impl Store {
     }
 }
 
+/// A catalogue, and its file or what the database is called.
+type Named = (Arc<dyn Catalog>, PathBuf);
+
+/// Makes the folders in `root`, and opens the catalogue where it is in a database: before anything is removed, since it is another process's folder
+/// where the database is.
+fn open_folder(root: &Path, disk: Arc<dyn Disk>, database: Option<&str>) -> Result<(Files, Option<Named>), StoreError> {
+    let files = Files::new(root, disk);
+    if database.is_none() {
+        database::refuse(&files)?;
+    }
+    let parts = [&files.sessions, &files.cages, &files.recoveries, &files.transfers, &files.contents];
+    for folder in parts.into_iter().chain([&files.trash, &files.prepared, &files.quarantine, &files.tmp]) {
+        make_folder(&*files.disk, folder)?;
+    }
+    let Some(url) = database else { return Ok((files, None)) };
+    let (catalog, name) = database::open(&files, url)?;
+    let disk = Arc::new(FencedDisk { disk: files.disk, catalog: Arc::clone(&catalog) });
+    Ok((Files::new(root, disk), Some((catalog, name))))
+}
+
 /// Opens the catalogue in the folder itself. Gives its path too.
-fn own_catalog(files: &Files) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
-    database::refuse(files)?;
+fn own_catalog(files: &Files) -> Result<Named, StoreError> {
     let path = files.root.join(CATALOG);
     if !files.exists(&path)? && import::is_without_records(files)? {
         let what = "it is missing, and there are sessions or jobs in the folder";

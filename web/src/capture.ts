@@ -34,8 +34,6 @@ export interface StaticPart {
   readonly rowsPerFrame: number;
   /** Frames per second, if the file or session says. */
   readonly frameRate: number | null;
-  /** How many of the most unstable directions of Φ kept the shape of the rest cage, as far as known. */
-  readonly spectrum?: number;
   /** Figures about the encoding (`Report` in proto/src/report.rs), as far as known. */
   readonly report: Readonly<Record<string, unknown>> | null;
   /** Boundary elements that harmonic coordinates were solved on (`ELEM` in docs/FORMAT.md), where the file has them. */
@@ -138,6 +136,8 @@ export interface Capture {
   hasFinal?(frame: number): boolean;
   /** Φ, points × columns, from the service; for coordinate systems that the page does not compute itself. */
   coordinates?(onProgress?: (fraction: number) => void, signal?: AbortSignal): Promise<Float32Array>;
+  /** Φ, points × columns, where decoding cages computes it anyway. */
+  phi?(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array>;
   /** Point numbers of the handles, where they are known. */
   handles?(signal?: AbortSignal): Promise<Uint32Array>;
   /** The container that holds the capture, for copies of it with edited cages. */

@@ -8,7 +8,7 @@ const FRAMES: usize = 64;
 /// Copies all records with their frames, but for those that are there; what an earlier call did not live to finish is begun anew. Gives how many records
 /// it copied.
 ///
-/// A session whose frames are damaged is copied as one that is damaged, with those that can be read.
+/// A session whose frames are damaged is copied as one that is damaged, without the damaged ones and those that are read with them.
 ///
 /// # Errors
 /// Those of either catalogue.

@@ -221,6 +221,14 @@ pub trait Catalog: Debug + Send + Sync {
     /// Checks that it can be written to.
     fn probe(&self) -> Result<(), CatalogError>;
 
+    /// Checks that no other process has taken it over.
+    ///
+    /// # Errors
+    /// [`CatalogError::TakenOver`].
+    fn check_owner(&self) -> Result<(), CatalogError> {
+        Ok(())
+    }
+
     /// Whether another process has taken it over, so that nothing can be changed any more.
     fn is_taken_over(&self) -> bool {
         false

@@ -1,7 +1,6 @@
 /** Everything that the coded sections of one capture need between one and the next: synchronous, for a worker. */
 
-import type { CoordinateSystem, FrameErrors, Residual, TriangleMesh } from '../capture';
-import { columnsOf, computeCoordinates } from '../coordinates/compute';
+import type { FrameErrors, Residual } from '../capture';
 import { CageBasis } from './basis';
 import { cagesOf, decodeCageNumbers } from './cages';
 import { decodeFaces } from './connectivity';
@@ -37,17 +36,6 @@ export class GroupDecoder {
   setModel(polygons: Polygons, points: number): void {
     this.model = { polygons, points };
     this.hierarchy = null;
-  }
-
-  /** Computes the coordinates of sampled points, x y z each, and adds them as {@link addCoordinates} does. */
-  computeBasis(
-    system: CoordinateSystem,
-    cage: TriangleMesh,
-    points: Float64Array,
-    rows: number,
-    isFirst: boolean,
-  ): void {
-    this.addCoordinates(computeCoordinates(system, cage, points), columnsOf(system, cage), rows, isFirst);
   }
 
   /** Adds coordinates of sampled points to the basis of cages, points × columns; `isFirst` begins a new basis. */

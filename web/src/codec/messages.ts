@@ -3,8 +3,7 @@
 import type { GroupDecoder } from './groupDecoder';
 
 /** Names of the methods of {@link GroupDecoder}. */
-export type Method =
-  'faces' | 'positions' | 'errors' | 'setModel' | 'computeBasis' | 'addCoordinates' | 'cages' | 'residual';
+export type Method = 'faces' | 'positions' | 'errors' | 'setModel' | 'addCoordinates' | 'cages' | 'residual';
 
 export interface Call {
   readonly id: number;

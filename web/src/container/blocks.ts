@@ -5,6 +5,7 @@ import { sampleStride } from '../codec/basis';
 import { MAX_ROWS } from '../codec/cages';
 import type { Codec } from '../codec/client';
 import { columnsOf } from '../coordinates/compute';
+import { computePhi } from '../coordinates/pool';
 import { TiedNormals } from '../coordinates/tiedNormals';
 import { decodePayload } from './codecs';
 import { damaged, isDamage } from './error';
@@ -30,13 +31,16 @@ export interface DecodedBlock {
 /** Decodes the blocks of one capture. */
 export class BlockDecoder {
   private basis: Promise<void> | null = null;
+  /** Φ of all points, where the basis is of all of them, until it is handed on. */
+  private computed: Promise<Float32Array> | null = null;
+  private onProgress: ((fraction: number) => void) | undefined;
   private hasModel = false;
 
-  /** @param coordinates where the basis of coded cages comes from; null for the codec's own computation. */
+  /** @param given where the basis of coded cages comes from; null where it is to be computed. */
   constructor(
     private readonly part: StaticPart,
     private readonly codec: Codec,
-    private readonly coordinates: CoordinatesOf | null,
+    private readonly given: CoordinatesOf | null,
   ) {}
 
   /**
@@ -50,6 +54,9 @@ export class BlockDecoder {
     signal?: AbortSignal,
   ): Promise<DecodedBlock> {
     const { first, count } = frames.entry.fields;
+    // The codec decodes the residual while others compute the coordinates that cages need.
+    const adding = residual === null ? null : this.residual(residual, fileBytes, signal);
+    adding?.catch(() => undefined);
     const cages = await this.cages(frames, signal);
     const bad = cages.findIndex((x) => !Number.isFinite(x));
     if (bad >= 0) {
@@ -58,17 +65,32 @@ export class BlockDecoder {
     }
     let added: Residual | null = null;
     let problem: Error | null = null;
-    if (residual !== null) {
-      try {
-        added = await this.residual(residual, fileBytes, signal);
-      } catch (error) {
-        if (!isDamage(error)) {
-          throw error;
-        }
-        problem = error;
+    try {
+      added = await adding;
+    } catch (error) {
+      if (!isDamage(error)) {
+        throw error;
       }
+      problem = error;
     }
     return { block: { first, count, cages, residual: added }, problem };
+  }
+
+  /**
+   * Φ, points × columns, in single precision: what the basis of the coded cages is computed of, the first time and where it is of all points, or else computed anew.
+   */
+  async phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
+    const { part } = this;
+    if (this.basis === null && this.given === null && part.rowsPerFrame <= MAX_ROWS) {
+      this.prepareBasis().catch(() => undefined);
+    }
+    const { computed } = this;
+    if (computed === null) {
+      return computePhi(part, { onProgress, signal });
+    }
+    this.computed = null;
+    this.onProgress = onProgress;
+    return computed.finally(() => signal.throwIfAborted());
   }
 
   private async cages({ entry, payload }: Section, signal: AbortSignal | undefined): Promise<Float32Array> {
@@ -79,11 +101,7 @@ export class BlockDecoder {
     if (this.part.rowsPerFrame > MAX_ROWS) {
       throw damaged(entry.offset, `a coded frame has ${this.part.rowsPerFrame} rows`);
     }
-    this.basis ??= this.addCoordinates().catch((error: unknown) => {
-      this.basis = null;
-      throw error;
-    });
-    await this.basis;
+    await (this.basis ?? this.prepareBasis());
     return located(entry, this.codec.call('cages', [payload, count, restRows(this.part)], signal));
   }
 
@@ -101,30 +119,60 @@ export class BlockDecoder {
     return located(entry, this.codec.call('residual', [payload, entry.fields.count, most], signal));
   }
 
-  /** Hands the coordinates of the sampled points to the codec, some at a time. */
-  private async addCoordinates(): Promise<void> {
-    const { part, codec, coordinates } = this;
-    const stride = sampleStride(part.rest.length / 3);
-    const sampled = Math.ceil(part.rest.length / 3 / stride);
+  private prepareBasis(): Promise<void> {
+    const { given } = this;
+    this.basis = given === null ? this.computeBasis() : this.addGiven(given);
+    return this.basis.catch((error: unknown) => {
+      this.basis = null;
+      this.computed = null;
+      throw error;
+    });
+  }
+
+  /** Computes the coordinates of the sampled points, and hands them to the codec as they come. */
+  private async computeBasis(): Promise<void> {
+    const { part, codec } = this;
+    const { system, cage, rowsPerFrame } = part;
+    const rest = pointsAt(part.rest, sampledPoints(part));
+    let isFirst = true;
+    const onRows = async (rows: Float64Array): Promise<void> => {
+      const start = isFirst;
+      isFirst = false;
+      await codec.call('addCoordinates', [rows, columnsOf(system, cage), rowsPerFrame, start]);
+    };
+    const phi = computePhi({ system, cage, rest }, { onRows, onProgress: (fraction) => this.onProgress?.(fraction) });
+    this.computed = rest.length === part.rest.length ? phi : null;
+    await phi;
+  }
+
+  /** Hands the given coordinates of the sampled points to the codec, some at a time. */
+  private async addGiven(given: CoordinatesOf): Promise<void> {
+    const { part, codec } = this;
+    const sampled = sampledPoints(part);
     const batch = Math.max(1, Math.floor(BATCH_NUMBERS / columnsOf(part.system, part.cage)));
-    for (let start = 0; start === 0 || start < sampled; start += batch) {
-      const count = Math.min(batch, sampled - start);
-      const indices = Uint32Array.from({ length: count }, (_, k) => (start + k) * stride);
-      const points = Float64Array.from({ length: 3 * count }, (_, at) => {
-        return part.rest[3 * indices[Math.floor(at / 3)] + (at % 3)];
-      });
-      if (coordinates === null) {
-        await codec.call('computeBasis', [part.system, part.cage, points, part.rowsPerFrame, start === 0]);
-      } else {
-        const rows = await coordinates(part, points, indices);
-        const columns = count > 0 ? rows.length / count : part.rowsPerFrame;
-        if (columns < part.rowsPerFrame || !Number.isInteger(columns)) {
-          throw new Error(`The coordinates have ${columns} columns, not ${part.rowsPerFrame}. Reload the page.`);
-        }
-        await codec.call('addCoordinates', [rows, columns, part.rowsPerFrame, start === 0]);
+    for (let start = 0; start === 0 || start < sampled.length; start += batch) {
+      const indices = sampled.slice(start, start + batch);
+      const rows = await given(part, pointsAt(part.rest, indices), indices);
+      const columns = indices.length > 0 ? rows.length / indices.length : part.rowsPerFrame;
+      if (columns < part.rowsPerFrame || !Number.isInteger(columns)) {
+        throw new Error(`The coordinates have ${columns} columns, not ${part.rowsPerFrame}. Reload the page.`);
       }
+      await codec.call('addCoordinates', [rows, columns, part.rowsPerFrame, start === 0]);
     }
   }
+}
+
+/** Indices of the points whose coordinates make the basis. */
+function sampledPoints({ rest }: StaticPart): Uint32Array {
+  const stride = sampleStride(rest.length / 3);
+  return Uint32Array.from({ length: Math.ceil(rest.length / 3 / stride) }, (_, k) => k * stride);
+}
+
+/** x y z of the points with these indices. */
+function pointsAt(positions: Float64Array, indices: Uint32Array): Float64Array {
+  const points = new Float64Array(3 * indices.length);
+  indices.forEach((index, k) => points.set(positions.subarray(3 * index, 3 * index + 3), 3 * k));
+  return points;
 }
 
 /** Rows of the rest pose: the cage's vertices, and where normals are stored those of its faces. */

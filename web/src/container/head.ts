@@ -11,14 +11,7 @@ const MAX_BYTES = 64 * 2 ** 10;
 const MAX_COUNT = 2 ** 32 - 1;
 
 export interface Head {
-  readonly definition: number;
   readonly system: CoordinateSystem;
-  /** Points that the inversion read. */
-  readonly handles: string;
-  /** Treatment of the unstable end of the spectrum. */
-  readonly regularizer: string;
-  readonly spectrum: number;
-  readonly lambda: number;
   readonly points: number;
   readonly restFaces: number;
   readonly restCorners: number;
@@ -43,12 +36,8 @@ export function parseHead(bytes: Uint8Array, offset: number): Head {
   const reader = new FieldReader(bytes, offset);
   const definition = reader.u32();
   const system = reader.text();
+  reader.passHistory();
   const head = {
-    definition,
-    handles: reader.text(),
-    regularizer: reader.text(),
-    spectrum: reader.u32(),
-    lambda: reader.f64(),
     points: reader.u64(),
     restFaces: reader.u64(),
     restCorners: reader.u64(),
@@ -114,6 +103,13 @@ class FieldReader {
     } catch {
       throw damaged(this.offset, 'the header cannot be read');
     }
+  }
+
+  /** Passes over how the cages were solved: handles, regulariser, spectrum and λ, which no decoder needs. */
+  passHistory(): void {
+    this.text();
+    this.text();
+    this.advance(4 + 8);
   }
 
   optionalF64(): number | null {

@@ -36,7 +36,6 @@ export async function decodeStatic(
     cage: await decodeCage(head, sections.get('CTRI')!, sections.get('CVTX')!, codec),
     rowsPerFrame: head.rowsPerFrame,
     frameRate: head.frameRate,
-    spectrum: head.spectrum,
     report: null,
     ...(origin === undefined ? {} : { origin: decodeOrigin(origin) }),
     ...(elements === undefined ? {} : { elements: decodePayload(elements.entry, elements.payload) }),

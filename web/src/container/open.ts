@@ -2,6 +2,7 @@
 
 import type { Capture, FrameBlock, FrameErrors, StaticPart } from '../capture';
 import { type Codec, createCodec } from '../codec/client';
+import { computePhi } from '../coordinates/pool';
 import { BlockCache } from './blockCache';
 import { BlockDecoder, type CoordinatesOf } from './blocks';
 import { ContainerError, damaged, isDamage, isTolerable } from './error';
@@ -10,7 +11,7 @@ import { checkSize, type Chunk, type Layout } from './layout';
 import { decodePayload } from './codecs';
 import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
 import { readContents, readSections, scanSections } from './sectionReader';
-import { checkPrelude, type Entry, PRELUDE_BYTES } from './section';
+import { checkPrelude, CODEC, type Entry, PRELUDE_BYTES } from './section';
 import { EndsCache, type Source } from './source';
 import { decodeErrors, decodeFrameNumbers, decodeReport, NO_ERRORS } from './tail';
 import { KNOWN_TAGS } from './tag';
@@ -21,7 +22,7 @@ const LAST_BYTES = 1 << 13;
 
 export interface OpenOptions {
   readonly name?: string;
-  /** Where coordinates in double precision come from, which coded cages need; by default the codec's worker computes them where it can. */
+  /** Where coordinates in double precision come from, which coded cages need; by default they are computed where that is possible. */
   readonly coordinates?: CoordinatesOf;
   /** What decodes coded sections, closed with the capture; by default a worker. */
   readonly codec?: Codec;
@@ -160,6 +161,11 @@ class FileCapture implements ContainerCapture {
       this.cache.prefetch(next);
     }
     return block;
+  }
+
+  phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
+    const isCoded = this.layout.chunks.some(({ frames }) => frames.fields.codec === CODEC.coded);
+    return isCoded ? this.blocks.phi(onProgress, signal) : computePhi(this.static, { onProgress, signal });
   }
 
   readTogether(frame: number): { readonly first: number; readonly count: number } {

@@ -3,8 +3,7 @@ import { writeEdited } from '../editing/editedContainer';
 import { LocalCodec } from '../codec/localCodec';
 import { openOriginal } from '../originals/original';
 import { bytesSource } from './source';
-import { ContainerStream } from './stream';
-import { goldenBytes, openBytes, rawPart, takeApart, withPart } from './testSupport';
+import { goldenBytes, openBytes, rawPart, streamedPart, takeApart, withPart } from './testSupport';
 
 const golden = goldenBytes('definition3-mvc');
 const origin = Float64Array.of(450000, 5400000, 0.5);
@@ -19,15 +18,7 @@ describe('a capture far away', () => {
     expect(capture.static.origin).toEqual(origin);
     expect(capture.static.rest).toEqual(near.static.rest);
     expect(near.static.origin).toBeUndefined();
-    const streamed: unknown[] = [];
-    const stream = new ContainerStream({
-      codec: new LocalCodec(),
-      onStatic: (part) => streamed.push(part.origin),
-      onBlock: () => undefined,
-    });
-    await stream.push(far());
-    expect((await stream.finish()).problem).toBeNull();
-    expect(streamed).toEqual([origin]);
+    expect((await streamedPart(far()))!.origin).toEqual(origin);
   });
 
   it('keeps its origin when its cages are edited', async () => {

@@ -26,7 +26,7 @@ export async function readContents(source: Source, signal?: AbortSignal): Promis
 }
 
 /** The sections that the section `TOC_` lists, given with its header. */
-export function parseContents(bytes: Uint8Array, offset: number): Layout {
+function parseContents(bytes: Uint8Array, offset: number): Layout {
   const header = section.parseHeader(bytes.subarray(0, section.HEADER_BYTES), offset);
   const payload = bytes.subarray(section.HEADER_BYTES);
   const isRaw = header.codec === section.CODEC.raw && header.rawBytes === payload.length;

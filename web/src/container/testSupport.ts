@@ -10,6 +10,7 @@ import { crc32c } from './crc32c';
 import { type ContainerCapture, openContainer, type OpenOptions } from './open';
 import { ENTRY_BYTES, FOOTER_BYTES, HEADER_BYTES, parseFields, PRELUDE_BYTES, viewOf } from './section';
 import { bytesSource } from './source';
+import { StaticStream } from './stream';
 
 const FOLDER = new URL('../../../tests/golden/', import.meta.url);
 
@@ -32,6 +33,18 @@ export function goldenPositions(name: string): Float32Array | Float64Array {
 /** Opens bytes and decodes in this thread. */
 export function openBytes(bytes: Uint8Array, options: OpenOptions = {}): Promise<ContainerCapture> {
   return openContainer(bytesSource(bytes), { codec: new LocalCodec(), ...options });
+}
+
+/** Model and cage of a container that arrives in pieces of so many bytes; null where they do not come. */
+export async function streamedPart(bytes: Uint8Array, piece = bytes.length): Promise<StaticPart | null> {
+  const stream = new StaticStream(new LocalCodec());
+  for (let at = 0; at < bytes.length; at += piece) {
+    const part = await stream.push(bytes.subarray(at, at + piece));
+    if (part !== null) {
+      return part;
+    }
+  }
+  return null;
 }
 
 /** All blocks of a capture. */

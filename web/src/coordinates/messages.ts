@@ -1,16 +1,17 @@
-import type { CoordinateSystem } from '../capture';
+import type { CoordinateSystem, TriangleMesh } from '../capture';
 
 /** What the pool sends to a worker: first the cage, then slices of points. */
 export type ToWorker =
   | {
       readonly kind: 'cage';
       readonly system: CoordinateSystem;
-      readonly positions: Float64Array;
-      readonly triangles: Uint32Array;
+      readonly cage: TriangleMesh;
+      /** Whether rows are to come in double precision. */
+      readonly isExact: boolean;
     }
-  | { readonly kind: 'points'; readonly first: number; readonly points: Float64Array };
+  | { readonly kind: 'points'; readonly slice: number; readonly points: Float64Array };
 
 /** What a worker answers: rows of Φ of a slice, or one sentence that says what failed. */
 export type FromWorker =
-  | { readonly kind: 'rows'; readonly first: number; readonly rows: Float32Array }
+  | { readonly kind: 'rows'; readonly slice: number; readonly rows: Float32Array | Float64Array }
   | { readonly kind: 'failed'; readonly problem: string };

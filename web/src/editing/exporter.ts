@@ -1,5 +1,5 @@
 import type { Capture } from '../capture';
-import { save } from '../viewer/recording';
+import { save } from '../save';
 import type { CageEdit } from './cageEdit';
 import { decodedFrames } from './decodedFrames';
 import { writeEdited } from './editedContainer';

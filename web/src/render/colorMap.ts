@@ -57,15 +57,6 @@ export function signedGradient(): string {
   return gradient(SIGNED_ANCHORS);
 }
 
-/** The same as a function `vec3 signedColor(float)` for shaders: the sRGB colour of a value between −1 and 1. */
-export const signedShader = `
-vec3 signedColor(float value) {
-  vec3 anchors[${SIGNED_ANCHORS.length}] = vec3[](${SIGNED_ANCHORS.map((color) => `vec3(${color.map((x) => (x / 255).toFixed(4)).join(', ')})`).join(', ')});
-  float place = (clamp(value, -1.0, 1.0) * 0.5 + 0.5) * ${(SIGNED_ANCHORS.length - 1).toFixed(1)};
-  int low = min(int(place), ${SIGNED_ANCHORS.length - 2});
-  return mix(anchors[low], anchors[low + 1], place - float(low));
-}`;
-
 function between(colors: readonly Rgb[], value: number): Rgb {
   if (Number.isNaN(value)) return [128, 128, 128];
   const place = Math.min(1, Math.max(0, value)) * (colors.length - 1);

@@ -1,4 +1,4 @@
-import { save } from '../viewer/recording';
+import { save } from '../save';
 
 /** Saves canvases of one size beside each other as one picture, on a ground of this colour. */
 export function saveSideBySide(canvases: readonly HTMLCanvasElement[], ground: string) {

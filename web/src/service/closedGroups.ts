@@ -88,6 +88,11 @@ export class ClosedGroups {
     }
   }
 
+  /** Φ, which decoding needs as well. */
+  phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
+    return this.#decoder.phi(onProgress, signal);
+  }
+
   looked(session: Session): void {
     if (!this.#closing.signal.aborted) this.#follower.looked(session);
   }

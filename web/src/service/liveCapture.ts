@@ -2,6 +2,7 @@
 
 import type { Capture, FrameBlock, FrameErrors, LiveStatus, StaticPart } from '../capture';
 import type { Source } from '../container/source';
+import { computePhi } from '../coordinates/pool';
 import { persistently } from './backoff';
 import { ClosedGroups } from './closedGroups';
 import { CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
@@ -137,6 +138,11 @@ export class LiveCapture implements SessionCapture {
         await this.#change(signal);
       }
     }
+  }
+
+  phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
+    const from = this.#finished ?? this.#groups;
+    return from?.phi?.(onProgress, signal) ?? computePhi(this.static, { onProgress, signal });
   }
 
   readTogether(frame: number): { readonly first: number; readonly count: number } {

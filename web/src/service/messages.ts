@@ -13,24 +13,11 @@ export interface Session {
   /** Seconds since 1970. */
   readonly created: number;
   readonly points: number | null;
-  /** Rows of three numbers of a solved frame. */
-  readonly unknowns: number | null;
-  readonly handle_count: number | null;
   readonly cage_vertices: number | null;
-  readonly cage_faces: number | null;
   readonly coordinates: CoordinateSystem;
-  readonly handles: string;
-  readonly regularizer: string;
-  readonly spectrum: number | null;
-  readonly lambda: number;
-  readonly condition_number: { readonly full: number; readonly handles: number } | null;
-  readonly rank: number | null;
-  readonly affine_reproduction_error: number | null;
   readonly frames: FrameCounts;
   /** Only of sessions whose frames are coded in groups. */
   readonly coding?: CodedFrames;
-  readonly cache: 'hit' | 'miss' | null;
-  readonly seconds: Readonly<Record<string, number>>;
   readonly warnings: readonly string[];
   /** Why it failed. */
   readonly problem?: ProblemDetails;

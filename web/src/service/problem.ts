@@ -6,10 +6,6 @@ export interface ProblemDetails {
   readonly title?: string;
   readonly status?: number;
   readonly detail?: string;
-  readonly request_id?: string;
-  readonly frame?: number;
-  readonly missing?: readonly (readonly [number, number])[];
-  readonly limit?: number;
 }
 
 const TYPE_PREFIX = 'urn:cager:problem:';
@@ -53,7 +49,7 @@ export class ServiceProblem extends Error {
   constructor(
     readonly word: string,
     readonly status: number,
-    readonly details: ProblemDetails = {},
+    details: ProblemDetails = {},
     readonly retryAfter: number | null = null,
   ) {
     super(sentence(word, status, details));

@@ -1,7 +1,8 @@
 /** The container of a running session, which the service sends as it grows. */
 
 import type { StaticPart } from '../capture';
-import { ContainerStream } from '../container/stream';
+import { createCodec } from '../codec/client';
+import { StaticStream } from '../container/stream';
 import { ServiceProblem } from './problem';
 import { type Service, piecesOf, sessionPath } from './service';
 
@@ -37,34 +38,23 @@ export async function openRunning(service: Service, id: string, signal: AbortSig
   const { pieces, stop } = connect(service, id);
   const abort = (): void => stop.abort(signal.reason);
   signal.addEventListener('abort', abort);
-  const found: StaticPart[] = [];
-  let onStatic = (): void => undefined;
-  const decoded = new Promise<void>((resolve) => (onStatic = resolve));
-  const stream = new ContainerStream({
-    onStatic: (part) => {
-      found.push(part);
-      onStatic();
-    },
-    onBlock: () => undefined,
-  });
+  const codec = createCodec();
+  const stream = new StaticStream(codec);
   try {
     signal.throwIfAborted();
     const begun: Uint8Array[] = [];
-    while (found.length === 0) {
+    for (;;) {
       const { done, value } = await pieces.next();
       if (done) throw new ServiceProblem('unreachable', 0);
       begun.push(value);
-      const pushed = stream.push(value);
-      // Frames that came with it are not decoded here.
-      pushed.catch(() => undefined);
-      await Promise.race([pushed, decoded]);
+      const part = await stream.push(value);
+      if (part) return { part, connection: { begun, pieces, stop } };
     }
-    return { part: found[0], connection: { begun, pieces, stop } };
   } catch (error) {
     stop.abort();
     throw error;
   } finally {
     signal.removeEventListener('abort', abort);
-    stream.close();
+    codec.close();
   }
 }

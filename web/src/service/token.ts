@@ -39,8 +39,8 @@ export class TokenStore extends EventTarget {
 /** The token of the page. */
 export const pageToken = new TokenStore(guarded(() => globalThis.sessionStorage));
 
-/** Storage throws where a browser's settings forbid it. */
-function guarded<T>(use: () => T): T | null {
+/** What is read of storage, which throws where a browser's settings forbid it, or where it is full; null then. */
+export function guarded<T>(use: () => T): T | null {
   try {
     return use();
   } catch {

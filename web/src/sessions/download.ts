@@ -1,3 +1,4 @@
+import { save } from '../save';
 import type { Service } from '../service/service';
 import { piecesOf, sessionPath } from '../service/service';
 
@@ -22,10 +23,7 @@ export async function downloadContainer(
     if (total > 0) onProgress(Math.min(1, received / total));
   }
   if (total > 0 && received < total) throw new Error('The download broke off. Start it again.');
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(new Blob(pieces, { type: 'application/vnd.cager' }));
   // Signs that file systems do not take.
-  link.download = `${name.replace(/[\\/:*?"<>|\p{Cc}]+/gu, '-')}.cager`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  const file = `${name.replace(/[\\/:*?"<>|\p{Cc}]+/gu, '-')}.cager`;
+  save(new Blob(pieces, { type: 'application/vnd.cager' }), file);
 }

@@ -1,6 +1,7 @@
 /** What is kept of an upload until it is over, so that it can go on after the page was closed. Never the token. */
 
 import { holdName } from '../heldName';
+import { guarded } from '../service/token';
 import type { FileMarks } from './fileMarks';
 import type { Choices } from './optionsForm';
 
@@ -102,13 +103,4 @@ function recordOf(name: string): UploadRecord | null {
 /** A number that nobody else draws; pages without a secure connection have no `randomUUID`. */
 export function newKey(): string {
   return [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, '0')).join('');
-}
-
-/** Storage throws where a browser's settings forbid it, or where it is full. */
-function guarded<T>(use: () => T): T | null {
-  try {
-    return use();
-  } catch {
-    return null;
-  }
 }

@@ -13,7 +13,6 @@ export function phiOf(
   onProgress: (fraction: number) => void,
   signal: AbortSignal,
 ): Promise<Float32Array> {
-  return isFetched(capture)
-    ? capture.coordinates!(onProgress, signal)
-    : computePhi(capture.static, { signal, onProgress });
+  if (isFetched(capture)) return capture.coordinates!(onProgress, signal);
+  return capture.phi?.(onProgress, signal) ?? computePhi(capture.static, { signal, onProgress });
 }

@@ -57,12 +57,3 @@ async function turn(signal: AbortSignal, onFraction: (fraction: number) => void)
     if (fraction === 1) return;
   }
 }
-
-/** Has the browser save something under a name. */
-export function save(content: Blob, name: string) {
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(content);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
-}

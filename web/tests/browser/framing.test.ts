@@ -5,7 +5,6 @@ import { chromium } from './harness/programs';
 import { FilePages, goldenBytes, inViewer } from './harness/viewing';
 
 const DEVICES = [
-  ['a large desktop', { viewport: { width: 1440, height: 900 } }],
   ['a desktop', { viewport: { width: 1280, height: 800 } }],
   ['a phone', PHONE],
 ] as const;

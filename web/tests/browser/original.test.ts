@@ -87,8 +87,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     const canvas = page.getByRole('img', { name: 'the model, drawn' });
     const both = await canvas.screenshot();
     await page.getByRole('button', { name: 'Original', exact: true }).click();
-    await page.waitForTimeout(500);
-    expect(both.equals(await canvas.screenshot())).toBe(false);
+    await expect.poll(async () => both.equals(await canvas.screenshot())).toBe(false);
     await page.getByRole('button', { name: 'Put the original away' }).click();
     await expect.poll(() => page.getByRole('button', { name: 'Both' }).count()).toBe(0);
     expect(pages.errors).toEqual([]);

@@ -12,9 +12,16 @@ import { Site } from './harness/site';
 import { SphereCapture } from './harness/sphere';
 
 const capture = new SphereCapture();
-const FRAMES = 30;
+const small = new SphereCapture(2);
+const FRAMES = 12;
+/** A capture whose bytes take a slow connection long; its frames are repeated behind each other. */
+const large = new SphereCapture(4);
+const LARGE = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
+/** Bytes per second at which {@link dropLarge} takes about thirteen seconds: as long as tests need for what is to happen meanwhile, on a busy machine too. */
+const SLOW = { uploadThroughput: 384 << 10 };
+const LARGE_FRAMES = 160;
 
-describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
+describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
   let site: Site;
 
   beforeAll(async () => {
@@ -45,7 +52,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
 
   test('a_mesh_per_frame_without_rest_pose_or_cage_is_enough', async () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
-    const files = Object.fromEntries([8, 9, 10, 11].map((frame) => [`shot_${frame}.obj`, capture.frameObj(frame)]));
+    const files = Object.fromEntries([8, 9, 10, 11].map((frame) => [`shot_${frame}.obj`, small.frameObj(frame)]));
     await drop(page, files);
     await page.getByText('The first frame, shot_8.obj, is taken as the rest pose.').waitFor();
     await page.getByText('The service makes a cage around the rest pose').waitFor();
@@ -59,7 +66,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
   test('frames_of_another_mesh_are_refused_before_anything_is_sent', async () => {
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`);
     const before = await sessions(site);
-    await drop(page, { 'rest.obj': new SphereCapture(2).rest, 'wave.npy': capture.npy(2) });
+    await drop(page, { 'rest.obj': small.rest, 'wave.npy': capture.npy(2) });
     await page.getByText(/wave\.npy has 642 points in each frame and the rest pose rest\.obj has 162 points/).waitFor();
     expect(await page.getByRole('button', { name: 'Encode' }).isDisabled()).toBe(true);
     expect(await sessions(site)).toBe(before);
@@ -79,17 +86,10 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
   });
 
   test('a_service_that_is_killed_during_an_upload_gets_the_rest_when_it_is_back', async () => {
-    const large = new SphereCapture(4);
-    const frames = 1200;
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['502', 'ERR_']);
-    await slow(page, { uploadThroughput: 8 << 20 });
-    // The bytes are made in the page: they are too many to be carried there.
-    await drop(
-      page,
-      { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) },
-      { name: 'wave.npy', times: frames / 4 },
-    );
-    await page.getByText(`1,200 frames of 2,562 points`).waitFor();
+    await slow(page, SLOW);
+    await dropLarge(page);
+    await page.getByText(`${LARGE_FRAMES} frames of 2,562 points`).waitFor();
     await encodeCages(page);
     await page.getByText('You can watch it meanwhile').waitFor();
     await site.service.kill();
@@ -100,21 +100,21 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     await site.service.run();
     await slow(page, {});
     const id = await encoded(page);
-    expect((await site.client().session(id)).frames).toMatchObject({ solved: frames, missing: [] });
+    expect((await site.client().session(id)).frames).toMatchObject({ solved: LARGE_FRAMES, missing: [] });
     expect(errors).toEqual([]);
     await close();
   });
 
   test('an_upload_goes_on_while_the_session_is_watched', async () => {
-    const large = new SphereCapture(4);
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
-    await slow(page, { uploadThroughput: 8 << 20 });
-    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
-    await drop(page, files, { name: 'wave.npy', times: 200 });
+    await slow(page, SLOW);
+    await dropLarge(page);
     await encodeCages(page);
     await page.getByRole('link', { name: 'Watch live' }).click();
     const id = /#\/session\/([0-9a-f]+)/.exec(page.url())![1];
     await page.locator('cager-viewer').waitFor();
+    expect((await site.client().session(id)).state).toBe('ready');
+    await slow(page, {});
     await expect.poll(async () => (await site.client().session(id)).state, { timeout: 30_000 }).toBe('completed');
     await page.goto(`${site.page}#/upload`);
     await page.getByRole('heading', { name: 'Encoded: wave' }).waitFor();
@@ -141,10 +141,10 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
 
   test('a_cage_is_designed_from_the_motion_and_taken_by_the_session', async () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['404']);
-    await drop(page, { 'rest.obj': capture.rest, 'wave.npy': capture.npy(FRAMES) });
+    await drop(page, { 'rest.obj': small.rest, 'wave.npy': small.npy(FRAMES) });
     await page.getByLabel('Cage', { exact: true }).selectOption('motion');
     await page.getByLabel('Vertices of the cage, at most').fill('40');
-    await page.getByLabel('Seconds for the design, at most').fill('20');
+    await page.getByLabel('Seconds for the design, at most').fill('10');
     expect(await seriousFindings(page)).toEqual([]);
     await encodeCages(page);
     await page.getByRole('heading', { name: 'Designing the cage: wave' }).waitFor();
@@ -167,7 +167,6 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
   test('a_design_goes_on_after_a_reload_and_its_best_cage_so_far_can_be_taken', async () => {
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['404']);
     page.on('dialog', (dialog) => void dialog.accept());
-    const large = new SphereCapture(4);
     const files = { 'rest.obj': large.rest, 'wave.npy': large.npy(24) };
     await drop(page, files);
     await page.getByLabel('Cage', { exact: true }).selectOption('motion');
@@ -186,11 +185,9 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
   });
 
   test('a_session_that_is_deleted_during_its_upload_is_told_of_and_started_again', async () => {
-    const large = new SphereCapture(4);
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['404', '410', 'ERR_']);
-    await slow(page, { uploadThroughput: 3 << 20 });
-    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
-    await drop(page, files, { name: 'wave.npy', times: 200 });
+    await slow(page, SLOW);
+    await dropLarge(page);
     await page.getByLabel('Name').fill('to be deleted');
     await encodeCages(page);
     const link = page.getByRole('link', { name: 'Watch live' });
@@ -207,19 +204,14 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
     await page.getByRole('button', { name: 'Start again' }).click();
     const id = await encoded(page);
     expect(id).not.toBe(deleted);
-    expect((await site.client().session(id)).frames).toMatchObject({ solved: 800, missing: [] });
+    expect((await site.client().session(id)).frames).toMatchObject({ solved: LARGE_FRAMES, missing: [] });
     await close();
   });
 
   test('an_upload_that_was_stopped_goes_on_or_is_deleted', async () => {
-    const large = new SphereCapture(4);
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
-    await slow(page, { uploadThroughput: 3 << 20 });
-    await drop(
-      page,
-      { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) },
-      { name: 'wave.npy', times: 300 },
-    );
+    await slow(page, SLOW);
+    await dropLarge(page);
     await encodeCages(page);
     await page.getByText('You can watch it meanwhile').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
@@ -239,7 +231,7 @@ describe.skipIf(missing)('an upload', { timeout: 60_000 }, () => {
   });
 });
 
-describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, () => {
+describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, () => {
   const TOKEN = 'a-token-for-tests-alone';
   const OTHER_TOKEN = 'another-token-for-tests-alone';
   let site: Site;
@@ -251,17 +243,11 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
   afterAll(() => site.close());
 
   test('by_a_reload_goes_on_with_what_is_missing_when_the_same_files_are_dropped', async () => {
-    const large = new SphereCapture(4);
-    const frames = 800;
-    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
-    const dropAll = (page: Page) => drop(page, files, { name: 'wave.npy', times: frames / 4 });
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['401']);
     page.on('dialog', (dialog) => void dialog.accept());
-    await page.getByLabel('Access token').fill(TOKEN);
-    await page.keyboard.press('Enter');
-    await page.getByRole('heading', { name: 'Upload a capture' }).waitFor();
-    await slow(page, { uploadThroughput: 1 << 20 });
-    await dropAll(page);
+    await signIn(page);
+    await slow(page, SLOW);
+    await dropLarge(page);
     await page.getByLabel('Name').fill('broken off');
     await encodeCages(page);
     await page.getByText('You can watch it meanwhile').waitFor();
@@ -276,9 +262,9 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
     const kept = await page.evaluate(() => JSON.stringify(Object.entries(localStorage)));
     expect(kept).toContain(id);
     expect(kept).not.toContain(TOKEN);
-    await drop(page, { ...files, 'wave.npy': large.npy(5) });
+    await drop(page, { ...LARGE, 'wave.npy': large.npy(5) });
     await page.getByText(/The frames were wave\.npy \(.*\) then; wave\.npy \(.*\) is something else\./).waitFor();
-    await dropAll(page);
+    await dropLarge(page);
     await page.getByRole('heading', { name: 'These are the files of “broken off”' }).waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     // What was solved before is known by now, and is not sent again.
@@ -292,7 +278,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
     await page.getByRole('button', { name: 'Go on' }).click();
     expect(await encoded(page)).toBe(id);
     expect(Math.min(...posted)).toBe(firstMissing);
-    expect((await site.client(TOKEN).session(id)).frames).toMatchObject({ solved: frames, missing: [] });
+    expect((await site.client(TOKEN).session(id)).frames).toMatchObject({ solved: LARGE_FRAMES, missing: [] });
     expect((await list()).length).toBe(1);
     expect(await page.evaluate(() => Object.keys(localStorage))).toEqual([]);
     // All errors are shown, those that were measured before the reload too.
@@ -308,7 +294,6 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
   }
 
   test('during_its_design_is_shown_to_those_alone_whose_design_it_is', async () => {
-    const large = new SphereCapture(4);
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['401', '404']);
     page.on('dialog', (dialog) => void dialog.accept());
     await signIn(page);
@@ -338,13 +323,11 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
   });
 
   test('by_closing_the_page_can_be_deleted_from_another_one', async () => {
-    const large = new SphereCapture(4);
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['401']);
     page.on('dialog', (dialog) => void dialog.accept());
     await signIn(page);
-    await slow(page, { uploadThroughput: 1 << 20 });
-    const files = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
-    await drop(page, files, { name: 'wave.npy', times: 400 });
+    await slow(page, SLOW);
+    await dropLarge(page, 2 * LARGE_FRAMES);
     await encodeCages(page);
     await page.getByText('You can watch it meanwhile').waitFor();
     const other = await page.context().newPage();
@@ -365,7 +348,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 60_000 }, (
   });
 });
 
-describe.skipIf(missing)('an upload to a service with little room', { timeout: 60_000 }, () => {
+describe.skipIf(missing)('an upload to a service with little room', { timeout: 120_000 }, () => {
   let site: Site;
 
   beforeAll(async () => {
@@ -375,7 +358,6 @@ describe.skipIf(missing)('an upload to a service with little room', { timeout: 6
   afterAll(() => site.close());
 
   test('a_full_quota_says_what_to_do_and_the_upload_can_go_on', async () => {
-    const small = new SphereCapture(2);
     const { id: other } = await site.client().create(small, { name: 'other' });
     await site.client().whenReady(other);
     await site.client().post(other, small, 0, 3000);
@@ -400,7 +382,7 @@ describe.skipIf(missing)('an upload to a service with little room', { timeout: 6
   });
 });
 
-describe.skipIf(missing)('an upload to a service with as many sessions as it takes', { timeout: 60_000 }, () => {
+describe.skipIf(missing)('an upload to a service with as many sessions as it takes', { timeout: 120_000 }, () => {
   let site: Site;
 
   beforeAll(async () => {
@@ -410,7 +392,6 @@ describe.skipIf(missing)('an upload to a service with as many sessions as it tak
   afterAll(() => site.close());
 
   test('says_so_and_begins_by_itself_once_one_was_deleted', async () => {
-    const small = new SphereCapture(2);
     const { id: other } = await site.client().create(small, { name: 'other' });
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['429']);
     await drop(page, { 'rest.obj': small.rest, 'cage.obj': small.cage, 'wave.npy': small.npy(4) });
@@ -464,6 +445,11 @@ async function drop(page: Page, files: Files, repeated?: { name: string; times: 
   );
 }
 
+/** Drops {@link LARGE}; the bytes are made in the page, as they are too many to be carried there. */
+function dropLarge(page: Page, frames = LARGE_FRAMES): Promise<void> {
+  return drop(page, LARGE, { name: 'wave.npy', times: frames / 4 });
+}
+
 /** Waits for the end of the upload; the session's identifier. */
 async function encoded(page: Page): Promise<string> {
   const link = page.getByRole('link', { name: 'Open in viewer' });
@@ -492,10 +478,10 @@ async function encodedAroundRest(site: Site, vertices: number): Promise<string> 
   const client = site.client();
   const body = new FormData();
   body.append('options', JSON.stringify({ cage: { vertices } }));
-  body.append('rest', new Blob([capture.rest]), 'rest.obj');
+  body.append('rest', new Blob([small.rest]), 'rest.obj');
   const { id } = (await (await client.call('', { method: 'POST', body })).json()) as { id: string };
   await client.whenReady(id);
-  await client.post(id, capture, 0, FRAMES);
+  await client.post(id, small, 0, FRAMES);
   await client.complete(id, FRAMES);
   return id;
 }

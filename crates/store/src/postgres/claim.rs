@@ -52,7 +52,10 @@ impl Claim {
             link.query("SELECT pg_advisory_xact_lock($1, $2)", &[&CHANGES, &hash]).await?;
             only::<i64>(&link.query("UPDATE catalogue SET taken = taken + 1 RETURNING taken", &[]).await?)
         });
-        let taken = taken.map_err(|e| e.explain(&name))?;
+        let taken = taken.map_err(|trouble| match trouble.is_slow() {
+            true => CatalogError::InUse(format!("{name} is still being changed by its last owner")),
+            false => trouble.explain(&name),
+        })?;
         let begin =
             format!("BEGIN; SELECT pg_advisory_xact_lock_shared({CHANGES}, {hash}); SELECT taken FROM catalogue");
         let (lost, place) = (Arc::new(AtomicBool::new(false)), place.of_owner());

@@ -262,6 +262,13 @@ impl Catalog for PostgresCatalog {
         self.pool.write(&async |link: &Link| link.batch("UPDATE catalogue SET probed = now()").await)
     }
 
+    fn check_owner(&self) -> Result<(), CatalogError> {
+        let Some(taken) = self.pool.taken() else { return Ok(()) };
+        let sql = "SELECT taken FROM catalogue";
+        let now: i64 = self.pool.read(&async |link: &Link| only(&link.query(sql, &[]).await?))?;
+        if now == taken { Ok(()) } else { Err(CatalogError::TakenOver) }
+    }
+
     fn is_taken_over(&self) -> bool {
         self.claim.get().is_some_and(Claim::is_lost)
     }

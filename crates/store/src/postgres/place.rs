@@ -2,6 +2,7 @@
 
 use super::tls;
 use crate::CatalogError;
+use std::sync::Once;
 use std::time::Duration;
 use tokio_postgres::Config;
 use tokio_postgres::config::{Host, SslMode};
@@ -10,10 +11,12 @@ use tokio_postgres_rustls::MakeRustlsConnect;
 /// How long connecting may take, unless the URL says otherwise.
 const CONNECT: Duration = Duration::from_secs(5);
 /// Settings of each connection, unless the URL says otherwise. Nobody waits for ever, and who is gone holds no lock.
-const DEFAULTS: &str =
-    "-csearch_path=cager -cstatement_timeout=30s -cidle_in_transaction_session_timeout=60s -cjit=off";
+const DEFAULTS: &str = "-csearch_path=cager -cstatement_timeout=30s -cidle_in_transaction_session_timeout=15s -cjit=off -ctcp_keepalives_idle=5 -ctcp_keepalives_interval=2 -ctcp_keepalives_count=3 -ctcp_user_timeout=10s";
 /// Settings that hold whatever the URL and the database say: what is acknowledged is on its disk.
 const ALWAYS: &str = "-csynchronous_commit=on -cdefault_transaction_isolation=read\\ committed";
+
+/// It is said once.
+static TOLD: Once = Once::new();
 
 /// A database, and how to connect to it.
 pub(super) struct Place {
@@ -64,21 +67,27 @@ impl Place {
         let connect = config.get_connect_timeout().copied().unwrap_or(CONNECT);
         config.connect_timeout(connect);
         let name = name(&config);
+        if config.get_hosts().iter().any(|host| matches!(host, Host::Tcp(name) if name.contains('@'))) {
+            return Err(refused("there is an @ in its user or password, which is written %40"));
+        }
         if tls.is_none() && config.get_hosts().iter().any(is_elsewhere) {
-            tracing::warn!("the connection to {name} is not encrypted: `sslmode=require` in its address encrypts it");
+            TOLD.call_once(|| {
+                tracing::warn!(
+                    "the connection to {name} is not encrypted: `sslmode=require` in its address encrypts it"
+                )
+            });
         }
         Ok(Self { config, tls, connect, name })
     }
 
-    /// As it is, for a connection that says who has the database, and whose end the server notices soon.
+    /// As it is, for the connection that says who has the database.
     pub(super) fn of_owner(&self) -> Self {
         let mut config = self.config.clone();
         let system = rustix::system::uname();
         let host = system.nodename().to_string_lossy();
         config.application_name(format!("cager {} on {host}", std::process::id()));
-        let options = config.get_options().unwrap_or_default();
-        let soon = "-ctcp_keepalives_idle=5 -ctcp_keepalives_interval=2 -ctcp_keepalives_count=3";
-        let options = format!("{options} {soon}");
+        // It may wait for the changes of an owner that is gone.
+        let options = format!("{} -cstatement_timeout=40s", config.get_options().unwrap_or_default());
         config.options(options);
         Self { config, tls: self.tls.clone(), connect: self.connect, name: self.name.clone() }
     }

@@ -51,6 +51,11 @@ impl Pool {
         &self.place.name
     }
 
+    /// How often it was taken when this process took it.
+    pub(super) fn taken(&self) -> Option<i64> {
+        self.fence.get().map(|fence| fence.taken)
+    }
+
     /// From now on nothing is changed after another process has taken it.
     pub(super) fn set_fence(&self, fence: Fence) {
         // There is one already where it was taken twice, which its owner does not do.

@@ -55,6 +55,11 @@ impl Trouble {
         }
     }
 
+    /// It took too long.
+    pub(super) fn is_slow(&self) -> bool {
+        matches!(self, Self::TimedOut) || self.code() == Some(&SqlState::QUERY_CANCELED)
+    }
+
     /// Nothing was changed, and the same may succeed at once by another connection.
     pub(super) fn is_passing(&self) -> bool {
         let met = [SqlState::T_R_SERIALIZATION_FAILURE, SqlState::T_R_DEADLOCK_DETECTED, SqlState::UNIQUE_VIOLATION];
