@@ -76,6 +76,7 @@ async fn a_service_that_was_taken_over_while_it_stood_still_changes_nothing_and_
     database.sql("SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name LIKE 'cager%'");
     let second = tokio::task::spawn_blocking(|| waiting.ready()).await.expect("it starts");
     second.upload(&session.id, 15, capture.raw(15..20)).await;
+    let other = second.completed(capture, 15).await;
     kill_process(process, Signal::CONT).expect("it goes on");
     let path = format!("/v1/sessions/{}/frames?first=20", session.id);
     let sent = first.request(Method::POST, &path).header("content-type", OCTETS).body(capture.raw(20..25)).send().await;
@@ -84,6 +85,8 @@ async fn a_service_that_was_taken_over_while_it_stood_still_changes_nothing_and_
         let said = answer.text().await.unwrap_or_default();
         assert!(said.contains("storage-failed"), "{said}");
     }
+    // Nor does it remove what the other one has.
+    let _ = first.request(Method::DELETE, &format!("/v1/sessions/{}", session.id)).send().await;
     let (status, _) = first.ended().await;
     assert!(!status.success());
     assert!(first.log().contains("another process has taken over the database"), "{}", first.log());
@@ -91,6 +94,7 @@ async fn a_service_that_was_taken_over_while_it_stood_still_changes_nothing_and_
     second.upload(&session.id, 20, capture.raw(20..40)).await;
     second.complete(&session.id, 40).await.expect(200);
     assert!(second.container(&session.id).await == capture.encoded(40));
+    assert!(second.container(&other.id).await == capture.encoded(15));
 }
 
 #[tokio::test]
@@ -164,4 +168,28 @@ fn the_password_of_a_database_is_not_shown() {
         command.args(["--check-config", "--catalog", "postgres://me:secret@db/cager"]).stdin(Stdio::null()).output();
     let said = String::from_utf8(done.expect("the program").stdout).expect("text");
     assert!(said.contains("catalog = \"postgres://me:***@db/cager\"") && !said.contains("secret"), "{said}");
+}
+
+#[tokio::test]
+async fn a_service_at_work_is_left_alone_by_one_that_is_started_wrongly() {
+    let Some(database) = Database::start() else { return };
+    // With its catalogue in a database, by one that was not told so.
+    let app = TestApp::on(&database, &[]);
+    let (capture, being_written) = (Capture::tiny(), app.data().join("tmp/spool"));
+    let session = app.ready(capture).await;
+    std::fs::write(&being_written, "what is being written").expect("written");
+    let said = refused(&app.data(), None);
+    assert!(said.contains("is in a database: name it by --catalog"), "{said}");
+    assert!(being_written.exists());
+    // By one with a database that knows nothing of it.
+    let empty = Database::start().expect("another one");
+    let said = refused(&app.data(), Some(&empty.url()));
+    assert!(said.contains("is empty, and the data folder") && being_written.exists(), "{said}");
+    app.upload(&session.id, 0, capture.raw(0..15)).await;
+    // With a catalogue of its own, by one that would move it to a database.
+    let app = TestApp::in_folder();
+    let session = app.ready(capture).await;
+    let said = refused(&app.data(), Some(&empty.url()));
+    assert!(said.contains("is in use by another process"), "{said}");
+    app.upload(&session.id, 0, capture.raw(0..15)).await;
 }

@@ -8,7 +8,7 @@ import { pageToken } from '../service/token';
 import { controls, pageLayout } from '../style/controls';
 import { tokens } from '../style/tokens';
 import { cardsStyle } from './cardsStyle';
-import { downloadContainer } from './download';
+import { download, type Format } from './download';
 import { deleteDialog } from './deleteDialog';
 import { emptyList } from './emptyList';
 import { FigureLoader } from './figures';
@@ -133,7 +133,7 @@ export class Sessions extends LitElement {
                 rate: this.#list.rates.of(session.id),
                 now,
                 downloaded: this.downloads.get(session.id) ?? null,
-                onDownload: () => void this.#download(session),
+                onDownload: (format) => void this.#download(session, format),
                 onRemove: () => void this.#askRemoval(session),
               }),
           )}
@@ -212,7 +212,7 @@ export class Sessions extends LitElement {
     }
   }
 
-  async #download(session: Session): Promise<void> {
+  async #download(session: Session, format: Format): Promise<void> {
     const note = (part: number | null): void => {
       const downloads = new Map(this.downloads);
       if (part === null) downloads.delete(session.id);
@@ -221,7 +221,7 @@ export class Sessions extends LitElement {
     };
     try {
       note(0);
-      await downloadContainer(this.#service, session.id, nameOf(session), note);
+      await download(this.#service, session.id, nameOf(session), format, note);
       this.said = `Downloaded ${nameOf(session)}`;
     } catch (error) {
       this.failure = sentenceOf(error);

@@ -2,18 +2,26 @@ import { save } from '../save';
 import type { Service } from '../service/service';
 import { piecesOf, sessionPath } from '../service/service';
 
+/** What a session can be downloaded as beside its container, by the ending of the file's name. */
+export const FORMATS = { abc: 'Alembic', usdc: 'USD', glb: 'glTF', npy: 'NumPy' };
+
+/** Ending of the name of a downloaded file. */
+export type Format = 'cager' | keyof typeof FORMATS;
+
 /**
- * Downloads a session's container through the page, since a plain link cannot carry the token, and has the browser save it.
+ * Downloads a session's container, or what the service decodes of it, through the page, since a plain link cannot carry the token, and has the browser save it.
  *
  * @param onProgress hears the part that has arrived, 0 to 1
  */
-export async function downloadContainer(
+export async function download(
   service: Service,
   id: string,
   name: string,
+  format: Format,
   onProgress: (part: number) => void,
 ): Promise<void> {
-  const response = await service.request(sessionPath(id, 'capture.cager'));
+  const path = format === 'cager' ? sessionPath(id, 'capture.cager') : `${sessionPath(id, 'export')}?format=${format}`;
+  const response = await service.request(path);
   const total = Number(response.headers.get('content-length'));
   const pieces: BlobPart[] = [];
   let received = 0;
@@ -24,6 +32,6 @@ export async function downloadContainer(
   }
   if (total > 0 && received < total) throw new Error('The download broke off. Start it again.');
   // Signs that file systems do not take.
-  const file = `${name.replace(/[\\/:*?"<>|\p{Cc}]+/gu, '-')}.cager`;
-  save(new Blob(pieces, { type: 'application/vnd.cager' }), file);
+  const file = `${name.replace(/[\\/:*?"<>|\p{Cc}]+/gu, '-')}.${format}`;
+  save(new Blob(pieces, { type: response.headers.get('content-type') ?? '' }), file);
 }

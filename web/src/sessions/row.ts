@@ -3,6 +3,7 @@ import type { Session } from '../service/messages';
 import { problemFrom, sentenceOf } from '../service/problem';
 import type { Figures } from './figures';
 import { glyphs } from '../style/glyphs';
+import { FORMATS, type Format } from './download';
 import * as text from './text';
 
 /** What a row shows, and what its buttons do. */
@@ -15,7 +16,7 @@ export interface Row {
   readonly now: number;
   /** Part of the container that has been downloaded; null while none is. */
   readonly downloaded: number | null;
-  readonly onDownload: () => void;
+  readonly onDownload: (format: Format) => void;
   readonly onRemove: () => void;
 }
 
@@ -149,10 +150,24 @@ function download(row: Row, name: string) {
       title="Download"
       aria-label=${label}
       ?disabled=${downloaded !== null}
-      @click=${row.onDownload}
+      @click=${() => row.onDownload('cager')}
     >
       ${downloaded === null ? glyphs.download : html`<span class="fine">${Math.round(100 * downloaded)}%</span>`}
     </button>
+    <select
+      class="formats"
+      title="Download for other programs"
+      aria-label="Download ${name} for other programs"
+      ?disabled=${downloaded !== null}
+      @change=${({ target }: Event) => {
+        const chosen = target as HTMLSelectElement;
+        row.onDownload(chosen.value as Format);
+        chosen.value = '';
+      }}
+    >
+      <option value="" hidden selected>as…</option>
+      ${Object.entries(FORMATS).map(([ending, program]) => html`<option value=${ending}>${program} (.${ending})</option>`)}
+    </select>
   `;
 }
 

@@ -135,6 +135,14 @@ export const sessionsStyle = css`
     justify-content: flex-end;
     gap: 2px;
   }
+  .actions select {
+    width: 4.2em;
+    padding: 0.2em;
+    border-color: transparent;
+    background: none;
+    font-size: 0.85em;
+  }
+
   .actions button {
     min-height: 32px;
     width: 32px;

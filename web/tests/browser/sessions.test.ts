@@ -147,6 +147,11 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     expect(file.suggestedFilename()).toBe('fetched-1.cager');
     const there = Buffer.from(await (await client.call(`/${id}/capture.cager`)).arrayBuffer());
     expect(there.equals(await readFile(await file.path()))).toBe(true);
+    const decoded = page.waitForEvent('download');
+    await page.getByLabel('Download fetched/1 for other programs').selectOption('abc');
+    const archive = await decoded;
+    expect(archive.suggestedFilename()).toBe('fetched-1.abc');
+    expect((await readFile(await archive.path())).subarray(0, 5).toString()).toBe('Ogawa');
     expect(errors).toEqual([]);
     await close();
   });
