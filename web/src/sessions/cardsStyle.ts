@@ -30,7 +30,7 @@ export const cardsStyle = css`
     }
     .session td.title {
       order: 0;
-      flex: 1 1 calc(100% - 100px);
+      flex: 1 1 calc(100% - 150px);
       min-width: 0;
       font-size: var(--cager-size);
     }
