@@ -54,7 +54,6 @@ async fn a_second_service_waits_and_takes_over_when_the_first_one_ends() {
     first.kill();
     let clock = Instant::now();
     let second = tokio::task::spawn_blocking(|| waiting.ready()).await.expect("it starts");
-    println!("taken over in {:?}", clock.elapsed());
     assert!(clock.elapsed() < Duration::from_secs(10));
     assert_eq!(second.errors(&session.id).await, told);
     second.upload(&session.id, 15, capture.raw(15..40)).await;

@@ -30,7 +30,7 @@ export const cardsStyle = css`
     }
     .session td.title {
       order: 0;
-      flex: 1 1 calc(100% - 150px);
+      flex: 1 1 calc(100% - 158px);
       min-width: 0;
       font-size: var(--cager-size);
     }

@@ -136,7 +136,7 @@ export const sessionsStyle = css`
     gap: 2px;
   }
   .actions select {
-    width: 4.2em;
+    width: 5em;
     padding: 0.2em;
     border-color: transparent;
     background: none;

@@ -74,7 +74,7 @@ impl Place {
             TOLD.call_once(|| {
                 tracing::warn!(
                     "the connection to {name} is not encrypted: `sslmode=require` in its address encrypts it"
-                )
+                );
             });
         }
         Ok(Self { config, tls, connect, name })
