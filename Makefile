@@ -156,7 +156,7 @@ $(LINT)/bin/python: Makefile
 doc: ## build the API documentation
 	$(CARGO) doc --workspace --no-deps --locked
 
-bench: $(PEERS) ## measure the figures beside their peers: benches/results.json and the README's table
+bench: $(PEERS) ## measure the figures beside their peers: benches/results.json, docs/GUIDE.md
 	$(CARGO) build --release --locked --bin cager
 	$(PYTHON) benches/run.py
 
@@ -165,7 +165,7 @@ $(PEERS): benches/peers/requirements.txt
 	benches/.venv/bin/pip install --quiet --requirement benches/peers/requirements.txt
 	@touch $@
 
-bench-codec: $(CODECS) ## sizes and errors of coded files beside other formats, on the captures in CAGER_CAPTURES: docs/RATES.md, its plots, the README
+bench-codec: $(CODECS) ## sizes and errors of coded files beside other formats, on the captures in CAGER_CAPTURES: docs/RATES.md, its plots
 	$(CARGO) build --release --locked --bin cager
 	$(CODECS) benches/codec.py
 

@@ -1,4 +1,4 @@
-"""Sizes and errors of coded captures beside other formats': docs/RATES.md, its plots and the table in the README.
+"""Sizes and errors of coded captures beside other formats': docs/RATES.md and its plots.
 
 `make bench-codec` builds the program and calls this with the Python of the peers. Everything in a file counts: model, cage, errors, tables.
 Errors are measured on what each decoder gives back. The captures are looked for in CAGER_CAPTURES (default ../shared/data); cages that are
@@ -23,7 +23,6 @@ from pxr import Usd, UsdGeom, Vt
 
 from cages import CAGER, DATA, ROOT, table, write
 
-README = os.path.join(ROOT, "README.md")
 PAGE = os.path.join(ROOT, "docs", "RATES.md")
 BLENDER = os.path.join(ROOT, "target", "blender", "bin", "python")
 CAPTURES = ["samba", "horse-gallop", "makehuman-cmu-walk", "chickenCrossing", "supercages-arm"]
@@ -295,15 +294,11 @@ def main():
                 chosen.append(line)
     with open(os.path.join(folder, "rates.json"), "w", encoding="utf-8") as file:
         json.dump(everything, file, indent=1)
+    head = ["capture", "KG error at most", "cager, designed cage of 350", "quantised PCA + xz", "Draco, each frame", "meshoptimizer, temporal deltas"]
     with open(PAGE, encoding="utf-8") as file:
         text = write(file.read(), "rates", page.getvalue())
     with open(PAGE, "w", encoding="utf-8") as file:
-        file.write(text)
-    head = ["capture", "KG error at most", "cager, designed cage of 350", "quantised PCA + xz", "Draco, each frame", "meshoptimizer, temporal deltas"]
-    with open(README, encoding="utf-8") as file:
-        text = write(file.read(), "rates", table(head, chosen))
-    with open(README, "w", encoding="utf-8") as file:
-        file.write(text)
+        file.write(write(text, "summary", table(head, chosen)))
 
 
 if __name__ == "__main__":

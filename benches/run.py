@@ -1,4 +1,4 @@
-"""Measures this project beside its peers in one run: writes benches/results.json and the README's table.
+"""Measures this project beside its peers in one run: writes benches/results.json and the tables of docs/GUIDE.md.
 
 Standard library only. `make bench` builds everything and calls this.
 """
@@ -17,7 +17,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PEERS = os.path.join(ROOT, "benches", ".venv", "bin", "python")
 CAGER = os.path.join(ROOT, "target", "release", "cager")
 RESULTS = os.path.join(ROOT, "benches", "results.json")
-README = os.path.join(ROOT, "README.md")
+GUIDE = os.path.join(ROOT, "docs", "GUIDE.md")
 RUNS = 5
 
 
@@ -206,13 +206,13 @@ def nested(tree, keys):
     return tree
 
 
-def put_into_readme(text):
+def put_into_guide(text):
     begin, end = "<!-- figures: begin -->", "<!-- figures: end -->"
-    with open(README) as file:
-        readme = file.read()
-    head, rest = readme.split(begin)
+    with open(GUIDE, encoding="utf-8") as file:
+        guide = file.read()
+    head, rest = guide.split(begin)
     _, tail = rest.split(end)
-    with open(README, "w") as file:
+    with open(GUIDE, "w", encoding="utf-8") as file:
         file.write(f"{head}{begin}\n{text}\n{end}{tail}")
 
 
@@ -225,5 +225,5 @@ if __name__ == "__main__":
         with open(RESULTS, "w") as file:
             json.dump(results, file, indent=1)
             file.write("\n")
-    put_into_readme(table(results))
+    put_into_guide(table(results))
     print(table(results))

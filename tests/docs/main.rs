@@ -1,6 +1,7 @@
 //! Documents and deployment files against the program: what they say is run or looked up.
 
 mod clients;
+mod commands;
 mod deploy;
 mod format;
 mod operations;
