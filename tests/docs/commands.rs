@@ -171,7 +171,7 @@ fn every_message_of_the_guide_is_one_of_the_sources() {
     let guide = text(GUIDE);
     let errors = guide.split("\n## Errors\n").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("a section");
     let mut sources = String::new();
-    let mut folders = vec![repository().join("src"), repository().join("crates")];
+    let mut folders = ["src", "crates", "proto"].map(|folder| repository().join(folder)).to_vec();
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).expect("a folder") {
             let path = entry.expect("an entry").path();
