@@ -94,6 +94,19 @@ fn links_between_documents_lead_somewhere() {
     }
 }
 
+#[test]
+fn what_the_architecture_names_is_there() {
+    let document = text("docs/ARCHITECTURE.md");
+    let parts = ["benches/", "blender/", "crates/", "deploy/", "proto/", "src/", "tests/", "web/"];
+    let named: Vec<&str> = document.split('`').skip(1).step_by(2).collect();
+    let paths: Vec<&&str> =
+        named.iter().filter(|code| parts.iter().any(|p| code.starts_with(p)) && !code.contains([' ', '*'])).collect();
+    assert!(paths.len() > 60, "{paths:?}");
+    for path in paths {
+        assert!(repository().join(path).exists(), "{path}");
+    }
+}
+
 /// The anchor of a heading.
 fn slug(heading: &str) -> String {
     let words = heading.trim_start_matches('#').trim().to_lowercase();
