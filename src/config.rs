@@ -70,6 +70,11 @@ settings! {
     /// Address of a PostgreSQL database for what is known of sessions, `postgres://USER:PASSWORD@HOST:5432/DATABASE`; without one it is in a file in the data
     /// folder.
     catalog: Option<String> = None, Kind::Secret;
+    /// Address of an S3 bucket for files, `s3://BUCKET/PATH`, with keys and endpoint in the variables `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
+    /// `AWS_ENDPOINT_URL` and `AWS_REGION`; the data folder is a cache of it then. Needs `catalog`.
+    blobs: Option<String> = None, Kind::Text;
+    /// Bytes of the bucket's files kept in the data folder.
+    blobs_kept_bytes: u64 = 64 * GIB, Kind::Bytes { least: 0, most: 1 << 50 };
     /// File of access tokens; without one everyone on this machine is tenant `local`.
     tokens: Option<PathBuf> = None, Kind::File;
     /// Address of an OpenID Connect provider whose tokens are taken as well.
@@ -82,6 +87,8 @@ settings! {
     oidc_tenant: String = "tenant".to_owned(), Kind::Text;
     /// File of addresses that are told when sessions are completed or fail.
     webhooks: Option<PathBuf> = None, Kind::File;
+    /// File that says who changed what, a line of JSON for each change; without it nothing does.
+    audit: Option<PathBuf> = None, Kind::File;
     /// PEM file of the certificate, for TLS.
     tls_certificate: Option<PathBuf> = None, Kind::File;
     /// PEM file of the certificate's private key.
@@ -219,6 +226,9 @@ impl ServeConfig {
                 let (given, missing) = if has_a { (a, b) } else { (b, a) };
                 return Err(ConfigError::Half { given, missing });
             }
+        }
+        if self.blobs.is_some() && self.catalog.is_none() {
+            return Err(ConfigError::Half { given: "blobs", missing: "catalog" });
         }
         if self.oidc_keys.is_some() && self.oidc_issuer.is_none() {
             return Err(ConfigError::Half { given: "oidc_keys", missing: "oidc_issuer" });

@@ -1,6 +1,7 @@
 //! The `cager` program: the command line and the service over the crates that do the work.
 
 mod admission;
+mod audit;
 pub mod auth;
 pub mod belonging;
 pub mod cage_export;

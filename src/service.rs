@@ -1,6 +1,7 @@
 //! The service: store, engine, caches, registries and background tasks; startup and shutdown.
 
 use crate::admission::{Budget, Held};
+use crate::audit::Audit;
 use crate::auth::{Access, Tenant};
 use crate::cage_job::{CageDesign, DesignPool, Designer, local_designer};
 use crate::config::ServeConfig;
@@ -12,11 +13,12 @@ use crate::recovery::Recovery;
 use crate::session::commit::Committer;
 use crate::session::registry::Registry;
 use crate::shape_spaces::ShapeSpaces;
-use crate::store::{ContentKey, Disk, Store, StoreError};
+use crate::store::{ContentKey, Disk, Shared, Store, StoreError};
 use crate::tasks::blocking;
 use crate::transfers::Transfer;
 use crate::webhooks::{Webhooks, WebhooksError};
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -51,6 +53,7 @@ const TAKEN_OVER_CHECK: std::time::Duration = std::time::Duration::from_millis(2
 pub struct Service {
     pub(crate) config: ServeConfig,
     pub(crate) access: Access,
+    pub(crate) audit: Audit,
     pub(crate) store: Store,
     pub(crate) engine: Engine,
     pub(crate) solvers: Arc<Solvers>,
@@ -130,6 +133,14 @@ pub enum StartError {
     /// The webhooks file cannot be used.
     #[error(transparent)]
     Webhooks(#[from] WebhooksError),
+    /// The audit file cannot be used.
+    #[error("{}: {cause}; the audit file cannot be written to", path.display())]
+    Audit {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        cause: std::io::Error,
+    },
     /// Threads cannot be started.
     #[error("threads cannot be started: {0}; raise the limit of processes, or lower workers")]
     Threads(std::io::Error),
@@ -159,7 +170,17 @@ impl Service {
         if let Some(trust) = config.trust() {
             access = access.with_provider(trust)?;
         }
-        let opened = Store::open(&config.data, disk, config.catalog.as_deref())?;
+        let audit = Audit::open(config.audit.as_deref())
+            .map_err(|cause| StartError::Audit { path: config.audit.clone().unwrap_or_default(), cause })?;
+        let opened = Store::open(
+            &config.data,
+            disk,
+            Shared {
+                catalog: config.catalog.as_deref(),
+                blobs: config.blobs.as_deref(),
+                kept_bytes: config.blobs_kept_bytes,
+            },
+        )?;
         for damaged in &opened.quarantined {
             tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged, and left out");
             metrics::counter!("cager_quarantined_total").increment(1);
@@ -173,6 +194,7 @@ impl Service {
         let coders = threads::pool("code", config.workers, threads::NICE_BACKGROUND).map_err(StartError::Threads)?;
         let service = Arc::new(Self {
             access,
+            audit,
             webhooks,
             store: opened.store,
             engine,
@@ -225,6 +247,7 @@ impl Service {
             service.resume_job::<Transfer>(meta)?;
         }
         service.orphans().iter().for_each(|key| service.forget_orphan(key));
+        service.store.has_started();
         service.resumed.store(true, Ordering::Release);
         tracing::info!(
             sessions = count,

@@ -69,6 +69,7 @@ pub(crate) enum Command {
     Cage(Box<CageArgs>),
     Compare(CompareArgs),
     Serve(Box<ServeFlags>),
+    Store(StoreArgs),
     Health(HealthArgs),
     Demo(DemoArgs),
     /// List the file formats of meshes and captures: whether they are written as well as read, and what they say of units and times.
@@ -77,6 +78,49 @@ pub(crate) enum Command {
     Formats,
     Completions(CompletionsArgs),
     Man(ManArgs),
+}
+
+/// Look after what a service has stored, while it does not run: how much that is, whether it is whole, copies of its containers.
+///
+/// Example: cager store verify --data /srv/cager
+#[derive(Args)]
+pub(crate) struct StoreArgs {
+    #[command(subcommand)]
+    pub(crate) command: StoreCommand,
+
+    /// The service's data folder [default: cager-data].
+    #[arg(long, global = true, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+
+    /// The service's database, where it has one. A password is safer in the variable CAGER_CATALOG.
+    #[arg(long, global = true, value_name = "URL")]
+    pub(crate) catalog: Option<String>,
+
+    /// The service's bucket, where it has one.
+    #[arg(long, global = true, value_name = "URL")]
+    pub(crate) blobs: Option<String>,
+
+    /// The service's file of settings, TOML.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+/// What to do with what is stored.
+#[derive(Subcommand)]
+pub(crate) enum StoreCommand {
+    /// Sessions, jobs and bytes of each tenant.
+    Usage,
+    /// Read everything, and name what is damaged; exit status 1 if something is.
+    Verify,
+    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager.
+    Export {
+        /// Where to; it may be there.
+        #[arg(value_name = "DIR")]
+        output: PathBuf,
+        /// Only this session; may be repeated.
+        #[arg(long = "session", value_name = "ID")]
+        sessions: Vec<String>,
+    },
 }
 
 /// Recover the cage of every frame of a capture and write a .cager file.

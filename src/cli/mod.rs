@@ -38,6 +38,7 @@ mod rig;
 pub(crate) mod serve;
 mod service_args;
 mod solver_options;
+mod store;
 mod stretches;
 mod transfer;
 mod transfer_args;
@@ -77,6 +78,7 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),
+        Command::Store(args) => store::run(&args),
         Command::Health(args) => health::run(&args),
         Command::Formats => formats::run(),
         Command::Completions(args) => {

@@ -27,6 +27,10 @@ pub struct ServeFlags {
     #[arg(long, value_name = "URL")]
     pub catalog: Option<String>,
 
+    /// S3 bucket for files, s3://BUCKET/PATH [default: the data folder]. Needs --catalog; keys are in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY.
+    #[arg(long, value_name = "URL")]
+    pub blobs: Option<String>,
+
     /// File of settings, TOML.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -80,6 +84,7 @@ impl ServeFlags {
             ("admin_listen", self.admin_listen.clone()),
             ("data", path(&self.data)),
             ("catalog", self.catalog.clone()),
+            ("blobs", self.blobs.clone()),
             ("tokens", path(&self.tokens)),
             ("tls_certificate", path(&self.tls_certificate)),
             ("tls_key", path(&self.tls_key)),

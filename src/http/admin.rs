@@ -3,7 +3,8 @@
 //! On a loopback address every client is an operator. On other addresses a token with the scope `admin` is needed, except for health and
 //! metrics.
 
-use super::extract::{Query, granted};
+use super::audited::audited;
+use super::extract::{Query, TokenName, granted};
 use super::respond::JsonResult;
 use super::router::{finished, probes};
 use super::sessions::{PAGE, PageQuery};
@@ -30,6 +31,7 @@ pub fn admin(service: Arc<Service>, open_to_all: bool) -> Router {
         .route("/admin/sessions/{id}", delete(delete_session))
         .route("/admin/drain", post(drain))
         .route("/admin/evict", post(evict));
+    let operated = operated.route_layer(from_fn_with_state(Arc::clone(&service), audited));
     let operated = match open_to_all {
         true => operated.route_layer(from_fn(refuse_web_pages)),
         false => operated.route_layer(from_fn_with_state(Arc::clone(&service), require_admin)),
@@ -51,7 +53,7 @@ async fn refuse_web_pages(request: Request, next: Next) -> Result<Response, ApiE
 /// Refuses requests without a token of the scope `admin`, and all requests of a service without tokens.
 async fn require_admin(
     State(service): State<Arc<Service>>,
-    request: Request,
+    mut request: Request,
     next: Next,
 ) -> Result<Response, ApiError> {
     let grant = granted(&service, request.headers()).await?;
@@ -60,6 +62,7 @@ async fn require_admin(
         let detail = "operating the service from another machine needs a token whose scope is admin";
         return Err(ApiError::new(problem::FORBIDDEN, detail));
     }
+    request.extensions_mut().insert(TokenName(Arc::clone(&grant.token)));
     Ok(next.run(request).await)
 }
 

@@ -10,7 +10,7 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::container_frames::ContainerFrames;
 use crate::session::{Phase, Session};
-use crate::store::{Completion, StoreError};
+use crate::store::Completion;
 use crate::sync::lock;
 use crate::tasks::blocking;
 use axum::body::Body;
@@ -20,7 +20,6 @@ use bytes::Bytes;
 use http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use http::{HeaderMap, HeaderValue};
 use serde::Deserialize;
-use std::fs::File;
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 
@@ -75,8 +74,8 @@ async fn whole(
     completion: Completion,
     headers: &HeaderMap,
 ) -> Result<Response, ApiError> {
-    let path = service.store.container_path(&session.meta.id);
-    let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
+    let (store, path) = (service.store.clone(), service.store.container_path(&session.meta.id));
+    let opened = blocking(move || store.open_file(&path)).await?;
     let file = opened.map_err(|error| session.storage_error(error))?;
     let Completion { container_bytes, container_digest, .. } = completion;
     let room = service.download_memory.nothing(&tenant.name);

@@ -165,10 +165,11 @@ async fn made(
     let container = service.store.container_path(&session.meta.id);
     // What it contains is called as it is.
     let (folder, name) = (service.store.scratch(), name.to_owned());
-    let (coders, of) = (Arc::clone(&service.coders), Arc::clone(session));
+    let (coders, of, store) = (Arc::clone(&service.coders), Arc::clone(session), service.store.clone());
     let written = blocking(move || {
         // Disk and memory are held until it is done, also where nobody waits any more.
         let _places = places;
+        store.bring(&container)?;
         let written = coders.install(|| write(&container, &folder, &name)).map_err(|error| {
             tracing::error!(session = %of.meta.id, %error, "a file of its frames could not be written");
             if of.is_going() { crate::session::gone() } else { refused(&error) }

@@ -21,6 +21,10 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub(crate) struct Caller(pub(crate) Arc<Tenant>);
 
+/// The name of the request's token; empty in a service without tokens.
+#[derive(Clone)]
+pub(super) struct TokenName(pub(super) Arc<str>);
+
 /// Authenticates the request before anything else of it is processed.
 pub(crate) async fn authenticate(
     State(service): State<Arc<Service>>,
@@ -31,9 +35,7 @@ pub(crate) async fn authenticate(
         Ok(grant) => grant,
         Err(denied) => return denied.into_response(),
     };
-    // Decoding changes nothing, although it is a POST.
-    let reads = request.method().is_safe() || request.uri().path().ends_with("/decode");
-    if grant.scope == Scope::Read && !reads {
+    if grant.scope == Scope::Read && !only_reads(&request) {
         service.rejected("scope");
         let detail = "this token may look and decode, but change nothing; use one whose scope is write";
         return ApiError::new(problem::FORBIDDEN, detail).into_response();
@@ -42,6 +44,7 @@ pub(crate) async fn authenticate(
         connection.caller_is_known();
     }
     request.extensions_mut().insert(Caller(Arc::clone(&grant.tenant)));
+    request.extensions_mut().insert(TokenName(Arc::clone(&grant.token)));
     if !service.access.is_guarded() {
         return next.run(request).await;
     }
@@ -52,6 +55,11 @@ pub(crate) async fn authenticate(
         Some(_) => response,
         None => response.map(|body| revocable(body, &grant)),
     }
+}
+
+/// Whether a request changes nothing: decoding does not, although it is a POST.
+pub(super) fn only_reads(request: &axum::extract::Request) -> bool {
+    request.method().is_safe() || request.uri().path().ends_with("/decode")
 }
 
 /// Authenticates the request and records tenant and token in the log.

@@ -8,14 +8,12 @@ use crate::auth::Tenant;
 use crate::jobs::{Job, Work};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::StoreError;
 use crate::tasks::blocking;
 use axum::Json;
 use axum::response::{IntoResponse, Response};
 use http::header::CONTENT_DISPOSITION;
 use http::{HeaderMap, HeaderValue, StatusCode, header};
 use serde::Serialize;
-use std::fs::File;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -77,8 +75,8 @@ pub(super) async fn result<W: Work>(
     let finished = job.finished()?;
     let part = W::files(&finished).iter().find(|part| part.name == name);
     let part = part.ok_or_else(|| ApiError::new(problem::NOT_FOUND, W::MISSING))?;
-    let path = service.store.job_file(crate::jobs::kind_of::<W>(), job.id(), name)?;
-    let opened = blocking(move || File::open(&path).map_err(|error| StoreError::of(&path, "open", error))).await?;
+    let (store, path) = (service.store.clone(), service.store.job_file(crate::jobs::kind_of::<W>(), job.id(), name)?);
+    let opened = blocking(move || store.open_file(&path)).await?;
     let opened = opened.map_err(|error| job.fail_if_damaged(&service.store, error))?;
     let room = service.download_memory.nothing(&tenant.name);
     let etag =

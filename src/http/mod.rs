@@ -1,6 +1,7 @@
 //! HTTP: routes, what they take and give, and the listener.
 
 mod admin;
+mod audited;
 mod cage;
 mod cage_jobs;
 mod cages;

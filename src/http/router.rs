@@ -1,5 +1,6 @@
 //! All routes of the service, and their middleware.
 
+use super::audited::audited;
 use super::content_encoding::decoded;
 use super::extract::Caller;
 use super::guarded::with_permit;
@@ -125,6 +126,7 @@ pub fn router(service: Arc<Service>) -> Router {
         // Limited by memory and by the tenant's streams instead, so that slow bodies do not occupy the request slots that all tenants
         // share.
         .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
+        .route_layer(from_fn_with_state(Arc::clone(&service), audited))
         .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
     let cors = origin::cors(&service.config);
     let routes = Router::from(open())

@@ -6,7 +6,6 @@ use crate::store::{Kind, Store, StoreError};
 use cager_proto::recovery_messages::{
     FollowedFrame, Recovery as View, RecoveryFrames, RecoveryProgress, RecoveryState,
 };
-use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 
 /// Missing ranges in a view, at most.
@@ -116,7 +115,7 @@ impl RecoveryJob {
         let mut read = || {
             let path = store.job_file(Kind::Recovery, &self.meta.id, CAGES)?;
             let failed = |error| StoreError::of(&path, "read", error);
-            let mut file = File::open(&path).map_err(failed)?;
+            let mut file = store.open_file(&path)?;
             file.seek(SeekFrom::Start(stride * u64::from(first))).map_err(failed)?;
             file.read_exact(&mut bytes).map_err(failed)
         };

@@ -1,6 +1,7 @@
 //! Storage quotas of tenants and deletion of expired sessions and jobs.
 
 use super::registry::Reserved;
+use crate::audit::Change;
 use crate::auth::Tenant;
 use crate::cage_job::CageDesign;
 use crate::jobs::{Jobs, Work};
@@ -129,8 +130,11 @@ impl Service {
             if expired(&session.meta.tenant, session.meta.created_ms) {
                 tracing::info!(session = %session.meta.id, "deleted, because its time is over");
                 metrics::counter!("cager_sessions_expired_total").increment(1);
-                if let Err(error) = self.delete(&session).await {
-                    tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "could not be deleted");
+                match self.delete(&session).await {
+                    Ok(_) => self.note_expired(&session.meta.tenant, "/v1/sessions", &session.meta.id).await,
+                    Err(error) => {
+                        tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "could not be deleted");
+                    }
                 }
             } else {
                 let retried = Arc::clone(&session);
@@ -145,10 +149,32 @@ impl Service {
         for job in W::jobs(self).all() {
             if expired(job.meta.tenant(), job.meta.created_ms()) {
                 tracing::info!(job = job.id(), "deleted, because its time is over");
-                if let Err(error) = self.delete_job(&job).await {
-                    tracing::warn!(job = job.id(), detail = %error.problem.detail, "could not be deleted");
+                match self.delete_job(&job).await {
+                    Ok(_) => self.note_expired(job.meta.tenant(), W::LIST, job.id()).await,
+                    Err(error) => {
+                        tracing::warn!(job = job.id(), detail = %error.problem.detail, "could not be deleted");
+                    }
                 }
             }
         }
+    }
+
+    /// Tells the audit file of what is deleted because its time is over.
+    async fn note_expired(&self, tenant: &str, list: &str, id: &str) {
+        let (audit, tenant, path) = (self.audit.clone(), tenant.to_owned(), format!("{list}/{id}"));
+        let noted = blocking(move || {
+            audit.note(&Change {
+                time: SystemTime::now(),
+                tenant: Some(&tenant),
+                token: None,
+                peer: None,
+                action: "EXPIRE",
+                path: &path,
+                made: None,
+                status: 204,
+                request_id: None,
+            });
+        });
+        let _ = noted.await;
     }
 }

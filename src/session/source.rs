@@ -3,6 +3,7 @@
 use super::Phase;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::tasks::blocking;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -25,6 +26,7 @@ impl Service {
             );
             return Err(ApiError::new(problem::NOT_COMPLETED, detail).retry_after(2));
         }
-        Ok(self.store.container_path(id))
+        let (store, path) = (self.store.clone(), self.store.container_path(id));
+        blocking(move || store.bring(&path).map(|()| path)).await?.map_err(|error| session.storage_error(error))
     }
 }

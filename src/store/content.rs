@@ -70,7 +70,7 @@ impl StoredPart {
 const DESCRIPTION: &str = "content.json";
 
 impl Store {
-    fn content_path(&self, key: &ContentKey) -> PathBuf {
+    pub(super) fn content_path(&self, key: &ContentKey) -> PathBuf {
         self.files().contents.join(key.to_string())
     }
 
@@ -194,7 +194,7 @@ impl Store {
         Ok(NamedFile { name: part.name, bytes })
     }
 
-    fn read_content(&self, place: &Path) -> Result<Option<Content>, StoreError> {
+    pub(super) fn read_content(&self, place: &Path) -> Result<Option<Content>, StoreError> {
         let Some(Description { rest, cage, matrix }) = self.describe(place)? else { return Ok(None) };
         let read = |name: &str, part| self.read_content_part(place, name, part);
         let matrix = matrix.map(|part| read("matrix", part)).transpose()?;

@@ -9,24 +9,39 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Has the number of the folder where its catalogue is in a database.
-const NUMBER: &str = "catalog.database";
+pub(super) const NUMBER: &str = "catalog.database";
 /// Longest file of that name.
-const LIMIT: u64 = 256;
+pub(super) const LIMIT: u64 = 256;
 /// The catalogue's file once a database has all that it had.
 const MOVED: &str = "catalog.db.moved";
 
-/// Opens the catalogue in the database at `url` for this process alone, and takes over what the folder's own has. Gives what it is called too.
-pub(super) fn open(files: &Files, url: &str) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
+/// A catalogue in a database, and what it is called.
+pub(super) struct Database {
+    catalog: Arc<PostgresCatalog>,
+    name: PathBuf,
+    /// How often it was taken.
+    pub(super) taken: i64,
+}
+
+/// Opens the catalogue in the database at `url` for this process alone.
+pub(super) fn open(url: &str) -> Result<Database, StoreError> {
     let catalog = PostgresCatalog::open(url).map_err(|error| of_catalog(Path::new("the database"), "reach", error))?;
     let name = PathBuf::from(catalog.name());
     let failed = |error| match error {
         CatalogError::InUse(what) => StoreError::InUse { what },
         error => of_catalog(&name, "reach", error),
     };
-    catalog.claim().map_err(failed)?;
-    match_folder(files, &catalog, &name)?;
-    take_over(files, &catalog, &name)?;
-    Ok((Arc::new(catalog), name))
+    let taken = catalog.claim().map_err(failed)?;
+    Ok(Database { catalog: Arc::new(catalog), name, taken })
+}
+
+impl Database {
+    /// Sees that it belongs to the folder, and takes over what the folder's own catalogue has. Gives what it is called too.
+    pub(super) fn of_folder(self, files: &Files) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
+        match_folder(files, &self.catalog, &self.name)?;
+        take_over(files, &*self.catalog, &self.name)?;
+        Ok((self.catalog, self.name))
+    }
 }
 
 /// Refuses a folder whose catalogue is in a database.

@@ -60,6 +60,18 @@ pub trait Disk: Send + Sync + Debug {
     /// # Errors
     /// The catalogue's.
     fn catalog(&self, path: &Path) -> Result<Arc<dyn Catalog>, CatalogError>;
+    /// Sees that a file, or a folder with all that is in it, can be opened at its path by others than this: where files are in a bucket they are fetched.
+    fn bring(&self, _path: &Path) -> io::Result<()> {
+        Ok(())
+    }
+    /// Whether files are kept elsewhere than on this machine, so that reading them all is dear; what they are kept by has checksums of its own.
+    fn is_elsewhere(&self) -> bool {
+        false
+    }
+    /// Checks that what has the files besides this machine can be written to.
+    fn probe(&self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// An open file with positioned reads and writes, so that readers and a writer can share it. Every call fails as the system does.

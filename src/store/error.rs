@@ -1,5 +1,6 @@
 //! Errors of the store, one variant per reaction of the caller.
 
+use cager_store::{BlobsError, CatalogError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -38,10 +39,10 @@ pub enum StoreError {
         /// Which, and what to do.
         what: String,
     },
-    /// The catalogue cannot be used.
+    /// The catalogue or the bucket cannot be used.
     #[error("could not {action} {}: {what}", path.display())]
     Catalog {
-        /// Its file, or what the database is called.
+        /// The file, or what the database is called.
         path: PathBuf,
         /// What was attempted, as a verb.
         action: &'static str,
@@ -77,7 +78,10 @@ impl StoreError {
         };
         match cause.kind() {
             StorageFull | QuotaExceeded | FileTooLarge => Self::Full { path: path.to_owned() },
-            _ => Self::Io { path: path.to_owned(), action, cause },
+            _ => match cause.get_ref().filter(|inner| inner.is::<BlobsError>() || inner.is::<CatalogError>()) {
+                Some(inner) => Self::Catalog { path: path.to_owned(), action, what: inner.to_string() },
+                None => Self::Io { path: path.to_owned(), action, cause },
+            },
         }
     }
 

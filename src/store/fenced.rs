@@ -75,4 +75,16 @@ impl Disk for FencedDisk {
     fn catalog(&self, path: &Path) -> Result<Arc<dyn Catalog>, CatalogError> {
         self.disk.catalog(path)
     }
+
+    fn bring(&self, path: &Path) -> io::Result<()> {
+        self.disk.bring(path)
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        self.disk.is_elsewhere()
+    }
+
+    fn probe(&self) -> io::Result<()> {
+        self.disk.probe()
+    }
 }

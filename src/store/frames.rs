@@ -32,6 +32,11 @@ impl Store {
         self.catalog().frames(id).map_err(|e| self.of_session(id, "read", e))
     }
 
+    /// Bytes that the frames of a session take, about.
+    pub fn frame_bytes(&self, id: &str) -> Result<u64, StoreError> {
+        Ok(self.record(Kind::Session, id)?.map_or(0, |record| record.frame_bytes))
+    }
+
     /// Appends the cages of frames to `out`, each m × 3 `f32`, little-endian. On an error `out` is unchanged.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 //! fail as the disk does, with [`StoreError::Io`]; the documentation of each names only further errors.
 //!
 //! ```text
+//! catalog.bucket   the bucket where the files are in one, and the folder is a cache of it
 //! lock             locked while a process uses the folder
 //! catalog.db       records of sessions and jobs, and the cages of frames (crate `cager-store`), with -wal, -shm and .reserve beside it
 //! catalog.database instead of it where they are in a database: the folder's number, which that has too
@@ -22,18 +23,22 @@
 
 use crate::store::fenced::FencedDisk;
 use crate::store::files::Files;
-use cager_store::{Catalog, CatalogError};
+use crate::sync::lock as lock_of;
+use cager_store::{Catalog, CatalogError, Record};
+use std::collections::HashMap;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
+mod bucket;
 mod cage_jobs;
 mod content;
 mod database;
 pub mod disk;
 mod error;
+mod evicted;
 #[cfg(test)]
 #[path = "../../tests/faults/mod.rs"]
 mod faults;
@@ -44,6 +49,7 @@ mod groups;
 mod import;
 mod jobs;
 mod meta;
+mod mirrored;
 mod names;
 mod prepared;
 mod records;
@@ -52,6 +58,7 @@ mod sessions;
 mod solver_file;
 mod spool;
 mod transfers;
+mod verified;
 mod workshop;
 
 #[cfg(test)]
@@ -69,6 +76,7 @@ pub use recoveries::{RecoveryMeta, RecoveryParts};
 pub use sessions::{Completion, Container, Idempotency, SessionBytes, SessionMeta};
 pub use spool::{Spool, StoredFile};
 pub use transfers::{PAIRS, SOURCE, SOURCE_FRAMES, TransferMeta};
+pub use verified::Verified;
 pub use workshop::Workshop;
 
 /// The data folder. Clones share it.
@@ -85,8 +93,21 @@ struct Inner {
     catalog_path: PathBuf,
     /// Something that may need content could not be read at the start.
     keeps_contents: AtomicBool,
+    /// Records as they were read at the start, so that each is read once.
+    at_start: Mutex<HashMap<(Kind, String), Record>>,
     /// `None` where the database has the lock.
     _lock: Option<File>,
+}
+
+/// What of a store is not in its folder: one machine's is all there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shared<'a> {
+    /// Address of the database with its catalogue.
+    pub catalog: Option<&'a str>,
+    /// Address of the bucket with its files, where its catalogue is in a database.
+    pub blobs: Option<&'a str>,
+    /// Bytes of the bucket's files that may be in the folder too.
+    pub kept_bytes: u64,
 }
 
 /// Name of the catalogue's file.
@@ -121,15 +142,14 @@ pub struct Quarantined {
 }
 
 impl Store {
-    /// Opens the folder `root` for this process alone, creating it if it is missing, with its catalogue in the database at this address where one is
-    /// given. Finishes interrupted deletions, removes temporary
+    /// Opens the folder `root` for this process alone, creating it if it is missing, with what is elsewhere where that is given. Finishes interrupted deletions, removes temporary
     /// files, takes over what an earlier version stored, and moves objects with damaged metadata to `quarantine/`.
     ///
     /// # Errors
     /// [`StoreError::Locked`] or [`StoreError::InUse`] if another process uses it; [`StoreError::Elsewhere`] where database and folder do not belong
     /// together; [`StoreError::Damaged`] where its catalogue is damaged, or is missing while sessions or
     /// jobs are there. Damaged sessions are not an error.
-    pub fn open(root: &Path, disk: Arc<dyn Disk>, database: Option<&str>) -> Result<Opened, StoreError> {
+    pub fn open(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<Opened, StoreError> {
         make_folder(&*disk, root)?;
         let lock_path = root.join("lock");
         let lock = || {
@@ -137,9 +157,9 @@ impl Store {
             lock.ok_or_else(|| StoreError::Locked { path: root.to_owned() })
         };
         // Where machines share the folder, a lock of one that is gone may stay for long; the database knows better once it has all.
-        let is_own = database.is_none() || root.join(CATALOG).exists();
+        let is_own = shared.catalog.is_none() || root.join(CATALOG).exists();
         let lock = is_own.then(lock).transpose()?;
-        let (files, in_database) = open_folder(root, disk, database)?;
+        let (files, in_database) = open_folder(root, disk, shared)?;
         let own = [&files.sessions, &files.cages, &files.recoveries, &files.transfers, &files.contents];
         let kept = [&files.trash, &files.prepared].into_iter().chain(own);
         // They may be so on purpose: whoever made them decides.
@@ -165,7 +185,16 @@ impl Store {
             None => own_catalog(&files)?,
         };
         let keeps_contents = AtomicBool::new(false);
-        let store = Self { inner: Arc::new(Inner { files, catalog, catalog_path, keeps_contents, _lock: lock }) };
+        let store = Self {
+            inner: Arc::new(Inner {
+                files,
+                catalog,
+                catalog_path,
+                keeps_contents,
+                at_start: Mutex::default(),
+                _lock: lock,
+            }),
+        };
         let records = store.catalog().records().map_err(|e| store.failed("open", e))?;
         if records.is_empty() && import::is_without_records(store.files())? {
             let what = "it is empty, and there are sessions or jobs in the folder";
@@ -179,6 +208,8 @@ impl Store {
         let cage_jobs = store.metas(&records, &mut quarantined);
         let recoveries = store.metas(&records, &mut quarantined);
         let transfers = store.metas(&records, &mut quarantined);
+        let known = records.into_iter().map(|record| ((record.kind, record.id.clone()), record));
+        *lock_of(&store.inner.at_start) = known.collect();
         quarantined.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Opened { store, sessions, cage_jobs, recoveries, transfers, quarantined })
     }
@@ -200,6 +231,11 @@ impl Store {
         &self.inner.files
     }
 
+    /// What was read at the start is read anew from here on.
+    pub fn has_started(&self) {
+        *lock_of(&self.inner.at_start) = HashMap::new();
+    }
+
     /// Whether another process has taken the database over, so that this one can change nothing any more.
     pub fn is_taken_over(&self) -> bool {
         self.catalog().is_taken_over()
@@ -210,13 +246,25 @@ impl Store {
         self.files().disk.free_bytes(&self.files().root).unwrap_or(0)
     }
 
+    /// Opens a file of the store for reading.
+    pub fn open_file(&self, path: &Path) -> Result<File, StoreError> {
+        self.bring(path)?;
+        File::open(path).map_err(|e| StoreError::of(path, "open", e))
+    }
+
+    /// Sees that a file of the store can be opened at its path.
+    pub fn bring(&self, path: &Path) -> Result<(), StoreError> {
+        self.files().disk.bring(path).map_err(|e| StoreError::of(path, "open", e))
+    }
+
     /// Checks that the store can write and sync, files and records.
     pub fn probe(&self) -> Result<(), StoreError> {
         let files = self.files();
         let path = files.temporary("probe");
         let written = files.write_new(&path, b"probe\n");
         files.discard(&path);
-        written.and_then(|()| self.catalog().probe().map_err(|e| self.failed("write", e)))
+        let there = || files.disk.probe().map_err(|e| StoreError::of(&files.root, "write", e));
+        written.and_then(|()| there()).and_then(|()| self.catalog().probe().map_err(|e| self.failed("write", e)))
     }
 }
 
@@ -225,17 +273,25 @@ type Named = (Arc<dyn Catalog>, PathBuf);
 
 /// Makes the folders in `root`, and opens the catalogue where it is in a database: before anything is removed, since it is another process's folder
 /// where the database is.
-fn open_folder(root: &Path, disk: Arc<dyn Disk>, database: Option<&str>) -> Result<(Files, Option<Named>), StoreError> {
+fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(Files, Option<Named>), StoreError> {
     let files = Files::new(root, disk);
-    if database.is_none() {
+    if shared.blobs.is_none() {
+        bucket::refuse(&files)?;
+    }
+    if shared.catalog.is_none() {
         database::refuse(&files)?;
     }
     let parts = [&files.sessions, &files.cages, &files.recoveries, &files.transfers, &files.contents];
     for folder in parts.into_iter().chain([&files.trash, &files.prepared, &files.quarantine, &files.tmp]) {
         make_folder(&*files.disk, folder)?;
     }
-    let Some(url) = database else { return Ok((files, None)) };
-    let (catalog, name) = database::open(&files, url)?;
+    let Some(url) = shared.catalog else { return Ok((files, None)) };
+    let database = database::open(url)?;
+    let files = match shared.blobs {
+        Some(url) => bucket::open(&files, url, database.taken, shared.kept_bytes)?,
+        None => files,
+    };
+    let (catalog, name) = database.of_folder(&files)?;
     let disk = Arc::new(FencedDisk { disk: files.disk, catalog: Arc::clone(&catalog) });
     Ok((Files::new(root, disk), Some((catalog, name))))
 }

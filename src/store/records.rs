@@ -3,6 +3,7 @@
 use super::files::Files;
 use super::names::check_id;
 use super::{Kind, Quarantined, Store, StoreError, is_session_id, make_folder, meta};
+use crate::sync::lock;
 use cager_store::{CatalogError, Change, Key, NewRecord, Phase, Record};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -112,15 +113,23 @@ impl Store {
     /// Not found where it was deleted.
     pub(super) fn change(&self, key: Key<'_>, changes: &[Change]) -> Result<(), StoreError> {
         check_id(key.id)?;
+        self.read_anew(key);
         match self.catalog().change(key, changes).map_err(|e| self.failed("write", e))? {
             true => Ok(()),
             false => Err(StoreError::of(self.catalog_path(), "write", std::io::ErrorKind::NotFound.into())),
         }
     }
 
+    fn read_anew(&self, key: Key<'_>) {
+        lock(&self.inner.at_start).remove(&(key.kind, key.id.to_owned()));
+    }
+
     /// The record of an object; `None` where there is none, or where its deletion has begun.
     pub(super) fn record(&self, kind: Kind, id: &str) -> Result<Option<Record>, StoreError> {
         check_id(id)?;
+        if let Some(record) = lock(&self.inner.at_start).get(&(kind, id.to_owned())) {
+            return Ok(Some(record.clone()));
+        }
         let found = self.catalog().record(Key { kind, id }).map_err(|e| self.failed("read", e))?;
         Ok(found.filter(|record| record.phase == Phase::Open))
     }
@@ -155,6 +164,7 @@ impl Store {
     /// Deletes an object, if it exists. On `Ok` the deletion is durable; after an error it is either gone or still there as a whole.
     pub fn delete(&self, kind: Kind, id: &str) -> Result<(), StoreError> {
         let (key, folder) = (Key { kind, id }, self.folder(kind, id)?);
+        self.read_anew(key);
         self.catalog().change(key, &[Change::Phase(Phase::Deleted)]).map_err(|e| self.failed("write", e))?;
         // From here on it is gone; what takes space yet goes with the next start.
         let cleared = self.files().delete_durably(&folder);

@@ -141,9 +141,9 @@ impl Store {
 
     /// Length of the session's container; 0 where there is none.
     pub fn container_bytes(&self, id: &str) -> Result<u64, StoreError> {
-        let path = self.folder(Kind::Session, id)?.join(CONTAINER);
-        let file = self.files().open(&path)?;
-        file.map_or(Ok(0), |file| file.length().map_err(|e| StoreError::of(&path, "read", e)))
+        // Without opening it, which would fetch it where it is in a bucket.
+        let entries = self.files().list(&self.folder(Kind::Session, id)?)?;
+        Ok(entries.iter().find(|entry| entry.name == CONTAINER).map_or(0, |entry| entry.bytes))
     }
 
     /// Bytes of the session's files, frames and content.
@@ -151,7 +151,7 @@ impl Store {
         let entries = self.files().list(&self.folder(Kind::Session, &meta.id)?)?;
         let container = entries.iter().find(|entry| entry.name == CONTAINER).map_or(0, |entry| entry.bytes);
         let own: u64 = entries.iter().map(|entry| entry.bytes).sum();
-        let frames = self.record(Kind::Session, &meta.id)?.map_or(0, |record| record.frame_bytes);
+        let frames = self.frame_bytes(&meta.id)?;
         Ok(SessionBytes { all: own + frames + self.content_bytes(&meta.key)?, container })
     }
 
@@ -160,8 +160,11 @@ impl Store {
         self.files().remove_file(&self.folder(Kind::Session, id)?.join(CONTAINER))
     }
 
-    /// Verifies length and digest of the session's container, reading all of it.
+    /// Verifies length and digest of the session's container, reading all of it; only the length where files are in a bucket.
     pub fn container_is_whole(&self, id: &str, completion: &Completion) -> Result<bool, StoreError> {
+        if self.files().disk.is_elsewhere() {
+            return Ok(self.container_bytes(id)? == completion.container_bytes);
+        }
         let path = self.folder(Kind::Session, id)?.join(CONTAINER);
         let failed = |e| StoreError::of(&path, "read", e);
         let file = self.files().disk.open(&path).map_err(failed)?;

@@ -71,7 +71,8 @@ impl Store {
 
     /// Path of the source's container.
     pub fn transfer_source(&self, id: &str) -> Result<PathBuf, StoreError> {
-        self.job_file(Kind::Transfer, id, SOURCE)
+        let path = self.job_file(Kind::Transfer, id, SOURCE)?;
+        self.bring(&path).map(|()| path)
     }
 
     /// Removes the input of a transfer that is over, best effort: files that remain are removed at the next start.

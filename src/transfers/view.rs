@@ -87,6 +87,7 @@ impl TransferFrames {
             if from.is_none() {
                 let path =
                     service.store.job_file(Kind::Transfer, job.id(), "capture.cager").map_err(io::Error::other)?;
+                service.store.bring(&path)?;
                 *from = Some(Positioned::Decoded(Box::new(Positions::open(&path).map_err(io::Error::other)?)));
             }
             let Some(Positioned::Decoded(positions)) = from else { return Ok(Vec::new()) };

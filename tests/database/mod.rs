@@ -1,4 +1,4 @@
-//! A PostgreSQL server of the test's own, for the catalogue of a service.
+//! A PostgreSQL server of the test's own, for the catalogue of a service, and a service of S3 for its files.
 
 use server::Server;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -7,12 +7,21 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[path = "../../crates/store/tests/postgres/support.rs"]
 mod server;
 
-/// Tells all tests to keep what is known of sessions in a database.
+#[allow(dead_code, reason = "the bucket's own tests use more")]
+#[path = "../../crates/store/tests/blobs/support.rs"]
+mod bucket;
+
+/// Tells all tests to keep what is known of sessions in a database (`postgres`), and files in a bucket (`postgres+s3`).
 const ALL: &str = "CAGER_TEST_CATALOG";
 
-/// A database; its server ends with the last of its clones.
+/// A database, and a bucket where there is one; their servers end with the last of its clones.
 #[derive(Clone)]
-pub(crate) struct Database(Arc<Mutex<Server>>);
+pub(crate) struct Database {
+    server: Arc<Mutex<Server>>,
+    bucket: Option<Bucket>,
+}
+
+type Bucket = Arc<Mutex<bucket::Server>>;
 
 impl std::fmt::Debug for Database {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -24,16 +33,43 @@ impl std::fmt::Debug for Database {
 impl Database {
     /// `None`, which is said, where PostgreSQL is not installed and not required.
     pub(crate) fn start() -> Option<Self> {
-        Server::start().map(|server| Self(Arc::new(Mutex::new(server))))
+        Server::start().map(|server| Self { server: Arc::new(Mutex::new(server)), bucket: None })
+    }
+
+    /// As [`Self::start`], with a bucket.
+    pub(crate) fn with_bucket() -> Option<Self> {
+        let (bucket, database) = (bucket::Server::start()?, Self::start()?);
+        Some(Self { bucket: Some(Arc::new(Mutex::new(bucket))), ..database })
     }
 
     /// For a test that says nothing of a database: one where `CAGER_TEST_CATALOG=postgres` is set.
     pub(crate) fn of_all() -> Option<Self> {
-        Self::is_for_all().then(|| Self::start().expect("PostgreSQL"))
+        match std::env::var(ALL).as_deref() {
+            Ok("postgres+s3") => Some(Self::with_bucket().expect("PostgreSQL and SeaweedFS")),
+            Ok("postgres") => Some(Self::start().expect("PostgreSQL")),
+            _ => None,
+        }
     }
 
     pub(crate) fn is_for_all() -> bool {
-        std::env::var(ALL).as_deref() == Ok("postgres")
+        matches!(std::env::var(ALL).as_deref(), Ok("postgres" | "postgres+s3"))
+    }
+
+    /// What tells a service to use it.
+    pub(crate) fn flags(&self) -> Vec<String> {
+        let blobs = self.bucket.iter().flat_map(|bucket| ["--blobs".to_owned(), lock(bucket).url("files")]);
+        ["--catalog".to_owned(), self.url()].into_iter().chain(blobs).collect()
+    }
+
+    /// The environment that goes with them.
+    pub(crate) fn environment(&self) -> Vec<(&'static str, String)> {
+        self.bucket.iter().flat_map(|bucket| lock(bucket).environment()).collect()
+    }
+
+    /// Names of files in the bucket.
+    pub(crate) fn files(&self, folder: &str) -> Vec<String> {
+        let blobs = lock(self.bucket.as_ref().expect("a bucket")).open("files", 0).expect("the bucket");
+        blobs.list(folder).into_iter().map(|listed| listed.name).collect()
     }
 
     pub(crate) fn url(&self) -> String {
@@ -42,6 +78,15 @@ impl Database {
 
     pub(crate) fn sql(&self, sql: &str) -> String {
         self.server().sql(sql)
+    }
+
+    /// Kills the service of S3, as if it had crashed.
+    pub(crate) fn kill_bucket(&self) {
+        lock(self.bucket.as_ref().expect("a bucket")).kill();
+    }
+
+    pub(crate) fn run_bucket(&self) {
+        lock(self.bucket.as_ref().expect("a bucket")).run();
     }
 
     /// Kills the server, as if it had crashed.
@@ -54,6 +99,10 @@ impl Database {
     }
 
     fn server(&self) -> MutexGuard<'_, Server> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.server)
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -56,7 +56,7 @@ impl Setup {
             command.args(["--set", setting]);
         }
         if let Some(database) = &self.database {
-            command.args(["--catalog", &database.url()]);
+            command.args(database.flags()).envs(database.environment());
         }
         if let Some(tokens) = &self.tokens {
             command.arg("--tokens").arg(tokens);

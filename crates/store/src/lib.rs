@@ -4,6 +4,7 @@
 //! [`Catalog`] is what the service asks for; [`SqliteCatalog`] keeps it in one file, [`PostgresCatalog`] in a database that several processes share. Everything that a call changes is changed as a whole and
 //! durable when it returns `Ok`; after an error nothing is changed, unless the error is that of a database whose answer was lost. All calls block.
 
+mod blobs;
 mod checksums;
 mod chunks;
 mod copy;
@@ -12,6 +13,7 @@ mod numbers;
 mod postgres;
 mod sqlite;
 
+pub use blobs::{Blobs, BlobsError, Listed};
 pub use copy::copy;
 pub use error::CatalogError;
 pub use postgres::PostgresCatalog;

@@ -3,7 +3,7 @@
 use super::{byte, mend};
 use crate::Target;
 use crate::disk::MemoryDisk;
-use cager::store::{Content, ContentKey, Kind, NamedFile, SessionMeta, Store};
+use cager::store::{Content, ContentKey, Kind, NamedFile, SessionMeta, Shared, Store};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{Rows, Solver, SolverOptions};
@@ -18,7 +18,7 @@ const LOG_PATH: &str = "/data/sessions/f/frames.log";
 const SOLVER_PATH: &str = "/data/prepared/0707070707070707070707070707070707070707070707070707070707070707.solver";
 
 fn open(disk: &MemoryDisk) -> Store {
-    Store::open(Path::new("/data"), Arc::new(disk.clone()), None).expect("a store").store
+    Store::open(Path::new("/data"), Arc::new(disk.clone()), Shared::default()).expect("a store").store
 }
 
 /// The second byte says how many rows the session's cages have.
@@ -62,7 +62,8 @@ fn log(mut bytes: &[u8]) {
     cager::store::Disk::create_dir(&disk, folder).expect("a folder");
     disk.put(Path::new(FILES[0].0), &session_file());
     disk.put(Path::new(LOG_PATH), &file);
-    let opened = Store::open(Path::new("/data"), Arc::new(disk.clone()), None).expect("damage is no error");
+    let opened =
+        Store::open(Path::new("/data"), Arc::new(disk.clone()), Shared::default()).expect("damage is no error");
     let store = opened.store;
     if !opened.quarantined.is_empty() {
         return;
@@ -236,7 +237,8 @@ fn small_file(mut bytes: &[u8]) {
     if kind == "completion" {
         disk.put(Path::new(FILES[0].0), &session_file());
     }
-    let opened = Store::open(Path::new("/data"), Arc::new(disk.clone()), None).expect("damage is no error");
+    let opened =
+        Store::open(Path::new("/data"), Arc::new(disk.clone()), Shared::default()).expect("damage is no error");
     if kind == "session" {
         assert_eq!(opened.sessions.len() + opened.quarantined.len(), 1, "the session is not accounted for");
         assert!(opened.sessions.iter().all(|meta| meta.id == ID));

@@ -2,7 +2,7 @@
 
 use super::{EIO, ENOSPC, Given, KEY};
 use crate::store::faults::{Fault, Loss};
-use crate::store::{CageJobMeta, Kind, Opened, Store, StoreError, StoredPart};
+use crate::store::{CageJobMeta, Kind, Opened, Shared, Store, StoreError, StoredPart};
 use cager_proto::cage_messages::CageOptions;
 use std::io::{self, Read as _};
 
@@ -50,7 +50,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), StoreError> {
     fn twice<T>(mut step: impl FnMut() -> Result<T, StoreError>) -> Result<T, StoreError> {
         step().or_else(|_| step())
     }
-    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), None))?.store;
+    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), Shared::default()))?.store;
     for id in ["a", "b"] {
         twice(|| create(&store, id))?;
         told.created.push(id);

@@ -2,7 +2,7 @@
 
 use super::{EIO, ENOSPC, Given, KEY, SOLVER, append, completion, content, frames, meta, write_frames};
 use crate::store::faults::{Fault, Loss};
-use crate::store::{Kind, Opened, Store, StoreError};
+use crate::store::{Kind, Opened, Shared, Store, StoreError};
 use std::io;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), ()> {
             .map_err(|error| errors.push(error))
     }
     let errors = &mut told.errors;
-    let store = twice(errors, || Store::open(given.root(), Arc::new(given.disk.clone()), None))?.store;
+    let store = twice(errors, || Store::open(given.root(), Arc::new(given.disk.clone()), Shared::default()))?.store;
     twice(errors, || store.put_content(&KEY, &content()))?;
     told.content = true;
     twice(errors, || store.put_prepared(&KEY, &SOLVER))?;

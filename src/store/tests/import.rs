@@ -2,7 +2,7 @@
 
 use super::{Given, ROWS, cage, completion, entry, frames, meta};
 use crate::store::faults::{Fault, Loss};
-use crate::store::{Disk as _, Kind, Opened, SessionMeta, meta as files};
+use crate::store::{Disk as _, Kind, Opened, SessionMeta, Shared, meta as files};
 use serde::Serialize;
 use std::path::Path;
 
@@ -125,7 +125,8 @@ fn taking_over_may_stop_anywhere() {
         for loss in [Loss::Nothing, Loss::Everything, Loss::Torn(nth)] {
             let given = old();
             given.disk.fail(None, nth, Fault::Stop);
-            let stopped = crate::store::Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), None);
+            let stopped =
+                crate::store::Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), Shared::default());
             drop(stopped);
             given.disk.restart(loss).unwrap();
             look(&given, &format!("stopped at operation {nth}, {loss:?}"));

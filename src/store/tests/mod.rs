@@ -45,7 +45,7 @@ impl Given {
     }
 
     pub(crate) fn open(&self) -> Opened {
-        Store::open(self.root(), Arc::new(self.disk.clone()), None).unwrap()
+        Store::open(self.root(), Arc::new(self.disk.clone()), Shared::default()).unwrap()
     }
 }
 

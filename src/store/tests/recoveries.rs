@@ -2,7 +2,7 @@
 
 use super::{EIO, ENOSPC, Given};
 use crate::store::faults::{Fault, Loss};
-use crate::store::{Kind, NamedFile, Opened, RecoveryMeta, RecoveryParts, Store, StoreError, StoredPart};
+use crate::store::{Kind, NamedFile, Opened, RecoveryMeta, RecoveryParts, Shared, Store, StoreError, StoredPart};
 use cager_proto::recovery_messages::RecoveryOptions;
 use std::convert::Infallible;
 use std::io;
@@ -63,7 +63,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), StoreError> {
     fn twice<T>(mut step: impl FnMut() -> Result<T, StoreError>) -> Result<T, StoreError> {
         step().or_else(|_| step())
     }
-    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), None))?.store;
+    let store = twice(|| Store::open(given.root(), std::sync::Arc::new(given.disk.clone()), Shared::default()))?.store;
     for id in ["a", "b"] {
         twice(|| match store.create_recovery(&meta(id), &parts()) {
             // Made at the first attempt, where even taking it back had failed.

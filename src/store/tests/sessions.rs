@@ -2,7 +2,7 @@
 
 use super::{ENOSPC, Given, append, completion, frames, meta};
 use crate::store::faults::{Fault, Op};
-use crate::store::{Kind, LocalDisk, Opened, SessionMeta, Store, StoreError};
+use crate::store::{Kind, LocalDisk, Opened, SessionMeta, Shared, Store, StoreError};
 use cager_store::{Key, NewRecord, Phase};
 use std::io;
 use std::sync::Arc;
@@ -60,7 +60,7 @@ fn a_damaged_session_stays_so_until_it_is_deleted() {
 fn a_folder_that_has_lost_its_catalogue_is_left_as_it_is() {
     let given = Given::new();
     let folder = given.root().join("data");
-    let open = || Store::open(&folder, Arc::new(LocalDisk), None);
+    let open = || Store::open(&folder, Arc::new(LocalDisk), Shared::default());
     let store = open().unwrap().store;
     store.create_session(&meta("a")).unwrap();
     append(&store, "a", &[1, 2]).unwrap();
@@ -84,12 +84,12 @@ fn a_folder_that_has_lost_its_catalogue_is_left_as_it_is() {
 fn one_process_at_a_time() {
     let given = Given::new();
     let opened = given.open();
-    let refused = Store::open(given.root(), Arc::new(LocalDisk), None);
+    let refused = Store::open(given.root(), Arc::new(LocalDisk), Shared::default());
     assert!(matches!(refused, Err(StoreError::Locked { .. })), "{refused:?}");
     let store = opened.store.clone();
     drop(opened);
     assert!(
-        matches!(Store::open(given.root(), Arc::new(LocalDisk), None), Err(StoreError::Locked { .. })),
+        matches!(Store::open(given.root(), Arc::new(LocalDisk), Shared::default()), Err(StoreError::Locked { .. })),
         "it is in use"
     );
     drop(store);

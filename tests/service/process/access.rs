@@ -327,3 +327,42 @@ async fn from_another_machine_the_operator_has_a_token_that_says_so() {
     operator(Some(root)).delete(&path).await.expect(204);
     app.caller(Some(ANNA)).get(&format!("/v1/sessions/{}", session.id)).await.problem(404, "not-found");
 }
+
+#[tokio::test]
+async fn the_audit_file_says_who_changed_what() {
+    let place = folder();
+    let path = place.path().join("audit.jsonl");
+    let setting = format!("audit={}", path.display());
+    let app = TestApp::guarded_with(&[("anna", ANNA, ""), ("bert", BERT, "scope = \"read\"")], &[&setting]);
+    let capture = Capture::tiny();
+    let id = app.completed(capture, 10).await.id;
+    app.get(&format!("/v1/sessions/{id}")).await.expect(200);
+    app.caller(Some(BERT)).delete(&format!("/v1/sessions/{id}")).await.problem(403, "forbidden");
+    app.caller(None).delete(&format!("/v1/sessions/{id}")).await.problem(401, "unauthorized");
+    app.delete(&format!("/v1/sessions/{id}")).await.expect(204);
+    let lines = std::fs::read_to_string(&path).expect("a file");
+    let lines: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let said: Vec<_> =
+        lines.iter().map(|line| (line["action"].as_str(), line["path"].as_str(), &line["status"])).collect();
+    let (session, at) = (format!("/v1/sessions/{id}"), |rest: &str| format!("/v1/sessions/{id}{rest}"));
+    let (frames, complete) = (at("/frames"), at("/complete"));
+    assert_eq!(
+        said,
+        [
+            (Some("POST"), Some("/v1/sessions"), &201.into()),
+            (Some("POST"), Some(&*frames), &200.into()),
+            (Some("POST"), Some(&*complete), &200.into()),
+            (Some("DELETE"), Some(&*session), &204.into()),
+        ]
+    );
+    assert_eq!(lines[0]["made"], session);
+    for line in &lines {
+        let request = line["request_id"].as_str().is_some_and(|id| app.log().contains(id));
+        assert!(
+            request && line["tenant"] == "anna" && line["token"] == "key-0" && line["peer"] == "127.0.0.1",
+            "{line}"
+        );
+    }
+    let said = refused(&["--set", "audit=/nowhere/audit.jsonl"]);
+    assert!(said.contains("/nowhere/audit.jsonl") && said.contains("cannot be written to"), "{said}");
+}

@@ -10,9 +10,15 @@ use std::time::{Duration, Instant};
 
 /// What a service that does not start says.
 fn refused(data: &std::path::Path, catalog: Option<&str>) -> String {
+    let flags: Vec<&str> = catalog.into_iter().flat_map(|url| ["--catalog", url]).collect();
+    refused_with(data, &flags, &[])
+}
+
+/// As [`refused`], with these flags and variables.
+pub(super) fn refused_with(data: &std::path::Path, flags: &[&str], environment: &[(&str, String)]) -> String {
     let mut command = service();
-    command.args(["--listen", "127.0.0.1:0", "--data"]).arg(data);
-    command.args(catalog.into_iter().flat_map(|url| ["--catalog", url]));
+    command.args(["--listen", "127.0.0.1:0", "--data"]).arg(data).args(flags);
+    command.envs(environment.iter().map(|(name, value)| (name, value)));
     let done = command.output().expect("the service");
     assert!(!done.status.success());
     String::from_utf8(done.stderr).expect("text")
@@ -69,6 +75,7 @@ async fn a_service_that_was_taken_over_while_it_stood_still_changes_nothing_and_
     let session = first.ready(capture).await;
     first.upload(&session.id, 0, capture.raw(0..15)).await;
     let waiting = first.beside();
+    eventually("it waits", async || waiting.log().contains("waits, to take over").then_some(())).await;
     let process = Pid::from_raw(first.id() as i32).expect("it runs");
     kill_process(process, Signal::STOP).expect("it stands still");
     // Its connections end, as they do where its machine is cut off.

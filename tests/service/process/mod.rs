@@ -1,4 +1,5 @@
 mod access;
+mod bucket;
 mod database;
 mod folder;
 mod limits;
@@ -8,5 +9,6 @@ mod problems;
 mod provider;
 mod restart;
 mod stop;
+mod store;
 mod traces;
 mod webhooks;

@@ -114,6 +114,12 @@ impl TestApp {
         Waiting::spawn(place, flags, Vec::new(), Some(database.clone()), self.api.token.clone()).ready()
     }
 
+    /// Another one with the same settings, on a folder that is new.
+    pub(crate) fn elsewhere(&self) -> Waiting {
+        let (flags, environment) = (self.flags.clone(), self.environment.clone());
+        Waiting::spawn(Arc::new(folder()), flags, environment, self.database.clone(), self.api.token.clone())
+    }
+
     /// Another one, on the same folder with the same settings.
     pub(crate) fn beside(&self) -> Waiting {
         let (place, flags, environment) = (Arc::clone(&self.place), self.flags.clone(), self.environment.clone());
@@ -295,8 +301,9 @@ impl Waiting {
         let mut process = service()
             .args(["--listen", "127.0.0.1:0", "--data"])
             .arg(place.path().join("data"))
-            .args(database.iter().flat_map(|database| ["--catalog".to_owned(), database.url()]))
+            .args(database.iter().flat_map(Database::flags))
             .args(&flags)
+            .envs(database.iter().flat_map(Database::environment))
             .envs(environment.iter().map(|(name, value)| (name, value)))
             .stdout(Stdio::piped())
             .stderr(log.expect("a log"))

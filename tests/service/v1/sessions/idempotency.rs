@@ -1,7 +1,7 @@
 //! `Idempotency-Key`: a session is made once, however often it is asked for.
 
 use crate::support::{Capture, TestApp, cage_form, file, form, text};
-use cager::store::{Idempotency, Kind, LocalDisk, Store};
+use cager::store::{Idempotency, Kind, LocalDisk, Shared, Store};
 use cager_proto::cage_messages::CageJob;
 use cager_proto::messages::{Session, SessionList};
 use futures_util::future::join_all;
@@ -112,7 +112,9 @@ async fn a_key_of_a_version_with_other_fingerprints_still_answers() {
     {
         let data = app.data();
         let database = app.catalog();
-        let opened = Store::open(&data, Arc::new(LocalDisk), database.as_deref()).expect("a store");
+        let opened =
+            Store::open(&data, Arc::new(LocalDisk), Shared { catalog: database.as_deref(), ..Shared::default() })
+                .expect("a store");
         let mut meta = opened.sessions.first().expect("a session").clone();
         meta.idempotency = Some(Idempotency { key: "k".to_owned(), fingerprint: "0".repeat(64) });
         opened.store.delete(Kind::Session, &meta.id).expect("a deletion");
