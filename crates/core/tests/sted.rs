@@ -103,7 +103,8 @@ fn a_rigid_motion_of_both_changes_nothing() {
 #[test]
 fn the_size_and_unit_of_the_capture_change_nothing() {
     let decoded = displaced(&capture(), noise(0.004, 1));
-    let scaled = |frames: &Frames| displaced(frames, |_, _| 0.0).iter().map(|f| f.iter().map(|x| 100.0 * x).collect()).collect();
+    let scaled =
+        |frames: &Frames| displaced(frames, |_, _| 0.0).iter().map(|f| f.iter().map(|x| 100.0 * x).collect()).collect();
     let (captured, found): (Frames, Frames) = (scaled(&capture()), scaled(&decoded));
     let mut meter = StedMeter::new(&grid(), SIDE * SIDE, 100.0 * DIAGONAL, StedOptions::default()).unwrap();
     captured.iter().zip(&found).for_each(|(a, b)| meter.add(a, b).unwrap());
@@ -152,13 +153,13 @@ fn what_cannot_be_measured_is_refused_or_nan() {
     let mut faces = Polygons::new();
     faces.push(&[0, 1, 3]);
     let options = StedOptions::default();
-    assert_eq!(
-        StedMeter::new(&faces, 3, 1.0, options).err(),
-        Some(StedError::NoSuchVertex { vertex: 3, points: 3 })
-    );
-    for (diagonal, options) in
-        [(0.0, options), (f64::NAN, options), (1.0, StedOptions { rings: 0, ..options }), (1.0, StedOptions { window: 1, ..options })]
-    {
+    assert_eq!(StedMeter::new(&faces, 3, 1.0, options).err(), Some(StedError::NoSuchVertex { vertex: 3, points: 3 }));
+    for (diagonal, options) in [
+        (0.0, options),
+        (f64::NAN, options),
+        (1.0, StedOptions { rings: 0, ..options }),
+        (1.0, StedOptions { window: 1, ..options }),
+    ] {
         assert!(matches!(StedMeter::new(&faces, 4, diagonal, options).err(), Some(StedError::Options { .. })));
     }
     let mut meter = StedMeter::new(&faces, 4, 1.0, options).unwrap();
@@ -202,7 +203,10 @@ fn numpy_finds_the_same() {
         let found = measured(&captured, &decoded, options);
         let [spatial, temporal, total] = by_numpy(&python, &captured, &decoded, options);
         for (a, b) in [(found.spatial, spatial), (found.temporal.unwrap(), temporal), (found.total, total)] {
-            assert!((a - b).abs() <= 1e-12 * b.abs(), "{options:?}: {found:?}, but numpy has {spatial}, {temporal}, {total}");
+            assert!(
+                (a - b).abs() <= 1e-12 * b.abs(),
+                "{options:?}: {found:?}, but numpy has {spatial}, {temporal}, {total}"
+            );
         }
     }
 }
