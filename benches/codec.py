@@ -2,7 +2,8 @@
 
 `make bench-codec` builds the program and calls this with the Python of the peers. Everything in a file counts: model, cage, errors, tables.
 Errors are measured on what each decoder gives back. The captures are looked for in CAGER_CAPTURES (default ../shared/data); cages that are
-designed stay in the folder given as argument (default out/codec).
+designed stay in the folder given as argument (default out/codec). `--perceptual` measures and writes what has no times alone: STED and differences
+between whole curves, which any build of the program may be used for.
 """
 
 import io
@@ -21,11 +22,16 @@ import numpy as np
 import zstandard
 from pxr import Usd, UsdGeom, Vt
 
+from bjontegaard import bd_rate, frontier
 from cages import CAGER, DATA, ROOT, table, write
+from sted import Sted
 
 PAGE = os.path.join(ROOT, "docs", "RATES.md")
 BLENDER = os.path.join(ROOT, "target", "blender", "bin", "python")
 CAPTURES = ["samba", "horse-gallop", "makehuman-cmu-walk", "chickenCrossing", "supercages-arm"]
+# The horse's capture has 24 frames twice.
+CYCLE = ("horse-gallop", 24)
+OURS, PEERS = "cager, cage designed, 350", ["quantised PCA, xz", "Draco, each frame", "meshoptimizer, temporal deltas"]
 SETTINGS = [
     ["--quality", "preview"],
     *(["--mean-error", f"{e:g}"] for e in (5e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 2.5e-4, 1e-4, 5e-5)),
@@ -36,9 +42,12 @@ FEW = [SETTINGS[0], ["--mean-error", "0.001"], ["--max-error", "0.001"], ["--max
 
 
 class Capture:
-    def __init__(self, name):
+    def __init__(self, name, count=None):
+        """All frames, or the first few."""
         self.name, self.folder = name, os.path.join(DATA, name)
-        self.frames = np.load(os.path.join(self.folder, "frames.npy")).astype(np.float64)
+        self.frames = np.load(os.path.join(self.folder, "frames.npy")).astype(np.float64)[:count]
+        files = ["--rest", f"{self.folder}/rest.obj", "--frames", f"{self.folder}/frames.npy"]
+        self.files = files if count is None else [*files, "--frames-range", f"0-{count - 1}"]
         points, faces = [], []
         with open(os.path.join(self.folder, "rest.obj"), encoding="utf-8") as file:
             for line in file:
@@ -51,11 +60,13 @@ class Capture:
         self.faces = np.array([[f[0], f[k], f[k + 1]] for f in faces for k in range(1, len(f) - 1)], np.uint32)
         self.diagonal = np.linalg.norm(np.ptp(self.rest, axis=0))
         self.spread = np.square(self.frames - self.frames.mean(1, keepdims=True)).sum()
+        self.sted = Sted(faces, len(self.rest), self.diagonal)
 
     def row(self, kind, setting, size, decoded, encode, decode):
         """Figures of a file of `size` bytes that decodes to these frames; times in seconds for the whole capture."""
         difference = self.frames - decoded
         count, points, _ = self.frames.shape
+        spatial, temporal, sted = self.sted(self.frames, decoded)
         return {
             "capture": self.name,
             "kind": kind,
@@ -64,6 +75,9 @@ class Capture:
             "bpvf": 8 * size / (count * points),
             "kg": 100 * math.sqrt(np.square(difference).sum() / self.spread),
             "max": np.linalg.norm(difference, axis=2).max() / self.diagonal,
+            "sted": sted,
+            "sted spatial": spatial,
+            "sted temporal": temporal,
             "encode": count / encode,
             "decode": count / decode,
         }
@@ -85,7 +99,7 @@ def cages(capture, folder):
     """Kinds of cages and their files: designed for this capture, made by a program, made by an artist."""
     designed = os.path.join(folder, f"{capture.name}-350.obj")
     if not os.path.exists(designed):
-        cager("cage", "--rest", f"{capture.folder}/rest.obj", "--frames", f"{capture.folder}/frames.npy", "--style", "free", "-o", designed)
+        cager("cage", *capture.files, "--style", "free", "-o", designed)
     found = {"designed, 350": designed}
     for name, kind in [("cage350.obj", "offset surface, 350"), ("cage.obj", "artist's")]:
         path = os.path.join(capture.folder, name)
@@ -94,13 +108,15 @@ def cages(capture, folder):
     return found
 
 
-def ours(capture, folder):
+def ours(capture, folder, kinds=None):
+    """In all cages, or in those of some kinds."""
     out, back = os.path.join(folder, "out.cager"), os.path.join(folder, "back.npy")
     for kind, cage in cages(capture, folder).items():
+        if kinds and kind not in kinds:
+            continue
         for setting in SETTINGS if kind.startswith("designed") else FEW:
-            files = ["--rest", f"{capture.folder}/rest.obj", "--cage", cage, "--frames", f"{capture.folder}/frames.npy"]
             try:
-                _, encode = timed(lambda: cager("encode", *files, *setting, "-o", out))
+                _, encode = timed(lambda: cager("encode", *capture.files, "--cage", cage, *setting, "-o", out))
             except SystemExit as refused:
                 print(f"{capture.name}, cage {kind}, {' '.join(setting)}: {refused}", flush=True)
                 continue
@@ -270,35 +286,88 @@ def rows_of(rows):
     )
 
 
+def curve(rows, kind, error):
+    """The best points of a kind, as logarithm of the error and rate."""
+    points = frontier((row[error], row["bpvf"]) for row in rows if row["kind"] == kind and row[error] > 0)
+    return [(math.log10(error), rate) for error, rate in points]
+
+
+def differences(captures):
+    """Table of what ours takes more or less than each peer."""
+    out = []
+    for name, rows in captures.items():
+        for error, label in (("kg", "KG error"), ("sted", "STED")):
+            found = [bd_rate(curve(rows, peer, error), curve(rows, OURS, error)) for peer in PEERS]
+            out.append([name, label, *("–" if d is None else f"{d[0]:+.1f} % over {100 * d[1]:.0f} %" for d in found)])
+    return table(["capture", "at the same", *(f"against {peer}" for peer in PEERS)], out)
+
+
+def perceptual(captures):
+    """The part of the page about STED: differences between curves, and the values of every file that is not exact."""
+    page = io.StringIO()
+    page.write(f"\n{differences(captures)}\n")
+    for name, rows in captures.items():
+        shown = [row for row in rows if row["kind"] in (OURS, *PEERS)]
+        page.write(f"\n### {name}\n\n")
+        head = ["file", "setting", "bits per vertex and frame", "KG error, %", "STED", "spatial part", "temporal part"]
+        lines = [[r["kind"], r["setting"], f"{r['bpvf']:.3f}", f"{r['kg']:.4f}", *(f"{r[key]:.6f}" for key in ("sted", "sted spatial", "sted temporal"))] for r in shown]
+        page.write(table(head, lines) + "\n")
+    return page.getvalue()
+
+
+def lossy(capture, folder):
+    """Rows of the files of which there are curves."""
+    return [row for part in (ours(capture, folder, ["designed, 350"]), draco(capture), meshopt(capture), pca(capture)) for row in part]
+
+
+def write_perceptual(folder, captures):
+    captures[f"{CYCLE[0]}, its first {CYCLE[1]} frames"] = lossy(Capture(*CYCLE), folder)
+    with open(os.path.join(folder, "perceptual.json"), "w", encoding="utf-8") as file:
+        json.dump(captures, file, indent=1)
+    with open(PAGE, encoding="utf-8") as file:
+        text = write(file.read(), "perceptual", perceptual(captures))
+    with open(PAGE, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
 def main():
-    folder = sys.argv[1] if len(sys.argv) > 1 else os.path.join(ROOT, "out", "codec")
+    arguments = [argument for argument in sys.argv[1:] if argument != "--perceptual"]
+    folder = arguments[0] if arguments else os.path.join(ROOT, "out", "codec")
     os.makedirs(folder, exist_ok=True)
+    if "--perceptual" in sys.argv[1:]:
+        captures = {}
+        for name in CAPTURES:
+            captures[name] = lossy(Capture(name), folder)
+            print(name, flush=True)
+        write_perceptual(folder, captures)
+        return
     page = io.StringIO()
     chosen = []
-    everything = []
+    captures = {}
     for name in CAPTURES:
         capture = Capture(name)
         rows = [row for part in (ours(capture, folder), draco(capture), meshopt(capture), pca(capture), plain(capture), alembic(capture)) for row in part]
         plot(name, rows)
-        everything += rows
+        captures[name] = rows
         count, points, _ = capture.frames.shape
         page.write(f"\n## {name}\n\n{points:,} points, {count} frames.\n\n![bits over error](rates-{name}.svg)\n\n{rows_of(rows)}\n")
         print(name, flush=True)
         if name in ("samba", "horse-gallop"):
             for goal in (0.6, 0.21, 0.11):
                 line = [name, f"{goal} %"]
-                for kind in ("cager, cage designed, 350", "quantised PCA, xz", "Draco, each frame", "meshoptimizer, temporal deltas"):
+                for kind in (OURS, *PEERS):
                     fitting = [r for r in rows if r["kind"] == kind and r["kg"] <= goal]
                     best = min(fitting, key=lambda r: r["bpvf"], default=None)
                     line.append("–" if best is None else f"{best['bpvf']:.2f} at {best['kg']:.2f} %")
                 chosen.append(line)
     with open(os.path.join(folder, "rates.json"), "w", encoding="utf-8") as file:
-        json.dump(everything, file, indent=1)
+        json.dump([row for rows in captures.values() for row in rows], file, indent=1)
     head = ["capture", "KG error at most", "cager, designed cage of 350", "quantised PCA + xz", "Draco, each frame", "meshoptimizer, temporal deltas"]
     with open(PAGE, encoding="utf-8") as file:
         text = write(file.read(), "rates", page.getvalue())
     with open(PAGE, "w", encoding="utf-8") as file:
         file.write(write(text, "summary", table(head, chosen)))
+    write_perceptual(folder, captures)
 
 
 if __name__ == "__main__":

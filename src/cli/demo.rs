@@ -15,6 +15,7 @@ use anyhow::{Context, Result, ensure};
 use cager_client::FnFrames;
 use cager_client::messages::SessionOptions;
 use cager_core::cage::Cage;
+use cager_core::sted::{Sted, StedMeter, StedOptions};
 use cager_demo::{Capture, Options};
 use cager_formats::{AtomicFile, Target, commit_together, open_frames, write_model};
 use cager_geometry::mesh::{Model, Polygons, diagonal};
@@ -73,9 +74,9 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     decode::decode(&output, &decoded, Decoding::default(), &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     let decode_seconds = clock.elapsed().as_secs_f64();
-    compare(&capture, &decoded, &report)?;
+    let sted = compare(&capture, &decoded, &report)?;
 
-    let rows = rows(&report, &steps, decode_seconds);
+    let rows = rows(&report, &sted, &steps, decode_seconds);
     let page_file = folder.join("report.html");
     let page = ReportPage::built_in();
     if let Some(page) = &page {
@@ -106,10 +107,11 @@ fn generated(capture: &Arc<Capture>) -> impl cager_client::FrameSource + 'static
 }
 
 /// Measures the decoded file anew, to show that the report says what a user gets.
-fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<()> {
+fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<Sted> {
     let n = capture.rest.points.len();
     let size = diagonal(&capture.rest.points);
     let mut reader = open_frames(decoded, n)?;
+    let mut sted = StedMeter::new(&capture.rest.faces, n, size, StedOptions::default())?;
     let (mut truth, mut found) = (Vec::new(), Vec::new());
     for (t, said) in report.error.per_frame.iter().enumerate() {
         capture.frame(t, &mut truth);
@@ -128,11 +130,12 @@ fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<()> {
             said.l2,
             said.linf
         );
+        sted.add(&truth, &found)?;
     }
-    Ok(())
+    Ok(sted.result())
 }
 
-fn rows(report: &Report, steps: &Steps, decode_seconds: f64) -> Vec<Row> {
+fn rows(report: &Report, sted: &Sted, steps: &Steps, decode_seconds: f64) -> Vec<Row> {
     let s = &report.seconds;
     let seconds = |s: f64| format!("{s:.3} s");
     let mut rows = Vec::new();
@@ -152,6 +155,7 @@ fn rows(report: &Report, steps: &Steps, decode_seconds: f64) -> Vec<Row> {
         format!("{:.3} / {:.3} %", 100.0 * report.error.linf_mean, 100.0 * report.error.linf_max),
         "of the rest diagonal",
     );
+    row("STED", format!("{:.5}", sted.total), "uneven change of edges, and trembling (Váša and Skala 2011)");
     row("affine reproduction", format!("{:.1e}", report.affine_reproduction_error), "of the rest diagonal");
     row(
         "condition number",

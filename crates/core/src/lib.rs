@@ -11,6 +11,7 @@ pub mod numbers;
 pub mod regularize;
 mod row_basis;
 mod simd;
+pub mod sted;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.
