@@ -28,6 +28,7 @@ pub const FORMATS: &[Listed] = &[
     animated("abc", "Alembic (Ogawa)", true, "frame rate, times"),
     animated("usdc", "Universal Scene Description, binary", true, "unit, up axis, frame rate, times"),
     animated("usdz", "the same as a package", true, "unit, up axis, frame rate, times"),
+    animated("usda", "the same as text", false, "unit, up axis, frame rate, times"),
     animated("usd", "the same, binary", true, "unit, up axis, frame rate, times"),
     animated("glb", "binary glTF", true, "metres, Y up, times"),
     animated("gltf", "the same as text and files", false, "metres, Y up, times"),

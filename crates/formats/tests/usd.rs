@@ -148,19 +148,22 @@ fn files_that_end_early_or_are_changed_are_errors_at_the_most() {
 fn what_is_no_layer_says_what_it_is() {
     let of = |bytes: &[u8]| message(open(bytes, 4));
     assert!(of(&support::npy_f4()).contains("is not a .usd file but a file of the kind .npy"));
-    assert!(of(b"#usda 1.0\n").contains("is text of USD, which is not read; write it as binary with usdcat"));
+    assert!(of(b"#usda 1.0\n").contains("holds no polygon mesh"));
     assert!(of(b"PXR-USDC\0\x03\0").contains("is of version 0.3.0 of USD's binary format, where 0.4.0 to 0.13.0 are"));
     assert!(of(b"what").contains("does not begin as a file of USD does"));
 }
 
+/// Both kinds of layers.
+const KINDS: [&str; 2] = ["usdc", "usda"];
+
 /// Files of OpenUSD, written by `tests/peers/usd.py make`.
 fn made(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/usd").join(name).with_extension("usdc")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/usd").join(name)
 }
 
-fn take(name: &str, prim: Option<&str>) -> Result<Box<dyn FrameReader>, Error> {
+fn take(name: &str, kind: &str, prim: Option<&str>) -> Result<Box<dyn FrameReader>, Error> {
     let selection = FrameSelection { prim: prim.map(str::to_owned), ..FrameSelection::default() };
-    open_selected_frames(made(name), 3, &selection)
+    open_selected_frames(made(name).with_extension(kind), 3, &selection)
 }
 
 /// What the library says that a file holds.
@@ -171,46 +174,58 @@ fn told(name: &str) -> Vec<Vec<f64>> {
 
 #[test]
 fn transforms_above_a_mesh_move_it_as_the_library_does() {
-    for (name, prim, largest) in
-        [("operations", None, 1e-5), ("reset", None, 0.0), ("doubles", None, 0.0), ("single", None, 0.0)]
+    let all_kinds = |name, largest| KINDS.map(|kind| (name, kind, largest));
+    for (name, kind, largest) in [("operations", 1e-5), ("reset", 0.0), ("doubles", 0.0), ("single", 0.0)]
+        .into_iter()
+        .flat_map(|(name, largest)| all_kinds(name, largest))
     {
-        let (read, told) = (all(&mut *take(name, prim).unwrap()), told(name));
-        assert_eq!(read.len(), told.len(), "{name}");
+        let (read, told) = (all(&mut *take(name, kind, None).unwrap()), told(name));
+        assert_eq!(read.len(), told.len(), "{name}.{kind}");
         for (frame, (read, told)) in read.iter().zip(&told).enumerate() {
             let off = read.iter().zip(told).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(off <= largest, "{name}: frame {frame} is off by {off}");
+            assert!(off <= largest, "{name}.{kind}: frame {frame} is off by {off}");
         }
     }
-    let reader = take("reset", None).unwrap();
-    assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(25.0), vec![1.0, 2.0, 3.0, 4.0]));
+    for kind in KINDS {
+        let reader = take("reset", kind, None).unwrap();
+        assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(25.0), vec![1.0, 2.0, 3.0, 4.0]));
+    }
 }
 
 #[test]
 fn faces_are_wound_counterclockwise() {
-    assert_eq!(take("left", None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
-    // One of its transforms mirrors.
-    assert_eq!(take("operations", None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
+    for kind in KINDS {
+        assert_eq!(take("left", kind, None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
+        // One of its transforms mirrors.
+        assert_eq!(take("operations", kind, None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
+    }
 }
 
 #[test]
 fn topology_that_changes_names_the_frame() {
-    let (mut reader, mut frame) = (take("faces", None).unwrap(), Vec::new());
-    assert!(reader.read_next(&mut frame).unwrap() && reader.read_next(&mut frame).unwrap());
-    let error = message(reader.read_next(&mut frame));
-    assert!(error.contains("frame 2: its topology changes: its faces are not those of frame 0; "), "{error}");
+    for kind in KINDS {
+        let (mut reader, mut frame) = (take("faces", kind, None).unwrap(), Vec::new());
+        assert!(reader.read_next(&mut frame).unwrap() && reader.read_next(&mut frame).unwrap());
+        let error = message(reader.read_next(&mut frame));
+        assert!(error.contains("frame 2: its topology changes: its faces are not those of frame 0; "), "{error}");
+    }
 }
 
 #[test]
 fn one_of_several_meshes_is_chosen_by_path_or_name() {
-    let error = message(take("several", None));
-    for path in ["holds 3 meshes", "/coat/body (3 points)", "/skin/body (3 points)", "/hat (3 points)", "with --prim"] {
-        assert!(error.contains(path), "{error}");
+    for kind in KINDS {
+        let error = message(take("several", kind, None));
+        for path in
+            ["holds 3 meshes", "/coat/body (3 points)", "/skin/body (3 points)", "/hat (3 points)", "with --prim"]
+        {
+            assert!(error.contains(path), "{error}");
+        }
+        for prim in ["/skin/body", "skin/body/", "skin"] {
+            assert_eq!(all(&mut *take("several", kind, Some(prim)).unwrap())[0], told("several")[0]);
+        }
+        assert!(message(take("several", kind, Some("body"))).contains("holds 2 meshes, "));
+        assert!(message(take("several", kind, Some("gone"))).contains("holds no mesh gone, but "));
     }
-    for prim in ["/skin/body", "skin/body/", "skin"] {
-        assert_eq!(all(&mut *take("several", Some(prim)).unwrap())[0], told("several")[0]);
-    }
-    assert!(message(take("several", Some("body"))).contains("holds 2 meshes, "));
-    assert!(message(take("several", Some("gone"))).contains("holds no mesh gone, but "));
 }
 
 #[test]
@@ -222,9 +237,11 @@ fn what_a_layer_is_composed_of_is_named() {
         ("variants", "/group has variants"),
         ("sublayers", "the layer has sublayers"),
     ] {
-        let error = message(take(name, None));
-        let cure = ", which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc";
-        assert!(error.contains(&format!("{what}{cure}")), "{error}");
+        for kind in KINDS {
+            let error = message(take(name, kind, None));
+            let cure = ", which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc";
+            assert!(error.contains(&format!("{what}{cure}")), "{error}");
+        }
     }
 }
 

@@ -48,6 +48,8 @@ pub enum MeshFormat {
     Usdc,
     /// The same as a package.
     Usdz,
+    /// The same as text.
+    Usda,
     /// Universal Scene Description of any kind.
     Usd,
     /// glTF 2.0 as text, with its data in it or in files beside it.
@@ -56,7 +58,7 @@ pub enum MeshFormat {
 
 impl MeshFormat {
     /// All formats.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Obj,
         Self::Ply,
         Self::Off,
@@ -65,6 +67,7 @@ impl MeshFormat {
         Self::Abc,
         Self::Usdc,
         Self::Usdz,
+        Self::Usda,
         Self::Usd,
         Self::Gltf,
     ];
@@ -83,6 +86,7 @@ impl MeshFormat {
             Self::Abc => "abc",
             Self::Usdc => "usdc",
             Self::Usdz => "usdz",
+            Self::Usda => "usda",
             Self::Usd => "usd",
             Self::Gltf => "gltf",
         }
@@ -97,9 +101,6 @@ impl MeshFormat {
             return Ok(format);
         }
         let found = match path.extension() {
-            Some(found) if found.eq_ignore_ascii_case("usda") => {
-                "text of USD is not read; write it as binary with usdcat in.usda -o out.usdc".to_owned()
-            }
             Some(found) => format!(
                 ".{} is not a mesh format that is read; convert it to one of {}",
                 found.display(),

@@ -80,6 +80,9 @@ pub fn create_frames(
     match CacheFormat::from_path(path) {
         Some(CacheFormat::Glb) => Ok(Box::new(MorphWriter::create(announced, &target, faces, options)?)),
         Some(CacheFormat::Gltf) => Err(Fault::unsupported("is written in binary alone; end the name in .glb").at(path)),
+        Some(CacheFormat::Usda) => {
+            Err(Fault::unsupported("is written in binary alone; end the name in .usdc").at(path))
+        }
         Some(format) if format.is_scene() => {
             Ok(Box::new(SceneWriter::create(announced, &target, format, faces, options)?))
         }
