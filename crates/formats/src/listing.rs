@@ -31,7 +31,7 @@ pub const FORMATS: &[Listed] = &[
     animated("usda", "the same as text", false, "unit, up axis, frame rate, times"),
     animated("usd", "the same, binary", true, "unit, up axis, frame rate, times"),
     animated("glb", "binary glTF", true, "metres, Y up, times"),
-    animated("gltf", "the same as text and files", false, "metres, Y up, times"),
+    animated("gltf", "the same as text and files", true, "metres, Y up, times"),
 ];
 
 const fn still(extension: &'static str, name: &'static str, written: bool) -> Listed {

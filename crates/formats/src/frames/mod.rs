@@ -123,7 +123,7 @@ pub enum CacheFormat {
     Usd,
     /// Binary glTF 2.0: its meshes as an animation moves them.
     Glb,
-    /// The same as text, with its data in it or in files beside it; not written.
+    /// The same as text, with its data in it or in files beside it.
     Gltf,
 }
 

@@ -1,6 +1,7 @@
 //! Models from and to mesh files.
 
 mod colors;
+mod normals;
 mod obj;
 mod off;
 mod parsed;
@@ -23,6 +24,7 @@ use crate::units::Units;
 use crate::usd;
 
 pub(crate) use colors::{Colors, Scale, srgb};
+pub(crate) use normals::{unit, vertex_normals};
 pub(crate) use parsed::Contents;
 use parsed::Parsed;
 pub(crate) use parsed::check_face;

@@ -38,7 +38,7 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 
 /// Begins an output of `frames` frames of `points` points each.
 ///
-/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`. Without an extension, with
+/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`; `.gltf`, which gets its numbers in a `.bin` file beside it. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
 /// A folder with nothing but such files is replaced as a whole where the target may be. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
@@ -78,8 +78,7 @@ pub fn create_frames(
         return Ok(Box::new(SingleWriter::create(announced, &target, format, faces, options)?));
     }
     match CacheFormat::from_path(path) {
-        Some(CacheFormat::Glb) => Ok(Box::new(MorphWriter::create(announced, &target, faces, options)?)),
-        Some(CacheFormat::Gltf) => Err(Fault::unsupported("is written in binary alone; end the name in .glb").at(path)),
+        Some(CacheFormat::Glb | CacheFormat::Gltf) => Ok(Box::new(MorphWriter::create(announced, &target, faces, options)?)),
         Some(CacheFormat::Usda) => {
             Err(Fault::unsupported("is written in binary alone; end the name in .usdc").at(path))
         }
@@ -88,7 +87,7 @@ pub fn create_frames(
         }
         Some(format) => Ok(Box::new(CacheWriter::create(announced, &target, format, options)?)),
         None => Err(Fault::unsupported(
-            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .abc .usdc .usdz .glb, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
+            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .abc .usdc .usdz .glb .gltf, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
         )
         .at(path)),
     }

@@ -48,7 +48,7 @@ pub struct FrameOptions {
     pub rounding: f64,
     /// What the positions mean, for the formats that say it; metres and Y up where nothing is told.
     pub units: Option<Units>,
-    /// How `.glb` holds the frames.
+    /// How `.glb` and `.gltf` hold the frames.
     pub morphs: MorphOptions,
 }
 
@@ -63,6 +63,8 @@ pub struct MorphOptions {
     pub diagonal: Option<f64>,
     /// Whether positions are floats instead of whole numbers of 16 bits.
     pub floats: bool,
+    /// Whether normals are written, of the mean shape and of each target: 12 bytes for each point of them.
+    pub normals: bool,
 }
 
 impl FrameOptions {
