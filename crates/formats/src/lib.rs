@@ -18,6 +18,7 @@ mod signature;
 mod text;
 mod units;
 mod usd;
+mod vat;
 
 pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
 pub use error::{Action, Error};

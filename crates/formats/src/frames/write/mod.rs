@@ -7,6 +7,7 @@ mod output;
 mod scene;
 mod sequence;
 mod single;
+mod textures;
 
 use std::path::{MAIN_SEPARATOR, Path};
 
@@ -25,6 +26,7 @@ pub use output::{FrameOptions, FrameWriter, MorphOptions};
 use scene::SceneWriter;
 use sequence::SequenceWriter;
 use single::SingleWriter;
+use textures::TextureWriter;
 
 /// The file or folder that [`create_frames`] makes for this path: of a pattern, the folder.
 pub fn frames_path(path: &Path) -> &Path {
@@ -38,7 +40,8 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 
 /// Begins an output of `frames` frames of `points` points each.
 ///
-/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`; `.gltf`, which gets its numbers in a `.bin` file beside it. Without an extension, with
+/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`; `.gltf`, which gets its numbers in a `.bin` file beside it. `.vat` becomes a folder of a mesh and the
+/// images that move it, as OpenVAT has them. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
 /// A folder with nothing but such files is replaced as a whole where the target may be. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
@@ -66,6 +69,9 @@ pub fn create_frames(
     if let Some(names) = NumberedNames::of(given) {
         check_numbered(&names, path).map_err(|fault| fault.at(given))?;
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
+    }
+    if pattern.is_none() && path.extension().is_some_and(|found| found.eq_ignore_ascii_case("vat")) {
+        return Ok(Box::new(TextureWriter::create(announced, &target, faces, options)?));
     }
     if pattern.is_some() || is_folder(path) {
         let whole = |frame: usize| options.number(frame).abs().trunc().to_string().len();
