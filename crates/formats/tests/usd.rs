@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cager_formats::{
-    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, MeshFormat, Units, Up, create_frames, open_frames,
-    open_frames_bytes, open_selected_frames, read_model, read_model_bytes, read_prim_with_units,
+    CacheFormat, CageMesh, Error, FrameOptions, FrameReader, FrameSelection, MeshFormat, Units, Up, create_frames,
+    open_frames, open_frames_bytes, open_selected_frames, read_model, read_model_bytes, read_prim_with_units,
 };
 use cager_geometry::mesh::Polygons;
 use support::{all, message, numbers, polygons, wide};
@@ -95,6 +95,65 @@ fn frames_between_samples_are_interpolated() {
     let (read, stored) = (all(&mut *reader), wide(&moving(3)));
     let between: Vec<f64> = stored[1].iter().zip(&stored[2]).map(|(a, b)| a + 0.5 * (b - a)).collect();
     assert_eq!(read, [stored[0].clone(), stored[1].clone(), between, stored[2].clone()]);
+}
+
+/// A cage of one triangle.
+fn cage() -> CageMesh {
+    CageMesh { points: 3, faces: polygons(&[&[0, 1, 2]]) }
+}
+
+/// The triangle in so many frames.
+fn cage_frames(frames: u16) -> Vec<Vec<f32>> {
+    (0..frames).map(|k| [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(|x| x + f32::from(k)).to_vec()).collect()
+}
+
+fn with_cage(name: &str, frames: u16, origin: Option<[f64; 3]>) -> (TempDir, PathBuf) {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join(name);
+    let options = FrameOptions { cage: Some(cage()), origin, ..FrameOptions::default() };
+    let mut writer = create_frames(&path, 4, frames.into(), &faces(), &options).unwrap();
+    for (frame, cage) in moving(frames).iter().zip(&cage_frames(frames)) {
+        writer.write_frame(frame).unwrap();
+        writer.write_cage(cage).unwrap();
+    }
+    writer.finish().unwrap();
+    (folder, path)
+}
+
+#[test]
+fn a_cage_is_kept_beside_the_mesh_and_read_where_it_is_asked_for() {
+    for name in ["a.usdc", "a.usdz"] {
+        let (_folder, path) = with_cage(name, 5, None);
+        let mut reader = open_frames(&path, 4).unwrap();
+        assert_eq!(reader.mesh().unwrap().1, &faces());
+        assert_eq!(all(&mut *reader), wide(&moving(5)));
+        let selection = FrameSelection { prim: Some("cage".to_owned()), ..FrameSelection::default() };
+        let mut reader = open_selected_frames(&path, 3, &selection).unwrap();
+        assert_eq!(reader.mesh().unwrap().1, &cage().faces);
+        assert_eq!(all(&mut *reader), wide(&cage_frames(5)));
+        assert_eq!(read_model(&path).unwrap().faces, faces());
+    }
+}
+
+#[test]
+fn cages_that_are_missing_or_cannot_be_written_are_refused() {
+    let folder = tempdir().unwrap();
+    let options = FrameOptions { cage: Some(cage()), ..FrameOptions::default() };
+    let path = folder.path().join("a.usdc");
+    let mut writer = create_frames(&path, 4, 2, &faces(), &options).unwrap();
+    moving(2).iter().for_each(|frame| writer.write_frame(frame).unwrap());
+    assert!(message(writer.write_cage(&[0.0; 6])).contains("frame 0 has 2 points where 3 are expected"));
+    writer.write_cage(&[0.0; 9]).unwrap();
+    assert!(message(writer.finish()).contains("was announced with 2 frames but given 1"));
+    assert!(!path.exists());
+    let mut without = create_frames(&path, 4, 2, &faces(), &FrameOptions::default()).unwrap();
+    assert!(message(without.write_cage(&[0.0; 9])).contains("has no cage that was announced"));
+    for name in ["a.abc", "a.glb", "a.npy", "a.obj", "folder/"] {
+        let error = message(create_frames(folder.path().join(name), 4, 1, &faces(), &options));
+        assert!(error.contains("is not written with a cage; write .usdc or .usdz"), "{error}");
+    }
+    let wrong = FrameOptions { cage: Some(CageMesh { points: 2, ..cage() }), ..FrameOptions::default() };
+    assert!(message(create_frames(&path, 4, 1, &faces(), &wrong)).contains("face 0 of the cage"));
 }
 
 /// Reads all that there is; gives whether it was good.
@@ -279,6 +338,33 @@ fn the_library_of_usd_reads_what_is_written() {
                 assert_eq!(values[1..], own[frame], "{name}: frame {frame}");
             }
         }
+    }
+}
+
+/// `make usd` installs it.
+#[test]
+fn the_library_of_usd_reads_cages_as_guides() {
+    let Ok(python) = std::env::var("CAGER_USD_PYTHON") else {
+        eprintln!("skipped: CAGER_USD_PYTHON is not set; `make usd` installs the library and runs this test");
+        return;
+    };
+    for (name, origin) in [("a.usdc", None), ("a.usdz", Some([10.0, 0.0, 0.0]))] {
+        let (_folder, path) = with_cage(name, 3, origin);
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/usd.py");
+        let done = Command::new(&python).arg(script).arg("cages").arg(&path).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let text = String::from_utf8(done.stdout).unwrap();
+        let mut lines = text.lines();
+        for (kind, frames) in [("/a/mesh default 4", moving(3)), ("/a/cage guide 3", cage_frames(3))] {
+            assert_eq!(lines.next(), Some(kind));
+            for frame in wide(&frames) {
+                let moved: Vec<f64> =
+                    frame.iter().zip(origin.unwrap_or_default().iter().cycle()).map(|(x, o)| x + o).collect();
+                let read: Vec<f64> = lines.next().unwrap().split(' ').map(|word| word.parse().unwrap()).collect();
+                assert_eq!(read, moved);
+            }
+        }
+        assert_eq!(lines.next(), None);
     }
 }
 

@@ -44,7 +44,7 @@ pub use source::{
 };
 pub(crate) use times::Times;
 pub(crate) use widen::{Scalar, half_precision};
-pub use write::{FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path};
+pub use write::{CageMesh, FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
 pub trait FrameReader: Send {

@@ -1,5 +1,5 @@
 """OpenUSD beside us. `usd.py read FILE` prints what the library reads of a file of one mesh: stage, faces, then a time code and the positions of each
-sample, moved by the transforms above; `usd.py make FOLDER` writes files that the library can write and we cannot, each in binary, as text of USD, and with a text of what is to be read."""
+sample, moved by the transforms above; `usd.py cages FILE` what each mesh is for and its positions; `usd.py make FOLDER` writes files that the library can write and we cannot, each in binary, as text of USD, and with a text of what is to be read."""
 
 import sys
 import zipfile
@@ -34,6 +34,14 @@ def read(path):
             assert package.testzip() is None
         info = Usd.ZipFile.Open(path).GetFileInfo(package.namelist()[0]) if hasattr(Usd, "ZipFile") else None
         assert info is None or info.dataOffset % 64 == 0
+
+
+def cages(path):
+    stage = Usd.Stage.Open(path)
+    for mesh in meshes(stage):
+        print(mesh.GetPath(), UsdGeom.Imageable(mesh).ComputePurpose(), len(mesh.GetPointsAttr().Get()))
+        for code in mesh.GetPointsAttr().GetTimeSamples():
+            print(*map(repr, numbers(mesh, code)))
 
 
 def make(folder):
@@ -156,4 +164,4 @@ def make(folder):
         keep(stage)
 
 
-{"read": read, "make": make}[sys.argv[1]](sys.argv[2])
+{"read": read, "cages": cages, "make": make}[sys.argv[1]](sys.argv[2])

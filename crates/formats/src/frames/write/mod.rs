@@ -22,7 +22,7 @@ use cache::CacheWriter;
 use mesh::FrameMesh;
 use morphs::MorphWriter;
 use output::Announced;
-pub use output::{FrameOptions, FrameWriter, MorphOptions};
+pub use output::{CageMesh, FrameOptions, FrameWriter, MorphOptions};
 use scene::SceneWriter;
 use sequence::SequenceWriter;
 use single::SingleWriter;
@@ -63,6 +63,11 @@ pub fn create_frames(
     let (path, pattern) = (frames_path(given), mesh_pattern(given));
     let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
     announced.check(options).map_err(|fault| fault.at(path))?;
+    let keeps_cages =
+        matches!(CacheFormat::from_path(path), Some(CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usd));
+    if options.cage.is_some() && (pattern.is_some() || !keeps_cages) {
+        return Err(Fault::unsupported("is not written with a cage; write .usdc or .usdz").at(path));
+    }
     if target == Target::StandardOutput {
         return Ok(Box::new(CacheWriter::create(announced, &target, CacheFormat::Npy, options)?));
     }

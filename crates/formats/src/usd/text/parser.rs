@@ -12,11 +12,12 @@ const MODIFIERS: [&str; 9] =
     ["custom", "uniform", "varying", "config", "add", "append", "prepend", "delete", "reorder"];
 
 /// Attributes that are asked for, beside the operations of transforms.
-const WANTED: [&str; 6] = [
+const WANTED: [&str; 7] = [
     "points",
     "faceVertexCounts",
     "faceVertexIndices",
     "orientation",
+    "purpose",
     "primvars:skel:jointIndices",
     "skel:blendShapes",
 ];
