@@ -89,10 +89,10 @@ pub fn create_frames(
         return Ok(Box::new(SingleWriter::create(announced, &target, format, faces, options)?));
     }
     match CacheFormat::from_path(path) {
-        Some(CacheFormat::Glb | CacheFormat::Gltf) => Ok(Box::new(MorphWriter::create(announced, &target, faces, options)?)),
-        Some(CacheFormat::Usda) => {
-            Err(Fault::unsupported("is written in binary alone; end the name in .usdc").at(path))
+        Some(CacheFormat::Glb | CacheFormat::Gltf) => {
+            Ok(Box::new(MorphWriter::create(announced, &target, faces, options)?))
         }
+        Some(CacheFormat::Usda) => Err(Fault::unsupported("is written in binary alone; end the name in .usdc").at(path)),
         Some(format) if format.is_scene() => {
             Ok(Box::new(SceneWriter::create(announced, &target, format, faces, options)?))
         }

@@ -54,7 +54,7 @@ impl MorphWriter {
         };
         let notes = note.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
         let data = match CacheFormat::from_path(path) {
-            Some(CacheFormat::Gltf) => Some(AtomicFile::create(&data_beside(target))?),
+            Some(CacheFormat::Gltf) => Some(AtomicFile::create(data_beside(target))?),
             _ => None,
         };
         let file = AtomicFile::create(target)?;

@@ -147,7 +147,9 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
             match owner {
                 Owner::Layer => self.layer_field(&key)?,
                 Owner::Prim(prim) => self.prim_field(prim, &key)?,
-                Owner::Property => drop(self.scanner.pass()?),
+                Owner::Property => {
+                    self.scanner.pass()?;
+                }
             }
             // The prim in another file, and by how much its times are moved.
             while matches!(self.scanner.solid()?, Some(b'<' | b'(')) {
