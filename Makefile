@@ -103,7 +103,7 @@ $(USD): Makefile
 	@touch $@
 
 gltf: $(GLTF) ## written files of glTF through the validator of Khronos and three.js; installs both, which need Node
-	CAGER_GLTF_NODE=$(abspath target/gltf) $(CARGO) test --workspace --locked --test animations three -- --nocapture
+	CAGER_GLTF_NODE=$(abspath target/gltf) $(CARGO) test --workspace --locked --test animations --test textures three -- --nocapture
 
 $(GLTF): Makefile
 	mkdir -p target/gltf

@@ -72,6 +72,7 @@ short! {
     abc "abc" 60_000;
     usdc "usdc" 60_000;
     usdz "usdz" 30_000;
+    usda "usda" 20_000;
     glb_frames "glb-frames" 20_000;
     npz "npz" 6_000;
     container "container" 30_000;

@@ -9,8 +9,12 @@ pub(super) fn run() -> Result<()> {
         format!("{format:<7} {name:<35} {files:<14} {holds:<17} {says}\n")
     };
     let mut text = row(["format", "name", "files are", "a file holds", "it says"]);
-    for Listed { extension, name, written, animated, says } in FORMATS {
-        let files = if *written { "read, written" } else { "read" };
+    for Listed { extension, name, read, written, animated, says } in FORMATS {
+        let files = match (read, written) {
+            (true, true) => "read, written",
+            (true, false) => "read",
+            _ => "written",
+        };
         let holds = if *animated { "all frames" } else { "one mesh or frame" };
         text += &row([&format!(".{extension}"), name, files, holds, says]);
     }

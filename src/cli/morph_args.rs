@@ -1,6 +1,6 @@
 //! Arguments of `cager decode` for morph targets.
 
-use cager_formats::MorphOptions;
+use cager_formats::{CacheFormat, MorphOptions};
 use clap::Args;
 use std::path::Path;
 
@@ -18,15 +18,24 @@ pub(crate) struct MorphArgs {
     /// Positions of a .glb as floats instead of whole numbers of 16 bits (KHR_mesh_quantization): larger, and more exact.
     #[arg(long, conflicts_with = "cages")]
     float: bool,
+
+    /// Normals in a .glb as well, of the mean shape and of each morph target: smooth shading, and 12 bytes more for each point of them.
+    #[arg(long, conflicts_with = "cages")]
+    normals: bool,
 }
 
 impl MorphArgs {
     /// Refuses what another file than a .glb would ignore.
     pub(super) fn check(&self, output: &Path) -> anyhow::Result<()> {
-        let asked =
-            [("--targets", self.targets.is_some()), ("--max-error", self.max_error.is_some()), ("--float", self.float)];
+        let asked = [
+            ("--targets", self.targets.is_some()),
+            ("--max-error", self.max_error.is_some()),
+            ("--float", self.float),
+            ("--normals", self.normals),
+        ];
+        let is_gltf = || matches!(CacheFormat::from_path(output), Some(CacheFormat::Glb | CacheFormat::Gltf));
         match asked.into_iter().find(|(_, is_given)| *is_given) {
-            Some((name, _)) if !output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("glb")) => {
+            Some((name, _)) if !is_gltf() => {
                 anyhow::bail!("{name} is for a .glb, and {} is none; leave it out, or write a .glb", output.display())
             }
             _ => Ok(()),
@@ -39,6 +48,7 @@ impl MorphArgs {
             max_error: self.max_error,
             diagonal: None,
             floats: self.float,
+            normals: self.normals,
         }
     }
 }

@@ -18,12 +18,13 @@ mod signature;
 mod text;
 mod units;
 mod usd;
+mod vat;
 
 pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
 pub use error::{Action, Error};
 pub use frames::{
-    CacheFormat, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence, MorphOptions,
-    create_frames, frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames,
+    CacheFormat, CageMesh, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence,
+    MorphOptions, create_frames, frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames,
     open_frames_bytes, open_frames_in, open_selected_frames,
 };
 pub use listing::{FORMATS, Listed};

@@ -7,7 +7,9 @@ pub struct Listed {
     pub extension: &'static str,
     /// What it is called.
     pub name: &'static str,
-    /// Whether files are written; all are read.
+    /// Whether files are read.
+    pub read: bool,
+    /// Whether files are written.
     pub written: bool,
     /// Whether one file holds all frames of a capture.
     pub animated: bool,
@@ -28,17 +30,19 @@ pub const FORMATS: &[Listed] = &[
     animated("abc", "Alembic (Ogawa)", true, "frame rate, times"),
     animated("usdc", "Universal Scene Description, binary", true, "unit, up axis, frame rate, times"),
     animated("usdz", "the same as a package", true, "unit, up axis, frame rate, times"),
+    animated("usda", "the same as text", false, "unit, up axis, frame rate, times"),
     animated("usd", "the same, binary", true, "unit, up axis, frame rate, times"),
     animated("glb", "binary glTF", true, "metres, Y up, times"),
-    animated("gltf", "the same as text and files", false, "metres, Y up, times"),
+    animated("gltf", "the same as text and files", true, "metres, Y up, times"),
+    Listed { read: false, ..animated("vat", "animation textures (OpenVAT)", true, "frame rate") },
 ];
 
 const fn still(extension: &'static str, name: &'static str, written: bool) -> Listed {
-    Listed { extension, name, written, animated: false, says: "nothing" }
+    Listed { extension, name, read: true, written, animated: false, says: "nothing" }
 }
 
 const fn animated(extension: &'static str, name: &'static str, written: bool, says: &'static str) -> Listed {
-    Listed { extension, name, written, animated: true, says }
+    Listed { extension, name, read: true, written, animated: true, says }
 }
 
 #[cfg(test)]
@@ -48,7 +52,8 @@ mod tests {
 
     #[test]
     fn every_format_that_is_read_is_listed() {
-        let listed = |animated: bool| FORMATS.iter().filter(move |f| f.animated == animated).map(|f| f.extension);
+        let listed =
+            |animated: bool| FORMATS.iter().filter(move |f| f.read && f.animated == animated).map(|f| f.extension);
         // Of glTF one mesh may be read, and all frames of a capture.
         let meshes = MeshFormat::STILL.into_iter().filter(|&format| format != MeshFormat::Glb);
         assert_eq!(listed(false).collect::<Vec<_>>(), meshes.map(MeshFormat::extension).collect::<Vec<_>>());

@@ -7,10 +7,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cager_formats::{
-    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, MorphOptions, create_frames, open_frames,
+    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, MorphOptions, Target, create_frames, open_frames,
     open_frames_bytes, open_selected_frames, read_model, read_prim_with_note,
 };
 use cager_geometry::mesh::Polygons;
+use gltf::json::Root;
+use gltf::json::accessor::Type;
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::Checked;
 use support::{POINTS, all, glb_file, message, numbers, polygons, wide};
 use tempfile::{TempDir, tempdir};
 
@@ -267,10 +271,39 @@ fn text_is_read_with_the_files_beside_it() {
     let bytes = text("a.bin").into_bytes();
     let opened = open_frames_bytes(CacheFormat::Gltf, &folder.path().join("a.gltf"), &bytes, 4);
     assert!(message(opened).contains("has its data in another file"));
-    assert!(
-        message(create_frames(folder.path().join("b.gltf"), 4, 1, &Polygons::new(), &FrameOptions::default()))
-            .contains("end the name in .glb")
-    );
+}
+
+#[test]
+fn of_several_animations_the_first_or_the_chosen_one_is_read() {
+    let mut built = Built::default();
+    built.points();
+    let times = built.floats("SCALAR", &[0.0, 1.0]);
+    let ways = [1.0, 2.0, 3.0].map(|x| built.floats("VEC3", &[0.0, 0.0, 0.0, x, 0.0, 0.0]));
+    let one = |name: &str, way: usize| {
+        let target = r#"{"sampler":0,"target":{"node":0,"path":"translation"}}"#;
+        format!(r#"{{{name}"channels":[{target}],"samplers":[{{"input":{times},"output":{way}}}]}}"#)
+    };
+    let all_of = [one(r#""name":"walk","#, ways[0]), one(r#""name":"run","#, ways[1]), one("", ways[2])].join(",");
+    let nodes = r#""scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}]"#;
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    fs::write(&path, built.file(&format!(r#"{MESH},{nodes},"animations":[{all_of}]"#))).unwrap();
+    let take = |animation: Option<&str>| {
+        let selection = FrameSelection { animation: animation.map(str::to_owned), ..FrameSelection::default() };
+        open_selected_frames(&path, 4, &selection)
+    };
+    for (animation, by) in [(None, 1.0), (Some("walk"), 1.0), (Some("run"), 2.0), (Some("2"), 3.0), (Some("1"), 2.0)] {
+        let mut reader = take(animation).unwrap();
+        assert!(reader.notes()[0].contains("of its 3 animations "), "{:?}", reader.notes());
+        close(&all(&mut *reader)[1], &moved(|[x, y, z]| [x + by, y, z]), 1e-6);
+    }
+    let note = &take(Some("run")).unwrap().notes()[0];
+    assert!(note.contains("run is read, and walk, animation 2 left out; choose one with --animation"), "{note}");
+    for gone in ["jump", "3"] {
+        let error = message(take(Some(gone)));
+        let listed = format!("holds no animation {gone} that moves the mesh, but walk, run, animation 2; give one of");
+        assert!(error.contains(&listed), "{error}");
+    }
 }
 
 #[test]
@@ -347,7 +380,7 @@ fn frames_come_back_as_near_as_is_told() {
         let options = FrameOptions {
             fps: 30000.0 / 1001.0,
             numbers: numbered.clone(),
-            ..morphs(MorphOptions { targets, floats, diagonal, max_error: None })
+            ..morphs(MorphOptions { targets, floats, diagonal, ..MorphOptions::default() })
         };
         let (_folder, path, notes) = written("my walk.glb", &frames, &strip(), &options);
         let mut reader = open_frames(&path, 48).unwrap();
@@ -364,6 +397,98 @@ fn frames_come_back_as_near_as_is_told() {
         close(rest.points.as_flattened(), &read[0], 1e-6);
         let triangles: Vec<u32> = strip().triangulated().concat();
         assert_eq!((rest.faces.indices(), reader.mesh().unwrap().1), (&triangles[..], &rest.faces));
+    }
+}
+
+#[test]
+fn text_and_numbers_are_written_together_or_not_at_all() {
+    let frames = waves(40);
+    let (folder, path, _) = written("my walk.gltf", &frames, &strip(), &FrameOptions::default());
+    let (_binary, binary, _) = written("my walk.glb", &frames, &strip(), &FrameOptions::default());
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(r#""uri":"my%20walk.bin""#), "{text:.400}");
+    let [read, wanted] = [&path, &binary].map(|path| all(&mut *open_frames(path, 48).unwrap()));
+    assert_eq!(read, wanted);
+    let names = || {
+        let mut names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(), ["my walk.bin", "my walk.gltf"]);
+    // Of a name that is taken, neither is written; nor of what is dropped.
+    fs::remove_file(&path).unwrap();
+    let new = || Target::New(path.clone());
+    let error = message(create_frames(new(), 48, 1, &strip(), &FrameOptions::default()));
+    assert!(error.contains("my walk.bin: is there already"), "{error}");
+    fs::remove_file(path.with_extension("bin")).unwrap();
+    let mut writer = create_frames(new(), 48, 2, &strip(), &FrameOptions::default()).unwrap();
+    writer.write_frame(&frames[0]).unwrap();
+    drop(writer);
+    assert!(names().is_empty());
+}
+
+/// Normals of a file as programs make them: the base and so much of each target, at the times of keys.
+fn normals(path: &Path, frames: usize) -> Vec<Vec<[f64; 3]>> {
+    let root: Root = gltf::json::deserialize::from_slice(&fs::read(path).unwrap()).unwrap();
+    let data = fs::read(path.with_extension("bin")).unwrap();
+    let floats = |accessor: usize| {
+        let accessor = &root.accessors[accessor];
+        let view = &root.buffer_views[accessor.buffer_view.unwrap().value()];
+        let start = (view.byte_offset.unwrap_or_default().0 + accessor.byte_offset.unwrap_or_default().0) as usize;
+        let width = if accessor.type_ == Checked::Valid(Type::Vec3) { 3 } else { 1 };
+        let bytes = data[start..start + 4 * width * accessor.count.0 as usize].as_chunks().0;
+        bytes.iter().map(|bytes| f64::from(f32::from_le_bytes(*bytes))).collect::<Vec<_>>()
+    };
+    let primitive = &root.meshes[0].primitives[0];
+    let base = floats(primitive.attributes[&Checked::Valid(Semantic::Normals)].value());
+    let targets: Vec<_> =
+        primitive.targets.as_ref().unwrap().iter().map(|target| floats(target.normals.unwrap().value())).collect();
+    let weights = floats(root.animations[0].samplers[0].output.value());
+    let sum = |frame: usize| {
+        let mut sum = base.clone();
+        for (k, target) in targets.iter().enumerate() {
+            let weight = weights[frame * targets.len() + k];
+            sum.iter_mut().zip(target).for_each(|(sum, x)| *sum += weight * x);
+        }
+        sum.as_chunks()
+            .0
+            .iter()
+            .map(|n: &[f64; 3]| n.map(|x| x / n.iter().map(|x| x * x).sum::<f64>().sqrt()))
+            .collect()
+    };
+    (0..frames).map(sum).collect()
+}
+
+#[test]
+fn normals_turn_with_the_mesh() {
+    // A sheet that bends by up to 60 degrees.
+    let sheet = |frame: usize| -> Vec<f32> {
+        let angle = |i: f64| 1.05 * (0.2 * frame as f64).sin() * i / 5.0;
+        let grid = (0..36).map(|k| (f64::from(k / 6), f64::from(k % 6)));
+        grid.flat_map(|(i, j)| [i * angle(i).cos(), i * angle(i).sin(), -j].map(|x| x as f32)).collect()
+    };
+    let mut faces = Polygons::new();
+    (0..30).filter(|k| k % 6 < 5).for_each(|k| faces.push(&[k, k + 6, k + 7, k + 1]));
+    let frames: Vec<Vec<f32>> = (0..30).map(sheet).collect();
+    let options = morphs(MorphOptions { normals: true, ..MorphOptions::default() });
+    let (_folder, path, _) = written("a.gltf", &frames, &faces, &options);
+    let found = normals(&path, 30);
+    for (frame, found) in frames.iter().zip(&found) {
+        let at = |k: u32| -> [f64; 3] { std::array::from_fn(|i| f64::from(frame[3 * k as usize + i])) };
+        let mut wanted = vec![[0.0; 3]; 36];
+        for triangle in faces.triangulated() {
+            let [a, b, c] = triangle.map(at);
+            let (u, v): ([f64; 3], [f64; 3]) =
+                (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
+            let area: [f64; 3] =
+                std::array::from_fn(|k| u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3]);
+            triangle.iter().for_each(|&k| (0..3).for_each(|i| wanted[k as usize][i] += area[i]));
+        }
+        for (found, wanted) in found.iter().zip(&wanted) {
+            let length = wanted.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let cosine = (0..3).map(|k| found[k] * wanted[k]).sum::<f64>() / length;
+            assert!(cosine > 0.999, "{} degrees off", cosine.acos().to_degrees());
+        }
     }
 }
 
@@ -488,7 +613,10 @@ fn the_validator_and_the_loader_of_three_read_what_is_written() {
     let numbered = FrameOptions { fps: 25.0, numbers: vec![3.0, 4.0, 6.0, 9.0], ..FrameOptions::default() };
     let floats = morphs(MorphOptions { floats: true, ..MorphOptions::default() });
     let few = morphs(MorphOptions { targets: Some(5), ..MorphOptions::default() });
+    let normals = morphs(MorphOptions { normals: true, ..MorphOptions::default() });
     for (options, count, faces) in [
+        (normals.clone(), 30, strip()),
+        (normals, 1, strip()),
         (numbered, 4, strip()),
         (floats, 90, strip()),
         (few, 40, strip()),

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cager_formats::{
-    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, MeshFormat, Units, Up, create_frames, open_frames,
-    open_frames_bytes, open_selected_frames, read_model, read_model_bytes, read_prim_with_units,
+    CacheFormat, CageMesh, Error, FrameOptions, FrameReader, FrameSelection, MeshFormat, Units, Up, create_frames,
+    open_frames, open_frames_bytes, open_selected_frames, read_model, read_model_bytes, read_prim_with_units,
 };
 use cager_geometry::mesh::Polygons;
 use support::{all, message, numbers, polygons, wide};
@@ -97,6 +97,65 @@ fn frames_between_samples_are_interpolated() {
     assert_eq!(read, [stored[0].clone(), stored[1].clone(), between, stored[2].clone()]);
 }
 
+/// A cage of one triangle.
+fn cage() -> CageMesh {
+    CageMesh { points: 3, faces: polygons(&[&[0, 1, 2]]) }
+}
+
+/// The triangle in so many frames.
+fn cage_frames(frames: u16) -> Vec<Vec<f32>> {
+    (0..frames).map(|k| [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(|x| x + f32::from(k)).to_vec()).collect()
+}
+
+fn with_cage(name: &str, frames: u16, origin: Option<[f64; 3]>) -> (TempDir, PathBuf) {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join(name);
+    let options = FrameOptions { cage: Some(cage()), origin, ..FrameOptions::default() };
+    let mut writer = create_frames(&path, 4, frames.into(), &faces(), &options).unwrap();
+    for (frame, cage) in moving(frames).iter().zip(&cage_frames(frames)) {
+        writer.write_frame(frame).unwrap();
+        writer.write_cage(cage).unwrap();
+    }
+    writer.finish().unwrap();
+    (folder, path)
+}
+
+#[test]
+fn a_cage_is_kept_beside_the_mesh_and_read_where_it_is_asked_for() {
+    for name in ["a.usdc", "a.usdz"] {
+        let (_folder, path) = with_cage(name, 5, None);
+        let mut reader = open_frames(&path, 4).unwrap();
+        assert_eq!(reader.mesh().unwrap().1, &faces());
+        assert_eq!(all(&mut *reader), wide(&moving(5)));
+        let selection = FrameSelection { prim: Some("cage".to_owned()), ..FrameSelection::default() };
+        let mut reader = open_selected_frames(&path, 3, &selection).unwrap();
+        assert_eq!(reader.mesh().unwrap().1, &cage().faces);
+        assert_eq!(all(&mut *reader), wide(&cage_frames(5)));
+        assert_eq!(read_model(&path).unwrap().faces, faces());
+    }
+}
+
+#[test]
+fn cages_that_are_missing_or_cannot_be_written_are_refused() {
+    let folder = tempdir().unwrap();
+    let options = FrameOptions { cage: Some(cage()), ..FrameOptions::default() };
+    let path = folder.path().join("a.usdc");
+    let mut writer = create_frames(&path, 4, 2, &faces(), &options).unwrap();
+    moving(2).iter().for_each(|frame| writer.write_frame(frame).unwrap());
+    assert!(message(writer.write_cage(&[0.0; 6])).contains("frame 0 has 2 points where 3 are expected"));
+    writer.write_cage(&[0.0; 9]).unwrap();
+    assert!(message(writer.finish()).contains("was announced with 2 frames but given 1"));
+    assert!(!path.exists());
+    let mut without = create_frames(&path, 4, 2, &faces(), &FrameOptions::default()).unwrap();
+    assert!(message(without.write_cage(&[0.0; 9])).contains("has no cage that was announced"));
+    for name in ["a.abc", "a.glb", "a.npy", "a.obj", "folder/"] {
+        let error = message(create_frames(folder.path().join(name), 4, 1, &faces(), &options));
+        assert!(error.contains("is not written with a cage; write .usdc or .usdz"), "{error}");
+    }
+    let wrong = FrameOptions { cage: Some(CageMesh { points: 2, ..cage() }), ..FrameOptions::default() };
+    assert!(message(create_frames(&path, 4, 1, &faces(), &wrong)).contains("face 0 of the cage"));
+}
+
 /// Reads all that there is; gives whether it was good.
 fn try_all(name: &str, bytes: &[u8]) -> bool {
     let path = Path::new(name);
@@ -148,19 +207,22 @@ fn files_that_end_early_or_are_changed_are_errors_at_the_most() {
 fn what_is_no_layer_says_what_it_is() {
     let of = |bytes: &[u8]| message(open(bytes, 4));
     assert!(of(&support::npy_f4()).contains("is not a .usd file but a file of the kind .npy"));
-    assert!(of(b"#usda 1.0\n").contains("is text of USD, which is not read; write it as binary with usdcat"));
+    assert!(of(b"#usda 1.0\n").contains("holds no polygon mesh"));
     assert!(of(b"PXR-USDC\0\x03\0").contains("is of version 0.3.0 of USD's binary format, where 0.4.0 to 0.13.0 are"));
     assert!(of(b"what").contains("does not begin as a file of USD does"));
 }
 
+/// Both kinds of layers.
+const KINDS: [&str; 2] = ["usdc", "usda"];
+
 /// Files of OpenUSD, written by `tests/peers/usd.py make`.
 fn made(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/usd").join(name).with_extension("usdc")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/usd").join(name)
 }
 
-fn take(name: &str, prim: Option<&str>) -> Result<Box<dyn FrameReader>, Error> {
+fn take(name: &str, kind: &str, prim: Option<&str>) -> Result<Box<dyn FrameReader>, Error> {
     let selection = FrameSelection { prim: prim.map(str::to_owned), ..FrameSelection::default() };
-    open_selected_frames(made(name), 3, &selection)
+    open_selected_frames(made(name).with_extension(kind), 3, &selection)
 }
 
 /// What the library says that a file holds.
@@ -171,46 +233,58 @@ fn told(name: &str) -> Vec<Vec<f64>> {
 
 #[test]
 fn transforms_above_a_mesh_move_it_as_the_library_does() {
-    for (name, prim, largest) in
-        [("operations", None, 1e-5), ("reset", None, 0.0), ("doubles", None, 0.0), ("single", None, 0.0)]
+    let all_kinds = |name, largest| KINDS.map(|kind| (name, kind, largest));
+    for (name, kind, largest) in [("operations", 1e-5), ("reset", 0.0), ("doubles", 0.0), ("single", 0.0)]
+        .into_iter()
+        .flat_map(|(name, largest)| all_kinds(name, largest))
     {
-        let (read, told) = (all(&mut *take(name, prim).unwrap()), told(name));
-        assert_eq!(read.len(), told.len(), "{name}");
+        let (read, told) = (all(&mut *take(name, kind, None).unwrap()), told(name));
+        assert_eq!(read.len(), told.len(), "{name}.{kind}");
         for (frame, (read, told)) in read.iter().zip(&told).enumerate() {
             let off = read.iter().zip(told).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(off <= largest, "{name}: frame {frame} is off by {off}");
+            assert!(off <= largest, "{name}.{kind}: frame {frame} is off by {off}");
         }
     }
-    let reader = take("reset", None).unwrap();
-    assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(25.0), vec![1.0, 2.0, 3.0, 4.0]));
+    for kind in KINDS {
+        let reader = take("reset", kind, None).unwrap();
+        assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(25.0), vec![1.0, 2.0, 3.0, 4.0]));
+    }
 }
 
 #[test]
 fn faces_are_wound_counterclockwise() {
-    assert_eq!(take("left", None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
-    // One of its transforms mirrors.
-    assert_eq!(take("operations", None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
+    for kind in KINDS {
+        assert_eq!(take("left", kind, None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
+        // One of its transforms mirrors.
+        assert_eq!(take("operations", kind, None).unwrap().mesh().unwrap().1, &polygons(&[&[2, 1, 0]]));
+    }
 }
 
 #[test]
 fn topology_that_changes_names_the_frame() {
-    let (mut reader, mut frame) = (take("faces", None).unwrap(), Vec::new());
-    assert!(reader.read_next(&mut frame).unwrap() && reader.read_next(&mut frame).unwrap());
-    let error = message(reader.read_next(&mut frame));
-    assert!(error.contains("frame 2: its topology changes: its faces are not those of frame 0; "), "{error}");
+    for kind in KINDS {
+        let (mut reader, mut frame) = (take("faces", kind, None).unwrap(), Vec::new());
+        assert!(reader.read_next(&mut frame).unwrap() && reader.read_next(&mut frame).unwrap());
+        let error = message(reader.read_next(&mut frame));
+        assert!(error.contains("frame 2: its topology changes: its faces are not those of frame 0; "), "{error}");
+    }
 }
 
 #[test]
 fn one_of_several_meshes_is_chosen_by_path_or_name() {
-    let error = message(take("several", None));
-    for path in ["holds 3 meshes", "/coat/body (3 points)", "/skin/body (3 points)", "/hat (3 points)", "with --prim"] {
-        assert!(error.contains(path), "{error}");
+    for kind in KINDS {
+        let error = message(take("several", kind, None));
+        for path in
+            ["holds 3 meshes", "/coat/body (3 points)", "/skin/body (3 points)", "/hat (3 points)", "with --prim"]
+        {
+            assert!(error.contains(path), "{error}");
+        }
+        for prim in ["/skin/body", "skin/body/", "skin"] {
+            assert_eq!(all(&mut *take("several", kind, Some(prim)).unwrap())[0], told("several")[0]);
+        }
+        assert!(message(take("several", kind, Some("body"))).contains("holds 2 meshes, "));
+        assert!(message(take("several", kind, Some("gone"))).contains("holds no mesh gone, but "));
     }
-    for prim in ["/skin/body", "skin/body/", "skin"] {
-        assert_eq!(all(&mut *take("several", Some(prim)).unwrap())[0], told("several")[0]);
-    }
-    assert!(message(take("several", Some("body"))).contains("holds 2 meshes, "));
-    assert!(message(take("several", Some("gone"))).contains("holds no mesh gone, but "));
 }
 
 #[test]
@@ -222,9 +296,11 @@ fn what_a_layer_is_composed_of_is_named() {
         ("variants", "/group has variants"),
         ("sublayers", "the layer has sublayers"),
     ] {
-        let error = message(take(name, None));
-        let cure = ", which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc";
-        assert!(error.contains(&format!("{what}{cure}")), "{error}");
+        for kind in KINDS {
+            let error = message(take(name, kind, None));
+            let cure = ", which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc";
+            assert!(error.contains(&format!("{what}{cure}")), "{error}");
+        }
     }
 }
 
@@ -262,6 +338,33 @@ fn the_library_of_usd_reads_what_is_written() {
                 assert_eq!(values[1..], own[frame], "{name}: frame {frame}");
             }
         }
+    }
+}
+
+/// `make usd` installs it.
+#[test]
+fn the_library_of_usd_reads_cages_as_guides() {
+    let Ok(python) = std::env::var("CAGER_USD_PYTHON") else {
+        eprintln!("skipped: CAGER_USD_PYTHON is not set; `make usd` installs the library and runs this test");
+        return;
+    };
+    for (name, origin) in [("a.usdc", None), ("a.usdz", Some([10.0, 0.0, 0.0]))] {
+        let (_folder, path) = with_cage(name, 3, origin);
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/usd.py");
+        let done = Command::new(&python).arg(script).arg("cages").arg(&path).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let text = String::from_utf8(done.stdout).unwrap();
+        let mut lines = text.lines();
+        for (kind, frames) in [("/a/mesh default 4", moving(3)), ("/a/cage guide 3", cage_frames(3))] {
+            assert_eq!(lines.next(), Some(kind));
+            for frame in wide(&frames) {
+                let moved: Vec<f64> =
+                    frame.iter().zip(origin.unwrap_or_default().iter().cycle()).map(|(x, o)| x + o).collect();
+                let read: Vec<f64> = lines.next().unwrap().split(' ').map(|word| word.parse().unwrap()).collect();
+                assert_eq!(read, moved);
+            }
+        }
+        assert_eq!(lines.next(), None);
     }
 }
 

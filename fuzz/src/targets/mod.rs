@@ -29,6 +29,7 @@ pub const TARGETS: &[Target] = &[
     alembic::ABC,
     usd::USDC,
     usd::USDZ,
+    usd::USDA,
     gltf::GLB_FRAMES,
     frames::NPZ,
     container::CONTAINER,

@@ -32,3 +32,35 @@ pub(super) const USDZ: Target = Target {
     seeds: || seeds("a.usdz", [0.0, 1.5, 5.25]),
     ..USDC
 };
+
+/// Files of OpenUSD's library as text.
+const TEXTS: [&[u8]; 4] = [
+    include_bytes!("../../../crates/formats/tests/usd/operations.usda"),
+    include_bytes!("../../../crates/formats/tests/usd/several.usda"),
+    include_bytes!("../../../crates/formats/tests/usd/single.usda"),
+    include_bytes!("../../../crates/formats/tests/usd/variants.usda"),
+];
+
+pub(super) const USDA: Target = Target {
+    name: "usda",
+    run: |bytes| read(CacheFormat::Usda, MeshFormat::Usda, "a.usda", bytes),
+    seeds: || TEXTS.iter().map(|text| [&[3], *text].concat()).collect(),
+    words: &[
+        "#usda",
+        "def Mesh \"",
+        "timeSamples = {",
+        ".spline",
+        "None",
+        "subLayers",
+        "variantSet",
+        "payload",
+        "\"\"\"",
+        "@@@",
+        "/*",
+        "inf",
+        "1e308",
+        "xformOpOrder",
+        "!invert!",
+    ],
+    ..USDC
+};

@@ -38,7 +38,7 @@ pub(super) fn open<'a>(
         CacheFormat::Npy => npy::layout(&head, expected_points as u64, place),
         CacheFormat::Pc2 => pc2::layout(&head),
         CacheFormat::Mdd => mdd::layout(&head),
-        CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usd => {
+        CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usda | CacheFormat::Usd => {
             return usd::open_frames(path, source, length, expected_points, prim);
         }
         CacheFormat::Glb | CacheFormat::Gltf => {

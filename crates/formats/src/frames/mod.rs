@@ -44,7 +44,7 @@ pub use source::{
 };
 pub(crate) use times::Times;
 pub(crate) use widen::{Scalar, half_precision};
-pub use write::{FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path};
+pub use write::{CageMesh, FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path};
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
 pub trait FrameReader: Send {
@@ -117,22 +117,34 @@ pub enum CacheFormat {
     Usdc,
     /// The same as a package: a zip archive whose first file it is.
     Usdz,
+    /// The same as text; not written.
+    Usda,
     /// Universal Scene Description of any kind; written in binary.
     Usd,
     /// Binary glTF 2.0: its meshes as an animation moves them.
     Glb,
-    /// The same as text, with its data in it or in files beside it; not written.
+    /// The same as text, with its data in it or in files beside it.
     Gltf,
 }
 
 impl CacheFormat {
     /// All formats.
-    pub const ALL: [Self; 9] =
-        [Self::Npy, Self::Pc2, Self::Mdd, Self::Abc, Self::Usdc, Self::Usdz, Self::Usd, Self::Glb, Self::Gltf];
+    pub const ALL: [Self; 10] = [
+        Self::Npy,
+        Self::Pc2,
+        Self::Mdd,
+        Self::Abc,
+        Self::Usdc,
+        Self::Usdz,
+        Self::Usda,
+        Self::Usd,
+        Self::Glb,
+        Self::Gltf,
+    ];
 
     /// Whether a file has a whole scene, which may have several meshes and other files; a `.glb` is taken as one mesh.
     pub fn is_scene(self) -> bool {
-        matches!(self, Self::Abc | Self::Usdc | Self::Usdz | Self::Usd | Self::Gltf)
+        matches!(self, Self::Abc | Self::Usdc | Self::Usdz | Self::Usda | Self::Usd | Self::Gltf)
     }
 
     /// The file name extension, without the dot.
@@ -144,6 +156,7 @@ impl CacheFormat {
             Self::Abc => "abc",
             Self::Usdc => "usdc",
             Self::Usdz => "usdz",
+            Self::Usda => "usda",
             Self::Usd => "usd",
             Self::Glb => "glb",
             Self::Gltf => "gltf",

@@ -13,6 +13,8 @@ pub struct FrameSelection {
     pub no_frames: Vec<PathBuf>,
     /// The mesh of a scene (Alembic, USD, glTF) that has several, by its path or name.
     pub prim: Option<String>,
+    /// The animation of a file of glTF that has several, by its name or its number from 0; the first one that moves the mesh by default.
+    pub animation: Option<String>,
     /// Frames per second to take of an animation that has keys and no frames (glTF); those at the times of its keys by default.
     pub rate: Option<f64>,
     /// Whether files of several sequences are taken one after another, in natural order, instead of refused.

@@ -64,11 +64,6 @@ pub(super) fn unknown(path: &Path) -> Error {
 pub(super) fn way_out(path: &Path) -> Option<String> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     let kind = match extension.as_str() {
-        "usda" => {
-            return Some(
-                "is text of USD, which is not read; write it as binary with usdcat in.usda -o out.usdc".to_owned(),
-            );
-        }
         "fbx" => "an FBX scene",
         "dae" => "a Collada scene",
         "blend" => "a Blender scene",

@@ -24,16 +24,28 @@ pub(super) struct Clip {
 }
 
 impl Clip {
-    /// The first animation that moves the chosen placements; none where none does.
-    pub(super) fn of(buffers: &Buffers<'_>, scene: &Scene, chosen: Range<usize>) -> Result<Option<Self>, Fault> {
+    /// The animation that `wanted` names, or else the first one that moves the chosen placements; none where none does.
+    pub(super) fn of(
+        buffers: &Buffers<'_>,
+        scene: &Scene,
+        chosen: Range<usize>,
+        wanted: Option<&str>,
+    ) -> Result<Option<Self>, Fault> {
         let root = &buffers.root;
         let movers = Movers::of(root, scene, chosen);
         let moves = |k: &usize| {
             let channels = &root.animations[*k].channels;
             channels.iter().any(|channel| movers.move_by(channel.target.node.value(), property(&channel.target.path)))
         };
-        let mut moving = (0..root.animations.len()).filter(moves);
-        let Some(first) = moving.next() else { return Ok(None) };
+        let moving: Vec<usize> = (0..root.animations.len()).filter(moves).collect();
+        // The only one is taken whatever it is called, as the only mesh is.
+        let first = match wanted.filter(|_| moving.len() > 1) {
+            Some(wanted) => find(root, &moving, wanted)?,
+            None => match moving.first() {
+                Some(&first) => first,
+                None => return Ok(None),
+            },
+        };
         let (animation, mut room) = (&root.animations[first], buffers.most_items());
         let mut channels = Vec::new();
         for (k, stored) in animation.channels.iter().enumerate() {
@@ -58,20 +70,13 @@ impl Clip {
             }
             channels.push(channel);
         }
-        let others: Vec<usize> = moving.collect();
-        let name = |k: usize| match &root.animations[k].name {
-            Some(name) => shown(name),
-            None => format!("animation {k}"),
-        };
+        let others: Vec<usize> = moving.into_iter().filter(|&k| k != first).collect();
         let note = (!others.is_empty()).then(|| {
-            let listed: Vec<String> = others.iter().take(LISTED).map(|&k| name(k)).collect();
-            let more =
-                if others.len() > LISTED { format!(" and {} more", others.len() - LISTED) } else { String::new() };
             format!(
-                "of its {} animations {} is read, and {}{more} left out; export those to files of their own",
+                "of its {} animations {} is read, and {} left out; choose one with --animation, where the command has it, or export it to a file of its own",
                 others.len() + 1,
-                name(first),
-                listed.join(", ")
+                name(root, first),
+                listed(root, &others)
             )
         });
         Ok(Some(Self { channels, note }))
@@ -93,6 +98,31 @@ impl Clip {
             }
         }
     }
+}
+
+/// The one of several animations that is called so, or has this number among all in the file.
+fn find(root: &Root, moving: &[usize], wanted: &str) -> Result<usize, Fault> {
+    let called = moving.iter().find(|&&k| root.animations[k].name.as_deref() == Some(wanted));
+    let numbered = || moving.iter().find(|&&k| wanted.parse() == Ok(k));
+    called.or_else(numbered).copied().ok_or_else(|| {
+        Fault::invalid(format!(
+            "holds no animation {} that moves the mesh, but {}; give one of these with --animation, by its name or number",
+            shown(wanted),
+            listed(root, moving)
+        ))
+    })
+}
+
+/// An animation as messages have it.
+fn name(root: &Root, k: usize) -> String {
+    root.animations[k].name.as_ref().map_or_else(|| format!("animation {k}"), |name| shown(name))
+}
+
+/// Animations as far as a message has room.
+fn listed(root: &Root, animations: &[usize]) -> String {
+    let names: Vec<String> = animations.iter().take(LISTED).map(|&k| name(root, k)).collect();
+    let more = animations.len().saturating_sub(LISTED);
+    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
 fn property(path: &Checked<Property>) -> Option<Property> {

@@ -88,7 +88,7 @@ impl MeshFrames {
             );
             return Err(Fault::invalid(what).into());
         }
-        let clip = Clip::of(&buffers, &scene, chosen.clone())?;
+        let clip = Clip::of(&buffers, &scene, chosen.clone(), selection.animation.as_deref())?;
         let keys = clip.as_ref().map_or_else(Vec::new, Clip::key_times);
         // A byte of the file stands for a few points of frames at the most: weights of targets, or turns of joints.
         let held = buffers.most_items().saturating_mul(POINTS_PER_ITEM);

@@ -1,6 +1,7 @@
 //! Models from and to mesh files.
 
 mod colors;
+mod normals;
 mod obj;
 mod off;
 mod parsed;
@@ -23,6 +24,7 @@ use crate::units::Units;
 use crate::usd;
 
 pub(crate) use colors::{Colors, Scale, srgb};
+pub(crate) use normals::{unit, vertex_normals};
 pub(crate) use parsed::Contents;
 use parsed::Parsed;
 pub(crate) use parsed::check_face;
@@ -48,6 +50,8 @@ pub enum MeshFormat {
     Usdc,
     /// The same as a package.
     Usdz,
+    /// The same as text.
+    Usda,
     /// Universal Scene Description of any kind.
     Usd,
     /// glTF 2.0 as text, with its data in it or in files beside it.
@@ -56,7 +60,7 @@ pub enum MeshFormat {
 
 impl MeshFormat {
     /// All formats.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Obj,
         Self::Ply,
         Self::Off,
@@ -65,6 +69,7 @@ impl MeshFormat {
         Self::Abc,
         Self::Usdc,
         Self::Usdz,
+        Self::Usda,
         Self::Usd,
         Self::Gltf,
     ];
@@ -83,6 +88,7 @@ impl MeshFormat {
             Self::Abc => "abc",
             Self::Usdc => "usdc",
             Self::Usdz => "usdz",
+            Self::Usda => "usda",
             Self::Usd => "usd",
             Self::Gltf => "gltf",
         }
@@ -97,9 +103,6 @@ impl MeshFormat {
             return Ok(format);
         }
         let found = match path.extension() {
-            Some(found) if found.eq_ignore_ascii_case("usda") => {
-                "text of USD is not read; write it as binary with usdcat in.usda -o out.usdc".to_owned()
-            }
             Some(found) => format!(
                 ".{} is not a mesh format that is read; convert it to one of {}",
                 found.display(),

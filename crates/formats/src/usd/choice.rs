@@ -8,7 +8,10 @@ use crate::scene::{Failure, Objects, choose as choose_object, named, shown_path}
 pub(super) fn choose<'a>(layer: &mut Box<dyn Layer + 'a>, prim: Option<&str>) -> Result<u32, Failure> {
     let is_there = |&k: &usize| layer.ancestry(k).all(|k| layer.prims()[k].is_there);
     let there: Vec<usize> = (0..layer.prims().len()).filter(is_there).collect();
-    let meshes: Vec<usize> = there.iter().copied().filter(|&k| layer.prims()[k].is_mesh).collect();
+    let mut meshes: Vec<usize> = there.iter().copied().filter(|&k| layer.prims()[k].is_mesh).collect();
+    if prim.is_none() && meshes.len() > 1 {
+        meshes = without_guides(layer, meshes)?;
+    }
     let first_composed = |prims: &[Prim], among: &[usize]| among.iter().find_map(|&k| Some((k, prims[k].composed?)));
     if meshes.is_empty() {
         return Err(match first_composed(layer.prims(), &there) {
@@ -26,6 +29,19 @@ pub(super) fn choose<'a>(layer: &mut Box<dyn Layer + 'a>, prim: Option<&str>) ->
         Some((prim, of)) => Err(composed(&shown_path(layer, prim), of).into()),
         None => Ok(chosen as u32),
     }
+}
+
+/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides.
+fn without_guides<'a>(layer: &mut Box<dyn Layer + 'a>, meshes: Vec<usize>) -> Result<Vec<usize>, Failure> {
+    let mut rendered = Vec::new();
+    for &mesh in &meshes {
+        let purpose = layer.attribute(mesh as u32, "purpose")?.still();
+        let purpose = purpose.map_or(Ok(Vec::new()), |purpose| layer.tokens(purpose, 1))?;
+        if purpose != ["guide"] {
+            rendered.push(mesh);
+        }
+    }
+    Ok(if rendered.is_empty() { meshes } else { rendered })
 }
 
 impl Objects for Box<dyn Layer + '_> {

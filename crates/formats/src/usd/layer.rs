@@ -7,6 +7,19 @@ use crate::scene::Failure;
 /// How deep prims nest; programs write far less.
 pub(super) const DEEPEST: u32 = 256;
 
+/// Fields that say what a prim is composed of, as they are called in one of the two kinds of layers.
+pub(super) const COMPOSED: [(&str, &str); 9] = [
+    ("references", "references"),
+    ("payload", "payloads"),
+    ("inheritPaths", "inherited prims"),
+    ("inherits", "inherited prims"),
+    ("specializes", "specialized prims"),
+    ("variantSetNames", "variants"),
+    ("variantSets", "variants"),
+    ("clips", "value clips"),
+    ("clipSets", "value clips"),
+];
+
 /// A prim of the tree.
 #[derive(Clone, Debug)]
 pub(super) struct Prim {
@@ -30,7 +43,7 @@ pub(super) struct Prim {
 pub(super) struct Value(pub(super) u64);
 
 /// The values of an attribute.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Attribute {
     pub(super) default: Option<Value>,
     /// Time codes, ascending, and what is there.
@@ -122,4 +135,14 @@ pub(super) fn composed(what: &str, of: &str) -> Fault {
     Fault::unsupported(format!(
         "{what} has {of}, which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc"
     ))
+}
+
+/// The fault of prims within prims, more than programs write.
+pub(super) fn too_deep() -> Fault {
+    Fault::unsupported(format!("nests deeper than {DEEPEST}; export the mesh alone, without what it lies below"))
+}
+
+/// The fault of an attribute that has a curve in place of values.
+pub(super) fn spline(name: &str) -> Fault {
+    Fault::unsupported(format!("has {name} animated by a spline, which is not read; bake it into time samples"))
 }

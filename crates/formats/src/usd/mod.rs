@@ -8,6 +8,7 @@ mod choice;
 mod layer;
 mod mesh;
 mod package;
+mod text;
 mod timing;
 mod transform;
 mod write;
@@ -25,6 +26,7 @@ use crate::units::Units;
 use binary::Binary;
 use layer::Layer;
 use mesh::MeshFrames;
+use text::Text;
 pub(crate) use write::{MeshWriter, Scene};
 
 /// Opens the frames of a mesh in a file of `length` bytes; `prim` chooses one of several.
@@ -78,9 +80,8 @@ fn open_plain<'a>(
     if head.starts_with(binary::MAGIC) {
         return Ok(Box::new(Binary::open(source, length)?));
     }
-    if head.starts_with(b"#usda") {
-        let what = "is text of USD, which is not read; write it as binary with usdcat in.usda -o out.usdc";
-        return Err(Fault::unsupported(what).into());
+    if head.starts_with(text::MAGIC) {
+        return Ok(Box::new(Text::open(source)?));
     }
     let other = Signature::other_than("usdc", head);
     let none = "does not begin as a file of USD does; export it again";

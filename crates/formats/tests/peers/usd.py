@@ -1,5 +1,5 @@
 """OpenUSD beside us. `usd.py read FILE` prints what the library reads of a file of one mesh: stage, faces, then a time code and the positions of each
-sample, moved by the transforms above; `usd.py make FOLDER` writes files that the library can write and we cannot, each with a text of what is to be read."""
+sample, moved by the transforms above; `usd.py cages FILE` what each mesh is for and its positions; `usd.py make FOLDER` writes files that the library can write and we cannot, each in binary, as text of USD, and with a text of what is to be read."""
 
 import sys
 import zipfile
@@ -36,6 +36,14 @@ def read(path):
         assert info is None or info.dataOffset % 64 == 0
 
 
+def cages(path):
+    stage = Usd.Stage.Open(path)
+    for mesh in meshes(stage):
+        print(mesh.GetPath(), UsdGeom.Imageable(mesh).ComputePurpose(), len(mesh.GetPointsAttr().Get()))
+        for code in mesh.GetPointsAttr().GetTimeSamples():
+            print(*map(repr, numbers(mesh, code)))
+
+
 def make(folder):
     def begin(name, codes=(1, 4)):
         stage = Usd.Stage.CreateNew(f"{folder}/{name}.usdc")
@@ -51,8 +59,13 @@ def make(folder):
         mesh.GetPointsAttr().Set([(1, 2, 3), (4, 5, 7), (-1, 0.5, 2)])
         return mesh
 
+    def keep(stage):
+        layer = stage.GetRootLayer()
+        layer.Save()
+        layer.Export(layer.realPath.replace(".usdc", ".usda"))
+
     def save(stage, prim=None):
-        stage.GetRootLayer().Save()
+        keep(stage)
         mesh = UsdGeom.Mesh(stage.GetPrimAtPath(prim)) if prim else meshes(stage)[0]
         with open(stage.GetRootLayer().realPath.replace(".usdc", ".txt"), "w") as out:
             codes = range(int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode()) + 1)
@@ -134,7 +147,7 @@ def make(folder):
     spec = Sdf.AttributeSpec(stage.GetRootLayer().GetPrimAtPath("/mesh"), "points", Sdf.ValueTypeNames.Point3dArray)
     points = [(0.1, 0.2, 0.3), (1e300, 0.0, 1.0), (0.0, 0.0, 0.0)]
     spec.default = Vt.Vec3dArray(points)
-    stage.GetRootLayer().Save()
+    keep(stage)
     with open(f"{folder}/doubles.txt", "w") as out:
         print(*(repr(x) for point in points for x in point), file=out)
 
@@ -148,7 +161,7 @@ def make(folder):
         stage = begin(name)
         put(stage, "/group/mesh")
         compose(stage.GetPrimAtPath("/group"))
-        stage.GetRootLayer().Save()
+        keep(stage)
 
 
-{"read": read, "make": make}[sys.argv[1]](sys.argv[2])
+{"read": read, "cages": cages, "make": make}[sys.argv[1]](sys.argv[2])

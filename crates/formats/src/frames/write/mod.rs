@@ -7,6 +7,7 @@ mod output;
 mod scene;
 mod sequence;
 mod single;
+mod textures;
 
 use std::path::{MAIN_SEPARATOR, Path};
 
@@ -21,10 +22,11 @@ use cache::CacheWriter;
 use mesh::FrameMesh;
 use morphs::MorphWriter;
 use output::Announced;
-pub use output::{FrameOptions, FrameWriter, MorphOptions};
+pub use output::{CageMesh, FrameOptions, FrameWriter, MorphOptions};
 use scene::SceneWriter;
 use sequence::SequenceWriter;
 use single::SingleWriter;
+use textures::TextureWriter;
 
 /// The file or folder that [`create_frames`] makes for this path: of a pattern, the folder.
 pub fn frames_path(path: &Path) -> &Path {
@@ -38,7 +40,8 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 
 /// Begins an output of `frames` frames of `points` points each.
 ///
-/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`. Without an extension, with
+/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`; `.gltf`, which gets its numbers in a `.bin` file beside it. `.vat` becomes a folder of a mesh and the
+/// images that move it, as OpenVAT has them. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
 /// A folder with nothing but such files is replaced as a whole where the target may be. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
@@ -60,12 +63,20 @@ pub fn create_frames(
     let (path, pattern) = (frames_path(given), mesh_pattern(given));
     let announced = Announced { path: path.to_owned(), points, frames, written: 0 };
     announced.check(options).map_err(|fault| fault.at(path))?;
+    let keeps_cages =
+        matches!(CacheFormat::from_path(path), Some(CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usd));
+    if options.cage.is_some() && (pattern.is_some() || !keeps_cages) {
+        return Err(Fault::unsupported("is not written with a cage; write .usdc or .usdz").at(path));
+    }
     if target == Target::StandardOutput {
         return Ok(Box::new(CacheWriter::create(announced, &target, CacheFormat::Npy, options)?));
     }
     if let Some(names) = NumberedNames::of(given) {
         check_numbered(&names, path).map_err(|fault| fault.at(given))?;
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
+    }
+    if pattern.is_none() && path.extension().is_some_and(|found| found.eq_ignore_ascii_case("vat")) {
+        return Ok(Box::new(TextureWriter::create(announced, &target, faces, options)?));
     }
     if pattern.is_some() || is_folder(path) {
         let whole = |frame: usize| options.number(frame).abs().trunc().to_string().len();
@@ -78,14 +89,16 @@ pub fn create_frames(
         return Ok(Box::new(SingleWriter::create(announced, &target, format, faces, options)?));
     }
     match CacheFormat::from_path(path) {
-        Some(CacheFormat::Glb) => Ok(Box::new(MorphWriter::create(announced, &target, faces, options)?)),
-        Some(CacheFormat::Gltf) => Err(Fault::unsupported("is written in binary alone; end the name in .glb").at(path)),
+        Some(CacheFormat::Glb | CacheFormat::Gltf) => {
+            Ok(Box::new(MorphWriter::create(announced, &target, faces, options)?))
+        }
+        Some(CacheFormat::Usda) => Err(Fault::unsupported("is written in binary alone; end the name in .usdc").at(path)),
         Some(format) if format.is_scene() => {
             Ok(Box::new(SceneWriter::create(announced, &target, format, faces, options)?))
         }
         Some(format) => Ok(Box::new(CacheWriter::create(announced, &target, format, options)?)),
         None => Err(Fault::unsupported(
-            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .abc .usdc .usdz .glb, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
+            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .abc .usdc .usdz .glb .gltf, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
         )
         .at(path)),
     }

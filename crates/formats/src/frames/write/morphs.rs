@@ -1,12 +1,13 @@
-//! All frames as morph targets of binary glTF: their principal components, which are known once all frames are.
+//! All frames as morph targets of glTF, in one binary file or as text and a file of numbers: their principal components, which are known once all frames are.
 
 use std::io::{BufWriter, Write};
 
 use cager_geometry::mesh::Polygons;
 
+use super::super::CacheFormat;
 use super::output::{Announced, FrameOptions, FrameWriter, check_precision};
 use super::scene::name;
-use crate::atomic::{AtomicFile, Target};
+use crate::atomic::{AtomicFile, Target, commit_together};
 use crate::error::{Error, Fault};
 use crate::glb::{LARGEST_SIDE, MorphScene, Morphs, Wanted};
 use crate::mesh::check_face;
@@ -17,6 +18,8 @@ const MOST_BYTES: usize = 1 << 30;
 pub(super) struct MorphWriter {
     announced: Announced,
     file: AtomicFile,
+    /// Of text, the numbers.
+    data: Option<AtomicFile>,
     wanted: Wanted,
     scene: MorphScene,
     frames: Vec<f32>,
@@ -47,10 +50,15 @@ impl MorphWriter {
             times,
             origin: options.origin.unwrap_or_default(),
             floats: options.morphs.floats,
+            normals: options.morphs.normals,
         };
         let notes = note.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
+        let data = match CacheFormat::from_path(path) {
+            Some(CacheFormat::Gltf) => Some(AtomicFile::create(data_beside(target))?),
+            _ => None,
+        };
         let file = AtomicFile::create(target)?;
-        Ok(Self { announced, file, wanted, scene, frames: Vec::new(), notes })
+        Ok(Self { announced, file, data, wanted, scene, frames: Vec::new(), notes })
     }
 
     /// Writes the file, once all frames are there.
@@ -69,9 +77,24 @@ impl MorphWriter {
             ));
         }
         let mut out = BufWriter::with_capacity(1 << 16, &mut self.file);
-        let written = morphs.write(&mut out).and_then(|()| out.flush());
+        let written = match &mut self.data {
+            None => morphs.write(&mut out),
+            Some(data) => {
+                let name = path.with_extension("bin");
+                let name = name.file_name().unwrap_or_default().to_string_lossy();
+                let mut data = BufWriter::with_capacity(1 << 16, data);
+                morphs.write_apart(&mut out, &mut data, &name).and_then(|()| data.flush())
+            }
+        };
+        let written = written.and_then(|()| out.flush());
         written.map_err(|cause| Error::write(path, cause))
     }
+}
+
+/// The file of numbers that belongs to one of text.
+fn data_beside(target: &Target) -> Target {
+    let path = target.path().with_extension("bin");
+    if target.replaces() { Target::Replacing(path) } else { Target::New(path) }
 }
 
 fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(), Fault> {
@@ -138,6 +161,7 @@ impl FrameWriter for MorphWriter {
 
     fn finish(self: Box<Self>) -> Result<(), Error> {
         self.announced.check_complete()?;
-        self.file.commit()
+        // The numbers first, as the text says that they are there.
+        commit_together(self.data.into_iter().chain([self.file]).collect())
     }
 }

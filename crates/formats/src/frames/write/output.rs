@@ -16,6 +16,14 @@ pub trait FrameWriter: Send {
     /// frames than announced, [`Error::Unsupported`] where morph targets lose more than they may, [`Error::Io`].
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error>;
 
+    /// Writes the cage of the next frame, 3 × points coordinates, where [`FrameOptions::cage`] announced one: once for each frame, before or after it.
+    ///
+    /// # Errors
+    /// As [`Self::write_frame`]; [`Error::Unsupported`] where no cage was announced.
+    fn write_cage(&mut self, _positions: &[f32]) -> Result<(), Error> {
+        Err(no_cage(Path::new("the output")))
+    }
+
     /// Goes on with frames of another mesh: the number of its points, its faces, and of the options its origin and what rounding may lose.
     ///
     /// # Errors
@@ -48,8 +56,19 @@ pub struct FrameOptions {
     pub rounding: f64,
     /// What the positions mean, for the formats that say it; metres and Y up where nothing is told.
     pub units: Option<Units>,
-    /// How `.glb` holds the frames.
+    /// The cage that is kept beside the mesh, in USD alone.
+    pub cage: Option<CageMesh>,
+    /// How `.glb` and `.gltf` hold the frames.
     pub morphs: MorphOptions,
+}
+
+/// A cage that is written as a second mesh, which programs show as a guide and do not render.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CageMesh {
+    /// How many points it has.
+    pub points: usize,
+    /// Its faces.
+    pub faces: Polygons,
 }
 
 /// How frames become morph targets: as their principal components, which lose something.
@@ -63,6 +82,8 @@ pub struct MorphOptions {
     pub diagonal: Option<f64>,
     /// Whether positions are floats instead of whole numbers of 16 bits.
     pub floats: bool,
+    /// Whether normals are written, of the mean shape and of each target: 12 bytes for each point of them.
+    pub normals: bool,
 }
 
 impl FrameOptions {
@@ -86,6 +107,7 @@ impl Default for FrameOptions {
             origin: None,
             rounding: 0.0,
             units: None,
+            cage: None,
             morphs: MorphOptions::default(),
         }
     }
@@ -102,6 +124,11 @@ pub(super) fn check_precision(options: &FrameOptions, path: &Path) -> Result<(),
         "holds single precision, which loses all that is smaller than {lost:.1e} units so far from the origin; write .npy, or .obj or .ply files"
     );
     Err(Fault::unsupported(what).at(path))
+}
+
+/// Why an output takes no cage.
+pub(super) fn no_cage(path: &Path) -> Error {
+    Fault::unsupported("has no cage that was announced; write .usdc or .usdz with one").at(path)
 }
 
 /// Announced size of an output, and the number of frames written.

@@ -5,7 +5,7 @@ use std::path::Path;
 use cager_geometry::mesh::Polygons;
 
 use super::super::CacheFormat;
-use super::output::{Announced, FrameOptions, FrameWriter};
+use super::output::{Announced, CageMesh, FrameOptions, FrameWriter, no_cage};
 use crate::alembic::{self, Numbers, Schedule};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
@@ -21,6 +21,8 @@ const LONGEST_PACKAGE: usize = 0xf000_0000;
 pub(super) struct SceneWriter {
     announced: Announced,
     mesh: Mesh,
+    /// Points of the cage, and frames of it that are written.
+    cage: Option<(usize, usize)>,
 }
 
 enum Mesh {
@@ -39,6 +41,9 @@ impl SceneWriter {
         let path = &announced.path;
         check(&announced, format, faces).map_err(|fault| fault.at(path))?;
         let (name, write) = (name(path), |cause| Error::write(path, cause));
+        if let Some(cage) = &options.cage {
+            check_cage(cage).map_err(|fault| fault.at(path))?;
+        }
         let file = AtomicFile::create(target)?;
         if format != CacheFormat::Abc {
             let scene = Scene {
@@ -49,8 +54,10 @@ impl SceneWriter {
                 origin: options.origin,
                 is_packed: format == CacheFormat::Usdz,
             };
-            let mesh = usd::MeshWriter::new(file, faces, scene).map_err(write)?;
-            return Ok(Self { announced, mesh: Mesh::Usd(mesh) });
+            let cage = options.cage.as_ref();
+            let mesh = usd::MeshWriter::new(file, faces, cage.map(|cage| &cage.faces), scene).map_err(write)?;
+            let cage = cage.map(|cage| (cage.points, 0));
+            return Ok(Self { announced, mesh: Mesh::Usd(mesh), cage });
         }
         let numbers = match options.even_step() {
             Some(step) => Numbers::Even { first: options.number(0), step },
@@ -58,7 +65,7 @@ impl SceneWriter {
         };
         let schedule = Schedule { fps: options.fps, numbers };
         let mesh = alembic::MeshWriter::new(file, &name, faces, schedule, options.origin).map_err(write)?;
-        Ok(Self { announced, mesh: Mesh::Alembic(mesh) })
+        Ok(Self { announced, mesh: Mesh::Alembic(mesh), cage: None })
     }
 }
 
@@ -75,6 +82,16 @@ fn check(announced: &Announced, format: CacheFormat, faces: &Polygons) -> Result
         ));
     }
     faces.iter().enumerate().try_for_each(|(k, face)| check_face(face, announced.points, || format!("face {k}")))
+}
+
+fn check_cage(cage: &CageMesh) -> Result<(), Fault> {
+    if cage.points == 0 || cage.points > i32::MAX as usize {
+        return Err(Fault::invalid(format!("cannot have a cage of {} points", cage.points)));
+    }
+    cage.faces
+        .iter()
+        .enumerate()
+        .try_for_each(|(k, face)| check_face(face, cage.points, || format!("face {k} of the cage")))
 }
 
 /// The name of the mesh: that of the file, with `_` for what names in Maya cannot have.
@@ -98,12 +115,28 @@ impl FrameWriter for SceneWriter {
         Ok(())
     }
 
+    fn write_cage(&mut self, positions: &[f32]) -> Result<(), Error> {
+        let (Mesh::Usd(mesh), Some((points, written))) = (&mut self.mesh, &mut self.cage) else {
+            return Err(no_cage(&self.announced.path));
+        };
+        let Announced { path, frames, .. } = &self.announced;
+        let cage = Announced { path: path.clone(), points: *points, frames: *frames, written: *written };
+        cage.admit(positions)?;
+        mesh.write_cage(positions).map_err(|cause| Error::write(path, cause))?;
+        *written += 1;
+        Ok(())
+    }
+
     fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
         Err(self.announced.one_mesh())
     }
 
     fn finish(self: Box<Self>) -> Result<(), Error> {
         self.announced.check_complete()?;
+        if let Some((_, written)) = self.cage.filter(|(_, written)| *written < self.announced.frames) {
+            let path = self.announced.path.clone();
+            return Err(Error::FrameCount { path, announced: self.announced.frames, written });
+        }
         let finished = match self.mesh {
             Mesh::Alembic(mesh) => mesh.finish(),
             Mesh::Usd(mesh) => mesh.finish(),

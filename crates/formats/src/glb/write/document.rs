@@ -27,11 +27,13 @@ pub(super) struct Document<'a> {
     pub(super) stored: &'a Stored,
     /// Those of all targets, frame after frame.
     pub(super) weights: &'a [f32],
+    /// Those of the base and of all targets; empty where none are wanted.
+    pub(super) normals: &'a [[f32; 3]],
 }
 
 impl Document<'_> {
     pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        let mut json = self.json().into_bytes();
+        let mut json = self.json(None).into_bytes();
         json.resize(json.len().next_multiple_of(4), b' ');
         let length = self.lengths().iter().sum::<usize>();
         let word = |x: usize| u32::try_from(x).map(u32::to_le_bytes).map_err(|_| io::ErrorKind::FileTooLarge);
@@ -42,12 +44,20 @@ impl Document<'_> {
         out.write_all(&json)?;
         out.write_all(&word(length)?)?;
         out.write_all(b"BIN\0")?;
+        self.write_numbers(out)
+    }
+
+    /// As text, with all numbers in a file of this name.
+    pub(super) fn write_apart(&self, text: &mut impl Write, data: &mut impl Write, name: &str) -> io::Result<()> {
+        text.write_all(self.json(Some(name)).as_bytes())?;
+        self.write_numbers(data)
+    }
+
+    fn write_numbers(&self, out: &mut impl Write) -> io::Result<()> {
         self.write_positions(out)?;
         self.write_corners(out)?;
-        for x in self.scene.times.iter().chain(self.weights) {
-            out.write_all(&x.to_le_bytes())?;
-        }
-        Ok(())
+        let animation = self.scene.times.iter().chain(self.weights);
+        animation.chain(self.normals.as_flattened()).try_for_each(|x| out.write_all(&x.to_le_bytes()))
     }
 
     /// Refuses what the lengths in the file cannot count.
@@ -75,11 +85,12 @@ impl Document<'_> {
         if self.stored.points() <= FEW { 2 } else { 4 }
     }
 
-    /// Bytes of the three views.
-    fn lengths(&self) -> [usize; 3] {
+    /// Bytes of the four views.
+    fn lengths(&self) -> [usize; 4] {
         let positions = self.stored.parts() * self.stored.points() * self.stride();
         let corners = (3 * self.scene.triangles.len() * self.corner_size()).next_multiple_of(4);
-        [positions, corners, 4 * (self.scene.times.len() + self.weights.len())]
+        let normals = 12 * self.normals.len();
+        [positions, corners, 4 * (self.scene.times.len() + self.weights.len()), normals]
     }
 
     fn write_positions(&self, out: &mut impl Write) -> io::Result<()> {
@@ -103,7 +114,7 @@ impl Document<'_> {
         Ok(())
     }
 
-    fn json(&self) -> String {
+    fn json(&self, data: Option<&str>) -> String {
         let Scene { name, triangles, .. } = self.scene;
         let (targets, has_faces) = (self.stored.parts() - 1, !triangles.is_empty());
         let mut text = String::from(r#"{"asset":{"version":"2.0","generator":"cager"},"#);
@@ -117,11 +128,20 @@ impl Document<'_> {
             r#""scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"name":"{name}","mesh":0,"translation":{},"scale":[{step},{step},{step}]}}],"#,
             list(place.map(|x| f64::from(x as f32)))
         );
-        // Accessors: positions of the base and the targets, then corners, times and weights as far as there are any.
+        // Accessors: positions of the base and the targets, then corners, times and weights as far as there are any, and normals.
+        let first_normals = targets + 1 + usize::from(has_faces) + if targets > 0 { 2 } else { 0 };
+        let normal = |k: usize| match self.normals {
+            [] => String::new(),
+            _ => format!(r#","NORMAL":{}"#, first_normals + k),
+        };
         let primitive = if has_faces { format!(r#","indices":{}"#, targets + 1) } else { r#","mode":0"#.to_owned() };
-        let _ = write!(text, r#""meshes":[{{"name":"{name}","primitives":[{{"attributes":{{"POSITION":0}}{primitive}"#);
+        let _ = write!(
+            text,
+            r#""meshes":[{{"name":"{name}","primitives":[{{"attributes":{{"POSITION":0{}}}{primitive}"#,
+            normal(0)
+        );
         if targets > 0 {
-            let all: Vec<String> = (1..=targets).map(|k| format!(r#"{{"POSITION":{k}}}"#)).collect();
+            let all: Vec<String> = (1..=targets).map(|k| format!(r#"{{"POSITION":{k}{}}}"#, normal(k))).collect();
             let _ = write!(
                 text,
                 r#","targets":[{}]}}],"weights":{}}}],"#,
@@ -138,7 +158,8 @@ impl Document<'_> {
             text += "}]}],";
         }
         let _ = write!(text, r#""accessors":[{}],"bufferViews":[{}],"#, self.accessors(), self.views());
-        let _ = write!(text, r#""buffers":[{{"byteLength":{}}}]}}"#, self.lengths().iter().sum::<usize>());
+        let uri = data.map_or_else(String::new, |name| format!(r#","uri":"{}""#, escaped(name)));
+        let _ = write!(text, r#""buffers":[{{"byteLength":{}{uri}}}]}}"#, self.lengths().iter().sum::<usize>());
         text
     }
 
@@ -167,12 +188,17 @@ impl Document<'_> {
             let bounds = format!(r#"{scalar},"min":[{}],"max":[{}]"#, f64::from(*first), f64::from(*last));
             all.push(accessor(view, 0, FLOAT, times.len(), &bounds));
             all.push(accessor(view, 4 * times.len(), FLOAT, self.weights.len(), scalar));
+            view += 1;
         }
+        all.extend(
+            (0..self.normals.len() / points)
+                .map(|part| accessor(view, 12 * part * points, FLOAT, points, r#""type":"VEC3""#)),
+        );
         all.join(",")
     }
 
     fn views(&self) -> String {
-        let [positions, corners, animation] = self.lengths();
+        let [positions, corners, animation, normals] = self.lengths();
         let stride = self.stride();
         let mut all =
             vec![format!(r#"{{"buffer":0,"byteLength":{positions},"byteStride":{stride},"target":{VERTICES}}}"#)];
@@ -182,6 +208,12 @@ impl Document<'_> {
         if animation > 0 {
             all.push(format!(r#"{{"buffer":0,"byteOffset":{},"byteLength":{animation}}}"#, positions + corners));
         }
+        if normals > 0 {
+            let start = positions + corners + animation;
+            all.push(format!(
+                r#"{{"buffer":0,"byteOffset":{start},"byteLength":{normals},"byteStride":12,"target":{VERTICES}}}"#
+            ));
+        }
         all.join(",")
     }
 }
@@ -190,4 +222,12 @@ impl Document<'_> {
 fn list(numbers: impl IntoIterator<Item = f64>) -> String {
     let words: Vec<String> = numbers.into_iter().map(|x| x.to_string()).collect();
     format!("[{}]", words.join(","))
+}
+
+/// A file name as an address has it.
+fn escaped(name: &str) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
+    name.bytes()
+        .map(|byte| if is_plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
+        .collect()
 }

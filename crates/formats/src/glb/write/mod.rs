@@ -2,6 +2,7 @@
 
 mod components;
 mod document;
+mod normals;
 mod stored;
 
 use std::io::{self, Write};
@@ -12,6 +13,7 @@ use crate::error::Fault;
 use components::{Components, Frames};
 pub(crate) use components::{Deviation, LARGEST_SIDE, Wanted};
 use document::Document;
+use normals::Normals;
 use stored::Stored;
 
 /// What is written beside the frames.
@@ -25,6 +27,8 @@ pub(crate) struct Scene {
     pub(crate) origin: Point,
     /// Whether positions are floats instead of whole numbers of 16 bits.
     pub(crate) floats: bool,
+    /// Whether normals are written as well.
+    pub(crate) normals: bool,
 }
 
 /// A mesh with its morph targets, ready to be written.
@@ -32,6 +36,7 @@ pub(crate) struct Morphs<'a> {
     scene: &'a Scene,
     stored: Stored,
     components: Components,
+    normals: Option<Normals>,
 }
 
 impl<'a> Morphs<'a> {
@@ -39,21 +44,25 @@ impl<'a> Morphs<'a> {
     ///
     /// # Errors
     /// More than is wanted is lost; a file beyond 4 GiB.
-    pub(crate) fn of(frames: &[f32], points: usize, wanted: &Wanted, scene: &'a Scene) -> Result<Self, Fault> {
-        let frames = Frames::new(frames, points);
+    pub(crate) fn of(values: &[f32], points: usize, wanted: &Wanted, scene: &'a Scene) -> Result<Self, Fault> {
+        let frames = Frames::new(values, points);
         let mut stored = Stored::base(&frames, scene.floats);
         // The node's place is rounded too.
         let place = document::place(&stored, scene);
         let rounding = place.map(|x| f64::from(x as f32) - x);
         let components = Components::of(&frames, &mut stored, wanted, rounding)?;
         stored.truncate(components.deviation.targets);
-        let morphs = Self { scene, stored, components };
+        let targets = components.deviation.targets;
+        let normals = (scene.normals && !scene.triangles.is_empty())
+            .then(|| Normals::of(values, points, &scene.triangles, &components.weights, targets));
+        let morphs = Self { scene, stored, components, normals };
         morphs.document().check()?;
         Ok(morphs)
     }
 
     fn document(&self) -> Document<'_> {
-        Document { scene: self.scene, stored: &self.stored, weights: &self.components.weights }
+        let normals = self.normals.as_ref().map_or(&[][..], |normals| &normals.0);
+        Document { scene: self.scene, stored: &self.stored, weights: &self.components.weights, normals }
     }
 
     /// Targets, and how far what is written is from the frames.
@@ -61,7 +70,13 @@ impl<'a> Morphs<'a> {
         &self.components.deviation
     }
 
+    /// Writes one binary file.
     pub(crate) fn write(&self, out: &mut impl Write) -> io::Result<()> {
         self.document().write(out)
+    }
+
+    /// Writes a file of text, which has its numbers in another one of this name.
+    pub(crate) fn write_apart(&self, text: &mut impl Write, data: &mut impl Write, name: &str) -> io::Result<()> {
+        self.document().write_apart(text, data, name)
     }
 }

@@ -7,7 +7,7 @@ mod sections;
 
 use std::io::{Read, Seek};
 
-use super::layer::{Attribute, DEEPEST, Layer, Points, Prim, Stage, Value, composed, damaged};
+use super::layer::{Attribute, COMPOSED, DEEPEST, Layer, Points, Prim, Stage, Value, composed, damaged, spline};
 use crate::error::Fault;
 use crate::frames::{Scalar, half_precision};
 use crate::scene::Failure;
@@ -45,17 +45,6 @@ pub(super) const ROOT: u32 = 7;
 
 /// Versions 0.4.0 to 0.13.0 of the format are read: before them tables were not packed.
 const VERSIONS: std::ops::RangeInclusive<u8> = 4..=13;
-
-/// Fields that say what a prim is composed of.
-const COMPOSED: [(&str, &str); 7] = [
-    ("references", "references"),
-    ("payload", "payloads"),
-    ("inheritPaths", "inherited prims"),
-    ("specializes", "specialized prims"),
-    ("variantSetNames", "variants"),
-    ("clips", "value clips"),
-    ("clipSets", "value clips"),
-];
 
 pub(super) struct Binary<R> {
     file: File<R>,
@@ -205,10 +194,9 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
         let mut attribute = Attribute::default();
         let Some(spec) = self.find(prim, name) else { return Ok(attribute) };
         let field = |name| self.sections.field(spec, name);
-        let (default, samples, spline) = (field("default")?, field("timeSamples")?, field("spline")?);
-        if spline.is_some() {
-            let what = format!("has {name} animated by a spline, which is not read; bake it into time samples");
-            return Err(Fault::unsupported(what).into());
+        let (default, samples, curve) = (field("default")?, field("timeSamples")?, field("spline")?);
+        if curve.is_some() {
+            return Err(spline(name).into());
         }
         attribute.default = default.filter(|value| value.kind() != kind::BLOCKED).map(|value| Value(value.0));
         if let Some(samples) = samples {

@@ -1,7 +1,7 @@
 //! Paths of all that a layer holds, stored as a tree in depth-first order.
 
 use crate::error::Fault;
-use crate::usd::layer::{DEEPEST, damaged};
+use crate::usd::layer::{DEEPEST, damaged, too_deep};
 
 /// What a path leads to.
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,9 +33,7 @@ pub(super) fn paths(count: usize, [indices, names, jumps]: [&[i32]; 3]) -> Resul
             let (parent, depth) = above.map_or((index, 0), |(parent, depth)| (parent, depth + 1));
             // A property lies below the last of so many prims.
             if depth > DEEPEST + 1 {
-                return Err(Fault::unsupported(format!(
-                    "nests deeper than {DEEPEST}; export the mesh alone, without what it lies below"
-                )));
+                return Err(too_deep());
             }
             paths[index as usize] = Path { parent, depth, name: names[place].unsigned_abs() };
             match jumps[place] {

@@ -1,4 +1,4 @@
-//! Writes a layer of one polygon mesh below one transform, frame by frame, in version 0.8.0 of the binary format, which USD reads since 2019.
+//! Writes a layer of one polygon mesh, and its cage where there is one, below one transform, frame by frame, in version 0.8.0 of the binary format, which USD reads since 2019.
 
 mod sink;
 mod tables;
@@ -40,26 +40,58 @@ pub(crate) struct Scene {
 pub(crate) struct MeshWriter<W> {
     sink: Sink<W>,
     scene: Scene,
-    /// Values of how many corners faces have, and which.
-    faces: [u64; 2],
-    points: Vec<u64>,
-    extents: Vec<u64>,
+    mesh: Mesh,
+    cage: Mesh,
+    has_cage: bool,
     bytes: Vec<u8>,
 }
 
+/// Values of what is written of a mesh.
+#[derive(Default)]
+struct Mesh {
+    /// How many corners faces have, and which.
+    faces: [u64; 2],
+    points: Vec<u64>,
+    extents: Vec<u64>,
+}
+
 impl<W: Write + Seek> MeshWriter<W> {
-    pub(crate) fn new(out: W, faces: &Polygons, scene: Scene) -> io::Result<Self> {
+    /// Begins a layer of a mesh of these faces, and of a cage where its faces are given.
+    pub(crate) fn new(out: W, faces: &Polygons, cage: Option<&Polygons>, scene: Scene) -> io::Result<Self> {
         let sink = Sink::new(out, scene.is_packed.then(|| format!("{}.usdc", scene.name)))?;
-        let (points, extents, bytes) = (Vec::new(), Vec::new(), Vec::new());
-        let mut writer = Self { sink, scene, faces: [0; 2], points, extents, bytes };
+        let (mesh, has_cage, bytes) = (Mesh::default(), cage.is_some(), Vec::new());
+        let mut writer = Self { sink, scene, mesh, cage: Mesh::default(), has_cage, bytes };
+        writer.mesh.faces = writer.faces(faces)?;
+        if let Some(cage) = cage {
+            writer.cage.faces = writer.faces(cage)?;
+        }
+        Ok(writer)
+    }
+
+    fn faces(&mut self, faces: &Polygons) -> io::Result<[u64; 2]> {
         let counts: Vec<i32> = faces.arities().iter().map(|&count| count as i32).collect();
         let corners: Vec<i32> = faces.indices().iter().map(|&corner| corner as i32).collect();
-        writer.faces = [writer.integers(&counts)?, writer.integers(&corners)?];
-        Ok(writer)
+        Ok([self.integers(&counts)?, self.integers(&corners)?])
     }
 
     /// Writes a frame, `x y z x y z …`.
     pub(crate) fn write_frame(&mut self, positions: &[f32]) -> io::Result<()> {
+        let [points, extent] = self.positions(positions)?;
+        self.mesh.points.push(points);
+        self.mesh.extents.push(extent);
+        Ok(())
+    }
+
+    /// Writes the cage of a frame, in the order of frames.
+    pub(crate) fn write_cage(&mut self, positions: &[f32]) -> io::Result<()> {
+        let [points, extent] = self.positions(positions)?;
+        self.cage.points.push(points);
+        self.cage.extents.push(extent);
+        Ok(())
+    }
+
+    /// Positions, and their smallest and largest coordinates.
+    fn positions(&mut self, positions: &[f32]) -> io::Result<[u64; 2]> {
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for point in positions.as_chunks::<3>().0 {
             for k in 0..3 {
@@ -67,20 +99,13 @@ impl<W: Write + Seek> MeshWriter<W> {
                 high[k] = high[k].max(point[k]);
             }
         }
-        let points = self.vectors(positions)?;
-        self.points.push(points);
-        let extent = self.vectors([low, high].as_flattened())?;
-        self.extents.push(extent);
-        Ok(())
+        Ok([self.vectors(positions)?, self.vectors([low, high].as_flattened())?])
     }
 
     /// Writes what says where the frames are; gives the file back.
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let codes: Vec<u8> = self.scene.codes.iter().flat_map(|code| code.to_le_bytes()).collect();
         let times = self.list(kind::DOUBLES, self.scene.codes.len(), &codes)?;
-        let (points, extents) = (std::mem::take(&mut self.points), std::mem::take(&mut self.extents));
-        let [points_at, extents_at] = [self.samples(times, &points)?, self.samples(times, &extents)?];
-        let first = points.first().copied().unwrap_or(ARRAY | value(kind::VEC3F, 0));
 
         let mut tables = Tables::default();
         // A first name that no property has, as its negative would be no other number.
@@ -107,7 +132,8 @@ impl<W: Write + Seek> MeshWriter<W> {
         if self.scene.origin.is_some() {
             transform.push(("properties", self.tokens(&mut tables, &[TRANSLATE, ORDER])?));
         }
-        transform.push(("primChildren", self.tokens(&mut tables, &["mesh"])?));
+        let meshes: &[&str] = if self.has_cage { &["mesh", "cage"] } else { &["mesh"] };
+        transform.push(("primChildren", self.tokens(&mut tables, meshes)?));
         tables.spec(PRIM, &name, Next::Child, &transform);
         if let Some(origin) = self.scene.origin {
             self.sink.align()?;
@@ -119,25 +145,48 @@ impl<W: Write + Seek> MeshWriter<W> {
             tables.spec(ATTRIBUTE, ORDER, Next::Sibling, &fields);
         }
 
-        let names = ["extent", "faceVertexCounts", "faceVertexIndices", "points", "subdivisionScheme"];
-        let properties = ("properties", self.tokens(&mut tables, &names)?);
-        let mesh = [defined, ("typeName", token(&mut tables, "Mesh")), properties];
-        tables.spec(PRIM, "mesh", Next::Child, &mesh);
+        let (mesh, cage) = (std::mem::take(&mut self.mesh), std::mem::take(&mut self.cage));
+        let next = if self.has_cage { Next::ChildAndSibling(1 + PROPERTIES.len() as i32) } else { Next::Child };
+        self.put_mesh(&mut tables, "mesh", next, &mesh, times)?;
+        if self.has_cage {
+            self.put_mesh(&mut tables, "cage", Next::Child, &cage, times)?;
+        }
+
+        let contents = tables.write(&mut self.sink)?;
+        let head = [&MAGIC[..], &VERSION, &[0; 5], &contents.to_le_bytes()].concat();
+        self.sink.close(&head)
+    }
+
+    /// A mesh and its properties; the cage is a guide, which programs show and do not render.
+    fn put_mesh(&mut self, tables: &mut Tables, name: &str, next: Next, mesh: &Mesh, times: u64) -> io::Result<()> {
+        let [points_at, extents_at] = [self.samples(times, &mesh.points)?, self.samples(times, &mesh.extents)?];
+        let first = mesh.points.first().copied().unwrap_or(ARRAY | value(kind::VEC3F, 0));
+        let token = |tables: &mut Tables, text: &str| INLINED | value(kind::TOKEN, tables.token(text).into());
+        let uniform = ("variability", INLINED | value(kind::VARIABILITY, 1));
+        let is_guide = name == "cage";
+        let mut names = PROPERTIES.to_vec();
+        names.extend(is_guide.then_some(PURPOSE));
+        let properties = ("properties", self.tokens(tables, &names)?);
+        let prim =
+            [("specifier", INLINED | value(kind::SPECIFIER, 0)), ("typeName", token(tables, "Mesh")), properties];
+        tables.spec(PRIM, name, next, &prim);
         let kinds = ["float3[]", "int[]", "point3f[]", "token"];
-        let [extent, integers, point, text] = kinds.map(|kind| ("typeName", token(&mut tables, kind)));
-        let [counts, corners] = self.faces;
+        let [extent, integers, point, text] = kinds.map(|kind| ("typeName", token(tables, kind)));
+        let [counts, corners] = mesh.faces;
         tables.spec(ATTRIBUTE, names[0], Next::Sibling, &[extent, ("timeSamples", extents_at)]);
         tables.spec(ATTRIBUTE, names[1], Next::Sibling, &[integers, ("default", counts)]);
         tables.spec(ATTRIBUTE, names[2], Next::Sibling, &[integers, ("default", corners)]);
         // Readers without a time take the first frame.
         tables.spec(ATTRIBUTE, names[3], Next::Sibling, &[point, ("default", first), ("timeSamples", points_at)]);
         // Otherwise programs subdivide it.
-        let plain = ("default", token(&mut tables, "none"));
-        tables.spec(ATTRIBUTE, names[4], Next::None, &[text, uniform, plain]);
-
-        let contents = tables.write(&mut self.sink)?;
-        let head = [&MAGIC[..], &VERSION, &[0; 5], &contents.to_le_bytes()].concat();
-        self.sink.close(&head)
+        let plain = ("default", token(tables, "none"));
+        let last = if is_guide { Next::Sibling } else { Next::None };
+        tables.spec(ATTRIBUTE, names[4], last, &[text, uniform, plain]);
+        if is_guide {
+            let guide = ("default", token(tables, "guide"));
+            tables.spec(ATTRIBUTE, PURPOSE, Next::None, &[text, uniform, guide]);
+        }
+        Ok(())
     }
 
     /// Some elements behind how many they are.
@@ -190,6 +239,10 @@ impl<W: Write + Seek> MeshWriter<W> {
         Ok(value(kind::TIME_SAMPLES, at))
     }
 }
+
+/// Of meshes; cages have a purpose as well.
+const PROPERTIES: [&str; 5] = ["extent", "faceVertexCounts", "faceVertexIndices", "points", "subdivisionScheme"];
+const PURPOSE: &str = "purpose";
 
 const TRANSLATE: &str = "xformOp:translate";
 const ORDER: &str = "xformOpOrder";

@@ -12,11 +12,24 @@ pub(super) type Field<'a> = (&'a str, u64);
 #[derive(Clone, Copy)]
 pub(super) enum Next {
     /// Below it; it has no sibling.
-    Child = -1,
+    Child,
+    /// Below it; its sibling comes so many paths later.
+    ChildAndSibling(i32),
     /// Beside it.
-    Sibling = 0,
+    Sibling,
     /// Neither.
-    None = -2,
+    None,
+}
+
+impl Next {
+    fn jump(self) -> i32 {
+        match self {
+            Self::Child => -1,
+            Self::ChildAndSibling(paths) => paths,
+            Self::Sibling => 0,
+            Self::None => -2,
+        }
+    }
 }
 
 #[derive(Default)]
@@ -46,7 +59,7 @@ impl Tables {
     /// Appends a prim or a property, after what it lies below.
     pub(super) fn spec(&mut self, kind: u32, name: &str, next: Next, fields: &[Field<'_>]) {
         let (token, path) = (self.token(name) as i32, self.paths.len() as i32);
-        self.paths.push((if kind == crate::usd::binary::ATTRIBUTE { -token } else { token }, next as i32));
+        self.paths.push((if kind == crate::usd::binary::ATTRIBUTE { -token } else { token }, next.jump()));
         self.specs.push([path, self.sets.len() as i32, kind as i32]);
         for &(name, value) in fields {
             let token = self.token(name) as i32;

@@ -1,0 +1,174 @@
+//! Layers of text: read once from the beginning to the end for where values are, which are parsed when they are asked for.
+
+mod parser;
+mod scanner;
+
+use std::io::{Read, Seek};
+
+use super::layer::{Attribute, Layer, Points, Prim, Stage, Value, damaged, spline};
+use crate::error::Fault;
+use crate::frames::Scalar;
+use crate::scene::Failure;
+use parser::{Contents, Parser, Stored};
+use scanner::Scanner;
+
+/// What a layer begins with.
+pub(super) const MAGIC: &[u8; 5] = b"#usda";
+/// Numbers of one value, those of a matrix.
+const MOST_NUMBERS: usize = 16;
+/// Arrays of points that stay in memory: a frame between two samples needs both, and so does the next one.
+const KEPT: usize = 2;
+
+pub(super) struct Text<R> {
+    scanner: Scanner<R>,
+    contents: Contents,
+    /// Where points were read from, and these; the last ones first.
+    read: Vec<(u64, Vec<f64>)>,
+}
+
+impl<R: Read + Seek> Text<R> {
+    /// Opens a layer, which begins as one does.
+    pub(super) fn open(source: R) -> Result<Self, Failure> {
+        let mut scanner = Scanner::new(source)?;
+        let contents = Parser::parse(&mut scanner)?;
+        Ok(Self { scanner, contents, read: Vec::new() })
+    }
+
+    /// Goes to where a value is.
+    fn enter(&mut self, value: Value) -> Result<Stored, Failure> {
+        let stored = usize::try_from(value.0).ok().and_then(|index| self.contents.values.get(index).copied());
+        let stored = stored.ok_or_else(|| damaged("it has a value that is nowhere"))?;
+        if stored.is_blocked {
+            return Err(Fault::unsupported("has a value that is blocked at a time; export it again").into());
+        }
+        self.scanner.go(stored.place)?;
+        Ok(stored)
+    }
+
+    /// Whether another value follows in a list, whose last one may have a comma behind it.
+    fn follows(&mut self) -> Result<bool, Failure> {
+        self.scanner.has(b',')?;
+        Ok(!self.scanner.has(b']')?)
+    }
+
+    fn parse_points(&mut self, index: u64) -> Result<Vec<f64>, Failure> {
+        let Stored { count, is_double, .. } = self.enter(Value(index))?;
+        let mut values = Vec::with_capacity(3 * count);
+        self.scanner.expect(b'[')?;
+        while self.follows()? {
+            self.scanner.expect(b'(')?;
+            for k in 0..3 {
+                if k > 0 {
+                    self.scanner.expect(b',')?;
+                }
+                values.push(rounded(self.scanner.number()?, is_double));
+            }
+            self.scanner.expect(b')')?;
+        }
+        Ok(values)
+    }
+}
+
+/// As a type that is not of double precision holds it.
+fn rounded(number: f64, is_double: bool) -> f64 {
+    if is_double { number } else { f64::from(number as f32) }
+}
+
+impl<R: Read + Seek + Send> Layer for Text<R> {
+    fn stage(&self) -> &Stage {
+        &self.contents.stage
+    }
+
+    fn prims(&self) -> &[Prim] {
+        &self.contents.prims
+    }
+
+    fn name(&self, prim: &Prim) -> &[u8] {
+        self.contents.names[prim.name as usize].as_bytes()
+    }
+
+    fn attribute(&mut self, prim: u32, name: &str) -> Result<Attribute, Failure> {
+        let key = (prim, name.to_owned());
+        if self.contents.splines.contains(&key) {
+            return Err(spline(name).into());
+        }
+        Ok(self.contents.attributes.get(&key).cloned().unwrap_or_default())
+    }
+
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
+        let Stored { is_double, is_quaternion, .. } = self.enter(value)?;
+        let (mut numbers, mut depth) = (Vec::new(), 0_usize);
+        loop {
+            if self.scanner.has(b'(')? {
+                depth += 1;
+            } else if depth > 0 && self.scanner.has(b')')? {
+                depth -= 1;
+            } else if depth == 0 || !self.scanner.has(b',')? {
+                numbers.push(rounded(self.scanner.number()?, is_double));
+                if numbers.len() > MOST_NUMBERS {
+                    return Err(self.scanner.wrong("a value has more numbers than a matrix"));
+                }
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+        if is_quaternion && numbers.len() == 4 {
+            numbers.rotate_left(1);
+        }
+        Ok(numbers)
+    }
+
+    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure> {
+        self.enter(value)?;
+        if !self.scanner.has(b'[')? {
+            return Ok(vec![self.scanner.string()?]);
+        }
+        let mut names = Vec::new();
+        while self.follows()? {
+            if names.len() == most {
+                return Err(damaged(&format!("it has a list of more names than {most}, which are the most")).into());
+            }
+            names.push(self.scanner.string()?);
+        }
+        Ok(names)
+    }
+
+    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {
+        let count = self.enter(value)?.count;
+        if count as u64 > most {
+            return Err(damaged(&format!("it has {count} numbers of faces where {most} are the most")).into());
+        }
+        let mut numbers = Vec::with_capacity(count);
+        self.scanner.expect(b'[')?;
+        while self.follows()? {
+            let number = self.scanner.number()?;
+            if number != number.trunc() || !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&number) {
+                return Err(self.scanner.wrong(&format!("{number} stands where a whole number of faces belongs")));
+            }
+            numbers.push(number as i32);
+        }
+        Ok(numbers)
+    }
+
+    fn points(&mut self, value: Value) -> Result<Points, Failure> {
+        let count = self.enter(value)?.count;
+        Ok(Points { start: value.0, count, scalar: Scalar::F64Little })
+    }
+
+    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure> {
+        if let Some(known) = self.read.iter().position(|(index, _)| *index == points.start) {
+            self.read[..=known].rotate_right(1);
+        } else {
+            self.read.truncate(KEPT - 1);
+            let values = self.parse_points(points.start)?;
+            self.read.insert(0, (points.start, values));
+        }
+        let values = &self.read[0].1;
+        if values.len() != out.len() {
+            return Err(damaged("its points are not a list of three numbers each").into());
+        }
+        out.copy_from_slice(values);
+        Ok(values.iter().all(|x| x.is_finite()))
+    }
+}

@@ -1,0 +1,283 @@
+//! What a text says: its prims, and where the values of their attributes are.
+
+use std::collections::{HashMap, HashSet};
+use std::io::{Read, Seek};
+
+use super::scanner::{Place, Scanner, is_letter};
+use crate::scene::Failure;
+use crate::usd::layer::{Attribute, COMPOSED, DEEPEST, Prim, Stage, Value, composed, too_deep};
+
+/// Words in front of the type of a property or of the key of a field.
+const MODIFIERS: [&str; 9] =
+    ["custom", "uniform", "varying", "config", "add", "append", "prepend", "delete", "reorder"];
+
+/// Attributes that are asked for, beside the operations of transforms.
+const WANTED: [&str; 7] = [
+    "points",
+    "faceVertexCounts",
+    "faceVertexIndices",
+    "orientation",
+    "purpose",
+    "primvars:skel:jointIndices",
+    "skel:blendShapes",
+];
+
+/// A value: its place, how many values it has within it, and what they are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stored {
+    pub(super) place: Place,
+    pub(super) count: usize,
+    pub(super) is_blocked: bool,
+    pub(super) is_double: bool,
+    pub(super) is_quaternion: bool,
+}
+
+/// What was found.
+#[derive(Default)]
+pub(super) struct Contents {
+    pub(super) stage: Stage,
+    pub(super) prims: Vec<Prim>,
+    /// Names of prims.
+    pub(super) names: Vec<String>,
+    pub(super) values: Vec<Stored>,
+    pub(super) attributes: HashMap<(u32, String), Attribute>,
+    /// Attributes that splines animate.
+    pub(super) splines: HashSet<(u32, String)>,
+}
+
+pub(super) struct Parser<'a, R> {
+    scanner: &'a mut Scanner<R>,
+    contents: Contents,
+    /// The prims that are open, from the outside to the inside.
+    open: Vec<u32>,
+}
+
+/// What fields in brackets belong to.
+#[derive(Clone, Copy)]
+enum Owner {
+    Layer,
+    Prim(usize),
+    Property,
+}
+
+impl<'a, R: Read + Seek> Parser<'a, R> {
+    /// All that the text says.
+    pub(super) fn parse(scanner: &'a mut Scanner<R>) -> Result<Contents, Failure> {
+        let mut parser = Self { scanner, contents: Contents::default(), open: Vec::new() };
+        if parser.scanner.solid()? == Some(b'(') {
+            parser.fields(Owner::Layer)?;
+        }
+        loop {
+            match parser.scanner.solid()? {
+                None if parser.open.is_empty() => return Ok(parser.contents),
+                None => return Err(parser.scanner.wrong("the text ends within a prim")),
+                Some(b'}') if parser.open.pop().is_some() => parser.scanner.expect(b'}')?,
+                Some(byte) if is_letter(byte) => parser.statement()?,
+                Some(_) => {
+                    let found = parser.scanner.found()?;
+                    return Err(parser.scanner.wrong(&format!("{found} begins neither a prim nor a property")));
+                }
+            }
+        }
+    }
+
+    fn word(&mut self) -> Result<String, Failure> {
+        Ok(self.scanner.word(b"_:.")?.to_owned())
+    }
+
+    /// The next word behind those that say how it is meant.
+    fn key(&mut self) -> Result<String, Failure> {
+        loop {
+            let word = self.word()?;
+            if !MODIFIERS.contains(&word.as_str()) {
+                return Ok(word);
+            }
+        }
+    }
+
+    fn statement(&mut self) -> Result<(), Failure> {
+        let word = self.key()?;
+        match (word.as_str(), self.open.last()) {
+            ("def" | "over" | "class", _) => self.prim(word == "def"),
+            ("variantSet", Some(&prim)) => {
+                self.contents.prims[prim as usize].composed = Some("variants");
+                self.scanner.string()?;
+                self.scanner.expect(b'=')?;
+                self.scanner.pass().map(|_| ())
+            }
+            _ => self.property(&word),
+        }
+    }
+
+    fn prim(&mut self, is_defined: bool) -> Result<(), Failure> {
+        if self.open.len() == DEEPEST as usize {
+            return Err(too_deep().into());
+        }
+        let is_mesh = self.word()? == "Mesh";
+        let name = self.scanner.string()?;
+        let index = self.contents.prims.len();
+        self.contents.names.push(name);
+        self.contents.prims.push(Prim {
+            parent: self.open.last().copied(),
+            depth: self.open.len() as u32 + 1,
+            spec: index as u32,
+            name: index as u32,
+            is_mesh,
+            is_there: is_defined,
+            composed: None,
+        });
+        if self.scanner.solid()? == Some(b'(') {
+            self.fields(Owner::Prim(index))?;
+        }
+        self.open.push(index as u32);
+        self.scanner.expect(b'{')
+    }
+
+    /// What is said in round brackets of a layer, a prim or a property.
+    fn fields(&mut self, owner: Owner) -> Result<(), Failure> {
+        self.scanner.expect(b'(')?;
+        while !self.scanner.has(b')')? {
+            // A comment has no key.
+            if matches!(self.scanner.solid()?, Some(b'"' | b'\'')) {
+                self.scanner.string()?;
+                continue;
+            }
+            let key = self.key()?;
+            self.scanner.expect(b'=')?;
+            match owner {
+                Owner::Layer => self.layer_field(&key)?,
+                Owner::Prim(prim) => self.prim_field(prim, &key)?,
+                Owner::Property => {
+                    self.scanner.pass()?;
+                }
+            }
+            // The prim in another file, and by how much its times are moved.
+            while matches!(self.scanner.solid()?, Some(b'<' | b'(')) {
+                self.scanner.pass()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A value that is a word or a string; empty for others, which are passed over.
+    fn short(&mut self) -> Result<String, Failure> {
+        match self.scanner.solid()? {
+            Some(b'"' | b'\'') => self.scanner.string(),
+            Some(byte) if is_letter(byte) || b"+-.".contains(&byte) => Ok(self.scanner.word(b"+-._")?.to_owned()),
+            _ => self.scanner.pass().map(|_| String::new()),
+        }
+    }
+
+    fn layer_field(&mut self, key: &str) -> Result<(), Failure> {
+        if key == "subLayers" {
+            return match self.scanner.pass()?.count {
+                0 => Ok(()),
+                _ => Err(composed("the layer", "sublayers").into()),
+            };
+        }
+        let value = self.short()?;
+        let number = value.parse().ok();
+        let stage = &mut self.contents.stage;
+        match key {
+            "upAxis" => stage.up_is_z = Some(value == "Z"),
+            "metersPerUnit" => stage.metres_per_unit = number,
+            "timeCodesPerSecond" => stage.time_codes_per_second = number,
+            "framesPerSecond" => stage.frames_per_second = number,
+            "startTimeCode" => stage.start = number,
+            "endTimeCode" => stage.end = number,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn prim_field(&mut self, prim: usize, key: &str) -> Result<(), Failure> {
+        let value = self.short()?;
+        let prim = &mut self.contents.prims[prim];
+        if key == "active" {
+            prim.is_there &= !matches!(value.as_str(), "false" | "0");
+        }
+        let told = COMPOSED.iter().find(|(field, _)| *field == key);
+        prim.composed = told.map(|(_, words)| *words).or(prim.composed);
+        Ok(())
+    }
+
+    /// A property behind its type, or an order of names, which has none.
+    fn property(&mut self, type_name: &str) -> Result<(), Failure> {
+        if self.scanner.has(b'[')? {
+            self.scanner.expect(b']')?;
+        }
+        let name = self.word()?;
+        if self.scanner.has(b'=')? {
+            self.value(type_name, &name)?;
+        }
+        if self.scanner.solid()? == Some(b'(') {
+            self.fields(Owner::Property)?;
+        }
+        Ok(())
+    }
+
+    fn value(&mut self, type_name: &str, full: &str) -> Result<(), Failure> {
+        let (name, part) = full.split_once('.').unwrap_or((full, ""));
+        let is_wanted = WANTED.contains(&name) || name.starts_with("xformOp");
+        let Some(&prim) = self.open.last().filter(|_| is_wanted) else {
+            return self.scanner.pass().map(|_| ());
+        };
+        let key = (prim, name.to_owned());
+        match part {
+            "" => {
+                let value = self.stored(type_name)?;
+                let is_blocked = self.contents.values[value.0 as usize].is_blocked;
+                self.contents.attributes.entry(key).or_default().default = Some(value).filter(|_| !is_blocked);
+            }
+            "timeSamples" => {
+                let samples = self.samples(type_name)?;
+                let attribute = self.contents.attributes.entry(key).or_default();
+                (attribute.times, attribute.values) = samples.into_iter().unzip();
+            }
+            _ => {
+                self.scanner.pass()?;
+                if part == "spline" {
+                    self.contents.splines.insert(key);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn stored(&mut self, type_name: &str) -> Result<Value, Failure> {
+        let passed = self.scanner.pass()?;
+        self.contents.values.push(Stored {
+            place: passed.place,
+            count: passed.count,
+            is_blocked: passed.is_none,
+            // As in `double3`, `matrix4d` and `quatd`.
+            is_double: type_name.starts_with("double") || type_name.ends_with('d'),
+            is_quaternion: type_name.starts_with("quat"),
+        });
+        Ok(Value(self.contents.values.len() as u64 - 1))
+    }
+
+    /// Time codes, ascending, and what is there; of those at one time the last.
+    fn samples(&mut self, type_name: &str) -> Result<Vec<(f64, Value)>, Failure> {
+        let mut samples = Vec::new();
+        self.scanner.expect(b'{')?;
+        while !self.scanner.has(b'}')? {
+            let time = self.scanner.number()?;
+            if !time.is_finite() {
+                return Err(self.scanner.wrong("a time code is not finite"));
+            }
+            self.scanner.expect(b':')?;
+            samples.push((time, self.stored(type_name)?));
+            self.scanner.has(b',')?;
+        }
+        samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        samples.dedup_by(|later, earlier| {
+            let is_same = later.0 == earlier.0;
+            if is_same {
+                *earlier = *later;
+            }
+            is_same
+        });
+        Ok(samples)
+    }
+}

@@ -1,0 +1,267 @@
+//! Text byte by byte, block by block: words, strings, what is between them, and whole values that are passed over.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use crate::scene::Failure;
+use crate::usd::layer::damaged;
+
+const BLOCK: usize = 1 << 16;
+/// Bytes of a word or of a string that is kept; programs write far fewer.
+const LONGEST: usize = 1 << 12;
+/// Brackets within brackets of one value.
+const DEEPEST: usize = 64;
+
+/// A place in the text.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    offset: u64,
+    line: u64,
+}
+
+pub(super) struct Scanner<R> {
+    source: R,
+    block: Vec<u8>,
+    /// Where the block begins in the file, and the next byte in the block.
+    start: u64,
+    at: usize,
+    line: u64,
+    word: Vec<u8>,
+}
+
+/// A value that was passed over.
+pub(super) struct Passed {
+    pub(super) place: Place,
+    /// How many values it has in its outermost brackets.
+    pub(super) count: usize,
+    /// Whether it is `None`, which blocks an attribute.
+    pub(super) is_none: bool,
+}
+
+impl<R: Read + Seek> Scanner<R> {
+    /// From the beginning on.
+    pub(super) fn new(mut source: R) -> io::Result<Self> {
+        source.rewind()?;
+        Ok(Self { source, block: Vec::new(), start: 0, at: 0, line: 1, word: Vec::new() })
+    }
+
+    pub(super) fn place(&self) -> Place {
+        Place { offset: self.start + self.at as u64, line: self.line }
+    }
+
+    pub(super) fn go(&mut self, Place { offset, line }: Place) -> io::Result<()> {
+        self.line = line;
+        let end = self.start + self.block.len() as u64;
+        if (self.start..end).contains(&offset) {
+            self.at = (offset - self.start) as usize;
+            return Ok(());
+        }
+        self.block.clear();
+        (self.start, self.at) = (offset, 0);
+        self.source.seek(SeekFrom::Start(offset)).map(|_| ())
+    }
+
+    /// The fault of what no text of USD has, with the line.
+    pub(super) fn wrong(&self, what: &str) -> Failure {
+        damaged(&format!("line {}: {what}", self.line)).into()
+    }
+
+    pub(super) fn peek(&mut self) -> io::Result<Option<u8>> {
+        if self.at == self.block.len() {
+            self.start += self.block.len() as u64;
+            self.at = 0;
+            self.block.clear();
+            self.source.by_ref().take(BLOCK as u64).read_to_end(&mut self.block)?;
+        }
+        Ok(self.block.get(self.at).copied())
+    }
+
+    pub(super) fn next(&mut self) -> Result<u8, Failure> {
+        let byte = self.peek()?.ok_or_else(|| self.wrong("the text ends too early"))?;
+        self.at += 1;
+        self.line += u64::from(byte == b'\n');
+        Ok(byte)
+    }
+
+    /// The next byte that is neither white space nor in a comment, and is still to come.
+    pub(super) fn solid(&mut self) -> Result<Option<u8>, Failure> {
+        while let Some(byte) = self.peek()? {
+            match byte {
+                b'#' => self.pass_line()?,
+                b'/' => {
+                    self.next()?;
+                    match self.peek()? {
+                        Some(b'/') => self.pass_line()?,
+                        Some(b'*') => self.pass_to(b"*/")?,
+                        _ => return Err(self.wrong("a slash begins nothing")),
+                    }
+                }
+                // Between entries, where a line may end as well.
+                b';' => self.at += 1,
+                byte if byte.is_ascii_whitespace() => {
+                    self.next()?;
+                }
+                byte => return Ok(Some(byte)),
+            }
+        }
+        Ok(None)
+    }
+
+    fn pass_line(&mut self) -> Result<(), Failure> {
+        while self.peek()?.is_some_and(|byte| byte != b'\n' && byte != b'\r') {
+            self.at += 1;
+        }
+        Ok(())
+    }
+
+    /// Passes over what is there up to an end.
+    fn pass_to(&mut self, end: &[u8]) -> Result<(), Failure> {
+        let mut last = [0; 3];
+        while !last.ends_with(end) {
+            last = [last[1], last[2], self.next()?];
+        }
+        Ok(())
+    }
+
+    /// Whether this byte is next, which is then passed over.
+    pub(super) fn has(&mut self, byte: u8) -> Result<bool, Failure> {
+        let is_next = self.solid()? == Some(byte);
+        self.at += usize::from(is_next);
+        Ok(is_next)
+    }
+
+    pub(super) fn expect(&mut self, byte: u8) -> Result<(), Failure> {
+        if self.has(byte)? {
+            return Ok(());
+        }
+        let found = self.found()?;
+        Err(self.wrong(&format!("{found} stands where {:?} belongs", char::from(byte))))
+    }
+
+    /// The next byte as messages have it.
+    pub(super) fn found(&mut self) -> Result<String, Failure> {
+        Ok(self.solid()?.map_or_else(|| "the end".to_owned(), |byte| format!("{:?}", char::from(byte))))
+    }
+
+    /// Letters, digits and what `others` has of signs; empty where something else is next.
+    pub(super) fn word(&mut self, others: &[u8]) -> Result<&str, Failure> {
+        self.solid()?;
+        self.word.clear();
+        while let Some(byte) = self.peek()?.filter(|byte| is_letter(*byte) || others.contains(byte)) {
+            self.at += 1;
+            if self.word.len() == LONGEST {
+                return Err(self.wrong("a word is longer than any program writes"));
+            }
+            self.word.push(byte);
+        }
+        match std::str::from_utf8(&self.word) {
+            Ok(word) => Ok(word),
+            Err(_) => Err(damaged(&format!("line {}: a word is not UTF-8", self.line)).into()),
+        }
+    }
+
+    /// A number, `inf` and `nan` among them.
+    pub(super) fn number(&mut self) -> Result<f64, Failure> {
+        let found = self.word(b"+-.")?;
+        if let Ok(number) = found.parse() {
+            return Ok(number);
+        }
+        let found: String = found.chars().take(40).collect();
+        Err(self.wrong(&format!("{found:?} stands where a number belongs")))
+    }
+
+    /// What is between quotes, of which there may be three.
+    pub(super) fn string(&mut self) -> Result<String, Failure> {
+        self.solid()?;
+        let quote = self.next()?;
+        if !matches!(quote, b'"' | b'\'') {
+            return Err(self.wrong("a name has no quotes"));
+        }
+        let mut kept = Vec::new();
+        let mut ends = 1;
+        if self.peek()? == Some(quote) {
+            self.at += 1;
+            if self.peek()? != Some(quote) {
+                return Ok(String::new());
+            }
+            self.at += 1;
+            ends = 3;
+        }
+        let mut found = 0;
+        while found < ends {
+            let mut byte = self.next()?;
+            found = if byte == quote { found + 1 } else { 0 };
+            if byte == b'\\' {
+                byte = self.next()?;
+            }
+            if kept.len() < LONGEST + ends {
+                kept.push(byte);
+            }
+        }
+        kept.truncate(kept.len() - ends.min(kept.len()));
+        Ok(String::from_utf8_lossy(&kept).into_owned())
+    }
+
+    /// Passes over a value of any kind.
+    pub(super) fn pass(&mut self) -> Result<Passed, Failure> {
+        let first = self.solid()?;
+        let (place, mut count, mut open) = (self.place(), 0, Vec::new());
+        loop {
+            let depth = open.len();
+            match self.solid()? {
+                Some(b'"' | b'\'') => drop(self.string()?),
+                Some(b'@') => self.pass_asset()?,
+                Some(b'<') => self.pass_to(b">")?,
+                Some(byte @ (b'(' | b'[' | b'{')) => {
+                    self.at += 1;
+                    if depth == DEEPEST {
+                        return Err(self.wrong("a value nests deeper than any program writes"));
+                    }
+                    open.push(if byte == b'(' { b')' } else { byte + 2 });
+                }
+                Some(b',' | b'=' | b':') if depth > 0 => {
+                    self.at += 1;
+                    continue;
+                }
+                Some(byte) if open.last() == Some(&byte) => {
+                    self.at += 1;
+                    open.pop();
+                    if open.is_empty() {
+                        break;
+                    }
+                    continue;
+                }
+                _ => {
+                    if self.word(b"+-.:_")?.is_empty() {
+                        let found = self.found()?;
+                        return Err(self.wrong(&format!("{found} stands where a value belongs")));
+                    }
+                }
+            }
+            match depth {
+                0 if open.is_empty() => break,
+                1 => count += 1,
+                _ => {}
+            }
+        }
+        let is_none = first.is_some_and(is_letter) && self.word == b"None";
+        Ok(Passed { place, count, is_none })
+    }
+
+    fn pass_asset(&mut self) -> Result<(), Failure> {
+        self.next()?;
+        if self.peek()? != Some(b'@') {
+            return self.pass_to(b"@");
+        }
+        self.at += 1;
+        if self.peek()? == Some(b'@') {
+            self.at += 1;
+            self.pass_to(b"@@@")?;
+        }
+        Ok(())
+    }
+}
+
+/// Of names: every letter beyond ASCII may be one.
+pub(super) fn is_letter(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80
+}
