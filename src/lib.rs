@@ -3,35 +3,21 @@
 mod admission;
 mod audit;
 pub mod auth;
-pub mod belonging;
-pub mod cage_export;
 #[doc(hidden)]
 pub mod cage_job;
-pub mod capture;
 pub mod cli;
-pub mod coding;
 mod compare;
 pub mod config;
-pub mod decode;
-pub mod design;
-pub mod edit;
-pub mod edited;
-pub mod encode;
 pub mod engine;
 mod far_frames;
 mod file_bodies;
-pub mod frames;
 pub mod http;
 mod http_client;
 mod idempotency;
 mod jobs;
-pub mod memory;
-pub mod mismatch;
-mod origin;
 mod pose_cage;
 mod pose_faces;
 mod preparation;
-mod preparation_warnings;
 pub mod problem;
 pub mod recover;
 mod recovery;
@@ -40,12 +26,15 @@ mod report_page;
 pub mod service;
 mod session;
 mod shape_spaces;
-mod speed;
 pub mod store;
 mod sync;
 mod tasks;
 pub mod telemetry;
-pub mod timing;
 pub mod transfer;
 mod transfers;
 pub mod webhooks;
+
+pub use cager_capture::{
+    belonging, cage_export, capture, coding, decode, design, edit, edited, encode, frames, memory, mismatch, timing,
+};
+use cager_capture::{origin, preparation_warnings, speed};

@@ -14,7 +14,6 @@ pub use frames::FileFrames;
 pub use recover::{RemoteRecovery, RemoteRecoveryProgress, recover_remotely};
 pub use transfer::{RemoteTransfer, transfer_remotely};
 
-use crate::design;
 use crate::encode::Encoded;
 use cager_client::cage_messages::CageProgress;
 use cager_client::messages::{CageSource, FrameResult, PreparationSeconds, SessionOptions};
@@ -155,7 +154,7 @@ async fn encode<F: FrameSource + 'static>(
             let created = created.map_err(|cause| RemoteError::of_design(cause.into(), &design.id, job.address))?;
             // The session has its own copy of the cage.
             clean_up(&client, async |client| client.delete_cage(&design.id).await).await;
-            designed = Some((design::report_of_job(&design, options), design.warnings));
+            designed = Some((cage::report_of_job(&design, options), design.warnings));
             created.id
         }
     };

@@ -1,9 +1,11 @@
 //! Has a service design a cage from evenly spaced frames of a local capture.
 
 use super::{RemoteError, RemoteProgress};
+use crate::design::of_stages;
 use cager_cages::{DesignOptions, Goal, Style};
 use cager_client::cage_messages::{CageJob, CageOptions, CageState, CageStyle};
 use cager_client::{Client, ClientError, FrameSource, MeshFile, NewCage};
+use cager_proto::report::{DesignReport, StageReport};
 use futures_util::StreamExt as _;
 use std::io;
 use std::time::Duration;
@@ -137,4 +139,18 @@ mod tests {
         let (count, _) = sample(&mut MemoryFrames::new(2, vec![0.0; 18])).expect("frames");
         assert_eq!(count, 3);
     }
+}
+
+/// What is worth telling of a design that a service made.
+pub(super) fn report_of_job(job: &CageJob, options: &DesignOptions) -> DesignReport {
+    let stages = job.stages.iter().map(|stage| StageReport {
+        name: stage.name.clone(),
+        vertices: stage.vertices as usize,
+        designed_error: stage.error.designed.unwrap_or(0.0),
+        held_back_error: stage.error.held_back.unwrap_or(0.0),
+        condition_number: stage.condition_number,
+        singular: stage.singular,
+        seconds: stage.seconds,
+    });
+    of_stages(stages.collect(), options, job.sampled_frames as usize, job.timed_out)
 }

@@ -3,14 +3,13 @@
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
 use cager_cages::{Design, DesignOptions, Style};
-use cager_client::cage_messages::CageJob;
 use cager_proto::report::{DesignReport, StageReport};
 
 /// Frames of a capture that a design looks at, at most: every second one to design by, the others to judge by.
 pub const FRAMES: usize = 160;
 
 /// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
-pub(crate) fn default_vertices(points: usize) -> usize {
+pub fn default_vertices(points: usize) -> usize {
     350.min(points / 2).max(4)
 }
 
@@ -23,7 +22,7 @@ pub fn read_frames(files: &CaptureFiles) -> Result<Vec<Vec<f64>>, EncodeError> {
 }
 
 /// What is worth telling of a design from so many frames.
-pub(crate) fn report(design: &Design, options: &DesignOptions, frames: usize) -> DesignReport {
+pub fn report(design: &Design, options: &DesignOptions, frames: usize) -> DesignReport {
     let stages = design.stages.iter().map(|stage| StageReport {
         name: stage.name.clone(),
         vertices: stage.vertices,
@@ -36,21 +35,8 @@ pub(crate) fn report(design: &Design, options: &DesignOptions, frames: usize) ->
     of_stages(stages.collect(), options, frames, design.timed_out)
 }
 
-/// What is worth telling of a design that a service made.
-pub(crate) fn report_of_job(job: &CageJob, options: &DesignOptions) -> DesignReport {
-    let stages = job.stages.iter().map(|stage| StageReport {
-        name: stage.name.clone(),
-        vertices: stage.vertices as usize,
-        designed_error: stage.error.designed.unwrap_or(0.0),
-        held_back_error: stage.error.held_back.unwrap_or(0.0),
-        condition_number: stage.condition_number,
-        singular: stage.singular,
-        seconds: stage.seconds,
-    });
-    of_stages(stages.collect(), options, job.sampled_frames as usize, job.timed_out)
-}
-
-fn of_stages(stages: Vec<StageReport>, options: &DesignOptions, frames: usize, timed_out: bool) -> DesignReport {
+/// What is worth telling of a design whose stages these are, from so many frames.
+pub fn of_stages(stages: Vec<StageReport>, options: &DesignOptions, frames: usize, timed_out: bool) -> DesignReport {
     let last = stages.last();
     DesignReport {
         style: style_name(options.style).to_owned(),
@@ -64,10 +50,11 @@ fn of_stages(stages: Vec<StageReport>, options: &DesignOptions, frames: usize, t
     }
 }
 
-pub(crate) const STYLES: [Style; 2] = [Style::Free, Style::Editable];
+/// All styles.
+pub const STYLES: [Style; 2] = [Style::Free, Style::Editable];
 
 /// The style with this name.
-pub(crate) fn style_by_name(name: &str) -> Option<Style> {
+pub fn style_by_name(name: &str) -> Option<Style> {
     STYLES.into_iter().find(|&style| style_name(style) == name)
 }
 

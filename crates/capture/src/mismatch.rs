@@ -2,9 +2,7 @@
 //! correlation of positions. Deformation changes these far less than a mix-up does.
 
 mod faces;
-mod watch;
-
-pub use watch::{Departure, Progress, Watch};
+pub mod watch;
 
 use cager_geometry::mesh::{Model, Point, bounds};
 use cager_geometry::vector::distance;

@@ -5,14 +5,14 @@ use cager_geometry::mesh::{Point, bounds};
 use cager_geometry::vector::{add, distance, middle, sub};
 
 /// Diagonals of the rest pose from which on an origin is taken: there single precision resolves less than 1e-5 of the diagonal.
-pub(crate) const FAR: f64 = 100.0;
+pub const FAR: f64 = 100.0;
 
 /// What single precision may lose of a diagonal without being seen.
-pub(crate) const LOST: f64 = 1e-4;
+pub const LOST: f64 = 1e-4;
 
 /// An origin near the middle of a rest pose that lies far away; `None` for all others. In whole units, or the largest power of two that is not above
 /// the diagonal where that is less than one, so that subtracting it from doubles loses nothing.
-pub(crate) fn own_origin(rest: &[Point]) -> Option<Point> {
+pub fn own_origin(rest: &[Point]) -> Option<Point> {
     let (low, high) = bounds(rest);
     let (diagonal, centre) = (distance(low, high), middle(low, high));
     let far = centre.iter().any(|x| x.abs() > FAR * diagonal);
@@ -22,14 +22,14 @@ pub(crate) fn own_origin(rest: &[Point]) -> Option<Point> {
 }
 
 /// Moves points into the coordinates of an origin.
-pub(crate) fn move_to(origin: Option<Point>, points: &mut [Point]) {
+pub fn move_to(origin: Option<Point>, points: &mut [Point]) {
     if let Some(origin) = origin {
         points.iter_mut().for_each(|p| *p = sub(*p, origin));
     }
 }
 
 /// Moves points out of the coordinates of an origin.
-pub(crate) fn move_from(origin: Option<Point>, points: &mut [Point]) {
+pub fn move_from(origin: Option<Point>, points: &mut [Point]) {
     if let Some(origin) = origin {
         points.iter_mut().for_each(|p| *p = add(*p, origin));
     }

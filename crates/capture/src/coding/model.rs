@@ -1,6 +1,6 @@
 //! What groups of one model are coded and decoded with.
 
-use super::CodingError;
+use super::error::CodingError;
 use cager_codec::{CageBasis, Error, Hierarchy, MAX_POSITIONS, MAX_ROWS, Residual, decode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, ElementPlan};
@@ -40,7 +40,7 @@ impl GroupSpace {
 }
 
 /// Decodes groups of frames of one model.
-pub(crate) struct GroupDecoder {
+pub struct GroupDecoder {
     pub(super) basis: CageBasis,
     pub(super) hierarchy: Hierarchy,
     decoder: Decoder,
@@ -50,13 +50,8 @@ impl GroupDecoder {
     /// For a rest pose and cage as a decoder reads them, and the solver prepared with them.
     ///
     /// # Errors
-    /// As [`GroupSpace::new`].
-    pub(crate) fn new(
-        system: &dyn CoordinateSystem,
-        cage: &Cage,
-        rest: &Model,
-        solver: &Solver,
-    ) -> Result<Self, CodingError> {
+    /// More rows than can be coded; coordinates that cannot be computed.
+    pub fn new(system: &dyn CoordinateSystem, cage: &Cage, rest: &Model, solver: &Solver) -> Result<Self, CodingError> {
         let space = GroupSpace::new(system, cage, rest, solver.preparation().plan.as_ref())?;
         Ok(Self::in_space(space, solver))
     }
@@ -81,12 +76,12 @@ impl GroupDecoder {
     ///
     /// # Errors
     /// Damaged bytes.
-    pub(crate) fn cages(&self, frames: usize, bytes: &[u8]) -> Result<Vec<Vec<f32>>, Error> {
+    pub fn cages(&self, frames: usize, bytes: &[u8]) -> Result<Vec<Vec<f32>>, Error> {
         decode_cages(&self.basis, frames, bytes)
     }
 
     /// The positions that cages say.
-    pub(crate) fn positions(&self, cages: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    pub fn positions(&self, cages: &[Vec<f32>]) -> Vec<Vec<f32>> {
         let mut positions: Vec<Vec<f32>> = vec![Vec::new(); cages.len()];
         for (cages, positions) in cages.chunks(BATCH).zip(positions.chunks_mut(BATCH)) {
             let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
@@ -104,7 +99,7 @@ impl GroupDecoder {
     ///
     /// # Errors
     /// Damaged bytes.
-    pub(crate) fn add_residual(&self, bytes: &[u8], positions: &mut [Vec<f32>]) -> Result<(), Error> {
+    pub fn add_residual(&self, bytes: &[u8], positions: &mut [Vec<f32>]) -> Result<(), Error> {
         Residual::decode(&self.hierarchy, positions.len(), bytes, usize::MAX).map(|residual| residual.add(0, positions))
     }
 }

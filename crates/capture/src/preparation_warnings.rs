@@ -4,7 +4,7 @@ use cager_core::inversion::{Handles, Solver, SolverOptions};
 use cager_core::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
 
 /// Warnings that follow from the preparation.
-pub(crate) fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<String> {
+pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<String> {
     let found = solver.preparation();
     let unknowns = solver.decoder().unknowns();
     let mut warnings = Vec::new();

@@ -1,25 +1,9 @@
-//! Coded frames: how large the steps of cages and residual are for what was asked for, and groups of frames as a container holds them.
-//!
-//! One number, the step of the residual, decides a file's size and error. A step of the cage that moves all points by as much in the root mean square
-//! costs as much per binary digit; how far apart the two are best is measured on frames of the first group, and so is the step that meets an error or a size.
+//! What coded files are to meet, and how large steps and groups are for it.
 
-mod cage_size;
-mod group;
-mod inversion;
-mod meshes;
-mod model;
-mod steps;
-
-pub(crate) use cage_size::{CageSizes, FRAMES as CAGE_SIZE_FRAMES};
-pub(crate) use group::{Carried, CodedGroup, GroupCoder, Room};
-pub(crate) use inversion::InversionChoices;
-pub(crate) use meshes::RestMeshes;
-pub(crate) use model::{GroupDecoder, GroupSpace};
-
-use cager_core::coordinates::CoordinatesError;
+use super::error::CodingError;
 use cager_proto::container;
 use cager_proto::report::Coding;
-use group::Steps;
+use serde::{Deserialize, Serialize};
 
 /// What a coded file is to meet; errors are fractions of the rest pose's diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +28,7 @@ impl Goal {
     ///
     /// # Errors
     /// [`CodingError::BelowPrecision`].
-    pub(crate) fn check_precision(self, diagonal: f64, slack: f64) -> Result<(), CodingError> {
+    pub fn check_precision(self, diagonal: f64, slack: f64) -> Result<(), CodingError> {
         let (asked, times) = match self {
             Self::MaxError(error) => (error, 2.0),
             Self::MeanError(error) => (error, 1.0),
@@ -60,13 +44,13 @@ impl Goal {
     }
 
     /// The steps for a step of the residual and that of the cage over it, for a model of so many points.
-    fn steps(self, (residual, ratio): (f64, f64), points: usize) -> Steps {
+    pub(super) fn steps(self, (residual, ratio): (f64, f64), points: usize) -> Steps {
         let cage = ratio * residual / (points as f64).sqrt();
         Steps { cage, residual: (self != Self::Preview).then_some(residual) }
     }
 
     /// How frames were coded that left `carried`, as a report says it.
-    pub(crate) fn coding(self, carried: &Carried, points: usize, diagonal: f64, group_frames: usize) -> Option<Coding> {
+    pub fn coding(self, carried: &Carried, points: usize, diagonal: f64, group_frames: usize) -> Option<Coding> {
         let steps = self.steps(carried.chosen?, points);
         let max_error = if let Self::MaxError(error) = self { Some(error) } else { None };
         let residual_step = steps.residual.map(|step| step / diagonal);
@@ -74,7 +58,7 @@ impl Goal {
     }
 
     /// What the size leaves for so many frames after the `written` bytes of the meshes.
-    pub(crate) fn room(self, written: u64, frames: usize) -> Option<Room> {
+    pub fn room(self, written: u64, frames: usize) -> Option<Room> {
         let Self::Size(bytes) = self else { return None };
         let other = written + AROUND + 5 * frames as u64;
         Some(Room { bytes: bytes.saturating_sub(other), frames, other })
@@ -84,7 +68,7 @@ impl Goal {
     ///
     /// # Errors
     /// [`CodingError::TooSmall`].
-    pub(crate) fn check_size(self, meshes: u64, frames: usize) -> Result<(), CodingError> {
+    pub fn check_size(self, meshes: u64, frames: usize) -> Result<(), CodingError> {
         match (self, self.room(meshes, frames)) {
             (Self::Size(asked), Some(Room { bytes: 0, other: least, .. })) => {
                 Err(CodingError::TooSmall { asked, least })
@@ -94,10 +78,39 @@ impl Goal {
     }
 }
 
+/// Steps of the numbers, in the capture's unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Steps {
+    pub(super) cage: f64,
+    pub(super) residual: Option<f64>,
+}
+
+/// What is left of a size.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+pub struct Room {
+    /// Bytes for frames.
+    pub bytes: u64,
+    /// Frames.
+    pub frames: usize,
+    /// Bytes of everything else, and of groups before.
+    pub other: u64,
+}
+
+/// What one group leaves to the next: a coder with it goes on as the one that closed the group would.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+pub struct Carried {
+    /// Frames in the groups so far.
+    pub frames: usize,
+    /// Step of the residual and of the cage over it; set by the first group.
+    pub chosen: Option<(f64, f64)>,
+    /// What is left, where a size was asked for.
+    pub room: Option<Room>,
+}
+
 /// What positions may differ by from machine to machine, where the sizes of what is [added up](cager_core::decode::Decoder::largest_sum) for a
 /// coordinate are at most `sum` together, and coordinates at most `farthest`: the sums by their rounding, and the coordinates by a unit in the last place
 /// of each of three.
-pub(crate) fn slack(diagonal: f64, sum: f64, farthest: f64) -> f64 {
+pub fn slack(diagonal: f64, sum: f64, farthest: f64) -> f64 {
     1e-6 * diagonal.max(sum) + 2.0 * f64::from(f32::EPSILON) * farthest
 }
 
@@ -106,71 +119,12 @@ const MAX_HELD_BYTES: usize = 512 << 20;
 pub(crate) const HELD: usize = 112;
 
 /// Most frames of a group. The same on every machine, so that files are wherever a group fits into memory.
-pub(crate) fn group_frames(points: usize, rows: usize) -> usize {
+pub fn group_frames(points: usize, rows: usize) -> usize {
     container::group_frames(points, rows).min(MAX_HELD_BYTES / (HELD * points.max(1))).max(1)
 }
 
 /// Bytes of a file after its frames but for five of each: the report and the table of contents, about.
 const AROUND: u64 = 1500;
-
-/// Why frames cannot be coded as asked for.
-#[derive(Debug, thiserror::Error, PartialEq)]
-pub enum CodingError {
-    /// Below what single precision can hold.
-    #[error(
-        "an error of {asked:.1e} of the diagonal is below what positions in single precision can hold here; {}",
-        if *least < 1.0 { format!("ask for at least {least:.1e}, or move the capture closer to the origin") } else { "check these frames, whose positions are very far from the origin".to_owned() }
-    )]
-    BelowPrecision {
-        /// Asked for.
-        asked: f64,
-        /// Smallest possible.
-        least: f64,
-    },
-    /// Too little room.
-    #[error(
-        "{asked} bytes are too few for this capture and cage: the smallest possible file has about {least}; take a smaller cage, or allow more"
-    )]
-    TooSmall {
-        /// Asked for.
-        asked: u64,
-        /// About the smallest.
-        least: u64,
-    },
-    /// Numbers that cannot be counted in steps.
-    #[error(
-        "frames {first} to {last} cannot be coded: positions are not finite, or so far apart that no step counts them; encode without a target for error, size or quality"
-    )]
-    Uncountable {
-        /// First frame of the group, from 0.
-        first: usize,
-        /// Last one.
-        last: usize,
-    },
-    /// Coordinates of the points that the basis of the cages is made from.
-    #[error(transparent)]
-    Coordinates(#[from] CoordinatesError),
-    /// A model with very many points.
-    #[error(
-        "models of {points} points cannot be coded, only up to {most}; encode without a target for error, size or quality, or take a part of the model"
-    )]
-    TooManyPoints {
-        /// Points.
-        points: usize,
-        /// Most that can be.
-        most: usize,
-    },
-    /// A cage with very many vertices.
-    #[error(
-        "cages of {rows} rows cannot be coded, only up to {most}; encode without a target for error, size or quality, or take a smaller cage"
-    )]
-    TooManyRows {
-        /// Rows of a frame.
-        rows: usize,
-        /// Most that can be.
-        most: usize,
-    },
-}
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,10 @@
 //! How many vertices a cage needs for what a coded file is to meet: some frames are coded with cages of several sizes, made around the rest pose.
 
-use super::{Carried, CodingError, Goal, GroupCoder, GroupDecoder, HELD, RestMeshes, group_frames};
+use super::error::CodingError;
+use super::goal::{Carried, Goal, HELD, group_frames};
+use super::group::GroupCoder;
+use super::meshes::RestMeshes;
+use super::model::GroupDecoder;
 use crate::memory::Memory;
 use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
@@ -13,24 +17,28 @@ use std::sync::Arc;
 /// Numbers of vertices that are compared.
 const SIZES: [usize; 6] = [80, 120, 180, 250, 350, 500];
 /// Frames that are coded for each.
-pub(crate) const FRAMES: usize = 64;
+pub const FRAMES: usize = 64;
 
 /// What the sizes are compared for.
-pub(crate) struct CageSizes<'a> {
-    pub(crate) goal: Goal,
-    pub(crate) rest: &'a Model,
-    pub(crate) system: &'a dyn CoordinateSystem,
+pub struct CageSizes<'a> {
+    /// What the file is to meet.
+    pub goal: Goal,
+    /// The rest pose.
+    pub rest: &'a Model,
+    /// Coordinate system.
+    pub system: &'a dyn CoordinateSystem,
     /// The first frames of the capture, at most [`FRAMES`].
-    pub(crate) frames: &'a [Vec<f64>],
+    pub frames: &'a [Vec<f64>],
     /// Frames of the capture.
-    pub(crate) total: usize,
-    pub(crate) memory: Memory,
+    pub total: usize,
+    /// What coding may hold in memory.
+    pub memory: Memory,
 }
 
 impl CageSizes<'_> {
     /// The number of vertices that gives the smallest file, or the smallest error where a size is the goal. `None` where the goal does not say which is
     /// better, or no cage can be coded. `prepare` makes a solver for a cage and a rest pose.
-    pub(crate) fn best(&self, prepare: impl Fn(&Cage, &Model) -> Result<Solver, PrepareError>) -> Option<usize> {
+    pub fn best(&self, prepare: impl Fn(&Cage, &Model) -> Result<Solver, PrepareError>) -> Option<usize> {
         if !matches!(self.goal, Goal::MaxError(_) | Goal::Size(_)) || self.frames.is_empty() {
             return None;
         }

@@ -10,15 +10,16 @@ use std::time::Instant;
 
 /// When the steps of a preparation began.
 #[derive(Default)]
-pub(crate) struct StepClock(RefCell<Vec<(Step, Instant)>>);
+pub struct StepClock(RefCell<Vec<(Step, Instant)>>);
 
 impl StepClock {
-    pub(crate) fn begin(&self, step: Step) {
+    /// Notes that a step begins.
+    pub fn begin(&self, step: Step) {
         self.0.borrow_mut().push((step, Instant::now()));
     }
 
     /// Seconds for the coordinates, for the handles, and for all that came after these up to now.
-    pub(crate) fn seconds(&self) -> [f64; 3] {
+    pub fn seconds(&self) -> [f64; 3] {
         let (now, begun) = (Instant::now(), self.0.borrow());
         let begin = |step| begun.iter().find(|(one, _)| *one == step).map_or(now, |(_, begin)| *begin);
         let [coordinates, handles, rest] = [Step::Coordinates, Step::Handles, Step::SingularValues].map(begin);
@@ -31,7 +32,7 @@ const SIZE: usize = 384;
 const REPEATS: usize = 10;
 
 /// Seconds per multiply-add in a single-threaded matrix product.
-pub(crate) fn seconds_per_multiplication() -> f64 {
+pub fn seconds_per_multiplication() -> f64 {
     let a = Mat::from_fn(SIZE, SIZE, |i, j| 1.0 / (1 + i + j) as f64);
     let mut out = a.clone();
     let product = |_| {
@@ -43,7 +44,7 @@ pub(crate) fn seconds_per_multiplication() -> f64 {
 }
 
 /// Estimated seconds to prepare a solver; the factors are fitted to measurements.
-pub(crate) fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> f64 {
+pub fn seconds_to_prepare(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> f64 {
     /// Points that are analysed at the most, times unknowns, as the core has it.
     const ANALYSED: f64 = (1u64 << 25) as f64;
     let (n, m, faces) = (points as f64, system.values(cage).unknowns() as f64, cage.faces().len() as f64);

@@ -1,10 +1,13 @@
 //! Reading cages that were edited in another program.
 
-use crate::decode::{Container, DecodeError};
+use crate::decode::opened::{Container, DecodeError};
 use crate::origin::move_to;
 use cager_formats::{Error, FrameReader, open_frames};
 use cager_geometry::mesh::Point;
 use std::path::{Path, PathBuf};
+
+/// Opens the frames of edited cages from the first.
+type Reopen = dyn Fn() -> Result<Box<dyn FrameReader>, Error> + Send;
 
 /// Edited cages of a container, frame by frame in any order.
 pub struct EditedCages {
@@ -12,6 +15,7 @@ pub struct EditedCages {
     vertices: usize,
     origin: Option<Point>,
     reader: Box<dyn FrameReader>,
+    reopen: Box<Reopen>,
     /// The frame that the reader gives next.
     next: usize,
     wide: Vec<f64>,
@@ -25,6 +29,15 @@ impl EditedCages {
     /// Frames that cannot be read or have another number of vertices; cages with normals of their own, which no file of
     /// positions holds.
     pub fn open(path: &Path, container: &Container) -> Result<Self, DecodeError> {
+        let (file, vertices) = (path.to_owned(), container.header().rows_per_frame as usize);
+        Self::of_frames(path, container, Box::new(move || open_frames(&file, vertices)))
+    }
+
+    /// The same of frames that `reopen` gives from the first; errors name `path`.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn of_frames(path: &Path, container: &Container, reopen: Box<Reopen>) -> Result<Self, DecodeError> {
         let header = container.header();
         let fail = |what: String| DecodeError::Edited { path: path.to_owned(), what };
         if u64::from(header.rows_per_frame) != header.cage_vertices {
@@ -34,9 +47,9 @@ impl EditedCages {
             )));
         }
         let vertices = header.rows_per_frame as usize;
-        let reader = open_frames(path, vertices).map_err(|error| named(error, vertices, header.points))?;
+        let reader = reopen().map_err(|error| named(error, vertices, header.points))?;
         let origin = header.origin;
-        Ok(Self { path: path.to_owned(), vertices, origin, reader, next: 0, wide: Vec::new() })
+        Ok(Self { path: path.to_owned(), vertices, origin, reader, reopen, next: 0, wide: Vec::new() })
     }
 
     /// Number of frames.
@@ -50,7 +63,7 @@ impl EditedCages {
     /// Damage, another number of vertices, and coordinates beyond single precision.
     pub fn read_frame(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), DecodeError> {
         if frame < self.next {
-            self.reader = open_frames(&self.path, self.vertices)?;
+            self.reader = (self.reopen)()?;
             self.next = 0;
         }
         while self.next < frame && self.reader.skip()? {

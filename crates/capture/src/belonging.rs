@@ -1,7 +1,7 @@
 //! Whether every frame of a capture goes on as its rest pose and the frames before it: a frame that does not is refused as it is read, or
 //! noted where the user goes on all the same.
 
-use crate::mismatch::{Departure, Progress, Watch};
+use crate::mismatch::watch::{Departure, Progress, Watch};
 use cager_formats::Error;
 use cager_geometry::mesh::{Model, Point, Polygons};
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ impl Belonging {
 }
 
 /// One pass over the frames.
-pub(crate) struct Pass {
+pub struct Pass {
     belonging: Arc<Belonging>,
     progress: Progress,
     has_skipped: bool,
@@ -47,26 +47,23 @@ pub(crate) struct Pass {
 }
 
 impl Pass {
-    pub(crate) fn new(belonging: Arc<Belonging>) -> Self {
+    /// Of the frames from the first.
+    pub fn new(belonging: Arc<Belonging>) -> Self {
         Self { belonging, progress: Progress::default(), has_skipped: false, smaller: None }
     }
 
-    pub(crate) fn skipped(&mut self) {
+    /// Notes that the next frame is skipped.
+    pub fn skipped(&mut self) {
         self.has_skipped = true;
     }
 
-    pub(crate) fn has_skipped(&self) -> bool {
+    /// Whether frames were skipped.
+    pub fn has_skipped(&self) -> bool {
         self.has_skipped
     }
 
     /// Compares the next frame, number `number` in the file at `path`; what is found may be of the frame before.
-    pub(crate) fn compare(
-        &mut self,
-        frame: &[Point],
-        faces: Option<&Polygons>,
-        path: &Path,
-        number: f64,
-    ) -> Option<Finding> {
+    pub fn compare(&mut self, frame: &[Point], faces: Option<&Polygons>, path: &Path, number: f64) -> Option<Finding> {
         if self.belonging.noted().is_some() {
             return None;
         }
@@ -88,7 +85,7 @@ impl Pass {
 }
 
 /// A frame that departs.
-pub(crate) struct Finding {
+pub struct Finding {
     belonging: Arc<Belonging>,
     departure: Departure,
     path: PathBuf,
@@ -97,7 +94,10 @@ pub(crate) struct Finding {
 
 impl Finding {
     /// Notes it where the user goes on all the same.
-    pub(crate) fn refuse_or_note(self) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// What was found, and what to do, where the user does not.
+    pub fn refuse_or_note(self) -> Result<(), Error> {
         let Self { belonging, departure, path, number } = self;
         let what =
             format!("frame {number} does not look like one of a capture of {}: {departure}", belonging.rest.display());

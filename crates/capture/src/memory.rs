@@ -36,7 +36,7 @@ impl Memory {
 
 /// The free memory, also within the limits of a cgroup: what coordinates may take that cannot be computed in parts. Asking for it tells nothing, as
 /// systems promise more than they have.
-pub(crate) fn free_bytes() -> u64 {
+pub fn free_bytes() -> u64 {
     let read = |path: &str| std::fs::read_to_string(path).ok();
     let number = |path: &str| read(path)?.trim().parse::<u64>().ok();
     let machine = read("/proc/meminfo").as_deref().and_then(available);

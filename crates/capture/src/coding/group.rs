@@ -1,29 +1,26 @@
 //! Groups of frames: collected, coded, and read back to measure what they decode to.
 
-use super::{CodingError, Goal, GroupDecoder, slack};
+use super::error::CodingError;
+use super::goal::{Carried, Goal, slack};
+use super::model::GroupDecoder;
 use cager_codec::{
     AdjacentGroups, Hierarchy, Residual, ResidualGroup, encode_cages, encode_residual, estimate_residual,
 };
 use cager_core::decode::FrameError;
 use cager_proto::container::most_residual_numbers;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
-/// Steps of the numbers, in the capture's unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Steps {
-    pub(super) cage: f64,
-    pub(super) residual: Option<f64>,
-}
-
 /// A group of frames as a container holds it, and the errors of what it decodes to.
-pub(crate) struct CodedGroup {
-    pub(crate) cages: Vec<u8>,
-    pub(crate) residual: Option<Vec<u8>>,
-    pub(crate) errors: Vec<FrameError>,
+pub struct CodedGroup {
+    /// The coded cages.
+    pub cages: Vec<u8>,
+    /// The coded residual, where there is one.
+    pub residual: Option<Vec<u8>>,
+    /// Errors of the decoded frames.
+    pub errors: Vec<FrameError>,
     /// The frame whose cage lies farthest from the origin, and how far.
-    pub(crate) farthest: (usize, f64),
+    pub farthest: (usize, f64),
 }
 
 /// A group's bytes, and where its cages take the points.
@@ -56,30 +53,9 @@ impl CodedGroup {
 
 /// Bytes of a section beside its payload: its header, and its entry in the table of contents.
 const SECTION: usize = 80;
-/// What is left of a size.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-pub(crate) struct Room {
-    /// Bytes for frames.
-    pub(crate) bytes: u64,
-    /// Frames.
-    pub(crate) frames: usize,
-    /// Bytes of everything else, and of groups before.
-    pub(crate) other: u64,
-}
-
-/// What one group leaves to the next: a coder with it goes on as the one that closed the group would.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-pub(crate) struct Carried {
-    /// Frames in the groups so far.
-    pub(crate) frames: usize,
-    /// Step of the residual and of the cage over it; set by the first group.
-    pub(crate) chosen: Option<(f64, f64)>,
-    /// What is left, where a size was asked for.
-    pub(crate) room: Option<Room>,
-}
 
 /// Collects frames and codes them group by group.
-pub(crate) struct GroupCoder {
+pub struct GroupCoder {
     pub(super) goal: Goal,
     pub(super) model: Arc<GroupDecoder>,
     pub(super) diagonal: f64,
@@ -93,17 +69,17 @@ pub(crate) struct GroupCoder {
 
 impl GroupCoder {
     /// For groups of at most `most` frames of a prepared model. `diagonal` is the unit of errors.
-    pub(crate) fn new(goal: Goal, model: Arc<GroupDecoder>, diagonal: f64, most: usize, carried: Carried) -> Self {
+    pub fn new(goal: Goal, model: Arc<GroupDecoder>, diagonal: f64, most: usize, carried: Carried) -> Self {
         Self { goal, model, diagonal, carried, frames: Vec::new(), cages: Vec::new(), most, slack: OnceLock::new() }
     }
 
     /// What the groups so far leave to the next.
-    pub(crate) fn carried(&self) -> Carried {
+    pub fn carried(&self) -> Carried {
         self.carried
     }
 
     /// Says that so many frames are left, those that wait included.
-    pub(crate) fn expect(&mut self, frames: usize) {
+    pub fn expect(&mut self, frames: usize) {
         if let Some(room) = &mut self.carried.room {
             room.frames = frames;
         }
@@ -117,19 +93,19 @@ impl GroupCoder {
     }
 
     /// Adds a frame; true where the group is full and to be [closed](Self::close).
-    pub(crate) fn push(&mut self, frame: Vec<f64>, cage: Vec<f32>) -> bool {
+    pub fn push(&mut self, frame: Vec<f64>, cage: Vec<f32>) -> bool {
         self.frames.push(frame);
         self.cages.push(cage);
         self.frames.len() >= self.most
     }
 
     /// Whether frames wait.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
 
     /// Codes what was collected and begins the next group.
-    pub(crate) fn close(&mut self) -> Result<CodedGroup, CodingError> {
+    pub fn close(&mut self) -> Result<CodedGroup, CodingError> {
         self.goal.check_precision(self.diagonal, self.slack())?;
         let (residual, ratio) = match self.carried.chosen {
             Some(chosen) => chosen,

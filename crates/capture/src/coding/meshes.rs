@@ -1,6 +1,6 @@
 //! Rest pose and cage on a grid.
 
-use super::Goal;
+use super::goal::Goal;
 use cager_codec::CodedMesh;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
@@ -12,15 +12,18 @@ use cager_proto::container::colors_bytes;
 const CHECKED_POINTS: usize = 1 << 13;
 
 /// The meshes at rest as a coded file holds them.
-pub(crate) struct RestMeshes {
-    pub(crate) rest: CodedMesh,
-    pub(crate) cage: CodedMesh,
-    pub(crate) checked: Cage,
+pub struct RestMeshes {
+    /// The rest pose.
+    pub rest: CodedMesh,
+    /// The cage.
+    pub cage: CodedMesh,
+    /// The cage as it is decoded.
+    pub checked: Cage,
 }
 
 impl RestMeshes {
     /// On a grid fine enough for the goal. `None` where the cage or the points would not be valid there: the meshes are then stored as they are.
-    pub(crate) fn new(goal: Goal, rest: &Model, cage: &Cage, system: &dyn CoordinateSystem) -> Option<Self> {
+    pub fn new(goal: Goal, rest: &Model, cage: &Cage, system: &dyn CoordinateSystem) -> Option<Self> {
         let diagonal = diagonal(&rest.points);
         let (step, rest) = coded_rest(goal, rest, diagonal)?;
         let (cage, checked) = coded_cage(cage, step, diagonal, &rest.mesh.points, system)?;

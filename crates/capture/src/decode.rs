@@ -1,151 +1,23 @@
 //! Decodes containers to positions.
 
 pub mod joined;
+pub(crate) mod opened;
+
+pub use opened::{Container, DecodeError, open, open_cut};
 
 use crate::edited::EditedCages;
 use crate::memory::{Memory, free_bytes};
 use crate::origin::{LOST, move_to};
 use crate::timing::Timing;
-use cager_core::cage::{Cage, CageError};
+use cager_core::cage::Cage;
 use cager_core::coordinates;
-use cager_core::coordinates::{Coordinates, CoordinatesError, DEFINITION, ElementPlan};
+use cager_core::coordinates::{Coordinates, DEFINITION, ElementPlan};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, PrepareError, coordinates_bytes, reject_far_points};
-use cager_formats::{Action, FrameOptions, FrameRange, FrameWriter, MorphOptions, Signature, Target, create_frames};
+use cager_core::inversion::{BATCH, coordinates_bytes, reject_far_points};
+use cager_formats::{FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
 use cager_geometry::mesh::{Model, Point, diagonal};
-use cager_proto::container::{self, ContainerReader};
-use std::fs::File;
-use std::io::BufReader;
+use cager_proto::container;
 use std::path::{Path, PathBuf};
-
-/// Why decoding stopped; nothing was written.
-#[derive(Debug, thiserror::Error)]
-pub enum DecodeError {
-    /// The container cannot be read.
-    #[error("{}: {cause}", .path.display())]
-    Container {
-        /// The container.
-        path: PathBuf,
-        /// What went wrong; part of the message, so not a source as well.
-        cause: container::Error,
-    },
-    /// The container is a pipe or a device.
-    #[error("{}: is a pipe or a device, and frames are read from anywhere in a .cager file; save it as a file first", .path.display())]
-    NotAFile {
-        /// The container.
-        path: PathBuf,
-    },
-    /// The cage in the container is invalid.
-    #[error("{}: {cause}", .path.display())]
-    Cage {
-        /// The container.
-        path: PathBuf,
-        /// What is wrong with it; part of the message, so not a source as well.
-        cause: CageError,
-    },
-    /// The container needs a feature that this version lacks.
-    #[error("{}: {what}; use a newer cager, or encode the capture again where one before 0.2.0 wrote it", .path.display())]
-    Unsupported {
-        /// The container.
-        path: PathBuf,
-        /// What it needs.
-        what: String,
-    },
-    /// The coordinates of the file's model do not exist.
-    #[error("{}: {cause}", .path.display())]
-    Coordinates {
-        /// The input.
-        path: PathBuf,
-        /// Why; part of the message, so not a source as well.
-        cause: CoordinatesError,
-    },
-    /// A point of another model lies too far from the cage.
-    #[error("{}: {cause}", .path.display())]
-    Model {
-        /// The model.
-        path: PathBuf,
-        /// Which point, and how far; part of the message, so not a source as well.
-        cause: PrepareError,
-    },
-    /// The coordinates do not fit into memory.
-    #[error("{}: its coordinates need {gigabytes:.0} GB of memory; decode it on a larger machine", .path.display())]
-    Memory {
-        /// The container.
-        path: PathBuf,
-        /// What decoding needs.
-        gigabytes: f64,
-    },
-    /// The edited cages do not belong to the container.
-    #[error("{}: {what}", .path.display())]
-    Edited {
-        /// The file of edited cages.
-        path: PathBuf,
-        /// What is wrong with it, and what to do.
-        what: String,
-    },
-    /// The positions cannot be written, or the edited cages not be read.
-    #[error(transparent)]
-    Formats(#[from] cager_formats::Error),
-}
-
-impl DecodeError {
-    pub(crate) fn container(path: &Path, cause: container::Error) -> Self {
-        let path = path.to_owned();
-        match cause {
-            container::Error::Io(cause) => cager_formats::Error::Io { path, action: Action::Read, cause }.into(),
-            cause => Self::Container { path, cause },
-        }
-    }
-
-    /// The message without the path that it begins with: the one of a service is its own.
-    pub(crate) fn without(&self, path: &Path) -> String {
-        let message = self.to_string();
-        message.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&message).to_owned()
-    }
-}
-
-/// An opened container.
-pub type Container = ContainerReader<BufReader<File>>;
-
-/// Opens a container.
-///
-/// # Errors
-/// A file that cannot be read or is no container; the path is named.
-pub fn open(path: &Path) -> Result<Container, DecodeError> {
-    open_with(path, ContainerReader::open)
-}
-
-/// Opens what is there of a container that was damaged or cut.
-///
-/// # Errors
-/// As [`open`]; a file without a whole model and cage.
-pub fn open_cut(path: &Path) -> Result<Container, DecodeError> {
-    match open(path) {
-        Err(DecodeError::Container { cause: container::Error::Corrupt { .. }, .. }) => {
-            open_with(path, ContainerReader::open_cut)
-        }
-        opened => opened,
-    }
-}
-
-fn open_with(
-    path: &Path,
-    read: impl FnOnce(BufReader<File>) -> Result<Container, container::Error>,
-) -> Result<Container, DecodeError> {
-    let fail = |cause| DecodeError::container(path, cause);
-    // Opening a pipe would block until another process writes to it.
-    if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        return Err(DecodeError::NotAFile { path: path.to_owned() });
-    }
-    let file = File::open(path).map_err(|e| fail(container::Error::from(e)))?;
-    if file.metadata().is_ok_and(|m| m.is_dir()) {
-        return Err(fail(container::Error::NotAContainer));
-    }
-    read(BufReader::new(file)).map_err(|cause| match Signature::stand_in_of(path) {
-        Some(other) if matches!(cause, container::Error::NotAContainer) => other.into(),
-        _ => fail(cause),
-    })
-}
 
 /// What to decode, if not all frames of the container with its own model and cages.
 #[derive(Default)]
@@ -171,7 +43,8 @@ pub struct Decoding<'a> {
 }
 
 /// How much of a coded file is decoded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Layer {
     /// What the cages say alone.
     Cages,
@@ -290,7 +163,7 @@ fn bind(
 }
 
 /// Frames of a container, decoded as they are asked for.
-pub(crate) struct Positions {
+pub struct Positions {
     container: Container,
     model: BoundModel,
     path: PathBuf,
@@ -301,7 +174,7 @@ impl Positions {
     ///
     /// # Errors
     /// As [`decode`].
-    pub(crate) fn open(path: &Path) -> Result<Self, DecodeError> {
+    pub fn open(path: &Path) -> Result<Self, DecodeError> {
         let mut container = open(path)?;
         container.limit_coordinates(free_bytes());
         let memory = Memory::half_of_free();
@@ -315,7 +188,7 @@ impl Positions {
     ///
     /// # Errors
     /// Damage, or a frame that is not there.
-    pub(crate) fn read(&mut self, frames: &[usize]) -> Result<Vec<Vec<f32>>, DecodeError> {
+    pub fn read(&mut self, frames: &[usize]) -> Result<Vec<Vec<f32>>, DecodeError> {
         let fail = |cause| DecodeError::container(&self.path, cause);
         let (mut cages, mut positions) = (vec![Vec::new(); frames.len()], vec![Vec::new(); frames.len()]);
         for (&frame, cage) in frames.iter().zip(&mut cages) {

@@ -10,24 +10,30 @@ const CODED_LAMBDA: f64 = 1e-3;
 
 /// Options of the inversion as far as they were given.
 #[derive(Clone, Copy)]
-pub(crate) struct InversionChoices {
-    pub(crate) system: &'static dyn CoordinateSystem,
-    pub(crate) handles: Option<Handles>,
-    pub(crate) regularizer: Regularizer,
-    pub(crate) spectrum: Option<usize>,
-    pub(crate) lambda: Option<f64>,
-    pub(crate) is_coded: bool,
+pub struct InversionChoices {
+    /// Coordinate system.
+    pub system: &'static dyn CoordinateSystem,
+    /// Points that are read.
+    pub handles: Option<Handles>,
+    /// Treatment of the unstable end of the spectrum.
+    pub regularizer: Regularizer,
+    /// How many of the last singular directions are regularised.
+    pub spectrum: Option<usize>,
+    /// Weight of the regularisation.
+    pub lambda: Option<f64>,
+    /// Whether frames are coded.
+    pub is_coded: bool,
 }
 
 impl InversionChoices {
     /// Nothing but that frames are coded.
-    pub(crate) fn coded(system: &'static dyn CoordinateSystem) -> Self {
+    pub fn coded(system: &'static dyn CoordinateSystem) -> Self {
         let regularizer = Regularizer::default();
         Self { system, handles: None, regularizer, spectrum: None, lambda: None, is_coded: true }
     }
 
     /// With what is usual for the rest, for a cage of so many unknowns.
-    pub(crate) fn options(self, unknowns: usize) -> SolverOptions {
+    pub fn options(self, unknowns: usize) -> SolverOptions {
         let usual = if self.is_light() { unknowns } else { default_spectrum(unknowns) };
         SolverOptions {
             handles: self.handles(),
@@ -38,12 +44,12 @@ impl InversionChoices {
     }
 
     /// The points read: all where frames are coded, since the closer cages are to all points, the less is left to code.
-    pub(crate) fn handles(self) -> Handles {
+    pub fn handles(self) -> Handles {
         self.handles.unwrap_or(if self.is_coded_linearly() { Handles::All } else { Handles::default() })
     }
 
     /// The weight of the regularisation.
-    pub(crate) fn lambda(self) -> f64 {
+    pub fn lambda(self) -> f64 {
         self.lambda.unwrap_or(if self.is_light() { CODED_LAMBDA } else { SolverOptions::default().lambda })
     }
 

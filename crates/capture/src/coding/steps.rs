@@ -1,7 +1,8 @@
 //! How large steps are: for a bound by what some frames of the first group cost, for a mean error and a size held in every group.
 
-use super::group::{CodedGroup, GroupCoder, Room};
-use super::{CodingError, Goal};
+use super::error::CodingError;
+use super::goal::{Goal, Room};
+use super::group::{CodedGroup, GroupCoder};
 use std::ops::Range;
 use std::sync::Arc;
 
