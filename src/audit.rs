@@ -33,8 +33,8 @@ pub(crate) struct Change<'a> {
     /// Path of what was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) made: Option<&'a str>,
-    /// The answer's status.
-    pub(crate) status: u16,
+    /// The answer's status; none where nobody waited for it, and what was asked for may have been done.
+    pub(crate) status: Option<u16>,
     /// The request's id, which is in the log too.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) request_id: Option<&'a str>,
@@ -94,7 +94,7 @@ mod tests {
             action: "DELETE",
             path: "/v1/sessions/x",
             made: None,
-            status,
+            status: Some(status),
             request_id: Some("r1"),
         };
         audit.note(&change(204));

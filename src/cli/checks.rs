@@ -43,9 +43,13 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "PATH")]
     pub(super) prim: Option<String>,
 
-    /// Frames to take for each second of an animated .glb, which has keys instead of frames [default: those at its keys].
+    /// Frames to take for each second of an animated .glb or .gltf, which has keys instead of frames [default: those at its keys].
     #[arg(long, value_name = "F", value_parser = rate, allow_negative_numbers = true, hide_default_value = true)]
     pub(super) sample_rate: Option<f64>,
+
+    /// The animation to take of a .glb or .gltf with several: its name, or its number from 0 [default: the first that moves the mesh].
+    #[arg(long, value_name = "NAME", hide_default_value = true)]
+    pub(super) animation: Option<String>,
 
     /// Go on where numbers are missing from the names of the capture's files.
     #[arg(long)]
@@ -109,6 +113,7 @@ pub(super) fn checked_files<'a>(
     files.selection.join_sequences = args.all_files;
     files.selection.prim.clone_from(&args.prim);
     files.selection.rate = args.sample_rate;
+    files.selection.animation.clone_from(&args.animation);
     files
 }
 

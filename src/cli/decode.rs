@@ -64,6 +64,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         layer: args.layer,
         salvage: args.salvage,
         morphs: args.morphs.options(),
+        with_cage: transfer.with_cage,
     };
     let bar = progress::PreparationBar::new("decoding", taken);
     let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
@@ -101,6 +102,7 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
     let transfer = &args.transfer;
     for (given, option, why) in [
         (transfer.cages, "--cages", "each file of a list has a cage of its own"),
+        (transfer.with_cage, "--with-cage", "each file of a list has a cage of its own"),
         (transfer.with_cages.is_some(), "--with-cages", "each file of a list has a cage of its own"),
         (transfer.model.is_some(), "--model", "each file of a list has a cage of its own"),
         (args.salvage, "--salvage", "what a list says holds for whole files"),

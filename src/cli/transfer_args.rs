@@ -18,6 +18,10 @@ pub(crate) struct TransferArgs {
     #[arg(long, value_name = "EDITED")]
     pub(crate) with_cages: Option<PathBuf>,
 
+    /// Keep the cage beside the model, as a second mesh that programs show as a guide and do not render; .usdc and .usdz alone.
+    #[arg(long, conflicts_with = "cages")]
+    pub(crate) with_cage: bool,
+
     /// Move another model instead, which lies in the same rest cage: another resolution, garments, eyes; .obj .ply .off .stl .glb .abc .usdc.
     #[arg(long, value_name = "OTHER")]
     pub(crate) model: Option<PathBuf>,

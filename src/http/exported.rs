@@ -190,6 +190,7 @@ fn write(container: &Path, folder: &Path, name: &str) -> anyhow::Result<(File, u
         layer: Layer::All,
         salvage: false,
         morphs: MorphOptions::default(),
+        with_cage: false,
     };
     std::fs::create_dir(folder)?;
     let output = folder.join(name);

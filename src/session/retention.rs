@@ -171,7 +171,7 @@ impl Service {
                 action: "EXPIRE",
                 path: &path,
                 made: None,
-                status: 204,
+                status: Some(204),
                 request_id: None,
             });
         });

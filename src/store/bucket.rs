@@ -14,9 +14,15 @@ use std::sync::Arc;
 /// Has the address of the bucket where the folder's files are in one.
 const MARKER: &str = "catalog.bucket";
 
+/// An opened bucket, and the folder that is a cache of it.
+pub(super) struct Bucket {
+    pub(super) files: Files,
+    blobs: Arc<Blobs>,
+}
+
 /// Opens the bucket at `url` for the process that has taken the database as the so-manieth, and makes the folder a cache of it. The first time the bucket gets
 /// what the folder has.
-pub(super) fn open(files: &Files, url: &str, taken: i64, kept_bytes: u64) -> Result<Files, StoreError> {
+pub(super) fn open(files: &Files, url: &str, taken: i64, kept_bytes: u64) -> Result<Bucket, StoreError> {
     let text = |(name, value): (OsString, OsString)| Some((name.into_string().ok()?, value.into_string().ok()?));
     let blobs = Blobs::open(url, taken, std::env::vars_os().filter_map(text)).map_err(|error| StoreError::Catalog {
         path: "the bucket".into(),
@@ -26,42 +32,74 @@ pub(super) fn open(files: &Files, url: &str, taken: i64, kept_bytes: u64) -> Res
     let root = &files.root;
     let elsewhere =
         |what: &str| StoreError::Elsewhere { what: format!("the data folder {} and {url}: {what}", root.display()) };
+    // A folder that knows its bucket is a cache of it, or was being sent there.
     let is_known = files.exists(&root.join(MARKER))?;
     let own = files.read(&root.join(NUMBER), LIMIT)?;
-    let is_new = blobs.bytes(NUMBER).is_none();
-    if is_new {
+    if blobs.bytes(NUMBER).is_none() {
         if !blobs.is_empty() && !is_known {
-            return Err(elsewhere("files of something else are in the bucket; name another path in it by --blobs"));
+            return Err(elsewhere(
+                "there are files in the bucket, of something else or of a folder that was not sent as a whole; start the service with that folder first, or name another path in the bucket by --blobs",
+            ));
         }
         note(files, url)?;
         send_all(files, &blobs)?;
     } else {
-        let staging = files.temporary("number");
-        let fetched = files.create(&staging).and_then(|_| {
-            let file = std::fs::File::options().write(true).open(&staging);
-            let fetched = file.and_then(|file| blobs.fetch(NUMBER, &file));
-            fetched.map_err(|error| StoreError::of(&root.join(NUMBER), "fetch", error))?;
-            files.read(&staging, LIMIT)
-        });
-        files.discard(&staging);
-        let there = fetched?;
-        let has_own = own.is_none() && (files.exists(&root.join(CATALOG))? || is_without_records(files)?);
-        if has_own || (own.is_some() && (own != there || !is_known)) {
+        let there = number(files, &blobs)?;
+        let is_used = || Ok(files.exists(&root.join(CATALOG))? || is_without_records(files)?);
+        if own.as_ref().is_some_and(|own| *own != there) || (!is_known && (own.is_some() || is_used()?)) {
             return Err(elsewhere(
-                "they do not belong together; name the right ones by --data and --blobs, or an empty folder",
+                "they do not belong together; name the right ones by --data and --blobs, or a folder that is new",
             ));
         }
         note(files, url)?;
+        if own.is_none() {
+            files.replace(&root.join(NUMBER), &there)?;
+        }
     }
     // What a process before this one has left may be old.
     for folder in FOLDERS {
-        files.clear(&root.join(folder))?;
+        let (folder, away) =
+            (root.join(folder), files.trash.join(format!("{folder}.{}", uuid::Uuid::now_v7().simple())));
+        let emptied = files.disk.rename(&folder, &away).and_then(|()| files.disk.create_dir(&folder));
+        emptied.map_err(|error| StoreError::of(&folder, "empty", error))?;
     }
-    if own.is_some() {
-        files.remove_file(&root.join(NUMBER))?;
+    let (trash, disk) = (files.trash.clone(), Arc::clone(&files.disk));
+    let root_of = root.clone();
+    let clearing = std::thread::Builder::new().name("emptying".to_owned());
+    // What is left goes with the next start.
+    let _ = clearing.spawn(move || Files::new(&root_of, disk).clear(&trash));
+    let blobs = Arc::new(blobs);
+    let disk = MirroredDisk::new(Arc::clone(&files.disk), Arc::clone(&blobs), root, kept_bytes);
+    Ok(Bucket { files: Files::new(root, Arc::new(disk)), blobs })
+}
+
+impl Bucket {
+    /// Notes that the folder's files and records are all where they belong: other machines may go on with them from now on.
+    pub(super) fn is_complete(self) -> Result<Files, StoreError> {
+        if self.blobs.bytes(NUMBER).is_none() {
+            put(&self.blobs, &self.files.root.join(NUMBER), NUMBER)?;
+        }
+        Ok(self.files)
     }
-    let disk = MirroredDisk::new(Arc::clone(&files.disk), blobs, root, NUMBER, kept_bytes);
-    Ok(Files::new(root, Arc::new(disk)))
+}
+
+/// The folder's number that the bucket has.
+fn number(files: &Files, blobs: &Blobs) -> Result<Vec<u8>, StoreError> {
+    let staging = files.temporary("number");
+    let failed = |error| StoreError::of(&staging, "fetch", error);
+    let fetched = files.create(&staging).and_then(|_| {
+        let file = std::fs::File::options().write(true).open(&staging).map_err(failed)?;
+        blobs.fetch(NUMBER, &file).map_err(failed)?;
+        files.read(&staging, LIMIT)
+    });
+    files.discard(&staging);
+    Ok(fetched?.unwrap_or_default())
+}
+
+/// Whether the folder has its files itself, and is no cache of a bucket.
+pub(super) fn is_own(files: &Files) -> Result<bool, StoreError> {
+    let there = |name| files.exists(&files.root.join(name));
+    Ok(!there(MARKER)? && (there(NUMBER)? || there(CATALOG)?))
 }
 
 /// Refuses a folder whose files are in a bucket.
@@ -83,14 +121,11 @@ fn note(files: &Files, url: &str) -> Result<(), StoreError> {
     files.replace(&path, line.as_bytes())
 }
 
-/// Stores all files of the folder in the bucket, the folder's number last.
+/// Stores all files of the folder in the bucket.
 fn send_all(files: &Files, blobs: &Blobs) -> Result<(), StoreError> {
     let mut sent = 0_u64;
     for folder in FOLDERS {
         sent += send(files, blobs, &files.root.join(folder), folder)?;
-    }
-    if files.exists(&files.root.join(NUMBER))? {
-        put(blobs, &files.root.join(NUMBER), NUMBER)?;
     }
     if sent > 0 {
         tracing::info!(files = sent, bucket = blobs.name(), "the folder's files are in the bucket now");

@@ -36,9 +36,14 @@ pub(super) fn open(url: &str) -> Result<Database, StoreError> {
 }
 
 impl Database {
+    /// Sees that it belongs to the folder.
+    pub(super) fn check_folder(&self, files: &Files) -> Result<(), StoreError> {
+        match_folder(files, &self.catalog, &self.name)
+    }
+
     /// Sees that it belongs to the folder, and takes over what the folder's own catalogue has. Gives what it is called too.
     pub(super) fn of_folder(self, files: &Files) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
-        match_folder(files, &self.catalog, &self.name)?;
+        self.check_folder(files)?;
         take_over(files, &*self.catalog, &self.name)?;
         Ok((self.catalog, self.name))
     }

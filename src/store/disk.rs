@@ -130,7 +130,7 @@ pub struct LocalDisk;
 
 /// Modes of folders and files.
 const FOLDER_MODE: u32 = 0o700;
-const FILE_MODE: u32 = 0o600;
+pub(super) const FILE_MODE: u32 = 0o600;
 
 /// Whether users of the machine who share no group with a folder may look into it.
 ///

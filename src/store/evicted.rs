@@ -9,6 +9,9 @@ use std::time::{Duration, Instant};
 /// So long after its last use a file stays in any case: whoever has asked for it may be about to open it.
 const REST: Duration = Duration::from_secs(60);
 
+/// Files that are written to stay, so that nobody fetches one meanwhile.
+const WRITTEN: &str = "frames-";
+
 #[derive(Debug)]
 pub(super) struct Cached {
     most: u64,
@@ -45,7 +48,11 @@ impl Cached {
         files.bytes = files.bytes + bytes - before;
         let mut gone = Vec::new();
         if files.bytes > self.most {
-            let rested = files.known.iter().filter(|(_, (_, last))| now.duration_since(*last) >= REST);
+            let may_go = |path: &Path| {
+                path.file_name().and_then(|name| name.to_str()).is_some_and(|name| !name.starts_with(WRITTEN))
+            };
+            let rested =
+                files.known.iter().filter(|(path, (_, last))| now.duration_since(*last) >= REST && may_go(path));
             let mut rested: Vec<_> = rested.map(|(path, (bytes, last))| (*last, path.clone(), *bytes)).collect();
             rested.sort();
             // Down to nine tenths, so that this is not done for each file.

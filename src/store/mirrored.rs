@@ -1,47 +1,59 @@
 //! A data folder whose files are in a bucket: the folder is a cache of it, emptied at each start, and what is put in place, replaced or removed there is so in
 //! the bucket first. Temporary files and prepared solvers are on this machine alone.
 
-use super::disk::{Disk, DiskFile, Entry};
+use super::disk::{Disk, DiskFile, Entry, FILE_MODE};
 use super::evicted::Cached;
 use cager_store::{Blobs, Catalog, CatalogError};
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
-use std::hash::{BuildHasher as _, BuildHasherDefault, DefaultHasher};
 use std::io::{self, ErrorKind};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::SystemTime;
 
 use crate::sync::lock;
 
 /// Folders whose files are in the bucket.
 pub(super) const FOLDERS: [&str; 6] = ["sessions", "cages", "recoveries", "transfers", "contents", "quarantine"];
-/// Files that may be fetched together.
-const FETCHES: usize = 16;
+/// Those of records: what is removed there does not come back.
+const RECORDS: [&str; 4] = ["sessions", "cages", "recoveries", "transfers"];
+/// Paths in use from which on those are forgotten that no longer are.
+const TURNS: usize = 256;
 
 #[derive(Debug)]
 pub(super) struct MirroredDisk {
     disk: Arc<dyn Disk>,
     blobs: Arc<Blobs>,
     root: PathBuf,
-    /// A file beside the folders that is in the bucket too.
-    number: &'static str,
-    /// One is taken while a file is fetched.
-    fetching: [Mutex<()>; FETCHES],
+    /// Who changes or fetches a file takes its turn.
+    turns: Mutex<HashMap<PathBuf, Weak<Mutex<()>>>>,
     cached: Cached,
 }
 
 impl MirroredDisk {
     /// The folder `root`, with at most so many bytes of the bucket's files in it.
-    pub(super) fn new(disk: Arc<dyn Disk>, blobs: Blobs, root: &Path, number: &'static str, bytes: u64) -> Self {
-        let (root, blobs) = (root.to_owned(), Arc::new(blobs));
-        Self { disk, blobs, root, number, fetching: Default::default(), cached: Cached::new(bytes) }
+    pub(super) fn new(disk: Arc<dyn Disk>, blobs: Arc<Blobs>, root: &Path, bytes: u64) -> Self {
+        Self { disk, blobs, root: root.to_owned(), turns: Mutex::default(), cached: Cached::new(bytes) }
     }
 
     /// What a path is called in the bucket; `None` for what is on this machine alone.
     fn name<'a>(&self, path: &'a Path) -> Option<&'a str> {
         let name = path.strip_prefix(&self.root).ok()?.to_str()?;
-        let first = name.split('/').next()?;
-        (FOLDERS.contains(&first) || name == self.number).then_some(name)
+        FOLDERS.contains(&name.split('/').next()?).then_some(name)
+    }
+
+    fn turn(&self, path: &Path) -> Arc<Mutex<()>> {
+        let mut turns = lock(&self.turns);
+        if let Some(turn) = turns.get(path).and_then(Weak::upgrade) {
+            return turn;
+        }
+        if turns.len() >= TURNS {
+            turns.retain(|_, turn| turn.strong_count() > 0);
+        }
+        let turn = Arc::default();
+        turns.insert(path.to_owned(), Arc::downgrade(&turn));
+        turn
     }
 
     fn make_parents(&self, path: &Path) -> io::Result<()> {
@@ -57,8 +69,8 @@ impl MirroredDisk {
 
     /// Fetches a file, or makes a folder, that the bucket has and this machine has not.
     fn bring_missing(&self, path: &Path, name: &str) -> io::Result<()> {
-        let turn = BuildHasherDefault::<DefaultHasher>::default().hash_one(name) as usize % FETCHES;
-        let _turn = lock(&self.fetching[turn]);
+        let turn = self.turn(path);
+        let _turn = lock(&turn);
         if self.disk.open(path).is_ok() {
             return Ok(());
         }
@@ -70,9 +82,8 @@ impl MirroredDisk {
             return unless_there(self.disk.create_dir(path));
         }
         let staging = self.root.join("tmp").join(format!("fetched-{}", uuid::Uuid::now_v7().simple()));
-        let fetched =
-            File::options().write(true).create_new(true).open(&staging).and_then(|file| self.blobs.fetch(name, &file));
-        let placed = fetched.and_then(|bytes| {
+        let file = File::options().write(true).create_new(true).mode(FILE_MODE).open(&staging);
+        let placed = file.and_then(|file| self.blobs.fetch(name, &file)).and_then(|bytes| {
             self.make_parents(path)?;
             self.disk.rename(&staging, path)?;
             self.keep(path, bytes);
@@ -124,6 +135,43 @@ impl MirroredDisk {
         }
         Ok(sent)
     }
+
+    /// Puts a temporary file or folder in place.
+    fn publish(&self, from: &Path, to: &Path, name: &str) -> io::Result<()> {
+        let turn = self.turn(to);
+        let _turn = lock(&turn);
+        let is_folder = self.disk.list(from).is_ok();
+        // As on a disk.
+        if is_folder && self.blobs.has_folder(name) {
+            return Err(ErrorKind::DirectoryNotEmpty.into());
+        }
+        let sent = self.send(from, to, name).inspect_err(|_| {
+            if is_folder {
+                // What of it was sent is of no use.
+                let _ = self.blobs.remove(name);
+            }
+        })?;
+        let placed = self.make_parents(to).and_then(|()| self.disk.rename(from, to));
+        if let Err(error) = placed {
+            // The bucket has the new one: what is here would be taken for that.
+            return match self.disk.remove_file(to) {
+                Err(gone) if !is_folder && gone.kind() == ErrorKind::NotFound => Ok(()),
+                Ok(()) if !is_folder => Ok(()),
+                _ => Err(error),
+            };
+        }
+        sent.iter().for_each(|(path, bytes)| self.keep(path, *bytes));
+        Ok(())
+    }
+
+    /// Removes what the bucket has of a path. In the folder of a record nothing is stored any more afterwards.
+    fn remove_there(&self, path: &Path, name: &str) -> io::Result<()> {
+        self.cached.forget(path);
+        let mut names = name.split('/');
+        let is_record =
+            names.next().is_some_and(|first| RECORDS.contains(&first)) && names.nth(1).is_none() && name.contains('/');
+        if is_record { self.blobs.remove_for_good(name) } else { self.blobs.remove(name) }
+    }
 }
 
 fn unless_there(made: io::Result<()>) -> io::Result<()> {
@@ -156,32 +204,42 @@ impl Disk for MirroredDisk {
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        let (was, is) = (self.name(from), self.name(to));
-        if let Some(name) = is {
-            if was.is_some() {
-                self.bring(from)?;
+        match (self.name(from), self.name(to)) {
+            (None, None) => self.disk.rename(from, to),
+            (None, Some(name)) => self.publish(from, to, name),
+            (Some(name), None) => {
+                let turn = self.turn(from);
+                let _turn = lock(&turn);
+                // Here first: where the bucket does not answer it is gone all the same.
+                let moved = self.disk.rename(from, to);
+                self.remove_there(from, name)?;
+                moved
             }
-            let sent = self.send(from, to, name)?;
-            self.make_parents(to)?;
-            self.disk.rename(from, to)?;
-            sent.iter().for_each(|(path, bytes)| self.keep(path, *bytes));
+            (Some(was), Some(is)) => {
+                let turn = self.turn(from);
+                let _turn = lock(&turn);
+                self.blobs.rename(was, is)?;
+                self.cached.forget(from);
+                match self.make_parents(to).and_then(|()| self.disk.rename(from, to)) {
+                    // Not all of it was here.
+                    Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+                    renamed => renamed,
+                }
+            }
         }
-        if let Some(name) = was {
-            self.blobs.remove(name)?;
-            self.cached.forget(from);
-        }
-        if is.is_none() { self.disk.rename(from, to) } else { Ok(()) }
     }
 
     fn remove_file(&self, path: &Path) -> io::Result<()> {
         let Some(name) = self.name(path) else { return self.disk.remove_file(path) };
+        let turn = self.turn(path);
+        let _turn = lock(&turn);
         if self.blobs.bytes(name).is_none() {
             let is_folder = self.blobs.has_folder(name);
             return if is_folder { Err(ErrorKind::IsADirectory.into()) } else { self.disk.remove_file(path) };
         }
-        self.blobs.remove(name)?;
-        self.cached.forget(path);
-        match self.disk.remove_file(path) {
+        let removed = self.disk.remove_file(path);
+        self.remove_there(path, name)?;
+        match removed {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
             removed => removed,
         }
@@ -198,11 +256,13 @@ impl Disk for MirroredDisk {
         let Some(name) = self.name(path) else { return self.disk.list(path) };
         let listed = self.blobs.list(name);
         let mut entries = match self.disk.list(path) {
-            Err(error) if error.kind() == ErrorKind::NotFound && !listed.is_empty() => Vec::new(),
+            // Folders without files are made when there are some.
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
             entries => entries?,
         };
         // What was written and is not in the bucket yet is told as it is here.
-        entries.retain(|entry| listed.iter().all(|there| entry.name != *there.name));
+        let names: HashSet<&str> = listed.iter().map(|there| &there.name[..]).collect();
+        entries.retain(|entry| entry.name.to_str().is_none_or(|name| !names.contains(name)));
         entries.extend(listed.into_iter().map(|there| Entry {
             name: there.name.into(),
             is_dir: there.is_folder,
@@ -294,12 +354,12 @@ impl DiskFile for Written {
     }
 
     fn sync_data(&self) -> io::Result<()> {
-        let Some(place) = &self.place else { return Ok(()) };
+        let Some(place) = &self.place else { return self.file.sync_data() };
         let mut ranges = lock(&self.ranges);
         while let Some((start, end)) = ranges.first().copied() {
             let mut bytes = vec![0; (end - start) as usize];
             self.file.read_exact_at(&mut bytes, start)?;
-            place.blobs.put_piece(&place.name, start, bytes)?;
+            place.blobs.put_piece(&place.name, start, &bytes)?;
             ranges.remove(0);
         }
         Ok(())

@@ -21,6 +21,7 @@
 //! everything in `sessions`, `cages`, `recoveries`, `transfers`, `contents` and `prepared` is complete, but for frames that wait to be coded,
 //! whose digests the catalogue has. A record is there before its folder and after it: what it says of its phase decides.
 
+use crate::store::bucket::Bucket;
 use crate::store::fenced::FencedDisk;
 use crate::store::files::Files;
 use crate::sync::lock as lock_of;
@@ -287,11 +288,13 @@ fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(
     }
     let Some(url) = shared.catalog else { return Ok((files, None)) };
     let database = database::open(url)?;
-    let files = match shared.blobs {
-        Some(url) => bucket::open(&files, url, database.taken, shared.kept_bytes)?,
-        None => files,
-    };
-    let (catalog, name) = database.of_folder(&files)?;
+    // What is only here is sent nowhere before it is known to belong to the database.
+    if shared.blobs.is_some() && bucket::is_own(&files)? {
+        database.check_folder(&files)?;
+    }
+    let bucket = shared.blobs.map(|url| bucket::open(&files, url, database.taken, shared.kept_bytes)).transpose()?;
+    let (catalog, name) = database.of_folder(bucket.as_ref().map_or(&files, |bucket| &bucket.files))?;
+    let files = bucket.map_or(Ok(files), Bucket::is_complete)?;
     let disk = Arc::new(FencedDisk { disk: files.disk, catalog: Arc::clone(&catalog) });
     Ok((Files::new(root, disk), Some((catalog, name))))
 }

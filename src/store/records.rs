@@ -251,7 +251,10 @@ impl Store {
             }
             let open = records.iter().filter(|record| record.kind == kind && record.phase == Phase::Open);
             for record in open.filter(|record| missing.contains(&record.id[..]) && is_session_id(&record.id)) {
-                if let Err(error) = make_folder(&*files.disk, &all(kind, files).join(&record.id)) {
+                // A bucket has no folders without files.
+                if !files.disk.is_elsewhere()
+                    && let Err(error) = make_folder(&*files.disk, &all(kind, files).join(&record.id))
+                {
                     tracing::error!(%error, id = record.id, "its folder is missing and cannot be made");
                 }
             }

@@ -14,8 +14,8 @@ use cager_core::coordinates;
 use cager_core::coordinates::{Coordinates, DEFINITION, ElementPlan};
 use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, coordinates_bytes, reject_far_points};
-use cager_formats::{FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
-use cager_geometry::mesh::{Model, Point, diagonal};
+use cager_formats::{CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
+use cager_geometry::mesh::{Model, Point, Polygons, diagonal};
 use cager_proto::container;
 use std::path::{Path, PathBuf};
 
@@ -40,6 +40,8 @@ pub struct Decoding<'a> {
     pub salvage: bool,
     /// How a `.glb` holds the frames.
     pub morphs: MorphOptions,
+    /// Whether the cage is kept beside the model, which USD alone does.
+    pub with_cage: bool,
 }
 
 /// How much of a coded file is decoded.
@@ -257,6 +259,12 @@ impl<'a> Chosen<'a> {
         let mut wanted: Vec<usize> =
             if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };
         let mut options = frame_options(&mut container, there, taken, timing, salvage).map_err(fail)?;
+        if what.with_cage {
+            let cage = container.cage().map_err(fail)?;
+            let mut faces = Polygons::new();
+            cage.triangles.iter().for_each(|triangle| faces.push(triangle));
+            options.cage = Some(CageMesh { points: cage.vertices.len(), faces });
+        }
         let numbers_lost = salvage && container.frame_numbers().is_err();
         let mut damaged = Vec::new();
         if salvage && cages.is_none() {
@@ -320,6 +328,12 @@ impl<'a> Chosen<'a> {
                 }
                 for frame in &positions[..count] {
                     writer.write_frame(frame)?;
+                }
+                if let Some(mesh) = &self.options.cage {
+                    for cage in &cages[..count] {
+                        // Normals of the cage follow, where there are any.
+                        writer.write_cage(&cage[..3 * mesh.points])?;
+                    }
                 }
             }
             first += count;

@@ -1,7 +1,7 @@
 //! What the store's tests share.
 
 use super::faults::FaultyDisk;
-use super::{CagePlace, Completion, Content, ContentKey, FrameEntry, Idempotency, NamedFile, NewFrame, Opened};
+use super::{CagePlace, Completion, Content, ContentKey, FrameEntry, Idempotency, NamedFile, NewFrame, Opened, Shared};
 use super::{SessionMeta, Store, StoreError};
 use cager_core::cage::Cage;
 use cager_core::coordinates;

@@ -14,20 +14,22 @@ use std::future::Future;
 use std::io::{self, Read as _};
 use std::ops::Range;
 use std::os::unix::fs::FileExt as _;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::runtime::{Builder, Handle, Runtime, RuntimeFlavor};
 use tokio::task::block_in_place;
 
 /// Bytes of a part: S3 wants 5 MiB at least, and 10,000 of them at most.
-const PART: usize = 16 << 20;
+const PART: usize = 8 << 20;
 /// Parts under way together.
-const PARTS: usize = 3;
+const PARTS: usize = 2;
 /// How long a connection may take, and the next bytes on one.
 const CONNECT: Duration = Duration::from_secs(5);
-const SILENCE: Duration = Duration::from_secs(20);
+/// A request with its bytes counts as silence.
+const SILENCE: Duration = Duration::from_secs(60);
 /// Endpoints on this machine.
-const LOCAL: [&str; 3] = ["http://127.0.0.1", "http://localhost", "http://[::1]"];
+const LOCAL: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
 /// How long a request is tried again, so that clients are answered while they wait.
 const RETRIES: usize = 3;
 const RETRY: Duration = Duration::from_secs(10);
@@ -37,6 +39,10 @@ pub(super) struct Bucket {
     store: Arc<dyn ObjectStore>,
     prefix: Path,
     pub(super) name: String,
+    /// What was wrong when it was asked last, where it did not answer.
+    away: Mutex<Option<BlobsError>>,
+    /// Whether somebody tries if it answers again.
+    is_tried: AtomicBool,
     /// Always there until it is dropped.
     runtime: Option<Runtime>,
 }
@@ -47,7 +53,14 @@ impl Bucket {
         let runtime =
             runtime.map_err(|error| BlobsError(format!("no thread can be started for the bucket: {error}")))?;
         let (store, prefix) = place(url, environment)?;
-        Ok(Self { store, prefix, name: url.trim_end_matches('/').to_owned(), runtime: Some(runtime) })
+        Ok(Self {
+            store,
+            prefix,
+            name: url.trim_end_matches('/').to_owned(),
+            away: Mutex::default(),
+            is_tried: AtomicBool::new(false),
+            runtime: Some(runtime),
+        })
     }
 
     fn path(&self, key: &str) -> Path {
@@ -150,15 +163,38 @@ impl Bucket {
         })
     }
 
+    /// Gives an object another name too.
+    pub(super) fn copy(&self, from: &str, to: &str) -> io::Result<()> {
+        self.block_on(async { self.store.copy(&self.path(from), &self.path(to)).await })
+    }
+
+    /// Where it has not answered, one caller at a time tries again; the others are told at once, so that they do not all wait.
     fn block_on<T>(&self, work: impl Future<Output = Result<T, object_store::Error>>) -> io::Result<T> {
         let Some(runtime) = &self.runtime else { return Err(io::ErrorKind::NotConnected.into()) };
+        let known = lock(&self.away).clone();
+        let tries = known.is_some();
+        if let Some(error) = known.filter(|_| self.is_tried.swap(true, Ordering::SeqCst)) {
+            return Err(io::Error::other(error));
+        }
         let done = match Handle::try_current().map(|handle| handle.runtime_flavor()) {
             // Of asynchronous work, which goes on elsewhere meanwhile.
             Ok(RuntimeFlavor::MultiThread) => block_in_place(|| runtime.block_on(work)),
             _ => runtime.block_on(work),
         };
-        done.map_err(|error| io::Error::other(BlobsError(format!("{}: {}", self.name, innermost(&error)))))
+        let told = |error: &object_store::Error| BlobsError(format!("{}: {}", self.name, innermost(error)));
+        *lock(&self.away) = match &done {
+            Err(error @ object_store::Error::Generic { .. }) => Some(told(error)),
+            _ => None,
+        };
+        if tries {
+            self.is_tried.store(false, Ordering::SeqCst);
+        }
+        done.map_err(|error| io::Error::other(told(&error)))
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Drop for Bucket {
@@ -173,6 +209,8 @@ impl Drop for Bucket {
 /// The store at an address, and the path in it.
 fn place(url: &str, environment: &[(String, String)]) -> Result<(Arc<dyn ObjectStore>, Path), BlobsError> {
     let refused = |what: &dyn std::fmt::Display| {
+        // Keys may have been written into it.
+        let url = url.rsplit_once('@').map_or(url, |(_, rest)| rest);
         BlobsError(format!("{url:?} is no place for files: {what}; give s3://bucket/path, or file:///folder"))
     };
     if let Some(folder) = url.strip_prefix("file://").filter(|folder| folder.starts_with('/')) {
@@ -200,7 +238,10 @@ fn place(url: &str, environment: &[(String, String)]) -> Result<(Arc<dyn ObjectS
     }
     let is_encrypted = endpoint.is_none_or(|endpoint| endpoint.starts_with("https://"));
     // What stays on this machine is read by nobody on the way.
-    let is_local = endpoint.is_some_and(|endpoint| LOCAL.iter().any(|local| endpoint.starts_with(local)));
+    let is_local = endpoint.and_then(|endpoint| endpoint.strip_prefix("http://")).is_some_and(|rest| {
+        let host = rest.split('/').next().unwrap_or_default();
+        LOCAL.iter().any(|local| host.strip_prefix(local).is_some_and(|port| port.is_empty() || port.starts_with(':')))
+    });
     let is_allowed = environment.iter().any(|(name, value)| name == "AWS_ALLOW_HTTP" && value == "true");
     if !is_encrypted && !is_local && !is_allowed {
         return Err(refused(&format!(

@@ -1,17 +1,24 @@
 //! Files of sessions and jobs in a bucket, of which one process at a time knows all: it has asked once, and notes what it changes.
 
 mod bucket;
+mod index;
 mod names;
 
 use bucket::Bucket;
-use names::{Object, Part, in_force, parse};
-use std::collections::{BTreeMap, BTreeSet};
+use index::Index;
+use names::{Object, Part, in_force};
 use std::fs::File;
 use std::io;
-use std::ops::Bound;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Most bytes of what is written to a file that are sent at once.
+const PIECE: usize = 8 << 20;
+/// How often a file is fetched again that others change meanwhile.
+const FETCHES: usize = 5;
+/// Says that a process has begun to write; nothing reads it.
+const OWNER: &str = "owner";
 
 /// Why the bucket cannot be used; inside an [`io::Error`] where that is what a call gives.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -34,8 +41,7 @@ pub struct Listed {
 pub struct Blobs {
     bucket: Bucket,
     taken: i64,
-    /// What is there, by paths of files.
-    index: Mutex<BTreeMap<String, Vec<Object>>>,
+    index: Mutex<Index>,
     next: AtomicU64,
 }
 
@@ -52,17 +58,17 @@ impl Blobs {
     ) -> Result<Self, BlobsError> {
         let environment: Vec<_> = environment.into_iter().collect();
         let bucket = Bucket::connect(url, &environment)?;
-        let listed = bucket.list("").map_err(|error| BlobsError(error.to_string()))?;
-        let mut index = BTreeMap::<String, Vec<Object>>::new();
-        for (key, bytes) in &listed {
-            // Of other programs, or of later versions.
-            let Some((path, object)) = parse(key, *bytes) else { continue };
-            index.entry(path.to_owned()).or_default().push(object);
-        }
-        for objects in index.values_mut() {
-            *objects = in_force(objects).to_vec();
-        }
-        Ok(Self { bucket, taken, index: Mutex::new(index), next: AtomicU64::new(1) })
+        let failed = |error: io::Error| BlobsError(error.to_string());
+        let (mut index, last) = Index::of(&bucket.list("").map_err(failed)?);
+        // A database that was restored counts fewer takeovers than the bucket has seen.
+        let taken = taken.max(last + 1);
+        let object = Object { taken, part: Part::Whole, bytes: 0 };
+        bucket.put(&object.key(OWNER), Vec::new().into()).map_err(failed)?;
+        let before = index.take(OWNER);
+        let blobs = Self { bucket, taken, index: Mutex::new(index), next: AtomicU64::new(1) };
+        // They do no harm.
+        let _ = blobs.bucket.remove(&before.iter().map(|object| object.key(OWNER)).collect::<Vec<_>>());
+        Ok(blobs)
     }
 
     /// What it is called in messages.
@@ -77,87 +83,130 @@ impl Blobs {
 
     /// Length of a file; `None` if it is not there.
     pub fn bytes(&self, path: &str) -> Option<u64> {
-        Some(length(self.index().get(path)?))
+        self.index().bytes(path)
     }
 
     /// Whether there is a file in this folder.
     pub fn has_folder(&self, path: &str) -> bool {
-        within(&self.index(), path).next().is_some()
+        self.index().has_folder(path)
     }
 
     /// Files and folders in a folder.
     pub fn list(&self, folder: &str) -> Vec<Listed> {
-        let (mut files, mut folders) = (Vec::new(), BTreeSet::new());
-        for (path, objects) in within(&self.index(), folder) {
-            let name = &path[folder.len() + 1..];
-            match name.split_once('/') {
-                Some((name, _)) => drop(folders.insert(name.to_owned())),
-                None => files.push(Listed { name: name.to_owned(), is_folder: false, bytes: length(objects) }),
-            }
-        }
-        files.extend(folders.into_iter().map(|name| Listed { name, is_folder: true, bytes: 0 }));
-        files
+        self.index().list(folder)
     }
 
     /// Stores a file of this machine; replaces what is there. Durable on `Ok`.
+    ///
+    /// # Errors
+    /// `NotFound` in a folder that was removed for good.
     pub fn put_file(&self, path: &str, from: &Path) -> io::Result<()> {
         let object = Object { taken: self.taken, part: Part::Whole, bytes: 0 };
+        self.index().admit(path)?;
         let bytes = self.bucket.put_file(&object.key(path), &File::open(from)?)?;
-        let before = self.index().insert(path.to_owned(), vec![Object { bytes, ..object }]);
-        let old: Vec<String> =
-            before.iter().flatten().map(|old| old.key(path)).filter(|key| *key != object.key(path)).collect();
-        if !old.is_empty()
-            && let Err(error) = self.bucket.remove(&old)
-        {
-            tracing::warn!(%error, path, "what was replaced in the bucket takes space until the file is removed");
+        let old = self.note(path, Object { bytes, ..object }, true)?;
+        if !old.is_empty() {
+            let keys: Vec<String> = old.iter().map(|old| old.key(path)).collect();
+            match self.bucket.remove(&keys) {
+                Ok(()) => self.index().forget(path, &old),
+                Err(error) => {
+                    tracing::warn!(%error, path, "what was replaced in the bucket takes space until the file is removed")
+                }
+            }
         }
         Ok(())
     }
 
     /// Stores what was written to a file from `offset` on. Durable on `Ok`.
-    pub fn put_piece(&self, path: &str, offset: u64, bytes: Vec<u8>) -> io::Result<()> {
-        let number = self.next.fetch_add(1, Ordering::Relaxed);
-        let object = Object { taken: self.taken, part: Part::Piece { number, offset }, bytes: bytes.len() as u64 };
-        self.bucket.put(&object.key(path), bytes.into())?;
-        let mut index = self.index();
-        let objects = index.entry(path.to_owned()).or_default();
-        // Others may have been faster.
-        objects.push(object);
-        in_force(objects);
+    ///
+    /// # Errors
+    /// As [`Self::put_file`].
+    pub fn put_piece(&self, path: &str, offset: u64, bytes: &[u8]) -> io::Result<()> {
+        self.index().admit(path)?;
+        for (piece, place) in bytes.chunks(PIECE).zip(0..) {
+            let number = self.next.fetch_add(1, Ordering::Relaxed);
+            let part = Part::Piece { number, offset: offset + place * PIECE as u64 };
+            let object = Object { taken: self.taken, part, bytes: piece.len() as u64 };
+            self.bucket.put(&object.key(path), piece.to_vec().into())?;
+            self.note(path, object, false)?;
+        }
         Ok(())
     }
 
-    /// Writes a file of the bucket into an empty one of this machine.
+    /// Notes what was stored, unless its folder was removed meanwhile: then it goes again. Gives what it replaces.
+    fn note(&self, path: &str, object: Object, replaces: bool) -> io::Result<Vec<Object>> {
+        let noted = self.index().add(path, object, replaces);
+        noted.inspect_err(|_| {
+            if let Err(error) = self.bucket.remove(&[object.key(path)]) {
+                tracing::warn!(%error, path, "what came too late takes space in the bucket until the next start");
+            }
+        })
+    }
+
+    /// Writes a file of the bucket into an empty one of this machine, as it is at one moment.
     ///
     /// # Errors
     /// `NotFound` where it is not there.
     pub fn fetch(&self, path: &str, to: &File) -> io::Result<u64> {
-        let objects = self.index().get(path).cloned().ok_or(io::ErrorKind::NotFound)?;
-        for object in &objects {
-            let offset = object.end() - object.bytes;
-            self.bucket.get(&object.key(path), object.bytes, to, offset)?;
+        for _ in 0..FETCHES {
+            let objects = self.index().objects(path).ok_or(io::ErrorKind::NotFound)?;
+            to.set_len(0)?;
+            let mut parts = objects.clone();
+            let mut fetched = Ok(());
+            for object in in_force(&mut parts) {
+                fetched = self.bucket.get(&object.key(path), object.bytes, to, object.end() - object.bytes);
+                if fetched.is_err() {
+                    break;
+                }
+            }
+            // What others have replaced or removed meanwhile is not what it was.
+            if self.index().objects(path).as_ref() == Some(&objects) {
+                return fetched.map(|()| names::length(&objects));
+            }
         }
-        Ok(length(&objects))
+        Err(io::Error::other(BlobsError(format!("{}: {path} changes faster than it can be fetched", self.bucket.name))))
     }
 
-    /// Removes a file, or all in a folder. Nothing there is no error.
+    /// Gives a file, or all in a folder, another name.
+    pub fn rename(&self, from: &str, to: &str) -> io::Result<()> {
+        let all = self.index().within(from);
+        for (path, objects) in &all {
+            let target = format!("{to}{}", &path[from.len()..]);
+            for object in objects {
+                self.bucket.copy(&object.key(path), &object.key(&target))?;
+                self.note(&target, *object, false)?;
+            }
+        }
+        self.remove(from)
+    }
+
+    /// Removes a file, or all in a folder. Nothing there is no error. After an error it is not there either, and may come back when the bucket is opened again.
     pub fn remove(&self, path: &str) -> io::Result<()> {
+        self.remove_known(path, false)
+    }
+
+    /// As [`Self::remove`], for a folder in which nothing is stored again, whoever still tries.
+    pub fn remove_for_good(&self, folder: &str) -> io::Result<()> {
+        self.remove_known(folder, true)
+    }
+
+    fn remove_known(&self, path: &str, for_good: bool) -> io::Result<()> {
+        let (is_file, gone) = {
+            let mut index = self.index();
+            if for_good {
+                index.close(path);
+            }
+            (index.bytes(path).is_some(), index.remove(path))
+        };
         let mut keys: Vec<String> =
-            self.index().get(path).into_iter().flatten().map(|object| object.key(path)).collect();
-        if keys.is_empty() {
+            gone.iter().flat_map(|(path, objects)| objects.iter().map(|object| object.key(path))).collect();
+        if !is_file {
             // What an earlier process has sent late is known to the bucket alone.
-            keys = self.bucket.list(path)?.into_iter().map(|(key, _)| key).collect();
+            keys.extend(self.bucket.list(path)?.into_iter().map(|(key, _)| key));
+            keys.sort();
+            keys.dedup();
         }
-        if !keys.is_empty() {
-            self.bucket.remove(&keys)?;
-        }
-        let mut index = self.index();
-        index.remove(path);
-        let gone: Vec<String> = within(&index, path).map(|(path, _)| path.clone()).collect();
-        for path in gone {
-            index.remove(&path);
-        }
-        Ok(())
+        if keys.is_empty() { Ok(()) } else { self.bucket.remove(&keys) }
     }
 
     /// Checks that the bucket can be written to.
@@ -165,22 +214,7 @@ impl Blobs {
         self.bucket.put("probe", "probe\n".into())
     }
 
-    fn index(&self) -> MutexGuard<'_, BTreeMap<String, Vec<Object>>> {
+    fn index(&self) -> MutexGuard<'_, Index> {
         self.index.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// Length of a file of these objects.
-fn length(objects: &[Object]) -> u64 {
-    objects.iter().map(Object::end).max().unwrap_or(0)
-}
-
-/// The files in a folder and in those within it.
-fn within<'a>(
-    index: &'a BTreeMap<String, Vec<Object>>,
-    folder: &str,
-) -> impl Iterator<Item = (&'a String, &'a Vec<Object>)> + use<'a> {
-    let start = format!("{folder}/");
-    let range = index.range::<String, _>((Bound::Included(&start), Bound::Unbounded));
-    range.take_while(move |(path, _)| path.starts_with(&start)).collect::<Vec<_>>().into_iter()
 }

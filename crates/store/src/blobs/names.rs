@@ -34,7 +34,7 @@ impl Object {
     pub(super) fn end(&self) -> u64 {
         match self.part {
             Part::Whole => self.bytes,
-            Part::Piece { offset, .. } => offset + self.bytes,
+            Part::Piece { offset, .. } => offset.saturating_add(self.bytes),
         }
     }
 
@@ -68,6 +68,11 @@ pub(super) fn in_force(objects: &mut [Object]) -> &[Object] {
     objects.sort_by(|a, b| a.order().cmp(&b.order()).then(Ordering::Equal));
     let first = objects.iter().rposition(|object| object.part == Part::Whole).unwrap_or(0);
     &objects[first..]
+}
+
+/// Length of a file of these objects.
+pub(super) fn length(objects: &[Object]) -> u64 {
+    in_force(&mut objects.to_vec()).iter().map(Object::end).max().unwrap_or(0)
 }
 
 #[cfg(test)]
