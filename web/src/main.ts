@@ -1,7 +1,7 @@
 import { fragmentOf, parseFragment, type Route } from './routes';
 import { page, tokens } from './style/tokens';
-import { isContainer, type Dropped } from './upload/classify';
-import { pickedFiles } from './upload/drop';
+import { isContainer, type Dropped } from './files/classify';
+import { pickedFiles } from './files/drop';
 
 document.adoptedStyleSheets = [tokens.styleSheet!, page.styleSheet!];
 

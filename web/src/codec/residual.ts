@@ -147,6 +147,7 @@ export function addResidual(residual: Residual, frame: number, positions: Float3
   const sums = new Float64Array(positions.length);
   for (let k = 0; k < rank; k++) {
     const factor = trajectories[frame * rank + k];
+    if (factor === 0) continue;
     for (let at = 0, from = k * positions.length; at < positions.length; at++, from++) {
       sums[at] += factor * shapes[from];
     }

@@ -3,6 +3,7 @@ import { customElement, property, state } from 'lit/decorators.js';
 import { glyphs } from '../style/glyphs';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/controls';
+import { sentence } from '../text';
 import { editNotes } from './editNotes';
 import { editRow } from './editRow';
 import { editPanelStyle } from './editPanelStyle';
@@ -225,7 +226,7 @@ export class EditPanel extends LitElement {
       await exportEdited(player.capture, model.edits, kind, this.name, { signal: stop.signal, onProgress });
     } catch (error) {
       if (!stop.signal.aborted) {
-        const detail = error instanceof Error ? error.message : String(error);
+        const detail = sentence(error);
         this.dispatchEvent(new CustomEvent<string>('problem', { detail }));
       }
     } finally {
@@ -253,11 +254,5 @@ export class EditPanel extends LitElement {
   private keepKey(event: KeyboardEvent) {
     const target = event.composedPath()[0] as HTMLElement;
     if (/^(INPUT|SELECT)$/.test(target.tagName) && event.key !== 'Escape') event.stopPropagation();
-  }
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-edit-panel': EditPanel;
   }
 }

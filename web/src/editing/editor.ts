@@ -11,7 +11,7 @@ import type { Motion, MotionKind } from './motion';
 import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
 import type { Vector } from '../coordinates/vector';
-import { Projection } from './projection';
+import { Projection } from '../render/projection';
 import { degrees, timesAs } from './text';
 
 /** What the editor needs of the viewer around it. */

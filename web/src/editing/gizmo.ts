@@ -1,6 +1,6 @@
 import type { MotionKind } from './motion';
 import { cross, dot, normalized, plus, type Vector } from '../coordinates/vector';
-import type { Place, Projection } from './projection';
+import type { Place, Projection } from '../render/projection';
 
 /** What a drag of the gizmo is bound to: an axis, the plane across one, or the plane of the picture; rotations are about the axis, or about the line of sight. */
 export type Constraint =

@@ -66,9 +66,3 @@ export class KeptOffer extends LitElement {
     `;
   }
 }
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-kept-offer': KeptOffer;
-  }
-}

@@ -1,5 +1,5 @@
 import { cross, dot, normalized, sub, type Vector } from '../coordinates/vector';
-import type { Place, Projection } from './projection';
+import type { Place, Projection } from '../render/projection';
 
 /** A vertex of the cage in the picture. */
 export interface PlacedVertex extends Place {

@@ -183,9 +183,3 @@ function drawing(range: FrameRange, shareOf: (frame: number) => number) {
     <polygon points=${points.join(' ')} vector-effect="non-scaling-stroke" />
   </svg>`;
 }
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-range-strip': RangeStrip;
-  }
-}

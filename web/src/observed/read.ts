@@ -1,6 +1,6 @@
 import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
-import { UnusableFile } from '../upload/frameSource';
-import { extensionOf, objPoints } from '../upload/meshes';
+import { UnusableFile } from '../files/frameSource';
+import { extensionOf, objPoints } from '../files/meshes';
 import type { Surface } from './surface';
 
 /** Reads a mesh or a cloud of points (`.obj`, `.ply`). Throws one sentence for a person where it is neither. */

@@ -1,8 +1,8 @@
 import type { Capture } from '../capture';
 import { moduleWorker } from '../moduleWorker';
-import { counted } from '../sessions/text';
-import { classify, type Dropped } from '../upload/classify';
-import { extensionOf, pointsOf } from '../upload/meshes';
+import { counted } from '../text';
+import { classify, type Dropped } from '../files/classify';
+import { extensionOf, pointsOf } from '../files/meshes';
 import type { Surface } from './surface';
 import workerAddress from './worker.ts?worker&url';
 

@@ -1,9 +1,9 @@
 import type { Capture } from '../capture';
-import { counted } from '../sessions/text';
-import { classify, type Dropped } from '../upload/classify';
-import type { FrameSource } from '../upload/frameSource';
-import { extensionOf } from '../upload/meshes';
-import { framesOf } from '../upload/plan';
+import { counted } from '../text';
+import { classify, type Dropped } from '../files/classify';
+import { framesOf } from '../files/frames';
+import type { FrameSource } from '../files/frameSource';
+import { extensionOf } from '../files/meshes';
 
 /** Bytes of frames that are kept in memory. */
 const KEPT_BYTES = 48 * 2 ** 20;

@@ -187,9 +187,3 @@ export class PosePanel extends LitElement {
     this.view.moveTo([this.view.place[0] + x, this.view.place[1] + y]);
   };
 }
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-pose-panel': PosePanel;
-  }
-}

@@ -1,5 +1,6 @@
 import { ServiceProblem, sentenceOf } from '../service/problem';
-import { bodyOf, Service } from '../service/service';
+import { bodyOf } from '../service/answers';
+import { Service } from '../service/service';
 import type { Player } from '../viewer/player';
 import { polygonWeights, reachable } from './weights';
 
@@ -80,7 +81,7 @@ export class PoseView extends EventTarget {
 
   private show(rows: Float64Array) {
     if (this.stop.signal.aborted || this.poses.length < 2) return;
-    this.player.deform({ isMoving: false, isWhole: true, rows: () => rows });
+    this.player.deform(rows);
   }
 
   /** The cage at the place. A space that the service has forgotten is made anew. */

@@ -38,10 +38,6 @@ export class Stage {
   private observedColor = new Color();
   /** Pixels of the picture that something as large as its distance has, and those of a CSS pixel. */
   private pixels = { perUnit: 1, ratio: 1 };
-  /** What others draw together with the model, in its axes and in diagonals. */
-  readonly extras = new Group();
-  /** Called with the vertices of the cage whenever these have changed. */
-  onCage: (vertices: Float32Array) => void = () => undefined;
   /** Vertices of the cage as it is shown, x y z each, in diagonals and in the model's axes. */
   readonly cageVertices: Float32Array;
   private side: Side = 'decoded';
@@ -75,7 +71,7 @@ export class Stage {
     this.ground = new Ground(this.decoder.positions, surface.triangles);
     this.cageVertices = new Float32Array(capture.cage.positions.length);
     this.upright.matrixAutoUpdate = false;
-    this.upright.add(this.model.group, this.extras, this.cage.group);
+    this.upright.add(this.model.group, this.cage.group);
     this.scene.add(this.backdrop.mesh, this.upright, this.ground.mesh);
     this.showRest();
     canvas.addEventListener('webglcontextrestored', () => {
@@ -328,7 +324,6 @@ export class Stage {
     for (let k = 0; k < this.cageVertices.length; k++) this.cageVertices[k] = vertices[k];
     this.decoder.place(this.cageVertices);
     this.cage.setVertices(this.cageVertices);
-    this.onCage(this.cageVertices);
   }
 
   private putGroundBelow(positions: Float32Array) {

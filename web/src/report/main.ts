@@ -1,4 +1,5 @@
 import { page, tokens } from '../style/tokens';
+import { sentence } from '../text';
 import '../charts/chart';
 import './views';
 import { CageReportPage } from './cageReport';
@@ -27,7 +28,7 @@ try {
 } catch (error) {
   const message = document.createElement('p');
   message.setAttribute('role', 'alert');
-  const cause = error instanceof Error ? error.message : String(error);
+  const cause = sentence(error);
   message.textContent = `This report cannot be read (${cause}): the file is damaged or was changed; write it again with cager.`;
   document.body.append(message);
 }

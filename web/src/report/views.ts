@@ -7,6 +7,7 @@ import { CameraControls } from '../render/cameraControls';
 import { resolvedColor } from '../style/resolvedColor';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
+import { sentence } from '../text';
 import { Quality } from '../viewer/quality';
 import { stageColors } from '../viewer/stageColors';
 import { DrawingScene, type Drawing, type DrawingColors } from './geometry/drawing';
@@ -241,7 +242,7 @@ export class Views extends LitElement {
     try {
       this.paint(busy ? this.quality.moving : 1);
     } catch (error) {
-      this.problem = error instanceof Error ? error.message : String(error);
+      this.problem = sentence(error);
       return;
     }
     if (busy) this.ask();
@@ -290,11 +291,5 @@ export class Views extends LitElement {
       canvases,
       resolvedColor(this.renderRoot, getComputedStyle(this).getPropertyValue('--cager-surface')),
     );
-  }
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'report-views': Views;
   }
 }

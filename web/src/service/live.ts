@@ -2,7 +2,7 @@
 
 import type { Capture } from '../capture';
 import { openContainer, type OpenOptions } from '../container/open';
-import { httpSource, type Source } from '../container/source';
+import type { Source } from '../container/source';
 import { type Retry, pause, persistently } from './backoff';
 import { basisRows } from './basisRows';
 import { LiveCapture, type OpenFinished, type SessionCapture } from './liveCapture';
@@ -88,9 +88,7 @@ export async function openStored(
   known: (source: Source) => Source = (source) => source,
 ): Promise<Capture> {
   try {
-    const headers = () => service.authorization();
-    const source = await httpSource(service.address(path), { headers, signal: options.signal });
-    return await openContainer(known(steady(source)), options);
+    return await openContainer(known(steady(await service.source(path, options.signal))), options);
   } catch (error) {
     throw told(error);
   }

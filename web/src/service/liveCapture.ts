@@ -11,7 +11,8 @@ import { LiveFollower } from './liveFollower';
 import { type Session, solvedFromStart } from './messages';
 import { isAbort, sentenceOf } from './problem';
 import type { RunningContainer } from './runningContainer';
-import { type Service, piecesOf, sessionPath } from './service';
+import { piecesOf } from './answers';
+import { type Service, sessionPath } from './service';
 
 /** A capture of a session; `live` while it is followed. */
 export interface SessionCapture extends Capture {

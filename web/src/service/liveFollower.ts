@@ -6,7 +6,8 @@ import { BrokenRecord, type CageRecord, CageRecordReader, RECORDS_MEDIA_TYPE } f
 import { LatencyMeter, RateMeter } from './measures';
 import { type Session, solvedFromStart } from './messages';
 import { ServiceProblem, problemBehind, problemFrom } from './problem';
-import { type Service, piecesOf, sessionPath } from './service';
+import { piecesOf } from './answers';
+import { type Service, sessionPath } from './service';
 import { pageToken } from './token';
 
 const LOOK_SECONDS = 3;

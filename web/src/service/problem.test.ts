@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import { ServiceProblem, isAbort, problemBehind, problemOf, sentenceOf } from './problem';
-import { piecesOf } from './service';
+import { piecesOf } from './answers';
 
 function answer(status: number, body: unknown, headers: Record<string, string> = {}): Response {
   return new Response(JSON.stringify(body), {

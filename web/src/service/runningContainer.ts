@@ -4,7 +4,8 @@ import type { StaticPart } from '../capture';
 import { createCodec } from '../codec/client';
 import { StaticStream } from '../container/stream';
 import { ServiceProblem } from './problem';
-import { type Service, piecesOf, sessionPath } from './service';
+import { piecesOf } from './answers';
+import { type Service, sessionPath } from './service';
 
 /** A connection by which the container arrives, from its front on. */
 export interface ContainerConnection {

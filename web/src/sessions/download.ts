@@ -1,6 +1,7 @@
 import { save } from '../save';
 import type { Service } from '../service/service';
-import { piecesOf, sessionPath } from '../service/service';
+import { piecesOf } from '../service/answers';
+import { sessionPath } from '../service/service';
 
 /** What a session can be downloaded as beside its container, by the ending of the file's name. */
 export const FORMATS = { abc: 'Alembic', usdc: 'USD', glb: 'glTF', npy: 'NumPy' };

@@ -5,7 +5,7 @@ import { pageToken } from '../service/token';
 import { currentJob } from '../upload/currentJob';
 import { glyphs } from '../style/glyphs';
 import { isUnfinished, type SessionList } from './sessionList';
-import { counted } from './text';
+import { counted } from '../text';
 
 /** How many sessions there are, and what else can be done than look at one. */
 export function listHeader(sessions: readonly Session[], hasOlder: boolean) {

@@ -3,7 +3,7 @@ import { customElement, state } from 'lit/decorators.js';
 import type { Recovery } from '../service/messages';
 import { patiently, Service } from '../service/service';
 import { controls } from '../style/controls';
-import { counted } from './text';
+import { counted } from '../text';
 
 const POLL_SECONDS = 5;
 
@@ -82,10 +82,4 @@ function progressOf({ state, frames }: Recovery): string {
     frames.lost > 0 ? `${frames.lost} lost` : '',
   ];
   return parts.filter(Boolean).join(' · ');
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-recoveries': Recoveries;
-  }
 }

@@ -4,7 +4,7 @@ import { problemFrom, sentenceOf } from '../service/problem';
 import type { Figures } from './figures';
 import { glyphs } from '../style/glyphs';
 import { FORMATS, type Format } from './download';
-import * as text from './text';
+import * as text from '../text';
 
 /** What a row shows, and what its buttons do. */
 export interface Row {
@@ -59,6 +59,7 @@ export function nameOf(session: Session): string {
 export function row(row: Row): TemplateResult {
   const { session, figures, now } = row;
   const name = nameOf(session);
+  const created = new Date(1000 * session.created);
   return html`
     <tbody role="rowgroup" data-id=${session.id}>
       <tr class="session" role="row">
@@ -68,11 +69,17 @@ export function row(row: Row): TemplateResult {
         </td>
         <td role="cell">${state(session, row.rate)}</td>
         <td role="cell">${frames(session)}</td>
-        <td role="cell" class="number" data-label="Mean error">${figures ? text.fraction(figures.meanL2) : nothing}</td>
-        <td role="cell" class="number" data-label="Worst error">${figures ? text.fraction(figures.worst) : nothing}</td>
+        <td role="cell" class="number" data-label="Mean error">
+          ${figures ? text.percent(figures.meanL2, 2) : nothing}
+        </td>
+        <td role="cell" class="number" data-label="Worst error">
+          ${figures ? text.percent(figures.worst, 2) : nothing}
+        </td>
         <td role="cell" class="number" data-label="Size">${sizes(session, figures)}</td>
         <td role="cell" class="number">
-          <time datetime=${new Date(1000 * session.created).toISOString()} title=${text.moment(session.created)}
+          <time
+            datetime=${created.toISOString()}
+            title=${created.toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'medium' })}
             >${text.age(session.created, now)}</time
           >
         </td>

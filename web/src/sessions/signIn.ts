@@ -77,9 +77,3 @@ export class SignIn extends LitElement {
     pageToken.set(token, this.keep.checked);
   };
 }
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-sign-in': SignIn;
-  }
-}

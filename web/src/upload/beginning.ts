@@ -1,7 +1,7 @@
 /** The beginning of an upload, from files and what was chosen for them. */
 
 import type { Service } from '../service/service';
-import type { Dropped, Item } from './classify';
+import type { Dropped, Item } from '../files/classify';
 import { marksOf } from './fileMarks';
 import { KeptUpload, newKey } from './keptUpload';
 import { type Choices, designOf, optionsOf } from './optionsForm';

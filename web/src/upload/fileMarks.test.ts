@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { classify } from './classify';
+import { classify } from '../files/classify';
 import { difference, marksOf, shareNames, withEarlierRoles } from './fileMarks';
 import { sampledFrames } from './motionCage';
 

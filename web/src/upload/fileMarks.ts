@@ -1,7 +1,7 @@
 /** What tells the files of one upload from those of another, by their names and sizes. */
 
-import { counted, size } from '../sessions/text';
-import type { Item, Role } from './classify';
+import { counted, size } from '../text';
+import type { Item, Role } from '../files/classify';
 
 /** Files with one role. */
 export interface FileMark {

@@ -1,10 +1,10 @@
 import { expect, test } from 'vitest';
-import { ObjFrames, pointsOf } from './meshes';
-import { mddFrames } from './mdd';
-import { npyFrames } from './npy';
-import { pc2Frames } from './pc2';
+import { ObjFrames, pointsOf } from '../files/meshes';
+import { mddFrames } from '../files/mdd';
+import { npyFrames } from '../files/npy';
+import { pc2Frames } from '../files/pc2';
 import { planOf } from './plan';
-import { classify } from './classify';
+import { classify } from '../files/classify';
 
 const NUMBERS = Array.from({ length: 2 * 4 * 3 }, (_, i) => i / 8);
 

@@ -3,7 +3,7 @@
 import type { FrameResult } from '../service/messages';
 import { type ProblemDetails, problemBehind, problemFrom } from '../service/problem';
 import type { Service } from '../service/service';
-import type { FrameSource } from './frameSource';
+import type { FrameSource } from '../files/frameSource';
 
 const AT_ONCE = 2;
 const FIRST_BYTES = 1 << 20;

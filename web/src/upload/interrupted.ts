@@ -3,7 +3,7 @@ import { unsolved } from '../service/messages';
 import { ServiceProblem, problemBehind } from '../service/problem';
 import type { Service } from '../service/service';
 import { glyphs } from '../style/glyphs';
-import { age, count, counted } from '../sessions/text';
+import { age, count, counted } from '../text';
 import { type FileMark, type FileMarks, difference, shareNames } from './fileMarks';
 import { type KeptUpload, unfinishedUploads } from './keptUpload';
 import { readDesign, removeDesign } from './motionCage';

@@ -1,7 +1,7 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
 import type { Figures } from '../sessions/figures';
-import { count, counted, fraction, perSecond, ratio as times, size, span } from '../sessions/text';
+import { count, counted, percent, perSecond, ratio as times, size, span } from '../text';
 import { errorChart } from './errorChart';
 import { sampledFrames } from './motionCage';
 import type { Stage, UploadJob } from './uploadJob';
@@ -113,7 +113,7 @@ function designFacts({ design, plan }: UploadJob) {
   return html`
     ${state === 'queued' ? html`<span>Waiting for its turn</span>` : nothing}
     ${vertices ? html`<span>cage of <b>${count(vertices)} vertices</b> so far</span>` : nothing}
-    ${typeof error === 'number' ? html`<span>mean error <b>${fraction(error)}</b></span>` : nothing}
+    ${typeof error === 'number' ? html`<span>mean error <b>${percent(error, 2)}</b></span>` : nothing}
     ${stage ? html`<span>${stage}</span>` : nothing}
   `;
 }
@@ -124,6 +124,6 @@ function containerFacts(figures: Figures | null) {
   return html`
     <span>container of <b>${size(bytes)}</b></span>
     ${ratio === null ? nothing : html`<span><b>${times(ratio)}</b> smaller than the frames</span>`}
-    ${meanL2 === null ? nothing : html`<span>mean error <b>${fraction(meanL2)}</b></span>`}
+    ${meanL2 === null ? nothing : html`<span>mean error <b>${percent(meanL2, 2)}</b></span>`}
   `;
 }

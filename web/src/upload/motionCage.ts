@@ -4,7 +4,7 @@ import { followProgress } from '../service/events';
 import type { CageDesign, DesignOptions, DesignProgress } from '../service/messages';
 import { ServiceProblem, problemBehind, problemFrom } from '../service/problem';
 import { type Service, patiently } from '../service/service';
-import type { FrameSource } from './frameSource';
+import type { FrameSource } from '../files/frameSource';
 import type { KeptUpload } from './keptUpload';
 
 /** A design looks at no more frames. */

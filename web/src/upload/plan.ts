@@ -1,12 +1,10 @@
 /** What will be sent, checked as far as that goes before anything is. */
 
-import { counted } from '../sessions/text';
-import type { Item } from './classify';
-import { type FrameSource, UnusableFile } from './frameSource';
-import { ObjFrames, extensionOf, pointsOf } from './meshes';
-import { mddFrames } from './mdd';
-import { npyFrames } from './npy';
-import { pc2Frames } from './pc2';
+import { counted } from '../text';
+import type { Item } from '../files/classify';
+import { framesOf } from '../files/frames';
+import type { FrameSource } from '../files/frameSource';
+import { pointsOf } from '../files/meshes';
 
 /** A capture that can be sent. */
 export interface Plan {
@@ -45,13 +43,4 @@ export async function planOf(items: readonly Item[]): Promise<Plan> {
     );
   }
   return { rest, cage: cageItem?.files[0] ?? null, frames, remarks };
-}
-
-/** Frames of an array, a point cache, or of `.obj` files in this order. */
-export async function framesOf(files: readonly File[]): Promise<FrameSource> {
-  const extension = extensionOf(files[0].name);
-  if (files.length > 1 || extension === 'obj') return ObjFrames.of(files);
-  const read = { npy: npyFrames, pc2: pc2Frames, mdd: mddFrames }[extension];
-  if (!read) throw new UnusableFile(files[0].name, 'frames are .npy, .pc2, .mdd or .obj files.');
-  return read(files[0]);
 }

@@ -1,7 +1,7 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
-import { counted, size } from '../sessions/text';
-import type { Item, Role } from './classify';
+import { counted, size } from '../text';
+import type { Item, Role } from '../files/classify';
 import type { Choices } from './optionsForm';
 import type { Plan } from './plan';
 

@@ -7,7 +7,7 @@ import type { Player } from './player';
 import { save } from '../save';
 import { recordTurntable } from './recording';
 import type { Action } from './shortcuts';
-import { sentence } from './text';
+import { sentence } from '../text';
 import { sought, spedUp, started, stepped, worstFrame } from './transport';
 
 /** Angle and factor of one press of a key. */

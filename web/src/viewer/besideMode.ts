@@ -1,6 +1,6 @@
 import { html, nothing } from 'lit';
 import type { Capture, FrameErrors } from '../capture';
-import type { Dropped } from '../upload/classify';
+import type { Dropped } from '../files/classify';
 import { Beside } from './beside';
 import { paintCorrespondence } from './correspondence';
 import { numberAt, numberText } from './frameNumbers';
@@ -8,7 +8,7 @@ import { glyphs } from '../style/glyphs';
 import { openFile } from './opener';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
-import { percent, sentence } from './text';
+import { percent, sentence } from '../text';
 
 /** What showing a second capture needs of the viewer around it. */
 export interface BesideHost extends HTMLElement {

@@ -4,7 +4,7 @@ import { customElement, property, query, state } from 'lit/decorators.js';
 import { EditMode } from '../editing/editMode';
 import { controls } from '../style/controls';
 import { tokens } from '../style/tokens';
-import { isContainer, type Dropped } from '../upload/classify';
+import { isContainer, type Dropped } from '../files/classify';
 import { perform, stem } from './actions';
 import { BesideMode } from './besideMode';
 import { CaptureElement } from './captureElement';
@@ -24,7 +24,7 @@ import { canRecord } from './recording';
 import { correspondenceOf, readReport, trackingOf } from './reports';
 import { actionOfKey, type Action } from './shortcuts';
 import { followLooks, stageColors } from './stageColors';
-import { sentence } from './text';
+import { sentence } from '../text';
 import type { Timeline } from './timeline';
 import { viewerStyle } from './viewerStyle';
 

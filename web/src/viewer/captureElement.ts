@@ -3,7 +3,7 @@ import { property, query, state } from 'lit/decorators.js';
 import type { Capture } from '../capture';
 import { Opener } from './opener';
 import { Player } from './player';
-import { sentence } from './text';
+import { sentence } from '../text';
 import { sought, started } from './transport';
 import { ViewLink } from './viewLink';
 import { viewFromText } from './viewState';

@@ -3,7 +3,7 @@ import type { ObservedSurfaces } from '../observed/surfaces';
 import type { Original } from '../originals/original';
 import type { Side } from '../render/drawn';
 import type { Stage } from '../render/stage';
-import type { Dropped } from '../upload/classify';
+import type { Dropped } from '../files/classify';
 
 /** The capture beside the frames that it was encoded from, or the surfaces that it was recovered from, where somebody has given them to the page. */
 export class Comparison {

@@ -1,13 +1,12 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import { heatGradient } from '../render/colorMap';
 import type { Side } from '../render/drawn';
-import type { Dropped } from '../upload/classify';
-import { pickedFiles } from '../upload/drop';
+import type { Dropped } from '../files/classify';
+import { pickFiles } from '../files/drop';
 import { glyphs } from '../style/glyphs';
 import type { HeatRange, MeasuredFrame } from './heatMap';
-import { pressLabel } from './messages';
 import type { Player } from './player';
-import { grouped, percent, threeDigits } from './text';
+import { count, percent, threeDigits } from '../text';
 
 /** What the parts of a comparison ask the viewer to do. */
 export interface ComparisonActs {
@@ -36,7 +35,9 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
         Drop the ${wanted} here to see where the error is; neither the service nor the file keeps them. They are not
         sent anywhere.
       </p>
-      ${chooser(`Choose the ${wanted}`, acts)}`;
+      <button @click=${() => pickFiles((files) => acts.open(files), { accept: '.npy,.pc2,.mdd,.obj,.ply' })}>
+        ${glyphs.file} Choose files
+      </button>`;
   }
   const names = surfaces ? SURFACE_NAMES : SIDE_NAMES;
   const what = surfaces ? 'Distance from the surface' : 'Distance from the original';
@@ -86,7 +87,7 @@ function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, 
       ><span>${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})${more}</span>
     </div>
     <dl class="pairs">
-      <dt>Worst point, ${grouped(worst)}</dt>
+      <dt>Worst point, ${count(worst)}</dt>
       <dd>${percent(largest)} (${threeDigits(largest * diagonal)})</dd>
       <dt>Root mean square</dt>
       <dd>${percent(l2)} (${threeDigits(l2 * diagonal)})</dd>
@@ -101,17 +102,6 @@ function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, 
           ? html`<p class="muted">Up to ${percent(precision.error)} of it is the rounding of this picture.</p>`
           : nothing
     }`;
-}
-
-function chooser(label: string, acts: ComparisonActs) {
-  const take = (event: Event) => {
-    const { files } = event.target as HTMLInputElement;
-    if (files && files.length > 0) acts.open(pickedFiles(files));
-  };
-  return html`<label class="button" tabindex="0" @keydown=${pressLabel}>
-    ${glyphs.file} ${label}
-    <input class="visually-hidden" type="file" multiple accept=".npy,.pc2,.obj,.ply" tabindex="-1" @change=${take} />
-  </label>`;
 }
 
 /** The line between the original and the decoded model, to be dragged. */

@@ -1,7 +1,14 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
 import type { Player } from './player';
-import { bitrate, grouped, percent, SYSTEM_NAMES } from './text';
+import { bitrate, count, percent } from '../text';
+
+const SYSTEM_NAMES = {
+  mvc: 'mean value coordinates',
+  harmonic: 'harmonic coordinates',
+  green: 'Green coordinates',
+  'green-free': 'Green coordinates, free normals',
+} as const;
 
 /** Figures about the capture and the playing. */
 export function figuresPanel(player: Player, close: () => void) {
@@ -22,14 +29,14 @@ export function figuresPanel(player: Player, close: () => void) {
       <button class="quiet icon" title="Close" aria-label="Close the figures" @click=${close}>${glyphs.close}</button>
     </header>
     <dl class="pairs">
-      ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
-      ${row('Frames', grouped(frames))}
+      ${row('Points', count(points))} ${row('Polygons', count(part.cornerCounts.length))}
+      ${row('Frames', count(frames))}
       ${row('Frames per second', `${player.transport.rate}${part.frameRate === null ? ' (assumed)' : ''}`)}
     </dl>
     <h2>Cage</h2>
     <dl class="pairs">
-      ${row('Vertices', grouped(part.cage.positions.length / 3))}
-      ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
+      ${row('Vertices', count(part.cage.positions.length / 3))}
+      ${row('Triangles', count(part.cage.triangles.length / 3))} ${row('Unknowns', count(part.rowsPerFrame))}
     </dl>
     <p class="muted">${SYSTEM_NAMES[part.system]}</p>
     <h2>Bandwidth</h2>
@@ -44,16 +51,15 @@ export function figuresPanel(player: Player, close: () => void) {
               ${row('Behind the service', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
               ${row('Arriving', bitrate(live.bitsPerSecond / 8))}
               ${row('Frames arriving per second', live.framesPerSecond.toFixed(1))}
-              ${row('Frames not here yet', grouped(live.behindFrames))}
-              ${row('Frames waited for', grouped(live.lateFrames))}
-              ${row('Frames dropped', grouped(live.droppedFrames))}
+              ${row('Frames not here yet', count(live.behindFrames))}
+              ${row('Frames waited for', count(live.lateFrames))} ${row('Frames dropped', count(live.droppedFrames))}
             </dl>`
         : nothing
     }
     <h2>This browser</h2>
     <dl class="pairs">
       ${row('FPS', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
-      ${row('Dropped frames', grouped(player.playback.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
+      ${row('Dropped frames', count(player.playback.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
       ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}
     </dl>
   </aside>`;

@@ -4,7 +4,7 @@ import { openStored, type OpenSessionOptions } from '../service/live';
 import type { Recovery, Transfer } from '../service/messages';
 import { problemFrom } from '../service/problem';
 import { patiently, type Service } from '../service/service';
-import { counted } from '../sessions/text';
+import { counted } from '../text';
 import { correspondenceOf, trackingOf } from './reports';
 
 const LOOK_SECONDS = 2;

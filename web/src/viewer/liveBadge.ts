@@ -1,7 +1,7 @@
 import { html, type TemplateResult } from 'lit';
 import type { LiveStatus } from '../capture';
 import type { Player } from './player';
-import { threeDigits } from './text';
+import { threeDigits } from '../text';
 import { sought, started, type Transport } from './transport';
 
 /** What is shown counts as live while it is no more seconds than this behind the newest frame. */

@@ -1,6 +1,6 @@
 import { html, type TemplateResult } from 'lit';
-import type { Dropped } from '../upload/classify';
-import { pickedFiles } from '../upload/drop';
+import type { Dropped } from '../files/classify';
+import { pickFiles } from '../files/drop';
 import { glyphs } from '../style/glyphs';
 
 /** A sentence about something that went wrong, while the capture can still be looked at. */
@@ -61,10 +61,6 @@ export function emptyState(
       <p>Opening ${opening}</p>
     </div>`;
   }
-  const take = (event: Event) => {
-    const files = pickedFiles((event.target as HTMLInputElement).files ?? []);
-    if (files.length > 0) choose(files);
-  };
   return html`<div class="empty">
     <div class="lead"><slot name="lead"></slot></div>
     ${glyphs.cage}
@@ -74,16 +70,8 @@ export function emptyState(
         ? html`<p>A .cager file plays in this page. It is not sent anywhere.</p>`
         : html`<p class="notice" role="alert">${failure}</p>`
     }
-    <label class="button primary" tabindex="0" @keydown=${pressLabel}>
-      ${glyphs.file} Choose a file
-      <input class="visually-hidden" type="file" accept=".cager,.json" multiple tabindex="-1" @change=${take} />
-    </label>
+    <button class="primary" @click=${() => pickFiles(choose, { accept: '.cager,.json' })}>
+      ${glyphs.file} Choose file
+    </button>
   </div>`;
-}
-
-/** A label that looks like a button is pressed like one. */
-export function pressLabel(event: KeyboardEvent) {
-  if (event.key !== 'Enter' && event.key !== ' ') return;
-  event.preventDefault();
-  (event.currentTarget as HTMLElement).click();
 }

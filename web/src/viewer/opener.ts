@@ -1,8 +1,9 @@
 import type { Capture } from '../capture';
 import { openContainer } from '../container/open';
 import { checkPrelude, PRELUDE_BYTES } from '../container/section';
-import { blobSource, httpSource } from '../container/source';
-import { fileNameOf, sentence } from './text';
+import { blobSource } from '../container/source';
+import { httpSource } from '../service/httpSource';
+import { fileNameOf, sentence } from '../text';
 
 /** What opening captures needs of the viewer around it. */
 export interface OpenerHost {

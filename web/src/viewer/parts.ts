@@ -10,7 +10,7 @@ import type { Heat } from './heatMap';
 import type { Player } from './player';
 import { isLost } from './reports';
 import { keyLabel, SHORTCUTS, type Action } from './shortcuts';
-import { grouped, percent } from './text';
+import { count, percent } from '../text';
 import './timeline';
 import { sought, SPEEDS } from './transport';
 
@@ -102,10 +102,10 @@ export function titleBox(heading: string, { capture }: Player, isEdited: boolean
   return html`<div class="title glass">
     <h1 class="heading clip" title=${heading}>${heading}</h1>
     <p class="figures fine clip">
-      ${grouped(part.rest.length / 3)} points, ${grouped(frames)}
-      frames${frames > 1 ? ` (${first}–${last})` : nothing}<span class="more"
-        >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
-      >${lost > 0 ? html`, <span class="lost">${grouped(lost)} lost</span>` : nothing}${isEdited ? ', edited' : nothing}
+      ${count(part.rest.length / 3)} points, ${count(frames)} frames${frames > 1 ? ` (${first}–${last})` : nothing}<span
+        class="more"
+        >, cage of ${count(part.cage.positions.length / 3)} vertices</span
+      >${lost > 0 ? html`, <span class="lost">${count(lost)} lost</span>` : nothing}${isEdited ? ', edited' : nothing}
     </p>
   </div>`;
 }

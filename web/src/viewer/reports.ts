@@ -1,5 +1,5 @@
 import type { Tracking } from '../capture';
-import { counted } from '../sessions/text';
+import { counted } from '../text';
 
 interface FrameReport {
   readonly file: string;

@@ -1,53 +1,12 @@
-/** What keys do in the viewer: the help sheet lists them, and key presses are looked up here. */
-export type Action =
-  | 'play'
-  | 'previous'
-  | 'next'
-  | 'back'
-  | 'forth'
-  | 'first'
-  | 'last'
-  | 'slower'
-  | 'faster'
-  | 'loop'
-  | 'smooth'
-  | 'worst'
-  | 'frame'
-  | 'home'
-  | 'follow'
-  | 'turnLeft'
-  | 'turnRight'
-  | 'turnUp'
-  | 'turnDown'
-  | 'zoomIn'
-  | 'zoomOut'
-  | 'up'
-  | 'model'
-  | 'wireframe'
-  | 'points'
-  | 'cage'
-  | 'handles'
-  | 'ground'
-  | 'colors'
-  | 'heat'
-  | 'compare'
-  | 'picture'
-  | 'turntable'
-  | 'fullscreen'
-  | 'figures'
-  | 'edit'
-  | 'beside'
-  | 'poses'
-  | 'help';
-
 interface Shortcut {
-  readonly action: Action;
+  readonly action: string;
   /** Values of `KeyboardEvent.key`; the first one is shown. */
   readonly keys: readonly string[];
   readonly label: string;
 }
 
-export const SHORTCUTS: readonly { readonly title: string; readonly entries: readonly Shortcut[] }[] = [
+/** What keys do in the viewer: the help sheet lists them, and key presses are looked up here. */
+const TABLE = [
   {
     title: 'Play',
     entries: [
@@ -102,10 +61,14 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'help', keys: ['?'], label: 'Keyboard shortcuts' },
     ],
   },
-];
+] as const satisfies readonly { readonly title: string; readonly entries: readonly Shortcut[] }[];
+
+export type Action = (typeof TABLE)[number]['entries'][number]['action'];
+type Entry = Shortcut & { readonly action: Action };
+export const SHORTCUTS: readonly { readonly title: string; readonly entries: readonly Entry[] }[] = TABLE;
 
 const ACTIONS = new Map(
-  SHORTCUTS.flatMap(({ entries }) => entries).flatMap(({ action, keys }) => keys.map((key) => [key, action])),
+  SHORTCUTS.flatMap(({ entries }) => entries).flatMap(({ action, keys }) => keys.map((key) => [key, action] as const)),
 );
 
 /** What a key press asks for; nothing with a control, alt or command key, which belong to the browser. */

@@ -6,7 +6,7 @@ import type { FrameErrors, Tracking } from '../capture';
 import type { FrameRange } from '../editing/cageEdit';
 import { numberAt, numberText, placeOf, type FrameNumbers } from './frameNumbers';
 import { isLost, lostRuns } from './reports';
-import { percent } from './text';
+import { percent } from '../text';
 import { timelineStyle } from './timelineStyle';
 import { controls } from '../style/controls';
 

@@ -7,7 +7,7 @@ import { pageToken } from '../service/token';
 import '../sessions/signIn';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
-import type { Dropped } from '../upload/classify';
+import type { Dropped } from '../files/classify';
 import './cagerViewer';
 import type { CagerViewer } from './cagerViewer';
 import './compareDialog';

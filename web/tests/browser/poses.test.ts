@@ -51,7 +51,7 @@ describe.skipIf(chromium === undefined)('poses of a capture', { timeout: 120_000
     await page.getByRole('button', { name: 'Remove frame 0' }).click();
     await page.getByRole('button', { name: 'Remove frame 1' }).click();
     await page.getByText('Go to a frame and add it').waitFor();
-    expect(await inViewer(page, (viewer) => viewer.player!.playback.deformation, null)).toBeNull();
+    expect(await inViewer(page, (viewer) => viewer.player!.playback.shape, null)).toBeNull();
     expect(pages.errors.filter((error) => !error.includes('404'))).toEqual([]);
   });
 });

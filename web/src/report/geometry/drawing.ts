@@ -16,8 +16,7 @@ import type { TriangleMesh } from '../../capture';
 import { CageView } from '../../render/cageView';
 import { paleTexels, signedTexels } from '../../render/colorMap';
 import { ink, shaderMaterial } from '../../render/materials';
-import { cageVertexShader, inkFragmentShader, modelFragmentShader } from '../../render/sceneShaders';
-import { shapeVertexShader } from './shapeShader';
+import { cageVertexShader, inkFragmentShader, modelFragmentShader, shapeVertexShader } from '../../render/sceneShaders';
 
 /** What one view shows at one time. Positions are those of {@link RestPose}. */
 export interface Drawing {

@@ -1,4 +1,5 @@
 import type { TriangleMesh } from '../../capture';
+import { middleOf } from '../../coordinates/topology';
 import type { ModelInCage } from '../data';
 import { coordinates, floats, indices, type Quantised } from './numbers';
 
@@ -54,18 +55,6 @@ export class RestPose {
     }
     return found;
   }
-}
-
-/** Middle of the bounding box; the origin where there are no points. */
-function middleOf(positions: Float32Array): number[] {
-  return [0, 1, 2].map((axis) => {
-    let [low, high] = [Infinity, -Infinity];
-    for (let k = axis; k < positions.length; k += 3) {
-      low = Math.min(low, positions[k]);
-      high = Math.max(high, positions[k]);
-    }
-    return high >= low ? (low + high) / 2 : 0;
-  });
 }
 
 /** Numbers one list after another. */

@@ -2,9 +2,10 @@ import { createServer, type IncomingMessage, type Server, type ServerResponse } 
 import type { AddressInfo } from 'node:net';
 import { afterEach, expect, it } from 'vitest';
 import { LocalCodec } from '../codec/localCodec';
-import { openContainer, type OpenOptions } from './open';
-import { blobSource, bytesSource, EndsCache, httpSource, type Source } from './source';
-import { allBlocks, goldenBytes, openBytes } from './testSupport';
+import { openContainer, type OpenOptions } from '../container/open';
+import { blobSource, bytesSource, EndsCache, type Source } from '../container/source';
+import { allBlocks, goldenBytes, openBytes } from '../container/testSupport';
+import { httpSource } from './httpSource';
 
 const options = (): OpenOptions => ({ codec: new LocalCodec() });
 const bytes = goldenBytes('coded-green');
