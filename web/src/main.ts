@@ -48,7 +48,7 @@ async function show(anew = false) {
     const message = document.createElement('p');
     message.className = 'failure';
     message.setAttribute('role', 'alert');
-    message.textContent = 'A part of the page could not be loaded; reload it when the service answers again.';
+    message.textContent = 'Part of the page could not be loaded. Check your connection and reload.';
     if (shown === wanted) document.body.replaceChildren(message);
   }
 }

@@ -24,7 +24,7 @@ export function blobSource(blob: Blob): Source {
       try {
         buffer = await blob.slice(offset, offset + length).arrayBuffer();
       } catch {
-        throw new Error('The file cannot be read any more; it was changed or removed. Choose it again.');
+        throw new Error('The file can no longer be read; it was changed or removed. Choose it again.');
       }
       return new Uint8Array(buffer);
     },

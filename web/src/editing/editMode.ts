@@ -73,7 +73,7 @@ export class EditMode {
       this.editor.addEventListener('leave', this.leave);
       this.editor.addEventListener('change', this.follow);
     } catch {
-      this.host.report('The editor could not be loaded; reload the page when the service answers again.');
+      this.host.report('The editor could not be loaded. Check your connection and reload.');
       return;
     }
     this.isOn = true;

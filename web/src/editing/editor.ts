@@ -197,7 +197,7 @@ export class CageEditor extends EventTarget {
   /** Chooses vertices and says so. */
   select(vertices: readonly number[]) {
     this.model.selection = vertices.filter((v) => v >= 0);
-    this.say(this.model.selection.length === 0 ? 'No vertex is chosen.' : `${this.named()} chosen.`);
+    this.say(this.model.selection.length === 0 ? 'Nothing selected.' : `${this.named()} selected.`);
   }
 
   /** Tells screen readers what was done to the chosen vertices. */

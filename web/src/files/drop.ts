@@ -32,7 +32,7 @@ export function pickedFiles(files: Iterable<File>): Dropped[] {
 
 async function collect(entry: FileSystemEntry, found: Dropped[]): Promise<void> {
   if (found.length >= MAX_FILES)
-    throw new Error(`There are more than ${MAX_FILES} files; drop the folder of the capture alone.`);
+    throw new Error(`There are more than ${MAX_FILES} files; drop only the folder of the capture.`);
   if (entry instanceof FileSystemDirectoryEntry) {
     const reader = entry.createReader();
     for (;;) {

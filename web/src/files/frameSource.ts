@@ -35,7 +35,7 @@ export class ArrayFrames implements FrameSource {
     const stride = 3 * this.points * width;
     const begin = offset + first * stride;
     const bytes = await this.file.slice(begin, begin + count * stride).arrayBuffer();
-    if (bytes.byteLength !== count * stride) throw new Error('The file became shorter since it was dropped.');
+    if (bytes.byteLength !== count * stride) throw new Error('The file changed after it was added. Add it again.');
     if (littleEndian) return width === 4 ? new Float32Array(bytes) : Float32Array.from(new Float64Array(bytes));
     const view = new DataView(bytes);
     const values = new Float32Array(count * 3 * this.points);

@@ -9,6 +9,6 @@ export async function framesOf(files: readonly File[]): Promise<FrameSource> {
   const extension = extensionOf(files[0].name);
   if (files.length > 1 || extension === 'obj') return ObjFrames.of(files);
   const read = { npy: npyFrames, pc2: pc2Frames, mdd: mddFrames }[extension];
-  if (!read) throw new UnusableFile(files[0].name, 'frames are .npy, .pc2, .mdd or .obj files.');
+  if (!read) throw new UnusableFile(files[0].name, 'frames must be .npy, .pc2, .mdd or .obj files.');
   return read(files[0]);
 }

@@ -84,12 +84,12 @@ export async function openOriginal(
   const item = items.find(({ role }) => role === 'frames') ?? single;
   if (!item) {
     throw new Error(
-      'These are no frames of a capture: drop an array (.npy), a point cache (.pc2), or a folder with one .obj per frame.',
+      'No frames found: drop an array (.npy), a point cache (.pc2), or a folder with one .obj per frame.',
     );
   }
   if (capture.static.origin) {
     throw new Error(
-      'The capture lies so far from the origin of its coordinates that the page cannot compare it with its frames; `cager decode` gives its positions in double precision.',
+      'The capture is too far from the origin to be compared with its frames here; `cager decode` gives its positions in double precision.',
     );
   }
   const source = await framesOf(item.files);

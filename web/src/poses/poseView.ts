@@ -105,7 +105,7 @@ export class PoseView extends EventTarget {
     if (this.space?.poses === poses) return this.space;
     const { capture } = this.player;
     if (3 * capture.static.rowsPerFrame !== capture.static.cage.positions.length)
-      throw new Error('Poses cannot be blended in a capture whose cages have normals of their own.');
+      throw new Error('Poses cannot be blended in a capture whose cages store normals.');
     await this.forget();
     const body = new FormData();
     const { session } = capture;

@@ -19,7 +19,7 @@ function elementOf(): HTMLElement {
     case 'cage':
       return Object.assign(new CageReportPage(), { report });
     default:
-      throw new Error('it holds none of the reports that this page knows');
+      throw new Error('it is of an unknown kind');
   }
 }
 
@@ -29,6 +29,6 @@ try {
   const message = document.createElement('p');
   message.setAttribute('role', 'alert');
   const cause = sentence(error);
-  message.textContent = `This report cannot be read (${cause}): the file is damaged or was changed; write it again with cager.`;
+  message.textContent = `This report cannot be read (${cause}): the file is damaged or was changed; create it again with cager.`;
   document.body.append(message);
 }

@@ -62,7 +62,7 @@ async function whenPrepared(
     const session = await look();
     if (session.problem) throw problemFrom(session.problem);
     if (session.state !== 'preparing') return session;
-    onWaiting?.('The session is being prepared; large models take minutes.');
+    onWaiting?.('Preparing the session. Large models can take minutes.');
     await pause(PREPARING_SECONDS, signal);
   }
 }

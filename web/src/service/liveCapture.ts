@@ -225,13 +225,12 @@ export class LiveCapture implements SessionCapture {
         for await (const piece of piecesOf(response, signal)) {
           this.#follower.bytes.add(piece.length);
           for (const { frame, rows } of reader.push(piece)) {
-            if (frame < first || frame >= first + count)
-              throw new Error('The service sent another frame than was asked for.');
+            if (frame < first || frame >= first + count) throw new Error('The service sent the wrong frame.');
             this.#store.put(frame, rows);
             received += 1;
           }
         }
-        if (received < count) throw new Error('The service sent fewer frames than were asked for.');
+        if (received < count) throw new Error('The service sent too few frames.');
       },
       { signal, attempts: 4 },
     );

@@ -139,7 +139,7 @@ export class LiveFollower {
 
   #take(record: CageRecord): void {
     // Frames come in order; anything else is another session's, or a fault on the way.
-    if (record.frame !== this.#next) throw new BrokenRecord('A frame arrived out of its order.');
+    if (record.frame !== this.#next) throw new BrokenRecord('A frame arrived out of order.');
     this.#next += 1;
     this.frames.add(1);
     this.latency.arrived(record.frame);

@@ -37,9 +37,7 @@ test('what_passes_by_itself_is_told_from_what_does_not', async () => {
 
 test('answers_of_proxies_and_broken_networks_are_sentences_too', async () => {
   const proxy = await problemOf(new Response('<html>502 Bad Gateway</html>', { status: 502 }));
-  expect(proxy.message).toBe(
-    'The service cannot be reached through the proxy at the moment (status 502). Try again later.',
-  );
+  expect(proxy.message).toBe('The service is unreachable through its proxy (status 502). Try again later.');
   const lying = await problemOf(
     new Response('{', { status: 500, headers: { 'Content-Type': 'application/problem+json' } }),
   );

@@ -77,7 +77,7 @@ function progressOf({ state, frames }: Recovery): string {
   if (state === 'failed') return 'Failed';
   const followed = frames.followed === frames.received ? '' : `${frames.followed} of `;
   const parts = [
-    state === 'completed' ? '' : state === 'ready' ? 'waiting for frames' : state,
+    state === 'completed' ? '' : state === 'ready' ? 'waiting for frames' : 'running',
     `${followed}${counted(frames.received, 'frame')}`,
     frames.lost > 0 ? `${frames.lost} lost` : '',
   ];

@@ -31,7 +31,7 @@ export const tableHead = html`
         role="columnheader"
         scope="col"
         class="number"
-        title="Root mean square over the points, mean over the frames; of the rest pose's diagonal"
+        title="RMS over all points, averaged over frames; relative to the rest pose's diagonal"
       >
         Mean error
       </th>
@@ -39,7 +39,7 @@ export const tableHead = html`
         role="columnheader"
         scope="col"
         class="number"
-        title="Of the point and frame that are farthest off; of the rest pose's diagonal"
+        title="Worst point of all frames; relative to the rest pose's diagonal"
       >
         Worst error
       </th>
@@ -124,7 +124,7 @@ function frames(session: Session) {
   if (received === 0) return html`<span class="muted">no frames yet</span>`;
   const gaps = missing.reduce((sum, [first, end]) => sum + end - first, 0);
   const remarks = [
-    session.coding ? `${text.count(session.coding.frames)} coded` : null,
+    session.coding ? `${text.count(session.coding.frames)} compressed` : null,
     gaps > 0 ? `${text.count(gaps)} missing` : null,
   ].filter((remark) => remark !== null);
   const known = received + gaps;
@@ -163,8 +163,8 @@ function download(row: Row, name: string) {
     </button>
     <select
       class="formats"
-      title="Download for other programs"
-      aria-label="Download ${name} for other programs"
+      title="Export"
+      aria-label="Export ${name}"
       ?disabled=${downloaded !== null}
       @change=${({ target }: Event) => {
         const chosen = target as HTMLSelectElement;
@@ -172,7 +172,7 @@ function download(row: Row, name: string) {
         chosen.value = '';
       }}
     >
-      <option value="" hidden selected>as…</option>
+      <option value="" hidden selected>Export</option>
       ${Object.entries(FORMATS).map(([ending, program]) => html`<option value=${ending}>${program} (.${ending})</option>`)}
     </select>
   `;

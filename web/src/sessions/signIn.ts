@@ -35,7 +35,7 @@ export class SignIn extends LitElement {
 
   override render() {
     // A token that is there although this is shown was refused.
-    const refused = pageToken.token !== null ? 'The service refused the token. Check it, or ask for another one.' : '';
+    const refused = pageToken.token !== null ? 'The token was not accepted. Check it, or ask for a new one.' : '';
     const error = this.wrong || refused;
     return html`
       <form class="card" @submit=${this.#submit}>
@@ -69,7 +69,7 @@ export class SignIn extends LitElement {
     event.preventDefault();
     const token = this.input.value.trim().replace(/^Bearer\s+/i, '');
     if (!/^[\x21-\x7e]+$/.test(token)) {
-      this.wrong = 'A token has letters, digits and signs without spaces. Copy it once more.';
+      this.wrong = 'A token has no spaces or special letters. Copy it again.';
       return;
     }
     this.wrong = '';

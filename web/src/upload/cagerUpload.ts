@@ -109,7 +109,7 @@ export class Upload extends LitElement {
     }
     return html`
       <form class="card" @submit=${this.#submit}>
-        <h2>What these files are</h2>
+        <h2>Files</h2>
         <ul class="items">
           ${this.items.map((item) => itemRow(item, (role) => this.#reassign(item, role)))}
         </ul>

@@ -89,13 +89,13 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
           ${option('accuracy', 'cages', 'Cages only, no error limit')}
         </select>
         <span class="fine" id="accuracy-hint">
-          ${isCoded ? 'Frames are coded in groups, and the container is small.' : 'Cages are kept exactly; details that they cannot follow are lost.'}
+          ${isCoded ? 'Frames are compressed in groups; files are small.' : 'Cages are kept exactly; detail that they cannot follow is lost.'}
         </span>
       </div>
       ${
         choices.accuracy === 'bound'
           ? html`<div class="field">
-              <label for="bound">Largest error, in % of the diagonal</label>
+              <label for="bound">Maximum error, in % of the diagonal</label>
               <input
                 id="bound"
                 type="number"
@@ -172,10 +172,10 @@ function cageFields(choices: Choices, set: Set, option: Option) {
     <div class="field">
       <label for="cage">Cage</label>
       <select id="cage" aria-describedby="cage-hint" @change=${set('cage')}>
-        ${option('cage', 'rest', 'Made around the rest pose')} ${option('cage', 'motion', 'Designed from the motion')}
+        ${option('cage', 'rest', 'From the rest pose')} ${option('cage', 'motion', 'From the motion')}
       </select>
       <span class="fine" id="cage-hint">
-        ${isDesigned ? 'Several times more accurate; it takes about a minute more.' : 'Ready within seconds.'}
+        ${isDesigned ? 'Several times more accurate; takes about a minute longer.' : 'Ready within seconds.'}
       </span>
     </div>
     ${
@@ -197,7 +197,7 @@ function cageFields(choices: Choices, set: Set, option: Option) {
             placeholder: '',
             isRequired: true,
           })
-        : number('cageVertices', 'Vertices of the cage, at most', {
+        : number('cageVertices', 'Maximum cage vertices', {
             min: '4',
             max: '20000',
             step: '1',
@@ -207,11 +207,11 @@ function cageFields(choices: Choices, set: Set, option: Option) {
     }
     ${
       isDesigned
-        ? number('cageSeconds', 'Seconds for the design, at most', {
+        ? number('cageSeconds', 'Design time limit, in seconds', {
             min: '1',
             max: '86400',
             step: 'any',
-            placeholder: 'as the service allows',
+            placeholder: 'service default',
             isRequired: false,
           })
         : ''

@@ -26,20 +26,20 @@ export async function planOf(items: readonly Item[]): Promise<Plan> {
   const [framesItem, cageItem] = [having('frames'), having('cage')];
   if (!framesItem) {
     throw new Error(
-      'Frames are missing: drop an array (.npy), a point cache (.pc2 or .mdd), or a folder with one .obj per frame.',
+      'Frames are missing: add an array (.npy), a point cache (.pc2 or .mdd), or a folder with one .obj per frame.',
     );
   }
   const frames = await framesOf(framesItem.files);
   const restItem = having('rest');
   if (!restItem && framesItem.files.length < 2) {
-    throw new Error('The rest pose is missing: drop the mesh that moves, as .obj, .ply, .off, .stl or .glb.');
+    throw new Error('The rest pose is missing: add the undeformed mesh as .obj, .ply, .off, .stl or .glb.');
   }
   const rest = (restItem ?? framesItem).files[0];
-  const remarks = restItem ? [] : [`The first frame, ${rest.name}, is taken as the rest pose.`];
+  const remarks = restItem ? [] : [`The first frame, ${rest.name}, is used as the rest pose.`];
   const points = await pointsOf(rest);
   if (points !== null && points !== frames.points) {
     throw new Error(
-      `${framesItem.name} has ${counted(frames.points, 'point')} in each frame and the rest pose ${rest.name} has ${counted(points, 'point')}: both have to be the same mesh, with its points in the same order.`,
+      `${framesItem.name} has ${counted(frames.points, 'point')} in each frame and the rest pose ${rest.name} has ${counted(points, 'point')}: they must be the same mesh, with points in the same order.`,
     );
   }
   return { rest, cage: cageItem?.files[0] ?? null, frames, remarks };

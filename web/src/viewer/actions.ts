@@ -118,7 +118,7 @@ async function toggleRecording(viewer: CagerViewer, player: Player) {
   viewer.recording = recording;
   try {
     const showProgress = (fraction: number) => {
-      player.progress = { doing: 'Recording one turn', fraction };
+      player.progress = { doing: 'Recording turntable', fraction };
       viewer.requestUpdate();
     };
     const { video, ending } = await recordTurntable(player, recording.signal, showProgress);
@@ -135,7 +135,7 @@ async function toggleFullscreen(viewer: CagerViewer) {
   try {
     await (document.fullscreenElement ? document.exitFullscreen() : viewer.requestFullscreen());
   } catch {
-    viewer.report('This browser does not allow full screen here.');
+    viewer.report('Full screen is not available here.');
   }
 }
 

@@ -96,7 +96,7 @@ export class BesideMode {
     const canvas = document.createElement('canvas');
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'img');
-    canvas.setAttribute('aria-label', `${beside.name}: the model beside, drawn.`);
+    canvas.setAttribute('aria-label', `${beside.name}: second 3D view`);
     pane.prepend(canvas);
     try {
       this.pair = new Beside(canvas, beside, player);
@@ -111,7 +111,7 @@ export class BesideMode {
   paint(correspondence: readonly number[]) {
     const { player: first } = this.host;
     const { player: second } = this;
-    if (!first || !second) throw new Error('Show source and target beside each other first: drop the other one here.');
+    if (!first || !second) throw new Error('Show source and target side by side first: drop the other one here.');
     paintCorrespondence(correspondence, first, second);
     this.isPainted = true;
     first.layers = { ...first.layers, colors: true };
@@ -133,22 +133,22 @@ export class BesideMode {
     const progress = pair?.player.progress;
     return html`<div class="pane second">
       ${this.marks?.template ?? nothing}
-      <section class="caption corner glass" aria-label="Capture beside">
+      <section class="caption corner glass" aria-label="Second capture">
         <h2 class="heading clip" title=${this.host.beside.name}>${this.host.beside.name}</h2>
         <button
           class="quiet icon"
-          title="Show the first capture alone"
-          aria-label="Show the first capture alone"
+          title="Close the second capture"
+          aria-label="Close the second capture"
           @click=${() => this.leave()}
         >
           ${glyphs.close}
         </button>
         <p class="figures fine">
-          <i class="dashes" title="Dashed in the timeline"></i
+          <i class="dashes" title="Dashed line in the timeline"></i
           >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
           <span data-beside ?hidden=${Boolean(progress)}></span>
         </p>
-        ${this.isPainted ? html`<p class="fine">Places of one colour correspond</p>` : nothing}
+        ${this.isPainted ? html`<p class="fine">Matching colours mark corresponding points</p>` : nothing}
       </section>
     </div>`;
   }

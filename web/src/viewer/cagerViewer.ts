@@ -167,10 +167,7 @@ export class CagerViewer extends CaptureElement {
     this.files.follow();
     // The canvas is replaced with every capture, so no binding of the template can reach it.
     this.canvas.hidden = !this.player;
-    this.canvas.setAttribute(
-      'aria-label',
-      `${this.heading}: the model, drawn. Drag or use the keys A, D, W, X to turn it.`,
-    );
+    this.canvas.setAttribute('aria-label', `${this.heading}: 3D view. Drag, or press A, D, W or X, to orbit.`);
     if (this.layout.hasChanged(this.pair.player, this.coveredShare)) this.resize();
     this.writePlace();
   }

@@ -80,8 +80,8 @@ export class CompareDialog extends LitElement {
       </header>
       <input
         type="search"
-        placeholder="Name of a session"
-        aria-label="Name of a session"
+        placeholder="Search sessions"
+        aria-label="Search sessions"
         autofocus
         .value=${this.wanted}
         @input=${(event: Event) => (this.wanted = (event.target as HTMLInputElement).value)}
@@ -104,15 +104,13 @@ export class CompareDialog extends LitElement {
         problem !== null
           ? html`<p role="alert">${problem}</p>`
           : isLoading
-            ? html`<p class="muted" role="status">Loading sessions</p>`
+            ? html`<p class="muted" role="status">Loading sessions…</p>`
             : found.length === 0
-              ? html`<p class="muted" role="status">
-                  There is no other session${wanted === '' ? '' : ' of this name'}.
-                </p>`
+              ? html`<p class="muted" role="status">${wanted === '' ? 'No other sessions' : 'No matching sessions'}</p>`
               : nothing
       }
       <footer class="buttons">
-        ${next !== null ? html`<button @click=${() => void this.load()}>More sessions</button>` : nothing}
+        ${next !== null ? html`<button @click=${() => void this.load()}>Load more</button>` : nothing}
         <button @click=${() => pickFiles(([{ file }]) => this.choose({ file }), { accept: '.cager' })}>
           ${glyphs.file} Open file
         </button>

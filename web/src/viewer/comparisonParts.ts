@@ -31,28 +31,25 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
   const compared = original ?? surfaces;
   if (!compared) {
     const wanted = player.capture.tracking ? 'surfaces that it was recovered from' : 'original frames';
-    return html`<p>
-        Drop the ${wanted} here to see where the error is; neither the service nor the file keeps them. They are not
-        sent anywhere.
-      </p>
+    return html`<p>Drop the ${wanted} here to see the error of each point. They are not uploaded.</p>
       <button @click=${() => pickFiles((files) => acts.open(files), { accept: '.npy,.pc2,.mdd,.obj,.ply' })}>
         ${glyphs.file} Choose files
       </button>`;
   }
   const names = surfaces ? SURFACE_NAMES : SIDE_NAMES;
-  const what = surfaces ? 'Distance from the surface' : 'Distance from the original';
+  const what = surfaces ? 'Distance from the surface' : 'Error against the original';
   const { measured } = heatMap;
   const sides = Object.keys(SIDE_NAMES) as Side[];
   const showsErrors = heatMap.kind === 'error' && measured !== null;
   return html`
     <div class="source row">
       <span class="grow clip" title=${compared.name}>${showsErrors ? what : compared.name}</span>
-      <button class="quiet icon" aria-label="Put the original away" title="Put the original away" @click=${acts.close}>
+      <button class="quiet icon" aria-label="Close the original" title="Close the original" @click=${acts.close}>
         ${glyphs.close}
       </button>
     </div>
     ${showsErrors ? [errorFigures(player, measured), surfaces ? nothing : rangeChoice(player)] : nothing}
-    <div class="segments" role="group" aria-label="What is shown">
+    <div class="segments" role="group" aria-label="Show">
       ${sides.map(
         (side) =>
           html`<button aria-pressed=${String(comparison.side === side)} @click=${() => (comparison.side = side)}>
@@ -68,7 +65,7 @@ const RANGE_NAMES: Readonly<Record<HeatRange, string>> = { clip: 'Whole clip', f
 /** Which points the warm end of the colours is of: 99 of 100 stay below it. */
 export function rangeChoice(player: Player) {
   const { kind, range } = player.heatMap;
-  return html`<div class="segments" role="group" aria-label="What 99 of 100 points stay below, over">
+  return html`<div class="segments" role="group" aria-label="Range of the colours (99th percentile)">
     ${(Object.keys(RANGE_NAMES) as HeatRange[]).map(
       (each) =>
         html`<button aria-pressed=${String(each === range)} @click=${() => player.setHeat(kind, each)}>
@@ -80,7 +77,7 @@ export function rangeChoice(player: Player) {
 
 function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {
   const { diagonal, precision } = stage.decoder;
-  const more = heatMap.largest < largest ? ' and more' : '';
+  const more = heatMap.largest < largest ? ' and above' : '';
   return html`<div class="bar" .style=${`background: ${heatGradient()}`}></div>
     <div class="spread muted figures">
       <span>0</span
@@ -89,17 +86,17 @@ function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, 
     <dl class="pairs">
       <dt>Worst point, ${count(worst)}</dt>
       <dd>${percent(largest)} (${threeDigits(largest * diagonal)})</dd>
-      <dt>Root mean square</dt>
+      <dt>RMS</dt>
       <dd>${percent(l2)} (${threeDigits(l2 * diagonal)})</dd>
     </dl>
     ${
       l2 > UNLIKELY_ERROR
         ? html`<p class="muted">
-            That is far off: the files may have another unit, or
-            ${comparison.surfaces ? 'be other frames' : 'their points in another order'}.
+            This is far off: the files may use another unit, or have
+            ${comparison.surfaces ? 'other frames' : 'another point order'}.
           </p>`
         : precision.error > TELLING_PART * largest
-          ? html`<p class="muted">Up to ${percent(precision.error)} of it is the rounding of this picture.</p>`
+          ? html`<p class="muted">Up to ${percent(precision.error)} of this is rounding in this view.</p>`
           : nothing
     }`;
 }
@@ -126,7 +123,7 @@ export function divider({ comparison }: Player) {
     class="divider"
     role="slider"
     tabindex="0"
-    aria-label="Where the original ends and the decoded model begins"
+    aria-label="Divider between original and decoded model"
     aria-valuemin="0"
     aria-valuemax="100"
     aria-valuenow=${share}

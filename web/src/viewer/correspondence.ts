@@ -17,7 +17,7 @@ export function paintCorrespondence(correspondence: readonly number[], first: Pl
   const [source, target] = pointsOf(second) === correspondence.length ? [first, second] : [second, first];
   const count = pointsOf(source);
   if (pointsOf(target) !== correspondence.length || correspondence.some((point) => point >= count)) {
-    throw new Error('The report is of other models than these two: show the source and what was made of the target.');
+    throw new Error('This report is about other models: open the source and the transferred target.');
   }
   const colors = placeColors(source.capture.static);
   const taken = new Uint8Array(3 * correspondence.length);

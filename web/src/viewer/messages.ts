@@ -7,7 +7,7 @@ import { glyphs } from '../style/glyphs';
 export function notice(problem: string, close: () => void): TemplateResult {
   return html`<div class="toast glass row" role="alert">
     <span>${problem}</span>
-    <button class="quiet icon" aria-label="Close this message" @click=${close}>${glyphs.close}</button>
+    <button class="quiet icon" aria-label="Dismiss" @click=${close}>${glyphs.close}</button>
   </div>`;
 }
 
@@ -24,8 +24,8 @@ export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside'
     <form method="dialog">
       <h2 id="question-title">Open ${name}?</h2>
       <div class="buttons">
-        <button class="primary" value="instead" autofocus>Open instead</button>
-        <button value="beside">Show beside</button>
+        <button class="primary" value="instead" autofocus>Replace current</button>
+        <button value="beside">Open side by side</button>
         <button class="quiet" value="">Cancel</button>
       </div>
     </form>
@@ -35,7 +35,7 @@ export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside'
 /** What happens to files that are held above the viewer. */
 export function dropHint(isShowing: boolean): TemplateResult {
   return html`<div class="drop">
-    ${isShowing ? 'Drop another capture to play it or to see it beside this one, the original frames to compare with, or a report' : 'Drop a capture to play it'}
+    ${isShowing ? 'Drop a capture to open or compare, original frames, or a report' : 'Drop a capture to play it'}
   </div>`;
 }
 
@@ -64,10 +64,10 @@ export function emptyState(
   return html`<div class="empty">
     <div class="lead"><slot name="lead"></slot></div>
     ${glyphs.cage}
-    <h1>${failure === null ? 'Drop a capture here' : 'This cannot be shown'}</h1>
+    <h1>${failure === null ? 'Drop a capture here' : 'Could not open'}</h1>
     ${
       failure === null
-        ? html`<p>A .cager file plays in this page. It is not sent anywhere.</p>`
+        ? html`<p>A .cager file plays in this page and is not uploaded.</p>`
         : html`<p class="notice" role="alert">${failure}</p>`
     }
     <button class="primary" @click=${() => pickFiles(choose, { accept: '.cager,.json' })}>

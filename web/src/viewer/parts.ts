@@ -29,8 +29,8 @@ const LAYER_NAMES: Readonly<Record<keyof Layers, string>> = {
 
 const HEAT_NAMES: Readonly<Record<Heat, string>> = {
   none: 'Heat map',
-  motion: 'Heat map: movement from frame to frame',
-  error: 'Heat map: error of each point',
+  motion: 'Heat map: motion',
+  error: 'Heat map: error',
 };
 
 /** A button with a drawing; `pressed` makes it a switch. */
@@ -70,25 +70,19 @@ export function toolbar(
   return html`<div class="tools glass" role="toolbar" aria-label="View" aria-orientation="vertical">
     ${possible.map((layer) => tool(layer, layer, LAYER_NAMES[layer], act, player.layers[layer]))}
     ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}
-    ${tool('edit', 'edit', 'Edit the cage', act, shown.editing)}
+    ${tool('edit', 'edit', 'Edit cage', act, shown.editing)}
     ${player.capture.container ? tool('poses', 'poses', 'Blend poses', act, shown.poses) : nothing}
     ${tool('beside', 'beside', 'Compare with another capture', act, shown.beside)}
     <hr />
-    ${tool('frame', 'frame', 'Frame all of the motion', act)}
-    ${tool('follow', 'follow', 'Follow the model', act, player.isFollowing)}
-    ${tool('picture', 'camera', 'Save a picture', act)}
+    ${tool('frame', 'frame', 'Frame all', act)} ${tool('follow', 'follow', 'Follow the model', act, player.isFollowing)}
+    ${tool('picture', 'camera', 'Save image', act)}
     ${
       shown.recordable
-        ? tool(
-            'turntable',
-            'turntable',
-            shown.recording ? 'Stop recording' : 'Record a turntable video',
-            act,
-            shown.recording,
-          )
+        ? tool('turntable', 'turntable', shown.recording ? 'Stop recording' : 'Record turntable', act, shown.recording)
         : nothing
     }
-    ${tool('fullscreen', 'fullscreen', 'Full screen', act)} ${tool('figures', 'figures', 'Figures', act, shown.figures)}
+    ${tool('fullscreen', 'fullscreen', 'Full screen', act)}
+    ${tool('figures', 'figures', 'Statistics', act, shown.figures)}
     ${tool('help', 'keyboard', 'Keyboard shortcuts', act)}
   </div>`;
 }
@@ -149,7 +143,7 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
     </button>
     ${tool('previous', 'previous', 'Previous frame', act)} ${tool('next', 'next', 'Next frame', act)}
     ${tool('loop', 'loop', 'Loop', act, transport.loop)}
-    ${figures ? tool('worst', 'worst', 'Frame with the largest error', act) : nothing}
+    ${figures ? tool('worst', 'worst', 'Go to worst frame', act) : nothing}
     <select
       class="figures"
       aria-label="Speed"
@@ -164,12 +158,12 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
 }
 
 const errorFigures = html`<dl class="errors row figures">
-  <div class="row" title="Root mean square of the distances of all points, as part of the diagonal">
+  <div class="row" title="RMS distance over all points, relative to the diagonal">
     <dt><i class="key"></i></dt>
     <dt>L2</dt>
     <dd data-l2></dd>
   </div>
-  <div class="row" title="Largest distance of a point, as part of the diagonal">
+  <div class="row" title="Largest distance of any point, relative to the diagonal">
     <dt><i class="key linf"></i></dt>
     <dt>L∞</dt>
     <dd data-linf></dd>
@@ -177,7 +171,7 @@ const errorFigures = html`<dl class="errors row figures">
 </dl>`;
 
 const scoreFigure = html`<dl class="errors row figures">
-  <div class="row" title="How well the template lies on the surface, as part of the diagonal: less is better">
+  <div class="row" title="Distance of the template from the surface, relative to the diagonal; lower is better">
     <dt><i class="key"></i></dt>
     <dt>Score</dt>
     <dd data-score></dd>
@@ -193,10 +187,10 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
   return html`<div class="legend glass ${compares ? 'comparison' : ''} ${beside ? 'beside' : ''}">
     ${
       isMotion
-        ? html`Movement from frame to frame
+        ? html`Motion between frames
             <div class="bar" .style=${`background: ${heatGradient()}`}></div>
             <div class="spread muted figures">
-              <span>0</span><span>${percent(heatMap.largest)} of the diagonal and more</span>
+              <span>0</span><span>${percent(heatMap.largest)} of the diagonal and above</span>
             </div>
             ${rangeChoice(player)}`
         : nothing
@@ -232,8 +226,8 @@ export function helpSheet(close: () => void) {
       )}
     </div>
     <p class="muted">
-      Drag to turn, drag with the right button or two fingers to move, turn the wheel or pinch to zoom. Double-click to
-      frame all of the motion.
+      Drag to orbit; drag with the right button or two fingers to pan; scroll or pinch to zoom; double-click to frame
+      all.
     </p>
   </dialog>`;
 }

@@ -235,7 +235,7 @@ export class Player {
     this.stage.renew();
     this.stage.draw(this.camera);
     return new Promise((resolve, reject) => {
-      this.stage.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The picture could not be made.'))));
+      this.stage.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The image could not be saved.'))));
     });
   }
 

@@ -34,7 +34,7 @@ export class PoseMode {
       this.view ??= new PoseView(player);
       this.view.moveTo(this.view.place);
     } catch {
-      this.host.report('This part of the page could not be loaded; reload it when the service answers again.');
+      this.host.report('This part of the page could not be loaded. Check your connection and reload.');
       return;
     }
     this.isOn = true;

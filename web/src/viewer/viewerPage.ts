@@ -147,7 +147,7 @@ export class ViewerPage extends LitElement {
     return html`<main class="message">
       ${
         this.failure === null
-          ? html`<p role="status">${this.waiting || `Opening the ${this.kind}`}</p>`
+          ? html`<p role="status">${this.waiting || `Opening ${this.kind}`}</p>`
           : html`<p role="alert">${this.failure.message}</p>`
       }
       ${isGone ? nothing : html`<button class="primary" ?hidden=${this.failure === null} @click=${this.retry}>Try again</button>`}
@@ -223,7 +223,7 @@ export class ViewerPage extends LitElement {
       else {
         this.besideId = null;
         this.tellLink();
-        this.viewer?.report(`The session to compare with: ${problem.message}`);
+        this.viewer?.report(`Could not open the second session: ${problem.message}`);
       }
     }
   }

@@ -202,12 +202,12 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     expect(await page.evaluate(() => location.hash)).toContain(id);
     const file = await readFile(new URL('../../../tests/golden/definition3-mvc.cager', import.meta.url));
     await dropOnViewer(page, { 'walk.cager': file });
-    await page.getByRole('button', { name: 'Open instead' }).click();
-    await page.getByRole('img', { name: /^walk\.cager: the model/ }).waitFor({ timeout: 20_000 });
+    await page.getByRole('button', { name: 'Replace current' }).click();
+    await page.getByRole('img', { name: /^walk\.cager: 3D view/ }).waitFor({ timeout: 20_000 });
     expect(await page.evaluate(() => location.hash)).toMatch(/^#\/file/);
     await site.service.run();
     await page.goBack();
-    await page.getByRole('img', { name: /^dead: the model/ }).waitFor({ timeout: 20_000 });
+    await page.getByRole('img', { name: /^dead: 3D view/ }).waitFor({ timeout: 20_000 });
     await close();
   });
 

@@ -34,7 +34,7 @@ export function summary({ capture, recommendation }: Comparison) {
         recommendation.accuracy &&
         card(
           capture,
-          'For the lowest error',
+          'Lowest error',
           recommendation.accuracy,
           `The lowest mean L2 of all methods here: ${percents(recommendation.accuracy.l2_mean, 3)} %; ${smoothness(recommendation.accuracy)}.`,
         )
@@ -79,7 +79,7 @@ function card(capture: Comparison['capture'], title: string, choice: Choice, why
     <p class="choice">${choice.system}: ${choice.method}</p>
     <p>${why}</p>
     <pre tabindex="0"><code>${command}</code></pre>
-    <button @click=${copy}>Copy the command</button>
+    <button @click=${copy}>Copy command</button>
   </article>`;
 }
 
