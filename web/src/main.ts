@@ -10,7 +10,6 @@ let dropped: readonly Dropped[] = [];
 /** The route that is shown: a change of the view alone does not load it anew. */
 let shown = '';
 
-/** Loads what a route needs and makes its element. */
 async function elementOf(route: Route, view: string): Promise<HTMLElement> {
   switch (route.page) {
     case 'session':

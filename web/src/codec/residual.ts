@@ -22,7 +22,6 @@ const PARTS = 16;
  * Decodes the residual of a group of so many frames.
  *
  * @param mostNumbers most numbers of its components, three for each point.
- * @throws {CodedDataError} for bytes that the encoder did not write.
  */
 export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: number, mostNumbers: number): Residual {
   const points = hierarchy.order.length;

@@ -7,7 +7,6 @@ export interface Source {
   read(offset: number, length: number, signal?: AbortSignal): Promise<Uint8Array>;
 }
 
-/** Bytes in memory. */
 export function bytesSource(bytes: Uint8Array): Source {
   return {
     size: bytes.length,

@@ -4,7 +4,6 @@ import type { CageEdit } from './cageEdit';
 import { decodedFrames } from './decodedFrames';
 import { writeEdited } from './editedContainer';
 
-/** What a capture with edits can be saved as. */
 export type ExportKind = 'container' | 'frames';
 
 /** Why a capture cannot be saved as something, in a sentence; null where it can. */

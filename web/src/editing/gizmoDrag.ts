@@ -3,13 +3,11 @@ import { rotationAbout, type Motion, type MotionKind } from './motion';
 import { cross, dot, norm, normalized, plus, sub, type Vector } from '../coordinates/vector';
 import type { Projection } from '../render/projection';
 
-/** A place in the picture. */
 export interface Point {
   readonly x: number;
   readonly y: number;
 }
 
-/** A drag of the gizmo. */
 export interface Drag {
   readonly kind: MotionKind;
   readonly constraint: Constraint;

@@ -10,7 +10,6 @@ const KEYS = [
   ['Esc', 'Deselect, then close'],
 ] as const;
 
-/** How a cage is edited with the mouse and with keys. */
 export const mouseAndKeys = html`<details>
   <summary>Mouse and keyboard</summary>
   <p>

@@ -9,7 +9,6 @@ export interface Dropped {
   readonly path: string;
 }
 
-/** Whether something is an encoded capture, by its name. */
 export function isContainer({ path }: Dropped): boolean {
   return /\.cager$/i.test(path);
 }

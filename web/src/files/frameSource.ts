@@ -9,10 +9,8 @@ export class UnusableFile extends Error {
   }
 }
 
-/** The frames of a capture. */
 export interface FrameSource {
   readonly frames: number;
-  /** Points of each frame. */
   readonly points: number;
   /** What it is and how much of it, for people. */
   readonly description: string;

@@ -6,7 +6,6 @@ import { extensionOf, pointsOf } from '../files/meshes';
 import type { Surface } from './surface';
 import workerAddress from './worker.ts?worker&url';
 
-/** What the worker is asked. */
 export interface Asked {
   readonly frame: number;
   readonly file: File;

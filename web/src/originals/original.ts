@@ -5,7 +5,6 @@ import { framesOf } from '../files/frames';
 import type { FrameSource } from '../files/frameSource';
 import { extensionOf } from '../files/meshes';
 
-/** Bytes of frames that are kept in memory. */
 const KEPT_BYTES = 48 * 2 ** 20;
 
 /** The frames that a capture was encoded from, read from files piece by piece when they are wanted. */

@@ -20,7 +20,6 @@ export class PoseView extends EventTarget {
   poses: readonly number[] = [];
   /** Where between them: of two, from 0 to 1; of more, a place in their polygon. */
   place: readonly [number, number] = [0.5, 0];
-  /** Why there is no shape. */
   failure: string | null = null;
   private space: Space | null = null;
   private isAsking = false;

@@ -17,7 +17,6 @@ import { Painter } from './geometry/painter';
 import { saveSideBySide } from './savedSheet';
 import { viewsStyle } from './viewsStyle';
 
-/** One of the pictures of a group. */
 export interface View {
   readonly title: string;
   readonly note: string;
@@ -37,7 +36,6 @@ export interface Moments {
   readonly rate: number;
   /** Whether there is something to see between two moments. */
   readonly smooth: boolean;
-  /** Name of a moment. */
   readonly name: (place: number) => string;
 }
 
@@ -147,7 +145,6 @@ export class Views extends LitElement {
     this.ask();
   }
 
-  /** Binds the canvases to their views. */
   private follow() {
     this.forget();
     this.renderRoot.querySelectorAll('canvas').forEach((canvas, k) => {
@@ -281,7 +278,6 @@ export class Views extends LitElement {
     return { model: new Color(model), cage: new Color(cage), mark: new Color(handle), solid, edge };
   }
 
-  /** Saves all views beside each other. */
   private save() {
     for (const canvas of this.shown.keys()) this.visible.add(canvas);
     this.paint(1);

@@ -14,7 +14,6 @@ import { pageToken } from './token';
 
 export type { SessionCapture } from './liveCapture';
 
-/** Choices of {@link openSession}. */
 export interface OpenSessionOptions {
   readonly service?: Service;
   readonly signal?: AbortSignal;
@@ -52,7 +51,6 @@ export async function openSession(id: string, options: OpenSessionOptions = {}):
   }
 }
 
-/** Waits until a session is prepared. */
 async function whenPrepared(
   look: () => Promise<Session>,
   onWaiting: OpenSessionOptions['onWaiting'],

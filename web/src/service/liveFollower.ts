@@ -22,13 +22,10 @@ const MIN_SKIPPED = 30;
 /** Why the stream is left: the page goes on at the newest frame. */
 class TooFarBehind extends Error {}
 
-/** What a follower tells. */
 export interface Following {
-  /** A frame arrived. */
   readonly record: (record: CageRecord) => void;
   /** Frames up to `end` are solved, and will not be sent unless they are asked for. */
   readonly skipped: (end: number) => void;
-  /** A look at the session. */
   readonly looked: (session: Session) => void;
   /** The state or a measure changed. */
   readonly changed: () => void;

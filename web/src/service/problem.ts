@@ -96,7 +96,6 @@ export function problemBehind(failure: unknown, signal?: AbortSignal | null): Er
   return error instanceof Error ? error : new Error(String(error));
 }
 
-/** Whether an error is that of an aborted request. */
 export function isAbort(error: unknown): boolean {
   return error instanceof DOMException && error.name === 'AbortError';
 }

@@ -8,9 +8,7 @@ import type { FrameResult, Session, SessionPage } from './messages';
 import { ServiceProblem, problemBehind, problemOf } from './problem';
 import { pageToken, type TokenStore } from './token';
 
-/** Φ of a session. */
 export interface Coordinates {
-  /** Points of the model. */
   readonly rows: number;
   readonly columns: number;
   /** `rows × columns`, row by row. */
@@ -51,7 +49,6 @@ export class Service {
     throw problem;
   }
 
-  /** The address of what is at `path`. */
   address(path: string): string {
     return new URL(path, this.#base).href;
   }
@@ -67,7 +64,6 @@ export class Service {
     return httpSource(this.address(path), { headers, signal, ...(firstBytes !== undefined && { firstBytes }) });
   }
 
-  /** A request whose answer is JSON. */
   async json<T>(path: string, init: RequestInit = {}): Promise<T> {
     const response = await this.request(path, init);
     try {

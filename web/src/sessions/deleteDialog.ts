@@ -4,7 +4,6 @@ import { glyphs } from '../style/glyphs';
 import { nameOf } from './row';
 import { isUnfinished } from './sessionList';
 
-/** What the dialog shows, and what its buttons do. */
 export interface DeleteDialog {
   /** Whether the service is being asked. */
   readonly isRunning: boolean;

@@ -6,7 +6,6 @@ import { glyphs } from '../style/glyphs';
 import { FORMATS, type Format } from './download';
 import * as text from '../text';
 
-/** What a row shows, and what its buttons do. */
 export interface Row {
   readonly session: Session;
   readonly figures: Figures | null;
@@ -20,7 +19,6 @@ export interface Row {
   readonly onRemove: () => void;
 }
 
-/** The head of the table. */
 export const tableHead = html`
   <thead role="rowgroup">
     <tr role="row">
@@ -50,7 +48,6 @@ export const tableHead = html`
   </thead>
 `;
 
-/** A session's name for people. */
 export function nameOf(session: Session): string {
   return session.name ?? `Session ${session.id.slice(0, 8)}`;
 }

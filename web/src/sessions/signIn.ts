@@ -4,9 +4,7 @@ import { controls } from '../style/controls';
 import { tokens } from '../style/tokens';
 import { pageToken } from '../service/token';
 
-/**
- * Asks for an access token and gives it to the page. Whoever shows it listens to `change` of `pageToken`, and hides it then.
- */
+/** Asks for an access token and gives it to the page. Whoever shows it listens to `change` of `pageToken`, and hides it then. */
 @customElement('cager-sign-in')
 export class SignIn extends LitElement {
   static override styles = [

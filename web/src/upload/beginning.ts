@@ -8,7 +8,6 @@ import { type Choices, designOf, optionsOf } from './optionsForm';
 import type { Plan } from './plan';
 import { UploadJob } from './uploadJob';
 
-/** The record of an upload that begins now. */
 export function newUpload(service: Service, plan: Plan, choices: Choices, items: readonly Item[]): KeptUpload {
   return new KeptUpload({
     key: newKey(),

@@ -6,7 +6,6 @@ import { errorChart } from './errorChart';
 import { sampledFrames } from './motionCage';
 import type { Stage, UploadJob } from './uploadJob';
 
-/** What the buttons of a running upload do. */
 export interface JobActions {
   readonly stop: () => void;
   readonly takeBest: () => void;

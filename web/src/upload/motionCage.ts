@@ -22,13 +22,11 @@ export function sampledFrames(frames: number, points: number): number[] {
   return Array.from({ length: sampled }, (_, k) => Math.round((k * (frames - 1)) / Math.max(1, sampled - 1)));
 }
 
-/** What a design is made of. */
 interface Motion {
   readonly rest: File;
   readonly frames: FrameSource;
 }
 
-/** The design of one upload. */
 export class MotionCage {
   /** How far it is; null while none is at work. */
   progress: DesignProgress | null = null;

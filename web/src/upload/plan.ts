@@ -6,7 +6,6 @@ import { framesOf } from '../files/frames';
 import type { FrameSource } from '../files/frameSource';
 import { pointsOf } from '../files/meshes';
 
-/** A capture that can be sent. */
 export interface Plan {
   readonly rest: File;
   /** Without one the service makes it. */

@@ -17,7 +17,6 @@ import { type KeptUpload, newKey } from './keptUpload';
 import { MotionCage } from './motionCage';
 import type { Plan } from './plan';
 
-/** Where an upload is. */
 export type Stage =
   'designing' | 'creating' | 'preparing' | 'sending' | 'completing' | 'completed' | 'stopped' | 'failed';
 
@@ -29,7 +28,6 @@ export interface Measured {
 
 const PREPARING_POLL_SECONDS = 0.5;
 
-/** What is asked of the service. */
 export interface UploadRequest {
   readonly options: SessionOptions;
   /** What the cage is to be that is designed first; null where none is. */
@@ -90,12 +88,10 @@ export class UploadJob extends EventTarget {
     this.#stopping.abort();
   }
 
-  /** Goes on with the best cage that the design has found so far. */
   takeBest(): void {
     this.#cage.takeBest();
   }
 
-  /** How far the design of the cage is. */
   get design(): DesignProgress | null {
     return this.#cage.progress;
   }

@@ -5,7 +5,6 @@ import type { Item, Role } from '../files/classify';
 import type { Choices } from './optionsForm';
 import type { Plan } from './plan';
 
-/** What the buttons of the drop zone do. */
 export interface ChoosingFiles {
   readonly onFiles: () => void;
   readonly onFolder: () => void;
@@ -81,7 +80,6 @@ export function itemRow(item: Item, onRole: (role: Role) => void) {
   `;
 }
 
-/** What will be sent. */
 export function planSummary({ frames, cage, remarks }: Plan, choices: Choices) {
   const bytes = 12 * frames.frames * frames.points;
   const sentences = [

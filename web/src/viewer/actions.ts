@@ -13,7 +13,6 @@ import { sought, spedUp, started, stepped, worstFrame } from './transport';
 /** Angle and factor of one press of a key. */
 const [TURN, ZOOM] = [Math.PI / 12, 1.15];
 
-/** Does what a key or a button asks for. */
 export function perform(action: Action, viewer: CagerViewer) {
   const { player } = viewer;
   if (!player) return;

@@ -10,7 +10,6 @@ import type { Player } from './player';
 import { PointMarks } from './pointMarks';
 import { percent, sentence } from '../text';
 
-/** What showing a second capture needs of the viewer around it. */
 export interface BesideHost extends HTMLElement {
   readonly player: Player | null;
   readonly renderRoot: ParentNode;
@@ -60,7 +59,6 @@ export class BesideMode {
     this.host.dispatchEvent(new CustomEvent('besideclosed', { bubbles: true, composed: true }));
   }
 
-  /** The player of the second picture. */
   get player(): Player | null {
     return this.pair?.player ?? null;
   }
@@ -187,7 +185,6 @@ export class BesideMode {
   }
 }
 
-/** Frame and errors of the second capture. */
 function figures({ frame, player }: Beside, lead: Player): string {
   const { numbers, position } = lead.transport;
   const number = numberText(numberAt(numbers, Math.floor(position)));

@@ -127,7 +127,6 @@ export class CagerViewer extends CaptureElement {
     if (this.dispatchEvent(wanted)) this.files.pickBeside();
   }
 
-  /** Begins or ends to edit the cage. */
   toggleEditing(): Promise<void> {
     this.poses.leave();
     return this.editing.toggle();
@@ -139,7 +138,6 @@ export class CagerViewer extends CaptureElement {
     await this.poses.toggle();
   }
 
-  /** Shows the keyboard shortcuts. */
   openHelp() {
     this.sheet.showModal();
   }

@@ -11,7 +11,6 @@ export class Comparison {
   onChange: () => void = () => undefined;
   original: Original | null = null;
   surfaces: ObservedSurfaces | null = null;
-  /** The files of the original or the surfaces. */
   files: readonly Dropped[] = [];
   private shownSide: Side = 'decoded';
   private place = 0.5;

@@ -10,7 +10,6 @@ const SYSTEM_NAMES = {
   'green-free': 'Green coordinates, free normals',
 } as const;
 
-/** Figures about the capture and the playing. */
 export function figuresPanel(player: Player, close: () => void) {
   const { static: part, frames, frameBytes } = player.capture;
   const { decoder } = player.stage;

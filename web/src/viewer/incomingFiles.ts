@@ -5,12 +5,9 @@ import { dropHint, dropQuestion } from './messages';
 import { checkContainer } from './opener';
 import { sentence } from '../text';
 
-/** What taking files needs of the viewer around it. */
 export interface FilesHost extends HTMLElement {
   readonly renderRoot: ParentNode;
-  /** Whether a capture is shown. */
   readonly isShowing: boolean;
-  /** Whether one is being opened. */
   readonly isOpening: boolean;
   openFiles(files: readonly Dropped[], beside?: boolean): Promise<void>;
   fail(error: unknown): void;
@@ -26,7 +23,6 @@ export class IncomingFiles {
 
   constructor(private readonly host: FilesHost) {}
 
-  /** Whether somebody is asked what is to be done with a file. */
   get isAsking(): boolean {
     return this.asked !== null;
   }

@@ -32,7 +32,6 @@ export function liveFrame({ frames, rate }: Transport): number {
   return Math.max(0, frames - 1 - Math.min(MARGIN_FRAMES, Math.floor(MARGIN_SECONDS * rate)));
 }
 
-/** The badge of a session that is still running. */
 export class LiveBadge {
   /** Kind of the place that the badge was rendered for last. */
   private shown = '';

@@ -41,7 +41,6 @@ export class Playback {
   readonly heatMap: HeatMap;
   /** The original frames, where they are at hand. */
   readonly comparison: Comparison;
-  /** What is shown together with this capture. */
   companion: Companion | null = null;
   /** Rows of a cage, `rowsPerFrame × 3`, that are drawn in place of those of frames; residuals are left out then. */
   shape: Float64Array | null = null;

@@ -2,7 +2,6 @@ import { html, nothing } from 'lit';
 import type { PoseView } from '../poses';
 import type { Player } from './player';
 
-/** What showing shapes between frames needs of the viewer around it. */
 interface PoseHost {
   readonly player: Player | null;
   requestUpdate(): void;
@@ -52,7 +51,6 @@ export class PoseMode {
     this.host.requestUpdate();
   }
 
-  /** Forgets the capture. */
   close() {
     this.view?.dispose();
     this.view = null;

@@ -82,7 +82,6 @@ export class ViewerPage extends LitElement {
     if (!this.wantsToken && this.dialog?.isOpen !== true) this.viewer?.pressKey(event);
   };
 
-  /** Goes to another view of what is shown. */
   goTo(view: string) {
     this.followBeside(view);
     if (this.viewer) this.viewer.goTo(view);

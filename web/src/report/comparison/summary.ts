@@ -3,7 +3,6 @@ import { count } from '../../text';
 import type { Choice, Comparison } from '../data';
 import { percents, quoted } from '../text';
 
-/** Title, facts and advice. */
 export function summary({ capture, recommendation }: Comparison) {
   const measured = capture.measured.length;
   const frames = `${count(capture.frames)} frame${capture.frames === 1 ? '' : 's'}`;

@@ -68,7 +68,6 @@ export function joined(all: readonly Float32Array[]): Float32Array {
   return found;
 }
 
-/** Length of each vector. */
 export function lengths(vectors: Float32Array): Float32Array {
   return Float32Array.from({ length: vectors.length / 3 }, (_, i) =>
     Math.hypot(vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]),
