@@ -40,7 +40,7 @@ test('frames_that_do_not_fit_the_capture_are_refused_in_words', async () => {
   await expect(openOriginal(dropped(pointCache(5, 4)), capture(6, 4))).rejects.toThrow(
     'walk.pc2 has 5 frames and the capture 6 frames',
   );
-  await expect(openOriginal(dropped(new File(['x'], 'notes.txt')), capture(6, 4))).rejects.toThrow('no frames');
+  await expect(openOriginal(dropped(new File(['x'], 'notes.txt')), capture(6, 4))).rejects.toThrow('No frames found');
 });
 
 test('frames_of_a_capture_that_numbers_them_are_found_by_number', async () => {

@@ -45,7 +45,7 @@ test('answers_of_proxies_and_broken_networks_are_sentences_too', async () => {
   expect(problemBehind(new TypeError('Failed to fetch'))).toMatchObject({ word: 'unreachable', passes: true });
   expect(sentenceOf(new Error('the file has no points'))).toBe('The file has no points.');
   expect(sentenceOf(new Error('walk.npy has 3 points'))).toBe('walk.npy has 3 points.');
-  expect(sentenceOf(new ServiceProblem('unreachable', 0))).toContain('does not answer');
+  expect(sentenceOf(new ServiceProblem('unreachable', 0))).toContain('Cannot reach');
 });
 
 test('an_aborted_request_failed_for_the_reason_of_its_abort_whatever_the_browser_says', async () => {

@@ -103,7 +103,7 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     await eventually(watched, 'frames', 2);
     site.server.stall();
     await client.post(id, capture, 2, 5);
-    await expect.poll(async () => (await state(watched)).problem, { timeout: 20_000 }).toMatch(/does not answer/);
+    await expect.poll(async () => (await state(watched)).problem, { timeout: 20_000 }).toMatch(/Cannot reach/);
     expect((await state(watched)).frames).toBe(2);
     site.server.recover();
     await expect.poll(async () => (await state(watched)).frames, { timeout: 30_000 }).toBe(7);
