@@ -1,8 +1,8 @@
 import { Color, Group, Matrix3, Matrix4, PerspectiveCamera, Scene, Vector2, Vector3, type WebGLRenderer } from 'three';
 import type { StaticPart } from '../capture';
 import type { Surface } from '../observed/surface';
+import { boundsOf } from '../coordinates/topology';
 import { Backdrop } from './backdrop';
-import { boxOf } from './box';
 import { CageView } from './cageView';
 import { aim, cornersOf, FIELD_OF_VIEW, type CameraState } from './camera';
 import { Decoder, type Pose } from './decoder';
@@ -265,7 +265,7 @@ export class Stage {
   }
 
   /** Points, x y z each, in diagonals and in the model's axes, as they are in the scene. */
-  inScene(points: Float64Array | readonly number[]): Float64Array {
+  inScene(points: ArrayLike<number>): Float64Array {
     const turned = Float64Array.from(points);
     const point = new Vector3();
     for (let k = 0; k < turned.length; k += 3)
@@ -277,7 +277,7 @@ export class Stage {
   restCorners(): Float64Array {
     const rest = Float32Array.from(this.capture.rest);
     this.decoder.place(rest);
-    return cornersOf(boxOf(rest, this.upright.matrix));
+    return cornersOf(boundsOf(this.inScene(rest)));
   }
 
   /** Has the ground and its shadow go along with the model, whose middle is at this place of the scene. */
@@ -327,7 +327,7 @@ export class Stage {
   }
 
   private putGroundBelow(positions: Float32Array) {
-    const { low, high } = boxOf(positions, this.upright.matrix);
+    const { low, high } = boundsOf(this.inScene(positions));
     if (!Number.isFinite(low[1])) return;
     this.ground.middle.set((low[0] + high[0]) / 2, low[1] - CLEARANCE, (low[2] + high[2]) / 2);
     this.shadowIsOld = this.pictureIsOld = true;

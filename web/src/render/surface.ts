@@ -1,6 +1,6 @@
 import type { StaticPart } from '../capture';
 import { byVertex } from '../codec/byVertex';
-import { triangulated } from '../codec/polygons';
+import { type Polygons, triangulated } from '../codec/polygons';
 
 /** The model's polygons, prepared for drawing and for normals. */
 export interface Surface {
@@ -22,30 +22,25 @@ export function surfaceOf(model: Pick<StaticPart, 'rest' | 'cornerCounts' | 'cor
       throw new Error(`A face names point ${corners[k]}, but the model has ${points}; encode it again.`);
   }
   const triangles = triangulated({ counts: cornerCounts, corners });
-  const edgeKeys = new Float64Array(corners.length);
+  return { triangles, edges: edgesOf({ counts: cornerCounts, corners }, points), ...fansOf(triangles, points) };
+}
+
+/** Two points of each edge of polygons, each edge once and in ascending order. */
+export function edgesOf({ counts, corners }: Polygons, points: number): Uint32Array {
+  const keys = new Float64Array(corners.length);
   let at = 0;
-  for (const count of cornerCounts) {
+  for (const count of counts) {
     for (let k = 0; k < count; k++) {
       const [a, b] = [corners[at + k], corners[at + ((k + 1) % count)]];
-      edgeKeys[at + k] = Math.min(a, b) * points + Math.max(a, b);
+      keys[at + k] = Math.min(a, b) * points + Math.max(a, b);
     }
     at += count;
   }
-  return { triangles, edges: uniqueEdges(edgeKeys, points), ...fansOf(triangles, points) };
-}
-
-/** Edges from keys `low · points + high`, each once and in ascending order. */
-export function uniqueEdges(keys: Float64Array, points: number): Uint32Array {
-  keys.sort();
-  const edges = new Uint32Array(2 * keys.length);
-  let count = 0;
-  for (let k = 0; k < keys.length; k++) {
-    if (k > 0 && keys[k] === keys[k - 1]) continue;
-    const low = Math.floor(keys[k] / points);
-    edges[count++] = low;
-    edges[count++] = keys[k] - low * points;
-  }
-  return edges.slice(0, count);
+  const unique = keys.sort().filter((key, k) => k === 0 || key !== keys[k - 1]);
+  return Uint32Array.from({ length: 2 * unique.length }, (_, k) => {
+    const key = unique[k >> 1];
+    return k % 2 === 0 ? Math.floor(key / points) : key % points;
+  });
 }
 
 function fansOf(triangles: Uint32Array, points: number): Pick<Surface, 'fanStarts' | 'fans'> {

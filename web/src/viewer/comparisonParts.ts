@@ -1,5 +1,5 @@
 import { html, nothing, type TemplateResult } from 'lit';
-import { heatGradient } from '../render/colorMap';
+import { HEAT } from '../render/colorMap';
 import type { Side } from '../render/drawn';
 import type { Dropped } from '../files/classify';
 import { pickFiles } from '../files/drop';
@@ -8,7 +8,6 @@ import type { HeatRange, MeasuredFrame } from './heatMap';
 import type { Player } from './player';
 import { count, percent, threeDigits } from '../text';
 
-/** What the parts of a comparison ask the viewer to do. */
 export interface ComparisonActs {
   open(files: readonly Dropped[]): void;
   close(): void;
@@ -78,7 +77,7 @@ export function rangeChoice(player: Player) {
 function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {
   const { diagonal, precision } = stage.decoder;
   const more = heatMap.largest < largest ? ' and above' : '';
-  return html`<div class="bar" .style=${`background: ${heatGradient()}`}></div>
+  return html`<div class="bar" .style=${`background: ${HEAT.gradient}`}></div>
     <div class="spread muted figures">
       <span>0</span
       ><span>${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})${more}</span>

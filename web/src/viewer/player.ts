@@ -40,10 +40,8 @@ export class Player {
   readonly controls: CameraControls;
   readonly resolution: Resolution;
   progress: Progress | null = null;
-  /** The place that is shown. */
   readonly playback: Playback;
   readonly heatMap: HeatMap;
-  /** The original frames, where they are at hand. */
   readonly comparison: Comparison;
   private readonly motion: Motion;
   /** The camera that frames the motion as it was known last, and whether it does so from the usual side. */
@@ -229,7 +227,6 @@ export class Player {
     return positions;
   }
 
-  /** The picture as it is now. */
   picture(): Promise<Blob> {
     this.resolution.share = 1;
     this.stage.renew();
@@ -252,13 +249,13 @@ export class Player {
     const { capture } = this;
     try {
       // What the page cannot compute comes from the service.
-      const fetched = canCompute(capture.static.system) ? undefined : capture.coordinates;
-      const doing = fetched ? 'Loading coordinates' : 'Computing coordinates';
+      const isFetched = !canCompute(capture.static.system) && capture.coordinates !== undefined;
+      const doing = isFetched ? 'Loading coordinates' : 'Computing coordinates';
       const onProgress = (fraction: number) => this.report({ doing, fraction });
       onProgress(0);
-      const phi = await (fetched?.(onProgress, signal) ??
-        capture.phi?.(onProgress, signal) ??
-        computePhi(capture.static, { signal, onProgress }));
+      const phi = isFetched
+        ? await capture.coordinates!(onProgress, signal)
+        : await (capture.phi?.(onProgress, signal) ?? computePhi(capture.static, { signal, onProgress }));
       await this.stage.decoder.setPhi(phi);
       signal.throwIfAborted();
       this.motion.setPhi(phi);

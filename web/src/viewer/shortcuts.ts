@@ -19,8 +19,8 @@ const TABLE = [
       { action: 'last', keys: ['End'], label: 'Last frame' },
       { action: 'slower', keys: ['<', '['], label: 'Slower' },
       { action: 'faster', keys: ['>', ']'], label: 'Faster' },
-      { action: 'loop', keys: ['l'], label: 'Toggle loop' },
-      { action: 'smooth', keys: ['s'], label: 'Toggle interpolation' },
+      { action: 'loop', keys: ['l'], label: 'Loop' },
+      { action: 'smooth', keys: ['s'], label: 'Interpolate between frames' },
       { action: 'worst', keys: ['m'], label: 'Go to worst frame' },
     ],
   },
@@ -28,7 +28,7 @@ const TABLE = [
     title: 'View',
     entries: [
       { action: 'frame', keys: ['f'], label: 'Frame all' },
-      { action: 'follow', keys: ['y'], label: 'Toggle follow' },
+      { action: 'follow', keys: ['y'], label: 'Follow the model' },
       { action: 'home', keys: ['0'], label: 'Reset view' },
       { action: 'turnLeft', keys: ['a'], label: 'Orbit left' },
       { action: 'turnRight', keys: ['d'], label: 'Orbit right' },
@@ -86,19 +86,23 @@ export function actionOfKey(event: KeyboardEvent): Action | null {
   return actionOf(event);
 }
 
+const ENTRIES = new Map(SHORTCUTS.flatMap(({ entries }) => entries.map((entry) => [entry.action, entry] as const)));
+
+/** What an action does, for people. */
+export function labelOf(action: Action): string {
+  return ENTRIES.get(action)!.label;
+}
+
+const KEY_NAMES: Readonly<Record<string, string>> = {
+  ' ': 'Space',
+  ArrowLeft: '←',
+  ArrowRight: '→',
+  PageUp: 'Page ↑',
+  PageDown: 'Page ↓',
+};
+
 /** The key for an action as it is written on keyboards. */
 export function keyLabel(action: Action): string {
-  const names: Record<string, string> = {
-    ' ': 'Space',
-    ArrowLeft: '←',
-    ArrowRight: '→',
-    PageUp: 'Page ↑',
-    PageDown: 'Page ↓',
-  };
-  for (const { entries } of SHORTCUTS) {
-    const found = entries.find((entry) => entry.action === action);
-    if (found)
-      return names[found.keys[0]] ?? (found.keys[0].length === 1 ? found.keys[0].toUpperCase() : found.keys[0]);
-  }
-  return '';
+  const [key] = ENTRIES.get(action)!.keys;
+  return KEY_NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key);
 }

@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import { describe, expect, test } from 'vitest';
-import { openBytes, rawPart, withPart } from '../../src/container/testSupport';
+import { openBytes, rawPart, withPart } from '../support/containers';
 import { seriousFindings } from './harness/axe';
 import { chromium } from './harness/programs';
 import { FilePages, goldenBytes, inViewer } from './harness/viewing';

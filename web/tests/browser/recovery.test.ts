@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { openBytes } from '../../src/container/testSupport';
+import { openBytes } from '../support/containers';
 import { diagonalOf } from '../../src/coordinates/topology';
 import { seriousFindings } from './harness/axe';
 import { openPage } from './harness/browser';
