@@ -462,7 +462,7 @@ async function roles(page: Page): Promise<Record<string, string>> {
   return selects.evaluateAll((found) =>
     Object.fromEntries(
       (found as HTMLSelectElement[]).map((select) => [
-        select.getAttribute('aria-label')!.replace(/^What (.*) is$/, '$1'),
+        select.getAttribute('aria-label')!.replace(/^Role of /, ''),
         select.value,
       ]),
     ),
