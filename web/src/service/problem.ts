@@ -31,7 +31,7 @@ const ADVICE: Readonly<Record<string, string>> = {
   'too-many-sessions': 'Delete sessions that are no longer needed.',
   'storage-full': 'Ask your administrator to free disk space.',
   'storage-failed': 'Ask your administrator to check the disk.',
-  'frame-conflict': 'Upload into a new session.',
+  'frame-conflict': 'Upload to a new session.',
 };
 
 /** A request that failed. `message` is a sentence to show. */
