@@ -64,7 +64,7 @@ const RANGE_NAMES: Readonly<Record<HeatRange, string>> = { clip: 'Whole clip', f
 /** Which points the warm end of the colours is of: 99 of 100 stay below it. */
 export function rangeChoice(player: Player) {
   const { kind, range } = player.heatMap;
-  return html`<div class="segments" role="group" aria-label="Range of the colours (99th percentile)">
+  return html`<div class="segments" role="group" aria-label="Colour range (99th percentile)">
     ${(Object.keys(RANGE_NAMES) as HeatRange[]).map(
       (each) =>
         html`<button aria-pressed=${String(each === range)} @click=${() => player.setHeat(kind, each)}>

@@ -50,7 +50,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     await inViewer(page, (viewer) => viewer.pause(), null);
     await page.keyboard.press('Home');
     await page.keyboard.press('h');
-    await page.getByRole('group', { name: /^Range of the colours/ }).waitFor();
+    await page.getByRole('group', { name: /^Colour range/ }).waitFor();
     const largest = async (frame: number) => {
       await inViewer(page, (viewer, wanted) => (viewer.frame = wanted), frame);
       await page.waitForTimeout(300);
@@ -79,7 +79,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     await page.getByText('Error against the original').waitFor();
     await page.keyboard.press('o');
     await expect.poll(() => page.getByRole('button', { name: 'Both' }).getAttribute('aria-pressed')).toBe('true');
-    const line = page.getByRole('slider', { name: 'Where the original ends' });
+    const line = page.getByRole('slider', { name: 'Divider between original and decoded' });
     await line.focus();
     await page.keyboard.press('ArrowLeft');
     await expect.poll(() => line.getAttribute('aria-valuenow')).toBe('48');

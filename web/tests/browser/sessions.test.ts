@@ -113,7 +113,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     await tabTo(page, 'Delete doomed');
     await page.keyboard.press('Enter');
     await page.getByRole('dialog', { name: 'Delete “doomed”?' }).waitFor();
-    expect(await focused(page)).toBe('Keep it');
+    expect(await focused(page)).toBe('Cancel');
     await page.keyboard.press('Escape');
     await expect.poll(() => page.getByRole('dialog').count()).toBe(0);
     expect(await focused(page)).toBe('Delete doomed');

@@ -176,7 +176,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await page.reload();
     await page.getByRole('heading', { name: 'Upload of “wave” was interrupted' }).waitFor();
     await drop(page, files);
-    await page.getByRole('button', { name: 'Go on' }).click();
+    await page.getByRole('button', { name: 'Resume' }).click();
     await page.getByRole('button', { name: 'Use this cage' }).click({ timeout: 30_000 });
     const id = await encoded(page);
     expect((await site.client().session(id)).frames.solved).toBe(24);
@@ -216,7 +216,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await page.getByText('You can watch while it uploads').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
     await page.getByRole('heading', { name: /Stopped/ }).waitFor();
-    await page.getByRole('button', { name: 'Go on' }).click();
+    await page.getByRole('button', { name: 'Resume' }).click();
     await page.getByText('You can watch while it uploads').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
     const before = await sessions(site);
@@ -275,7 +275,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
       if (first) posted.push(Number(first[1]));
     });
     await slow(page, {});
-    await page.getByRole('button', { name: 'Go on' }).click();
+    await page.getByRole('button', { name: 'Resume' }).click();
     expect(await encoded(page)).toBe(id);
     expect(Math.min(...posted)).toBe(firstMissing);
     expect((await site.client(TOKEN).session(id)).frames).toMatchObject({ solved: LARGE_FRAMES, missing: [] });
