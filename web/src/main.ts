@@ -1,7 +1,7 @@
 import { fragmentOf, parseFragment, type Route } from './routes';
 import { page, tokens } from './style/tokens';
-import { isContainer, type Dropped } from './upload/classify';
-import { pickedFiles } from './upload/drop';
+import { isContainer, type Dropped } from './files/classify';
+import { pickedFiles } from './files/drop';
 
 document.adoptedStyleSheets = [tokens.styleSheet!, page.styleSheet!];
 
@@ -10,7 +10,6 @@ let dropped: readonly Dropped[] = [];
 /** The route that is shown: a change of the view alone does not load it anew. */
 let shown = '';
 
-/** Loads what a route needs and makes its element. */
 async function elementOf(route: Route, view: string): Promise<HTMLElement> {
   switch (route.page) {
     case 'session':
@@ -48,7 +47,7 @@ async function show(anew = false) {
     const message = document.createElement('p');
     message.className = 'failure';
     message.setAttribute('role', 'alert');
-    message.textContent = 'A part of the page could not be loaded; reload it when the service answers again.';
+    message.textContent = 'Part of the page could not be loaded. Check your connection and reload.';
     if (shown === wanted) document.body.replaceChildren(message);
   }
 }

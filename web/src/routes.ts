@@ -2,7 +2,6 @@
 
 import type { JobKind } from './viewer/jobCapture';
 
-/** Where in the page somebody is. */
 export type Route =
   { page: 'sessions' } | { page: 'session' | JobKind; id: string } | { page: 'file' } | { page: 'upload' };
 

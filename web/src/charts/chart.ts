@@ -1,7 +1,7 @@
 import { html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
 import { controls } from '../style/controls';
-import { threeDigits } from '../viewer/text';
+import { threeDigits } from '../text';
 import { axisOf, type Axis } from './axis';
 import { chartStyle } from './chartStyle';
 import { plot, plotStyle, type Point, type Series } from './plot';
@@ -193,10 +193,4 @@ function tick(value: number): string {
   return Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-4)
     ? value.toExponential(0)
     : String(Number(value.toPrecision(6)));
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-chart': Chart;
-  }
 }

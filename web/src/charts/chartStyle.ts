@@ -1,6 +1,5 @@
 import { css } from 'lit';
 
-/** Looks of a chart with a legend, beside `plotStyle`. */
 export const chartStyle = css`
   :host {
     display: block;

@@ -65,7 +65,6 @@ export function thinned(values: ArrayLike<number>, place: (k: number) => number,
   return [...found.values()];
 }
 
-/** Looks of {@link plot}. */
 export const plotStyle = css`
   svg.plot {
     position: absolute;

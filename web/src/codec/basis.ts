@@ -1,6 +1,4 @@
-/**
- * The coordinates in which cages are coded: what a cage's rows do to the model; docs/FORMAT.md, "Basis". `crates/codec/src/basis.rs` is the reference.
- */
+/** The coordinates in which cages are coded: what a cage's rows do to the model; docs/FORMAT.md, "Basis". `crates/codec/src/basis.rs` is the reference. */
 
 import { cholesky, multiply, solveTransposed, transposedTimesSelf } from './dense';
 import { eigenvectors } from './eigen';

@@ -26,11 +26,7 @@ export interface CageNumbers {
   readonly numbers: Int32Array;
 }
 
-/**
- * Reads the numbers of a group of so many frames.
- *
- * @throws {CodedDataError} for bytes that the encoder did not write.
- */
+/** Reads the numbers of a group of so many frames. */
 export function decodeCageNumbers(bytes: Uint8Array, frames: number, rows: number): CageNumbers {
   if (bytes.length < HEAD_BYTES) {
     throw new CodedDataError('a group of cages is cut');
@@ -52,11 +48,7 @@ export function decodeCageNumbers(bytes: Uint8Array, frames: number, rows: numbe
   return { frames, rotated: kind === 1, step, components, trajectories, numbers };
 }
 
-/**
- * The rows of all frames of a group, frames × rows × 3.
- *
- * @param rest rows of the rest pose, rows × 3.
- */
+/** The rows of all frames of a group, frames × rows × 3. */
 export function cagesOf(group: CageNumbers, basis: CageBasis, rest: Float64Array): Float32Array {
   const { frames, components, trajectories, numbers, step } = group;
   const rows = rest.length / 3;

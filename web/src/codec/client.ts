@@ -11,7 +11,6 @@ export interface Codec {
    * Calls a method of the capture's `GroupDecoder`.
    *
    * @param signal gives up a call that waits for others.
-   * @throws {CodedDataError} for bytes that the encoder did not write.
    */
   call<M extends Method>(method: M, args: Arguments<M>, signal?: AbortSignal): Promise<Result<M>>;
   /** Ends the worker; calls that wait fail. */

@@ -2,7 +2,7 @@ import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { parseHead } from '../container/head';
 import { parseFields } from '../container/section';
-import { openBytes, randomNumbers, takeApart } from '../container/testSupport';
+import { openBytes, randomNumbers, takeApart } from '../../tests/support/containers';
 import { diagonalOf } from '../coordinates/topology';
 import { decodeFaces } from './connectivity';
 import { CodedDataError } from './error';

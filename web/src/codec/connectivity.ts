@@ -24,11 +24,7 @@ const MAX_COUNT = 0xffffffff;
 
 const WRONG_COUNTS = 'faces are not those that the header counts';
 
-/**
- * Decodes `faces` faces with `corners` corners in all, over so many points.
- *
- * @throws {CodedDataError} for bytes that the encoder did not write.
- */
+/** Decodes `faces` faces with `corners` corners in all, over so many points. */
 export function decodeFaces(bytes: Uint8Array, points: number, faces: number, corners: number): Polygons {
   const decoder = new RangeDecoder(bytes);
   const polygons = new Walk(decoder, points, faces, corners).run();

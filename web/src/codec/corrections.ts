@@ -15,7 +15,6 @@ export interface Corrections {
  * Decodes the corrections of a group, none of no bytes.
  *
  * @param step unit of the corrections.
- * @throws {CodedDataError} for bytes that the encoder did not write.
  */
 export function decodeCorrections(bytes: Uint8Array, frames: number, points: number, step: number): Corrections {
   const correctionStarts = new Uint32Array(frames + 1);

@@ -10,9 +10,7 @@ const ROTATIONS = 1 << 14;
 /** Rows of the vectors that are rotated together. */
 const ROWS = 4;
 
-/**
- * Eigenvectors of a symmetric matrix n × n as columns, in the order of descending eigenvalues; null where the matrix is not finite.
- */
+/** Eigenvectors of a symmetric matrix n × n as columns, in the order of descending eigenvalues; null where the matrix is not finite. */
 export function eigenvectors(matrix: Float64Array, n: number): Float64Array | null {
   if (!matrix.every((x) => Number.isFinite(x))) {
     return null;

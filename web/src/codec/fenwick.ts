@@ -5,7 +5,6 @@ export class CountedSet {
   private readonly reach: number;
   private size = 0;
 
-  /** Of none of the numbers. */
   constructor(limit: number) {
     this.sums = new Uint32Array(limit + 1);
     let reach = 1;
@@ -15,18 +14,8 @@ export class CountedSet {
     this.reach = reach;
   }
 
-  /** How many are in the set. */
   get count(): number {
     return this.size;
-  }
-
-  /** How many of the set are below this number. */
-  before(number: number): number {
-    let count = 0;
-    for (let at = Math.min(number, this.sums.length - 1); at > 0; at &= at - 1) {
-      count += this.sums[at];
-    }
-    return count;
   }
 
   /** The number of the set that has so many of it below; null where there is none. */
@@ -46,7 +35,6 @@ export class CountedSet {
     return at;
   }
 
-  /** Adds a number that is not in the set. */
   add(number: number): void {
     this.size++;
     for (let at = number + 1; at < this.sums.length; at += at & -at) {
@@ -54,7 +42,6 @@ export class CountedSet {
     }
   }
 
-  /** Takes a number out that is in the set. */
   remove(number: number): void {
     this.size--;
     for (let at = number + 1; at < this.sums.length; at += at & -at) {
@@ -62,7 +49,6 @@ export class CountedSet {
     }
   }
 
-  /** Takes all numbers out. */
   clear(): void {
     this.size = 0;
     this.sums.fill(0);

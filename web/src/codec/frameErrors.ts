@@ -10,11 +10,7 @@ const LEFT_OUT = 12;
 /** What the numbers that are left are below. */
 const NUMBERS = 2 ** (32 - LEFT_OUT);
 
-/**
- * Decodes the errors of so many frames.
- *
- * @throws {CodedDataError} for bytes that the encoder did not write.
- */
+/** Decodes the errors of so many frames. */
 export function decodeFrameErrors(bytes: Uint8Array, frames: number): FrameErrors {
   const decoder = new RangeDecoder(bytes);
   const errors = { l2: new Float32Array(frames), linf: new Float32Array(frames) };

@@ -5,10 +5,8 @@ const TILE = 4;
 export class GramMatrix {
   /** The lower half, diagonal included, of the matrix rows × rows. */
   readonly lower: Float64Array;
-  /** Points that were added. */
   points = 0;
 
-  /** @param rows columns of Φ that count, from the first on */
   constructor(readonly rows: number) {
     this.lower = new Float64Array(rows * rows);
   }

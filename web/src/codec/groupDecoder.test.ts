@@ -1,6 +1,6 @@
 import { readFileSync } from 'node:fs';
 import { expect, it } from 'vitest';
-import { allBlocks, openBytes, positionsOf } from '../container/testSupport';
+import { allBlocks, openBytes, positionsOf } from '../../tests/support/containers';
 import { diagonalOf } from '../coordinates/topology';
 import { decodeFaces } from './connectivity';
 import { CodedDataError } from './error';

@@ -17,17 +17,14 @@ export class GroupDecoder {
   private hierarchy: Hierarchy | null = null;
   private basis: CageBasis | null = null;
 
-  /** {@link decodeFaces} */
   faces(bytes: Uint8Array, points: number, faces: number, corners: number): Polygons {
     return decodeFaces(bytes, points, faces, corners);
   }
 
-  /** {@link decodePositions} */
   positions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
     return decodePositions(bytes, faces, points);
   }
 
-  /** {@link decodeFrameErrors} */
   errors(bytes: Uint8Array, frames: number): FrameErrors {
     return decodeFrameErrors(bytes, frames);
   }
@@ -46,11 +43,7 @@ export class GroupDecoder {
     this.basis.add(coordinates, columns);
   }
 
-  /**
-   * The cages of a group of so many frames, frames × rows × 3.
-   *
-   * @param rest rows of the rest pose, rows × 3.
-   */
+  /** The cages of a group of so many frames, frames × rows × 3. */
   cages(bytes: Uint8Array, frames: number, rest: Float64Array): Float32Array {
     const numbers = decodeCageNumbers(bytes, frames, rest.length / 3);
     if (this.basis === null) {

@@ -2,7 +2,6 @@
 
 import type { GroupDecoder } from './groupDecoder';
 
-/** Names of the methods of {@link GroupDecoder}. */
 export type Method = 'faces' | 'positions' | 'errors' | 'setModel' | 'addCoordinates' | 'cages' | 'residual';
 
 export interface Call {

@@ -1,5 +1,5 @@
 import { expect, it } from 'vitest';
-import { randomNumbers } from '../container/testSupport';
+import { randomNumbers } from '../../tests/support/containers';
 import { OpenEdges } from './openEdges';
 
 it('a long list does what a short one does', () => {

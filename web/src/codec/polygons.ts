@@ -8,6 +8,10 @@ export interface Polygons {
 
 export const NO_POLYGONS: Polygons = { counts: new Uint32Array(0), corners: new Uint32Array(0) };
 
+export function polygonsOf(triangles: Uint32Array): Polygons {
+  return { counts: new Uint32Array(triangles.length / 3).fill(3), corners: triangles };
+}
+
 /** Fans of triangles around each face's first corner, three indices each. */
 export function triangulated({ counts, corners }: Polygons): Uint32Array {
   let total = 0;

@@ -15,8 +15,6 @@ const HEAD_BYTES = GRID_BYTES + WEIGHTS_BYTES;
 /**
  * Decodes the positions of so many points, x y z each, that the encoder wrote for the same faces in the same order. Damaged bytes may give positions that are
  * not finite.
- *
- * @throws {CodedDataError} for bytes that the encoder did not write.
  */
 export function decodePositions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
   if (bytes.length < HEAD_BYTES) {

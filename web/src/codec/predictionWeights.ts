@@ -7,7 +7,6 @@
 const PARTS = 32;
 /** By how many parallelograms predict a vertex, these and more alike. */
 const CLASSES = 3;
-/** Bytes of the weights. */
 export const WEIGHTS_BYTES = 2 * CLASSES;
 
 /** Of each class the weight of the parallelograms and that of the neighbours, as differences to the middle of the edges that the parallelograms lean on. */

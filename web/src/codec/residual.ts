@@ -22,7 +22,6 @@ const PARTS = 16;
  * Decodes the residual of a group of so many frames.
  *
  * @param mostNumbers most numbers of its components, three for each point.
- * @throws {CodedDataError} for bytes that the encoder did not write.
  */
 export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: number, mostNumbers: number): Residual {
   const points = hierarchy.order.length;
@@ -147,6 +146,7 @@ export function addResidual(residual: Residual, frame: number, positions: Float3
   const sums = new Float64Array(positions.length);
   for (let k = 0; k < rank; k++) {
     const factor = trajectories[frame * rank + k];
+    if (factor === 0) continue;
     for (let at = 0, from = k * positions.length; at < positions.length; at++, from++) {
       sums[at] += factor * shapes[from];
     }

@@ -6,9 +6,7 @@ import type { Predictions } from './parallelograms';
 import type { Polygons } from './polygons';
 import type { PredictionWeights } from './predictionWeights';
 
-/**
- * Predicts vertices, one after another, by parallelograms and neighbours, weighted. How far those of neighbours were off says how large a number will be.
- */
+/** Predicts vertices, one after another, by parallelograms and neighbours, weighted. How far those of neighbours were off says how large a number will be. */
 export class StepPredictor {
   private readonly neighbours: ByVertex;
   private readonly isKnown: Uint8Array;

@@ -4,6 +4,7 @@ import { CodedDataError } from './error';
 import { GroupDecoder } from './groupDecoder';
 import type { Answer, Call } from './messages';
 import { transferables } from './messages';
+import { sentence } from '../text';
 
 const decoder = new GroupDecoder();
 
@@ -14,11 +15,7 @@ self.onmessage = ({ data }: MessageEvent<Call>) => {
     const call = decoder[method] as (this: GroupDecoder, ...args: unknown[]) => unknown;
     answer = { id, result: call.apply(decoder, args) };
   } catch (error) {
-    answer = {
-      id,
-      failure: error instanceof Error ? error.message : String(error),
-      damaged: error instanceof CodedDataError,
-    };
+    answer = { id, failure: sentence(error), damaged: error instanceof CodedDataError };
   }
   postMessage(answer, { transfer: transferables(answer) });
 };

@@ -28,7 +28,6 @@ export interface DecodedBlock {
   readonly problem: Error | null;
 }
 
-/** Decodes the blocks of one capture. */
 export class BlockDecoder {
   private basis: Promise<void> | null = null;
   /** Φ of all points, where the basis is of all of them, until it is handed on. */
@@ -168,7 +167,6 @@ function sampledPoints({ rest }: StaticPart): Uint32Array {
   return Uint32Array.from({ length: Math.ceil(rest.length / 3 / stride) }, (_, k) => k * stride);
 }
 
-/** x y z of the points with these indices. */
 function pointsAt(positions: Float64Array, indices: Uint32Array): Float64Array {
   const points = new Float64Array(3 * indices.length);
   indices.forEach((index, k) => points.set(positions.subarray(3 * index, 3 * index + 3), 3 * k));

@@ -8,7 +8,6 @@ export class ByteQueue {
     return this.end - this.start;
   }
 
-  /** Copies a piece to the end. */
   append(piece: Uint8Array): void {
     if (this.end + piece.length > this.buffer.length) {
       const needed = this.length + piece.length;

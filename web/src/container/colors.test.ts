@@ -1,6 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import { CODEC, HEADER_BYTES, viewOf } from './section';
-import { allBlocks, goldenBytes, offsetOf, openBytes, type Part, rawPart, streamedPart, withPart } from './testSupport';
+import {
+  allBlocks,
+  goldenBytes,
+  offsetOf,
+  openBytes,
+  type Part,
+  rawPart,
+  streamedPart,
+  withPart,
+} from '../../tests/support/containers';
 
 const POINTS = 120;
 const golden = goldenBytes('definition3-mvc');

@@ -13,7 +13,7 @@ import {
   streamedPart,
   takeApart,
   withPart,
-} from './testSupport';
+} from '../../tests/support/containers';
 
 const SENTENCES = /^[A-Z].*\.$/s;
 

@@ -16,8 +16,8 @@ export class ContainerError extends Error {
 }
 
 export function notAContainer(): ContainerError {
-  const what = 'This is not a .cager file: its first bytes differ.';
-  return new ContainerError('not-a-container', `${what} Choose a file that cager encode or a session wrote.`);
+  const what = 'This is not a .cager file.';
+  return new ContainerError('not-a-container', `${what} Choose one from cager encode or a session.`);
 }
 
 export function newerVersion(version: number): ContainerError {
@@ -28,13 +28,13 @@ export function newerVersion(version: number): ContainerError {
 /** For a required section, a codec or a coordinate system of a later program. */
 export function unknownFeature(feature: string): ContainerError {
   const name = feature.replace(/[^ -~]/g, '?').slice(0, 60);
-  const what = `The file needs the feature “${name}”, which this page does not have.`;
+  const what = `The file needs the feature “${name}”, which this viewer does not support.`;
   return new ContainerError('newer', `${what} Use a newer viewer.`);
 }
 
 /** @param what the part of a sentence that says what does not fit */
 export function damaged(offset: number, what: string): ContainerError {
-  return new ContainerError('damaged', `The file is damaged at byte ${offset}: ${what}. Get the file again.`);
+  return new ContainerError('damaged', `The file is damaged at byte ${offset}: ${what}. Download or copy it again.`);
 }
 
 export function checksumDamage(offset: number): ContainerError {

@@ -1,7 +1,14 @@
 import { describe, expect, it } from 'vitest';
 import { diagonalOf } from '../coordinates/topology';
 import golden from './harmonicPhi.json';
-import { allBlocks, GOLDEN, goldenBytes, goldenPositions, openBytes, positionsOf } from './testSupport';
+import {
+  allBlocks,
+  GOLDEN,
+  goldenBytes,
+  goldenPositions,
+  openBytes,
+  positionsOf,
+} from '../../tests/support/containers';
 
 /** How far a decoded point may be from what the program decoded, over the diagonal; as in tests/cli/golden.rs. */
 const TOLERANCE = 1e-7;

@@ -17,13 +17,12 @@ export interface Chunk {
 /** Sections as they follow each other in a file. */
 export class Layout {
   readonly chunks: Chunk[] = [];
-  private readonly entries: Entry[] = [];
+  readonly entries: Entry[] = [];
   private readonly byTag = new Map<string, Entry>();
   private pendingResidual: Entry | null = null;
   /** Where the next section begins. */
   end = PRELUDE_BYTES;
 
-  /** Number of frames. */
   get frames(): number {
     const last = this.chunks.at(-1)?.frames.fields;
     return last === undefined ? 0 : last.first + last.count;
@@ -39,21 +38,11 @@ export class Layout {
     return bytes;
   }
 
-  /** Number of sections. */
-  get length(): number {
-    return this.entries.length;
-  }
-
-  at(place: number): Entry {
-    return this.entries[place];
-  }
-
   /** The one section with this tag. */
   get(tag: string): Entry | undefined {
     return this.byTag.get(tag);
   }
 
-  /** Adds the section that follows. */
   add(entry: Entry): void {
     const { tag, first, count, codec } = entry.fields;
     if (!KNOWN_TAGS.has(tag) && isRequired(tag)) {

@@ -105,7 +105,6 @@ async function decodePoints(
   return positions;
 }
 
-/** Whether a section of a mesh is coded. */
 function isCoded({ fields }: Entry): boolean {
   return fields.codec === CODEC.codedStatic;
 }

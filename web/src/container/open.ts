@@ -29,7 +29,6 @@ export interface OpenOptions {
   readonly signal?: AbortSignal;
 }
 
-/** A capture in a container. */
 export interface ContainerCapture extends Capture {
   readonly head: Head;
 }
@@ -50,10 +49,10 @@ export async function openContainer(source: Source, options: OpenOptions = {}): 
   if (problem === null) {
     layout.checkComplete(head);
   }
-  for (let k = 0; k < layout.length; k++) {
-    const { tag } = layout.at(k).fields;
+  for (const entry of layout.entries) {
+    const { tag } = entry.fields;
     if (KNOWN_TAGS.has(tag) && tag !== 'HEAD') {
-      checkSize(layout.at(k), head, layout.frames, source.size);
+      checkSize(entry, head, layout.frames, source.size);
     }
   }
   const codec = options.codec ?? createCodec();

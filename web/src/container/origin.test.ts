@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest';
 import { writeEdited } from '../editing/editedContainer';
-import { LocalCodec } from '../codec/localCodec';
+import { LocalCodec } from '../../tests/support/localCodec';
 import { openOriginal } from '../originals/original';
 import { bytesSource } from './source';
-import { goldenBytes, openBytes, rawPart, streamedPart, takeApart, withPart } from './testSupport';
+import { goldenBytes, openBytes, rawPart, streamedPart, takeApart, withPart } from '../../tests/support/containers';
 
 const golden = goldenBytes('definition3-mvc');
 const origin = Float64Array.of(450000, 5400000, 0.5);

@@ -1,6 +1,6 @@
 import { expect, it, vi } from 'vitest';
 import { computeCoordinates } from '../coordinates/compute';
-import { goldenBytes, openBytes } from './testSupport';
+import { goldenBytes, openBytes } from '../../tests/support/containers';
 
 vi.mock('../coordinates/compute', { spy: true });
 const never = new AbortController().signal;

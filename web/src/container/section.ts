@@ -9,8 +9,8 @@ export const FOOTER_BYTES = 24;
 /** Bytes of an entry of the table of contents: an offset, and a section's header without its checksums. */
 export const ENTRY_BYTES = 40;
 
-const MAGIC = [0x89, 0x43, 0x47, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
-const FOOTER_MAGIC = [0x43, 0x47, 0x52, 0x45];
+export const MAGIC = [0x89, 0x43, 0x47, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
+export const FOOTER_MAGIC = [0x43, 0x47, 0x52, 0x45];
 
 /** Numbers of the codecs. `coded` are groups of frames, `codedStatic` meshes at rest and errors of frames. */
 export const CODEC = { raw: 0, planes: 1, difference: 2, coded: 3, codedStatic: 4 } as const;
@@ -102,15 +102,7 @@ export function checkFooter(bytes: Uint8Array, fileBytes: number): number {
 }
 
 export function sameFields(a: SectionFields, b: SectionFields): boolean {
-  return (
-    a.tag === b.tag &&
-    a.codec === b.codec &&
-    a.width === b.width &&
-    a.first === b.first &&
-    a.count === b.count &&
-    a.payloadBytes === b.payloadBytes &&
-    a.rawBytes === b.rawBytes
-  );
+  return (Object.keys(b) as (keyof SectionFields)[]).every((name) => a[name] === b[name]);
 }
 
 export function viewOf(bytes: Uint8Array): DataView {

@@ -23,7 +23,6 @@ export class SectionParser {
   /** Bytes of an unknown section that are still to come. */
   private unknown = 0;
 
-  /** Bytes that were appended in all. */
   received = 0;
 
   append(piece: Uint8Array): void {

@@ -1,5 +1,13 @@
 import { expect, it } from 'vitest';
-import { GOLDEN, goldenBytes, offsetOf, openBytes, streamedPart, withPart, rawPart } from './testSupport';
+import {
+  GOLDEN,
+  goldenBytes,
+  offsetOf,
+  openBytes,
+  streamedPart,
+  withPart,
+  rawPart,
+} from '../../tests/support/containers';
 
 it.each(GOLDEN)('model and cage of %s are the same in pieces of any size as read at random', async (name) => {
   const bytes = goldenBytes(name);

@@ -1,4 +1,4 @@
-/** Model and cage of a container that is read from front to back while it arrives, as that of a session that is still running. */
+/** A container that is read from front to back while it arrives, as that of a session that is still running. */
 
 import type { StaticPart } from '../capture';
 import type { Codec } from '../codec/client';
@@ -7,93 +7,122 @@ import { checksumDamage, damaged, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize } from './layout';
 import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
-import type { Entry } from './section';
+import { type Entry, HEADER_BYTES } from './section';
 import { type Arrival, SectionParser } from './sectionParser';
 import { KNOWN_TAGS } from './tag';
 
-/** Takes a container in pieces of any size until model and cage are whole. */
-export class StaticStream {
+/** A section and its header as it is in the file. */
+export interface StoredSection extends Section {
+  readonly header: Uint8Array;
+}
+
+/** Frames that are in one section, and the residual before it. */
+export interface StoredChunk {
+  readonly frames: StoredSection;
+  readonly residual: StoredSection | null;
+}
+
+/** Takes a container in pieces of any size: first model and cage, then chunks of frames, undecoded. */
+export class ContainerStream {
   private readonly parser = new SectionParser();
   private readonly sections = new Map<string, Section>();
   private head: Head | null = null;
   private colors: Uint8Array | null = null;
+  private residual: StoredSection | null = null;
+  /** Whether model and cage are there. */
+  private isBegun = false;
+  /** Frames whose sections began, and bytes that these take. */
+  private begun = { frames: 0, bytes: 0 };
 
-  constructor(private readonly codec: Codec) {}
+  get received(): number {
+    return this.parser.received;
+  }
+
+  /** Bytes that a frame takes, as of the sections that began; null before the first of them. */
+  get bytesPerFrame(): number | null {
+    return this.begun.frames > 0 ? this.begun.bytes / this.begun.frames : null;
+  }
 
   /**
-   * Takes a piece; gives model and cage once they are whole. Colours that are damaged, or come later, are left out.
+   * Takes a piece, and looks at it as far as model and cage; whether these are whole.
    *
    * @throws {ContainerError} where the bytes are no container, need a later program, or model or cage are damaged
    */
-  async push(piece: Uint8Array): Promise<StaticPart | null> {
+  begin(piece: Uint8Array): boolean {
+    this.parser.append(piece);
+    while (!this.isBegun) {
+      const arrival = this.parser.next();
+      if (arrival === null) break;
+      this.take(arrival);
+    }
+    return this.isBegun;
+  }
+
+  /** Model and cage, which are whole. Colours that are damaged, or come later, are left out. */
+  async decodeStatic(codec: Codec): Promise<StaticPart> {
+    const { layout } = this.parser;
+    const head = this.headBefore(layout.end);
+    layout.checkStatic(head);
+    const part = await decodeStatic(head, this.sections, codec);
+    return this.colors === null ? part : { ...part, colors: this.colors };
+  }
+
+  /**
+   * Takes a piece; gives the chunks that are whole.
+   *
+   * @throws {ContainerError} for bytes behind which nothing can be found, and for damaged frames.
+   */
+  *push(piece: Uint8Array): Generator<StoredChunk, void, undefined> {
     this.parser.append(piece);
     for (let arrival = this.parser.next(); arrival !== null; arrival = this.parser.next()) {
-      if (this.isWholeAfter(arrival)) {
-        const { layout } = this.parser;
-        const head = this.headBefore(layout.end);
-        layout.checkStatic(head);
-        const part = await decodeStatic(head, this.sections, this.codec);
-        return this.colors === null ? part : { ...part, colors: this.colors };
-      }
-    }
-    return null;
-  }
-
-  private isWholeAfter(arrival: Arrival): boolean {
-    switch (arrival.kind) {
-      case 'header':
-        return this.check(arrival.entry);
-      case 'section':
-        return this.take(arrival.section, arrival.isIntact);
-      default:
-        return true;
+      const chunk = this.take(arrival);
+      if (chunk !== null) yield chunk;
     }
   }
 
-  /** Checks what a section says before its payload is waited for; whether it can only come behind model and cage. */
-  private check(entry: Entry): boolean {
-    const { tag } = entry.fields;
+  private take(arrival: Arrival): StoredChunk | null {
+    if (arrival.kind === 'header') this.check(arrival.entry);
+    if (arrival.kind === 'end') this.isBegun = true;
+    return arrival.kind === 'section' ? this.takeSection(arrival) : null;
+  }
+
+  /** Checks what a section says before its payload is waited for. */
+  private check(entry: Entry): void {
+    const { tag, first, count, payloadBytes } = entry.fields;
     const { layout } = this.parser;
-    if (tag === 'HEAD') {
-      checkHeadSection(entry);
-      return false;
+    if (tag === 'HEAD') checkHeadSection(entry);
+    else if (KNOWN_TAGS.has(tag)) {
+      checkSize(entry, this.headBefore(entry.offset), layout.frames, layout.end);
+      // Colours may be among the sections of the static part, or anywhere else.
+      this.isBegun ||= !STATIC_TAGS.includes(tag) && tag !== 'rcol';
     }
-    if (!KNOWN_TAGS.has(tag)) {
-      return false;
+    if (tag === 'resi' || tag === 'FRAM') {
+      this.begun = { frames: first + count, bytes: this.begun.bytes + HEADER_BYTES + payloadBytes };
     }
-    checkSize(entry, this.headBefore(entry.offset), layout.frames, layout.end);
-    // Colours may be among the sections of the static part, or anywhere else.
-    return !STATIC_TAGS.includes(tag) && tag !== 'rcol';
   }
 
-  /** Takes a section; whether it is the last one of model and cage. */
-  private take(section: Section, isIntact: boolean): boolean {
+  private takeSection({ section, header, isIntact }: Arrival & { kind: 'section' }): StoredChunk | null {
     const { entry, payload } = section;
     const { tag } = entry.fields;
     try {
-      if (!isIntact) {
-        throw checksumDamage(entry.offset);
-      }
-      if (tag === 'rcol') {
-        this.colors = decodePayload(entry, payload);
-      } else if (tag === 'HEAD') {
-        this.head = parseHead(decodePayload(entry, payload), entry.offset);
-      } else {
-        this.sections.set(tag, section);
-      }
+      if (!isIntact) throw checksumDamage(entry.offset);
+      if (tag === 'rcol') this.colors = decodePayload(entry, payload);
+      if (tag === 'HEAD') this.head = parseHead(decodePayload(entry, payload), entry.offset);
     } catch (error) {
-      if (tag !== 'rcol' || !isTolerable(error, tag)) {
-        throw error;
-      }
+      if (tag !== 'rcol' || !isTolerable(error, tag)) throw error;
     }
+    if (STATIC_TAGS.includes(tag)) this.sections.set(tag, section);
     // Harmonic coordinates may have one more section, behind the others.
-    return tag === (this.head?.system === 'harmonic' ? 'ELEM' : 'CTRI');
+    this.isBegun ||= tag === (this.head?.system === 'harmonic' ? 'ELEM' : 'CTRI');
+    const { residual } = this;
+    if (tag === 'resi') this.residual = { ...section, header };
+    if (tag !== 'FRAM') return null;
+    this.residual = null;
+    return { frames: { ...section, header }, residual };
   }
 
   private headBefore(offset: number): Head {
-    if (this.head === null) {
-      throw damaged(offset, 'the section HEAD is missing');
-    }
+    if (this.head === null) throw damaged(offset, 'the section HEAD is missing');
     return this.head;
   }
 }

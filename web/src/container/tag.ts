@@ -1,6 +1,3 @@
-/** Tags of sections. */
-
-/** Tags of the sections that this reader knows. */
 export const KNOWN_TAGS: ReadonlySet<string> = new Set(
   'HEAD ORIG RPTS RFAC rcol CVTX CTRI ELEM FRAM resi ERRS fnum summ TOC_'.split(' '),
 );

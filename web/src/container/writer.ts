@@ -1,10 +1,17 @@
 /** Writes containers from front to back; docs/FORMAT.md. */
 
 import { crc32c } from './crc32c';
-import { ENTRY_BYTES, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, type SectionFields, viewOf } from './section';
+import {
+  ENTRY_BYTES,
+  FOOTER_BYTES,
+  FOOTER_MAGIC,
+  HEADER_BYTES,
+  MAGIC,
+  PRELUDE_BYTES,
+  type SectionFields,
+  viewOf,
+} from './section';
 
-const MAGIC = [0x89, 0x43, 0x47, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
-const FOOTER_MAGIC = 'CGRE';
 const VERSION = 1;
 
 /** What a section's header says beside its lengths, which are those of its payload where nothing else is said. */
@@ -36,7 +43,7 @@ export class ContainerWriter {
     const view = viewOf(footer);
     view.setBigUint64(0, BigInt(offset), true);
     view.setBigUint64(8, BigInt(this.length + FOOTER_BYTES), true);
-    footer.set(new TextEncoder().encode(FOOTER_MAGIC), 16);
+    footer.set(FOOTER_MAGIC, 16);
     view.setUint32(20, crc32c(footer.subarray(0, 20)), true);
     this.push(footer);
     return new Blob(this.pieces, { type: 'application/vnd.cager' });

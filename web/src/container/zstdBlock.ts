@@ -53,7 +53,6 @@ const KINDS = [
   },
 ] as const;
 
-/** Decodes the compressed blocks of one frame, one after another. */
 export class BlockDecoder {
   private huffman: HuffmanTable | null = null;
   private tables: StateTable[] = [];

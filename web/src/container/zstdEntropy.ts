@@ -52,7 +52,6 @@ export function stateTable(counts: readonly number[], log: number): StateTable {
   return { log, symbols, bits, bases };
 }
 
-/** The table with a single symbol. */
 export function singleState(symbol: number): StateTable {
   return { log: 0, symbols: Uint8Array.of(symbol), bits: new Uint8Array(1), bases: new Uint16Array(1) };
 }

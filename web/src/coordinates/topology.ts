@@ -43,30 +43,25 @@ export function topologyOf(cage: TriangleMesh): Topology {
   return { edges: Uint32Array.from(edges), triangleEdges, signs };
 }
 
-/** Length of the diagonal of the axis-parallel bounding box of points, x y z each; 0 for none. */
-export function diagonalOf(positions: ArrayLike<number>): number {
-  let sum = 0;
-  for (let axis = 0; axis < 3; axis++) {
-    let [low, high] = [Infinity, -Infinity];
-    for (let k = axis; k < positions.length; k += 3) {
-      low = Math.min(low, positions[k]);
-      high = Math.max(high, positions[k]);
-    }
-    if (high > low) sum += (high - low) ** 2;
+/** Lowest and highest coordinates of points, x y z each, along every axis; infinite the wrong way round of none. */
+export function boundsOf(positions: ArrayLike<number>): { readonly low: number[]; readonly high: number[] } {
+  const [low, high] = [Array<number>(3).fill(Infinity), Array<number>(3).fill(-Infinity)];
+  for (let k = 0; k < positions.length; k++) {
+    low[k % 3] = Math.min(low[k % 3], positions[k]);
+    high[k % 3] = Math.max(high[k % 3], positions[k]);
   }
-  return Math.sqrt(sum);
+  return { low, high };
 }
 
-/** The middle of the bounding box of points, x y z each. */
-export function middleOf(positions: Float64Array): [number, number, number] {
-  const middle: [number, number, number] = [0, 0, 0];
-  for (let axis = 0; axis < 3; axis++) {
-    let [low, high] = [Infinity, -Infinity];
-    for (let k = axis; k < positions.length; k += 3) {
-      low = Math.min(low, positions[k]);
-      high = Math.max(high, positions[k]);
-    }
-    if (high >= low) middle[axis] = low / 2 + high / 2;
-  }
-  return middle;
+/** Length of the diagonal of the axis-parallel bounding box of points, x y z each; 0 for none. */
+export function diagonalOf(positions: ArrayLike<number>): number {
+  const { low, high } = boundsOf(positions);
+  return Math.sqrt(low.reduce((sum, least, k) => sum + Math.max(0, high[k] - least) ** 2, 0));
+}
+
+/** The middle of the bounding box of points, x y z each; the origin for none. */
+export function middleOf(positions: ArrayLike<number>): [number, number, number] {
+  const { low, high } = boundsOf(positions);
+  const at = (k: number) => (high[k] >= low[k] ? low[k] / 2 + high[k] / 2 : 0);
+  return [at(0), at(1), at(2)];
 }

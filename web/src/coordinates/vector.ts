@@ -1,4 +1,3 @@
-/** A point or vector. */
 export type Vector = readonly [number, number, number];
 
 export const sub = (a: Vector, b: Vector): Vector => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -24,7 +23,6 @@ export function pointAt(positions: ArrayLike<number>, index: number): Vector {
   return [positions[3 * index], positions[3 * index + 1], positions[3 * index + 2]];
 }
 
-/** Square of the distance of a point from a triangle. */
 export function squaredDistanceToTriangle(a: Vector, b: Vector, c: Vector, x: Vector): number {
   const [u, v, w] = [sub(b, a), sub(c, a), sub(x, a)];
   const n = cross(u, v);

@@ -1,4 +1,5 @@
 import { columnsOf, rowsOf } from './compute';
+import { sentence } from '../text';
 import type { RowOf } from './meanValue';
 import type { FromWorker, ToWorker } from './messages';
 
@@ -17,7 +18,7 @@ self.addEventListener('message', ({ data }: MessageEvent<ToWorker>) => {
       answer({ kind: 'rows', slice: data.slice, rows }, [rows.buffer]);
     }
   } catch (error) {
-    answer({ kind: 'failed', problem: error instanceof Error ? error.message : String(error) }, []);
+    answer({ kind: 'failed', problem: sentence(error) }, []);
   }
 });
 

@@ -24,9 +24,7 @@ export interface CageEdit {
   readonly enabled: boolean;
 }
 
-/**
- * How much of an edit a frame has, from 0 outside its range to 1: a smoothstep (3t² − 2t³) on either side, above 0 in every frame of the range.
- */
+/** How much of an edit a frame has, from 0 outside its range to 1: a smoothstep (3t² − 2t³) on either side, above 0 in every frame of the range. */
 export function weightAt({ first, last, easeIn, easeOut }: FrameRange, frame: number): number {
   if (frame < first || frame > last) return 0;
   return smoothstep((frame - first + 1) / (easeIn + 1)) * smoothstep((last - frame + 1) / (easeOut + 1));

@@ -38,9 +38,9 @@ export async function decodedFrames(
       positions = await new Response(response.body!.pipeThrough(counter)).blob();
     } catch (error) {
       signal?.throwIfAborted();
-      throw new Error('The connection to the service broke off; export again.', { cause: error });
+      throw new Error('The connection was lost. Export again.', { cause: error });
     }
-    if (received !== expected) throw new Error('The service sent fewer frames than were asked for; export again.');
+    if (received !== expected) throw new Error('The service sent too few frames. Export again.');
     pieces.push(positions);
   }
   return new Blob(pieces, { type: 'application/octet-stream' });

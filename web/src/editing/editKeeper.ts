@@ -36,7 +36,6 @@ export class EditKeeper {
     document.addEventListener('visibilitychange', this.flush);
   }
 
-  /** The edits as they are now. */
   note(edits: readonly CageEdit[]) {
     if (edits === this.edits) return;
     this.edits = edits;

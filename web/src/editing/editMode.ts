@@ -8,7 +8,6 @@ import './keptOffer';
 /** What the timeline shows before there is an edit: a strip without a range. */
 const NO_FRAMES: FrameRange = { first: 0, last: -1, easeIn: 0, easeOut: 0 };
 
-/** What edit mode needs of the viewer around it. */
 export interface EditHost extends HTMLElement {
   readonly player: Player | null;
   readonly renderRoot: HTMLElement | DocumentFragment;
@@ -21,7 +20,6 @@ export interface EditHost extends HTMLElement {
 export class EditMode {
   isOn = false;
   editor: CageEditor | null = null;
-  /** Whether the cage was shown before. */
   private showedCage = false;
   private keeper: EditKeeper | null = null;
 
@@ -40,12 +38,10 @@ export class EditMode {
     return this.isOn ? 0.38 : 0;
   }
 
-  /** Whether the capture is shown with edits. */
   get hasEdits(): boolean {
     return this.editor?.model.edits.some(counts) ?? false;
   }
 
-  /** Whether an edit changes a frame. */
   changes(frame: number): boolean {
     return this.editor?.model.edits.some((edit) => counts(edit) && weightAt(edit.range, frame) > 0) ?? false;
   }
@@ -73,7 +69,7 @@ export class EditMode {
       this.editor.addEventListener('leave', this.leave);
       this.editor.addEventListener('change', this.follow);
     } catch {
-      this.host.report('The editor could not be loaded; reload the page when the service answers again.');
+      this.host.report('The editor could not be loaded. Check your connection and reload.');
       return;
     }
     this.isOn = true;
@@ -84,7 +80,6 @@ export class EditMode {
     await this.relayout();
   }
 
-  /** The editor's panel, and edits from before. */
   panel(name: string) {
     return html`${this.offer()}${this.controls(name)}`;
   }
@@ -126,7 +121,6 @@ export class EditMode {
     if (this.isOn) this.editor?.recolor();
   }
 
-  /** Forgets the capture, and its edits once they are kept. */
   close() {
     this.keeper?.close();
     this.editor?.dispose();

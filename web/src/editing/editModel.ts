@@ -62,7 +62,6 @@ export class EditModel {
     return this.history.canRedo;
   }
 
-  /** Vertices that will be moved. */
   get selection(): readonly number[] {
     return this.chosen;
   }

@@ -11,10 +11,10 @@ export function editNotes(part: StaticPart, keeping: Keeping) {
       : html`<p class="muted">
           ${
             keeping === 'large'
-              ? 'These edits take too much room to be kept in the browser'
+              ? 'These edits are too large to be kept in this browser'
               : keeping === 'elsewhere'
-                ? 'These edits are not kept while another tab keeps its own of this capture'
-                : 'This browser keeps nothing for this page'
+                ? 'Another tab keeps its edits of this capture, so these are not kept'
+                : 'This browser does not keep edits'
           }:
           export them before you leave it.
         </p>`

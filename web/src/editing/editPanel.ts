@@ -3,6 +3,7 @@ import { customElement, property, state } from 'lit/decorators.js';
 import { glyphs } from '../style/glyphs';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/controls';
+import { sentence } from '../text';
 import { editNotes } from './editNotes';
 import { editRow } from './editRow';
 import { editPanelStyle } from './editPanelStyle';
@@ -19,7 +20,7 @@ import { AXES, type Axis } from './symmetry';
 const LARGEST_RADIUS = 0.6;
 const REACHES: readonly (readonly [Reach, string])[] = [
   ['frame', 'This frame'],
-  ['around', 'Around it'],
+  ['around', 'Nearby frames'],
   ['all', 'All frames'],
 ];
 
@@ -62,12 +63,12 @@ export class EditPanel extends LitElement {
   override render() {
     const { model, said } = this.editor;
     const { edits } = model;
-    return html`<section class="panel glass" aria-label="Edit the cage" @keydown=${this.keepKey}>
+    return html`<section class="panel glass" aria-label="Edit cage" @keydown=${this.keepKey}>
       <header>
-        <h2 class="grow">Edit the cage</h2>
+        <h2 class="grow">Edit cage</h2>
         ${this.action('undo', 'Undo (Ctrl Z)', !model.canUndo, () => model.undo())}
         ${this.action('redo', 'Redo (Ctrl Shift Z)', !model.canRedo, () => model.redo())}
-        ${this.action('reset', 'Take all edits away', edits.length === 0, () => model.reset())}
+        ${this.action('reset', 'Remove all edits', edits.length === 0, () => model.reset())}
         <button class="quiet icon" title="Done (E)" aria-label="Done" @click=${this.leave}>${glyphs.close}</button>
       </header>
       <p class="visually-hidden" role="status">${said}</p>
@@ -76,7 +77,7 @@ export class EditPanel extends LitElement {
         <h3 class="setting fine">Edits</h3>
         ${
           edits.length === 0
-            ? html`<p class="muted">None yet: drag a vertex of the cage.</p>`
+            ? html`<p class="muted">No edits yet: drag a vertex of the cage.</p>`
             : html`<ul>
                 ${edits.map((edit) => editRow(this.editor, edit))}
               </ul>`
@@ -92,7 +93,7 @@ export class EditPanel extends LitElement {
     const { selection } = model;
     const chosen =
       selection.length === 0
-        ? 'No vertex chosen'
+        ? 'Nothing selected'
         : selection.length === 1
           ? `Vertex ${selection[0]}`
           : `${selection.length} vertices`;
@@ -102,17 +103,21 @@ export class EditPanel extends LitElement {
     };
     return html`<div class="row">
       <strong class="figures grow">${chosen}</strong>
-      <button aria-pressed=${this.editor.addsToSelection} title="Clicks add vertices, as with Shift" @click=${toggle}>
-        Several
+      <button
+        aria-pressed=${this.editor.addsToSelection}
+        title="Clicks add to the selection, as with Shift"
+        @click=${toggle}
+      >
+        Multi-select
       </button>
-      <button ?disabled=${selection.length === 0} @click=${() => this.editor.select([])}>None</button>
+      <button ?disabled=${selection.length === 0} @click=${() => this.editor.select([])}>Deselect</button>
     </div>`;
   }
 
   private toolRow() {
     const { editor } = this;
     const isAlone = editor.model.selection.length === 1 && editor.model.settings.radius === 0;
-    return html`<div class="segments" role="group" aria-label="What is done to them">
+    return html`<div class="segments" role="group" aria-label="Tool">
         ${TOOLS.map(
           ([tool, label]) =>
             html`<button
@@ -126,9 +131,7 @@ export class EditPanel extends LitElement {
       </div>
       ${
         isAlone && editor.tool !== 'move'
-          ? html`<p class="muted">
-              A single vertex is its own pivot: choose several, or set a falloff, so that others turn about it.
-            </p>`
+          ? html`<p class="muted">A single vertex has nothing to turn or scale: select more, or set a falloff.</p>`
           : nothing
       }`;
   }
@@ -153,19 +156,19 @@ export class EditPanel extends LitElement {
           @input=${(event: Event) => set({ radius: Number((event.target as HTMLInputElement).value) / 100 })}
         />
         <select
-          aria-label="Falloff is measured"
+          aria-label="Falloff distance"
           @change=${(event: Event) =>
             set({ measure: (event.target as HTMLSelectElement).value === 'space' ? 'space' : 'surface' })}
         >
-          <option value="surface" .selected=${settings.measure === 'surface'}>On the surface</option>
-          <option value="space" .selected=${settings.measure === 'space'}>In space</option>
+          <option value="surface" .selected=${settings.measure === 'surface'}>Along the surface</option>
+          <option value="space" .selected=${settings.measure === 'space'}>Through space</option>
         </select>
       </div>
       <div class="setting fine" id="symmetry">Symmetry</div>
       <div class="segments" role="group" aria-labelledby="symmetry">
         ${planes.map((axis) => this.planeButton(axis, settings, () => set({ symmetry: axis })))}
       </div>
-      <div class="setting fine" id="reach">New edits reach</div>
+      <div class="setting fine" id="reach">Apply new edits to</div>
       <div class="segments" role="group" aria-labelledby="reach">
         ${REACHES.map(
           ([reach, label]) =>
@@ -178,9 +181,9 @@ export class EditPanel extends LitElement {
   private planeButton(axis: Axis | null, settings: EditSettings, choose: () => void) {
     const mirror = axis && this.editor.model.mirrors.get(axis);
     const title = !axis
-      ? 'Moves what is chosen alone'
+      ? 'No mirroring'
       : mirror
-        ? `Mirrors across ${axis}: ${Math.round(100 * mirror.share)} % of the vertices have a partner`
+        ? `Mirror across ${axis}: ${Math.round(100 * mirror.share)} % of the vertices match`
         : `The cage is not symmetric across ${axis}`;
     return html`<button
       aria-pressed=${settings.symmetry === axis}
@@ -198,13 +201,13 @@ export class EditPanel extends LitElement {
     if (exporting) {
       return html`<footer class="row">
         <progress aria-label="Exporting" max="1" .value=${exporting.fraction}></progress>
-        <button @click=${() => exporting.stop.abort()}>Stop</button>
+        <button @click=${() => exporting.stop.abort()}>Cancel</button>
       </footer>`;
     }
     const button = (kind: ExportKind, label: string) => {
       const reason = obstacle(this.editor.player.capture, kind);
       return html`<button
-        title=${reason ?? 'Saves the capture with all edits that count'}
+        title=${reason ?? 'Save the capture with all enabled edits'}
         ?disabled=${reason !== null}
         @click=${() => void this.export(kind)}
       >
@@ -225,7 +228,7 @@ export class EditPanel extends LitElement {
       await exportEdited(player.capture, model.edits, kind, this.name, { signal: stop.signal, onProgress });
     } catch (error) {
       if (!stop.signal.aborted) {
-        const detail = error instanceof Error ? error.message : String(error);
+        const detail = sentence(error);
         this.dispatchEvent(new CustomEvent<string>('problem', { detail }));
       }
     } finally {
@@ -253,11 +256,5 @@ export class EditPanel extends LitElement {
   private keepKey(event: KeyboardEvent) {
     const target = event.composedPath()[0] as HTMLElement;
     if (/^(INPUT|SELECT)$/.test(target.tagName) && event.key !== 'Escape') event.stopPropagation();
-  }
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-edit-panel': EditPanel;
   }
 }

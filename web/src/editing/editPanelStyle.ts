@@ -1,6 +1,5 @@
 import { css } from 'lit';
 
-/** What the panel of edits holds, beside `picturePanelStyle`. */
 export const editPanelStyle = css`
   .setting {
     margin: var(--cager-space-3) 0 4px;

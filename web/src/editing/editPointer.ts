@@ -59,7 +59,6 @@ export class EditPointer {
     host.addEventListener('dblclick', (event) => this.isOnVertex && event.stopPropagation(), options);
   }
 
-  /** Whether something is dragged. */
   get isDown(): boolean {
     return this.gesture !== null;
   }
@@ -75,7 +74,6 @@ export class EditPointer {
     return gesture?.kind === 'drag' && gesture.amount !== null ? { kind: gesture.tool, amount: gesture.amount } : null;
   }
 
-  /** The box that is drawn to choose what is in it. */
   get band(): Rectangle | null {
     return this.gesture?.kind === 'band' ? rectangleOf(this.gesture) : null;
   }
@@ -189,7 +187,6 @@ export class EditPointer {
     this.editor.draw();
   }
 
-  /** Forgets what is pointed at. */
   rest() {
     this.gesture = this.pointed = null;
     this.hovered = -1;

@@ -17,7 +17,7 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
     <div class="row">
       <input
         type="checkbox"
-        aria-label=${`${name}, frames ${range.first} to ${range.last}: counts`}
+        aria-label=${`Enable edit of ${name}, frames ${range.first} to ${range.last}`}
         .checked=${enabled}
         @change=${() => model.setEnabled(id, !enabled)}
       />
@@ -25,12 +25,7 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
         <span>${name}<span class="muted">${amountOf(motion)}</span></span>
         <span class="muted figures">${range.first === range.last ? range.first : `${range.first}–${range.last}`}</span>
       </button>
-      <button
-        class="quiet icon"
-        aria-label=${`Remove the edit of ${name}`}
-        title="Remove"
-        @click=${() => model.remove(id)}
-      >
+      <button class="quiet icon" aria-label=${`Remove edit of ${name}`} title="Remove" @click=${() => model.remove(id)}>
         ${glyphs.trash}
       </button>
     </div>

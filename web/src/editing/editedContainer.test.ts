@@ -3,9 +3,17 @@ import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'no
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { LocalCodec } from '../codec/localCodec';
+import { LocalCodec } from '../../tests/support/localCodec';
 import { bytesSource } from '../container/source';
-import { allBlocks, goldenBytes, openBytes, positionsOf, rawPart, takeApart, withPart } from '../container/testSupport';
+import {
+  allBlocks,
+  goldenBytes,
+  openBytes,
+  positionsOf,
+  rawPart,
+  takeApart,
+  withPart,
+} from '../../tests/support/containers';
 import { parseFields } from '../container/section';
 import { diagonalOf } from '../coordinates/topology';
 import { editedBlock, type CageEdit } from './cageEdit';

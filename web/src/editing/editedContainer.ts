@@ -10,7 +10,6 @@ import { editedBlock, type CageEdit } from './cageEdit';
 
 /** Sections that hold whatever the cages are; they are taken over as they are. */
 const KEPT_BEFORE = ['HEAD', 'ORIG', 'RPTS', 'RFAC', 'rcol', 'CVTX', 'CTRI', 'ELEM'];
-/** Frames of a chunk. */
 const CHUNK_FRAMES = 16;
 /** As `cager edit` writes it. */
 const NOT_MEASURED = 'the cages were edited: their errors are not measured';

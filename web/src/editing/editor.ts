@@ -11,10 +11,9 @@ import type { Motion, MotionKind } from './motion';
 import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
 import type { Vector } from '../coordinates/vector';
-import { Projection } from './projection';
+import { Projection } from '../render/projection';
 import { degrees, timesAs } from './text';
 
-/** What the editor needs of the viewer around it. */
 export interface EditorHost extends HTMLElement {
   readonly player: Player | null;
   readonly renderRoot: HTMLElement | DocumentFragment;
@@ -142,7 +141,6 @@ export class CageEditor extends EventTarget {
     this.canvas.remove();
   }
 
-  /** Whether the cage is edited now. */
   get isShown(): boolean {
     return !this.canvas.hidden;
   }
@@ -194,10 +192,9 @@ export class CageEditor extends EventTarget {
     this.sayChanged(tool);
   }
 
-  /** Chooses vertices and says so. */
   select(vertices: readonly number[]) {
     this.model.selection = vertices.filter((v) => v >= 0);
-    this.say(this.model.selection.length === 0 ? 'No vertex is chosen.' : `${this.named()} chosen.`);
+    this.say(this.model.selection.length === 0 ? 'Nothing selected.' : `${this.named()} selected.`);
   }
 
   /** Tells screen readers what was done to the chosen vertices. */
@@ -205,7 +202,6 @@ export class CageEditor extends EventTarget {
     this.say(`${this.named()} ${DONE[how]} in frame ${this.frame}.`);
   }
 
-  /** Tells screen readers what was done. */
   private say(sentence: string) {
     this.said = sentence;
     this.dispatchEvent(new Event('change'));

@@ -4,15 +4,14 @@ import type { CageEdit } from './cageEdit';
 import { decodedFrames } from './decodedFrames';
 import { writeEdited } from './editedContainer';
 
-/** What a capture with edits can be saved as. */
 export type ExportKind = 'container' | 'frames';
 
 /** Why a capture cannot be saved as something, in a sentence; null where it can. */
 export function obstacle(capture: Capture, kind: ExportKind): string | null {
-  if (!capture.complete) return 'The capture is still running; export it when it is completed.';
-  if (kind === 'container' && !capture.container) return 'Where this capture came from keeps no .cager file of it.';
+  if (!capture.complete) return 'The capture is still running. Export it when it is complete.';
+  if (kind === 'container' && !capture.container) return 'There is no .cager file of this capture.';
   if (kind === 'frames' && !capture.decode) {
-    return 'A service decodes the frames: open the capture as a session, or run cager decode on the exported file.';
+    return 'Frames are decoded by a service: open the capture as a session, or run cager decode on the exported file.';
   }
   return null;
 }

@@ -1,36 +1,29 @@
 import type { TriangleMesh } from '../capture';
+import { adjacency } from '../codec/adjacency';
+import type { ByVertex } from '../codec/byVertex';
+import { polygonsOf } from '../codec/polygons';
 
 /** How far away a vertex is: along the edges of the cage, or straight through space. */
 export type FalloffMeasure = 'surface' | 'space';
 
-/** The vertices of a cage and the edges between them. */
 export class CageGraph {
   readonly vertices: number;
-  /** Mean length of the edges. */
   readonly meanEdge: number;
-  private readonly neighbours: readonly (readonly number[])[];
+  private readonly neighbours: ByVertex;
 
   constructor(readonly cage: TriangleMesh) {
     this.vertices = cage.positions.length / 3;
-    const neighbours = Array.from({ length: this.vertices }, () => new Set<number>());
-    const { triangles } = cage;
-    for (let corner = 0; corner < triangles.length; corner++) {
-      const [a, b] = [triangles[corner], triangles[corner - (corner % 3) + ((corner + 1) % 3)]];
-      neighbours[a].add(b);
-      neighbours[b].add(a);
-    }
-    this.neighbours = neighbours.map((set) => [...set]);
-    let [sum, count] = [0, 0];
-    this.neighbours.forEach((others, a) =>
-      others.forEach((b) => {
-        sum += this.between(a, b);
-        count++;
-      }),
-    );
-    this.meanEdge = sum / Math.max(1, count);
+    this.neighbours = adjacency(polygonsOf(cage.triangles), this.vertices);
+    let sum = 0;
+    for (let v = 0; v < this.vertices; v++) for (const other of this.around(v)) sum += this.between(v, other);
+    this.meanEdge = sum / Math.max(1, this.neighbours.items.length);
   }
 
-  /** Straight distance of two vertices. */
+  private around(vertex: number): Uint32Array {
+    const { starts, items } = this.neighbours;
+    return items.subarray(starts[vertex], starts[vertex + 1]);
+  }
+
   between(a: number, b: number): number {
     const { positions: p } = this.cage;
     return Math.hypot(p[3 * a] - p[3 * b], p[3 * a + 1] - p[3 * b + 1], p[3 * a + 2] - p[3 * b + 2]);
@@ -53,7 +46,7 @@ export class CageGraph {
       let nearest = -1;
       for (const v of open) if (nearest < 0 || distances[v] < distances[nearest]) nearest = v;
       open.delete(nearest);
-      for (const next of this.neighbours[nearest]) {
+      for (const next of this.around(nearest)) {
         const distance = distances[nearest] + this.between(nearest, next);
         if (distance >= distances[next] || distance > farthest) continue;
         distances[next] = distance;

@@ -1,6 +1,6 @@
 import type { MotionKind } from './motion';
 import { cross, dot, normalized, plus, type Vector } from '../coordinates/vector';
-import type { Place, Projection } from './projection';
+import type { Place, Projection } from '../render/projection';
 
 /** What a drag of the gizmo is bound to: an axis, the plane across one, or the plane of the picture; rotations are about the axis, or about the line of sight. */
 export type Constraint =
@@ -23,7 +23,6 @@ const RING_POINTS = 64;
 /** An axis that is seen from its end, and a plane that is seen from its edge, cannot be dragged. */
 const SHORTEST = 0.22;
 
-/** An arrow in the picture. */
 export interface Arrow {
   readonly axis: 0 | 1 | 2;
   readonly from: Place;
@@ -89,7 +88,6 @@ export function gizmoAt(projection: Projection, at: Vector, kind: MotionKind = '
   return { kind, middle, arrows, squares: kind === 'move' ? squares : [], rings: [] };
 }
 
-/** The ring about an axis, or about the line of sight. */
 function ringAt(axis: Ring['axis'], sight: Vector, placeAt: (...steps: [Vector, number][]) => Place): Ring {
   const about = axis === null ? sight : UNITS[axis];
   const first = normalized(cross(about, Math.abs(about[0]) < 0.7 ? UNITS[0] : UNITS[1]));
@@ -121,7 +119,6 @@ export function constraintAt(gizmo: Gizmo, x: number, y: number, slack = 0): Con
   return nearest && { kind: 'axis', axis: nearest.axis };
 }
 
-/** The ring that is the nearest, of what is in front of the middle. */
 function ringNear(rings: readonly Ring[], x: number, y: number, reach: number): Constraint | null {
   let [nearest, least] = [null as Ring | null, reach];
   for (const ring of rings) {

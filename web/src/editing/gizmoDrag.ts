@@ -1,15 +1,13 @@
 import { RING, UNITS, type Constraint } from './gizmo';
 import { rotationAbout, type Motion, type MotionKind } from './motion';
 import { cross, dot, norm, normalized, plus, sub, type Vector } from '../coordinates/vector';
-import type { Projection } from './projection';
+import type { Projection } from '../render/projection';
 
-/** A place in the picture. */
 export interface Point {
   readonly x: number;
   readonly y: number;
 }
 
-/** A drag of the gizmo. */
 export interface Drag {
   readonly kind: MotionKind;
   readonly constraint: Constraint;

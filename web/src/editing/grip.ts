@@ -65,7 +65,6 @@ export function displace(rows: Float64Array, grip: Grip, motion: Motion, part: n
   }
 }
 
-/** The mean of some vertices. */
 export function meanOf(positions: ArrayLike<number>, vertices: readonly number[]): Vector {
   const mean = (k: number) => vertices.reduce((sum, v) => sum + positions[3 * v + k], 0) / vertices.length;
   return [mean(0), mean(1), mean(2)];

@@ -15,7 +15,6 @@ const MAX_BYTES = 32 << 20;
 /** Bytes at the beginning and at the end of a container that tell it from others. */
 const [HEAD_BYTES, TAIL_BYTES] = [1 << 16, 1 << 13];
 
-/** Edits as they were left. */
 export interface KeptEdits {
   /** The capture: see {@link identityOf}. */
   readonly key: string;
@@ -41,7 +40,6 @@ export async function identityOf(capture: Capture): Promise<string | null> {
   return ['file', capture.name, size, crc32c(tail, crc32c(head)).toString(16)].join(' ');
 }
 
-/** Whether there are kept edits of any capture. */
 export async function hasKeptEdits(): Promise<boolean> {
   try {
     return (await inStore('readonly', (store) => store.count())) > 0;

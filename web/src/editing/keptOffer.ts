@@ -1,6 +1,7 @@
 import { css, html, LitElement } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
 import { controls } from '../style/controls';
+import { counted } from '../text';
 import type { KeptEdits } from './keptEdits';
 
 /**
@@ -56,19 +57,12 @@ export class KeptOffer extends LitElement {
   override render() {
     const { edits, changed } = this.kept;
     const when = new Date(changed).toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'short' });
-    const what = edits.length === 1 ? 'An edit' : `${edits.length} edits`;
     return html`
-      <p role="status">${what} from ${when} ${edits.length === 1 ? 'is' : 'are'} still in this browser.</p>
+      <p role="status">${counted(edits.length, 'edit')} kept in this browser, from ${when}</p>
       <div class="row">
         <button class="primary" @click=${() => this.dispatchEvent(new Event('takeup'))}>Restore</button>
         <button @click=${() => this.dispatchEvent(new Event('throwaway'))}>Discard</button>
       </div>
     `;
-  }
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-kept-offer': KeptOffer;
   }
 }

@@ -1,6 +1,6 @@
 import { rotationAbout, type Motion, type MotionKind } from './motion';
 import { plus, type Vector } from '../coordinates/vector';
-import type { Projection } from './projection';
+import type { Projection } from '../render/projection';
 
 /** What a key press asks for while a cage is edited. Directions are those of the picture. */
 export type KeyCommand =

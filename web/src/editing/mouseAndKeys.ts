@@ -1,21 +1,20 @@
 import { html } from 'lit';
 
 const KEYS = [
-  ['Enter', 'choose the vertex in the middle'],
-  ['Tab', 'the next vertex; with Shift the one before'],
-  ['Alt ←', 'the vertex on the left; so in every direction'],
-  ['Q R U', 'move, rotate, scale'],
-  ['← ↑', 'do so; with Shift farther'],
-  ['Page ↑', 'away or clockwise; Page ↓ back'],
-  ['Esc', 'choose none; then done'],
+  ['Enter', 'Select the vertex in the centre'],
+  ['Tab', 'Next vertex; Shift for the previous one'],
+  ['Alt ←', 'Vertex to the left; likewise with every arrow'],
+  ['Q R U', 'Move, rotate, scale'],
+  ['← ↑', 'Apply the tool; Shift for larger steps'],
+  ['Page ↑', 'Push away or turn clockwise; Page ↓ reverses'],
+  ['Esc', 'Deselect, then close'],
 ] as const;
 
-/** How a cage is edited with the mouse and with keys. */
 export const mouseAndKeys = html`<details>
-  <summary>Mouse and keys</summary>
+  <summary>Mouse and keyboard</summary>
   <p>
-    Drag a vertex, an arrow, a square or a ring. Shift and a click add a vertex, Shift and a drag choose all in a box;
-    Shift while a ring or an arrow is dragged goes by steps of 15° or a tenth. A click beside the cage chooses none.
+    Drag a vertex, an arrow, a square or a ring. Shift-click adds a vertex, Shift-drag selects a box. Hold Shift while
+    dragging a ring or a block to snap to 15° or 0.1. Click beside the cage to deselect.
   </p>
   <dl class="keys">
     ${KEYS.map(

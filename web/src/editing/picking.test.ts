@@ -7,7 +7,7 @@ import { angleOf } from './motion';
 import { SHORTCUTS } from '../viewer/shortcuts';
 import { placedVertices, vertexAt, verticesWithin, vertexTowards } from './picking';
 import { dot, norm, plus, sub, type Vector } from '../coordinates/vector';
-import { Projection } from './projection';
+import { Projection } from '../render/projection';
 
 const [WIDTH, HEIGHT] = [800, 600];
 

@@ -1,5 +1,5 @@
 import { cross, dot, normalized, sub, type Vector } from '../coordinates/vector';
-import type { Place, Projection } from './projection';
+import type { Place, Projection } from '../render/projection';
 
 /** A vertex of the cage in the picture. */
 export interface PlacedVertex extends Place {
@@ -48,7 +48,6 @@ export function vertexAt(places: readonly (PlacedVertex | null)[], x: number, y:
   return nearest;
 }
 
-/** A part of the picture between two corners. */
 export interface Rectangle {
   readonly fromX: number;
   readonly fromY: number;
@@ -56,7 +55,6 @@ export interface Rectangle {
   readonly toY: number;
 }
 
-/** The vertices within a rectangle, at the back too. */
 export function verticesWithin(places: readonly (PlacedVertex | null)[], box: Rectangle): number[] {
   const [left, right] = [Math.min(box.fromX, box.toX), Math.max(box.fromX, box.toX)];
   const [top, bottom] = [Math.min(box.fromY, box.toY), Math.max(box.fromY, box.toY)];

@@ -95,11 +95,9 @@ export class RangeStrip extends LitElement {
   ];
 
   @property({ attribute: false }) range!: FrameRange;
-  /** Frames there are. */
   @property({ attribute: false }) frames = 0;
   /** Where a frame is in the width of the strip, 0 to 1. */
   @property({ attribute: false }) shareOf!: (frame: number) => number;
-  /** The frame under a pointer. */
   @property({ attribute: false }) frameAt!: (event: PointerEvent) => number;
   @state() private held: RangePart | null = null;
   private start: { readonly event: PointerEvent; readonly frame: number; readonly range: FrameRange } | null = null;
@@ -182,10 +180,4 @@ function drawing(range: FrameRange, shareOf: (frame: number) => number) {
   return svg`<svg viewBox="0 0 1 1" preserveAspectRatio="none">
     <polygon points=${points.join(' ')} vector-effect="non-scaling-stroke" />
   </svg>`;
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-range-strip': RangeStrip;
-  }
 }

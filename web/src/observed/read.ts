@@ -1,6 +1,6 @@
 import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
-import { UnusableFile } from '../upload/frameSource';
-import { extensionOf, objPoints } from '../upload/meshes';
+import { UnusableFile } from '../files/frameSource';
+import { extensionOf, objPoints } from '../files/meshes';
 import type { Surface } from './surface';
 
 /** Reads a mesh or a cloud of points (`.obj`, `.ply`). Throws one sentence for a person where it is neither. */
@@ -13,10 +13,10 @@ export async function readSurface(file: File): Promise<Surface> {
   try {
     geometry = new PLYLoader().parse(await file.arrayBuffer());
   } catch {
-    throw new UnusableFile(file.name, 'this is no PLY file that can be read.');
+    throw new UnusableFile(file.name, 'this PLY file cannot be read.');
   }
   const points = geometry.getAttribute('position') as { array: Float32Array } | undefined;
-  if (!points?.array.length) throw new UnusableFile(file.name, 'there are no points in it.');
+  if (!points?.array.length) throw new UnusableFile(file.name, 'it has no points.');
   return { points: points.array, triangles: Uint32Array.from(geometry.index?.array ?? []) };
 }
 

@@ -1,4 +1,5 @@
 import { Triangle, Vector3 } from 'three';
+import { type ByVertex, byVertex } from '../codec/byVertex';
 
 /** A surface, or a cloud of points where there are no triangles. */
 export interface Surface {
@@ -13,9 +14,7 @@ const LEAF = 8;
 /** Finds how far places are from a surface: its nearest point is found in a k-d tree, then the triangles around that are looked at. */
 export class NearestSurface {
   private readonly order: Uint32Array;
-  /** The triangles around point p are `around[starts[p] … starts[p + 1])`. */
-  private readonly starts: Uint32Array;
-  private readonly around: Uint32Array;
+  private readonly around: ByVertex;
   private readonly triangle = new Triangle();
   private readonly spot = new Vector3();
   private nearest = 0;
@@ -26,27 +25,22 @@ export class NearestSurface {
     const isFinite = (_: unknown, p: number) => Number.isFinite(points[3 * p] + points[3 * p + 1] + points[3 * p + 2]);
     this.order = Uint32Array.from({ length: points.length / 3 }, (_, p) => p).filter(isFinite);
     this.sort(0, this.order.length, 0);
-    this.starts = new Uint32Array(points.length / 3 + 1);
-    for (const corner of triangles) this.starts[corner + 1]++;
-    for (let p = 0; p + 1 < this.starts.length; p++) this.starts[p + 1] += this.starts[p];
-    const ends = this.starts.slice();
-    this.around = new Uint32Array(triangles.length);
-    for (let corner = 0; corner < triangles.length; corner++)
-      this.around[ends[triangles[corner]]++] = Math.floor(corner / 3);
+    this.around = byVertex(triangles, 3, points.length / 3);
   }
 
   /** The distance from each place, x y z each; NaN where there is no surface. */
   distances(places: Float32Array): Float32Array {
     const found = new Float32Array(places.length / 3).fill(NaN);
     const { points, triangles } = this.surface;
+    const { starts, items } = this.around;
     const place = new Vector3();
     if (this.order.length === 0) return found;
     for (let k = 0; k < found.length; k++) {
       place.fromArray(places, 3 * k);
       this.best = Infinity;
       this.search(place, 0, this.order.length, 0);
-      for (let at = this.starts[this.nearest]; at < this.starts[this.nearest + 1]; at++) {
-        const first = 3 * this.around[at];
+      for (let at = starts[this.nearest]; at < starts[this.nearest + 1]; at++) {
+        const first = 3 * items[at];
         this.triangle.a.fromArray(points, 3 * triangles[first]);
         this.triangle.b.fromArray(points, 3 * triangles[first + 1]);
         this.triangle.c.fromArray(points, 3 * triangles[first + 2]);

@@ -1,12 +1,11 @@
 import type { Capture } from '../capture';
 import { moduleWorker } from '../moduleWorker';
-import { counted } from '../sessions/text';
-import { classify, type Dropped } from '../upload/classify';
-import { extensionOf, pointsOf } from '../upload/meshes';
+import { counted } from '../text';
+import { classify, type Dropped } from '../files/classify';
+import { extensionOf, pointsOf } from '../files/meshes';
 import type { Surface } from './surface';
 import workerAddress from './worker.ts?worker&url';
 
-/** What the worker is asked. */
 export interface Asked {
   readonly frame: number;
   readonly file: File;
@@ -79,7 +78,7 @@ export async function openSurfaces(
   if (!tracking && !isPly && ends.every((points) => points === rest.length / 3)) return null;
   if (origin) {
     throw new Error(
-      'The capture lies so far from the origin of its coordinates that the page cannot compare it with its surfaces; the report of `cager recover` has the distances.',
+      'The capture is too far from the origin to be compared with its surfaces here; the report of `cager recover` has the distances.',
     );
   }
   const named = new Map(files.map((file) => [file.name, file]));
@@ -87,7 +86,7 @@ export async function openSurfaces(
   const matched = byName?.some(Boolean) ? byName : files;
   if (matched.length !== frames) {
     throw new Error(
-      `There are ${counted(files.length, 'surface')} and the capture has ${counted(frames, 'frame')}: drop the files that it was recovered from, one for each frame.`,
+      `There are ${counted(files.length, 'surface')} and the capture has ${counted(frames, 'frame')}: drop the files that it was recovered from, one per frame.`,
     );
   }
   return new ObservedSurfaces(`${files[0].name} …`, matched);

@@ -1,4 +1,5 @@
 import { readSurface } from './read';
+import { sentence } from '../text';
 import { NearestSurface } from './surface';
 import type { Asked, Answer } from './surfaces';
 
@@ -9,7 +10,7 @@ const kept = new Map<number, NearestSurface>();
 self.addEventListener('message', ({ data }: MessageEvent<Asked>) => {
   measure(data).then(
     (answer) => self.postMessage(answer),
-    (error: unknown) => self.postMessage({ problem: error instanceof Error ? error.message : String(error) }),
+    (error: unknown) => self.postMessage({ problem: sentence(error) }),
   );
 });
 

@@ -1,11 +1,10 @@
 import type { Capture } from '../capture';
-import { counted } from '../sessions/text';
-import { classify, type Dropped } from '../upload/classify';
-import type { FrameSource } from '../upload/frameSource';
-import { extensionOf } from '../upload/meshes';
-import { framesOf } from '../upload/plan';
+import { counted } from '../text';
+import { classify, type Dropped } from '../files/classify';
+import { framesOf } from '../files/frames';
+import type { FrameSource } from '../files/frameSource';
+import { extensionOf } from '../files/meshes';
 
-/** Bytes of frames that are kept in memory. */
 const KEPT_BYTES = 48 * 2 ** 20;
 
 /** The frames that a capture was encoded from, read from files piece by piece when they are wanted. */
@@ -84,12 +83,12 @@ export async function openOriginal(
   const item = items.find(({ role }) => role === 'frames') ?? single;
   if (!item) {
     throw new Error(
-      'These are no frames of a capture: drop an array (.npy), a point cache (.pc2), or a folder with one .obj per frame.',
+      'No frames found: drop an array (.npy), a point cache (.pc2), or a folder with one .obj per frame.',
     );
   }
   if (capture.static.origin) {
     throw new Error(
-      'The capture lies so far from the origin of its coordinates that the page cannot compare it with its frames; `cager decode` gives its positions in double precision.',
+      'The capture is too far from the origin to be compared with its frames here; `cager decode` gives its positions in double precision.',
     );
   }
   const source = await framesOf(item.files);

@@ -11,19 +11,6 @@ export interface Picture {
   readonly height: number;
 }
 
-/** Where point `point` of `positions` is in the picture; null of one behind the eye. */
-export function spotOf(
-  positions: ArrayLike<number>,
-  point: number,
-  { matrix: m, width, height }: Picture,
-): Spot | null {
-  const [x, y, z] = [positions[3 * point], positions[3 * point + 1], positions[3 * point + 2]];
-  const w = m[3] * x + m[7] * y + m[11] * z + m[15];
-  if (!(w > 0)) return null;
-  const [cx, cy] = [m[0] * x + m[4] * y + m[8] * z + m[12], m[1] * x + m[5] * y + m[9] * z + m[13]];
-  return { x: (cx / w / 2 + 0.5) * width, y: (0.5 - cy / w / 2) * height };
-}
-
 /** The point that is seen at a spot: of those within `reach` pixels, the one nearest to the eye; null if no point is within reach. */
 export function pointAt(positions: ArrayLike<number>, spot: Spot, picture: Picture, reach: number): number | null {
   const { matrix: m, width, height } = picture;

@@ -103,7 +103,7 @@ export class PosePanel extends LitElement {
       </header>
       <div class="body">
         ${failure !== null ? html`<p role="alert">${failure}</p>` : nothing}
-        ${poses.length < 2 ? html`<p>Go to a frame and add it. Two poses or more are blended.</p>` : nothing}
+        ${poses.length < 2 ? html`<p>Go to a frame and add it. Add two or more to blend them.</p>` : nothing}
         ${poses.length === 2 ? this.slider() : poses.length > 2 ? this.pad() : nothing}
         ${poses.map(
           (frame, k) =>
@@ -132,7 +132,7 @@ export class PosePanel extends LitElement {
       max="1.25"
       step="0.01"
       .value=${String(view.place[0])}
-      aria-label="From the first pose to the second"
+      aria-label="Blend from the first pose to the second"
       @input=${(event: Event) => view.moveTo([Number((event.target as HTMLInputElement).value), 0])}
     />`;
   }
@@ -145,7 +145,7 @@ export class PosePanel extends LitElement {
       viewBox="${-REACH} ${-REACH} ${2 * REACH} ${2 * REACH}"
       tabindex="0"
       role="application"
-      aria-label="Pad of poses: the arrow keys move the mark between them"
+      aria-label="Pose pad: arrow keys blend between the poses"
       @pointerdown=${this.point}
       @pointermove=${this.point}
     >
@@ -186,10 +186,4 @@ export class PosePanel extends LitElement {
     const [x, y] = WAYS[event.key];
     this.view.moveTo([this.view.place[0] + x, this.view.place[1] + y]);
   };
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-pose-panel': PosePanel;
-  }
 }

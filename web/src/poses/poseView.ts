@@ -1,5 +1,6 @@
 import { ServiceProblem, sentenceOf } from '../service/problem';
-import { bodyOf, Service } from '../service/service';
+import { bodyOf } from '../service/answers';
+import { Service } from '../service/service';
 import type { Player } from '../viewer/player';
 import { polygonWeights, reachable } from './weights';
 
@@ -19,7 +20,6 @@ export class PoseView extends EventTarget {
   poses: readonly number[] = [];
   /** Where between them: of two, from 0 to 1; of more, a place in their polygon. */
   place: readonly [number, number] = [0.5, 0];
-  /** Why there is no shape. */
   failure: string | null = null;
   private space: Space | null = null;
   private isAsking = false;
@@ -80,7 +80,7 @@ export class PoseView extends EventTarget {
 
   private show(rows: Float64Array) {
     if (this.stop.signal.aborted || this.poses.length < 2) return;
-    this.player.deform({ isMoving: false, isWhole: true, rows: () => rows });
+    this.player.deform(rows);
   }
 
   /** The cage at the place. A space that the service has forgotten is made anew. */
@@ -104,7 +104,7 @@ export class PoseView extends EventTarget {
     if (this.space?.poses === poses) return this.space;
     const { capture } = this.player;
     if (3 * capture.static.rowsPerFrame !== capture.static.cage.positions.length)
-      throw new Error('Poses cannot be blended in a capture whose cages have normals of their own.');
+      throw new Error('Poses cannot be blended in a capture whose cages store normals.');
     await this.forget();
     const body = new FormData();
     const { session } = capture;

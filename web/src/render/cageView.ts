@@ -10,9 +10,10 @@ import {
   Color,
 } from 'three';
 import type { TriangleMesh } from '../capture';
+import { polygonsOf } from '../codec/polygons';
 import { ink, shaderMaterial } from './materials';
 import { cageVertexShader, inkFragmentShader } from './sceneShaders';
-import { uniqueEdges } from './surface';
+import { edgesOf } from './surface';
 
 /** The cage: edges and vertices; what the model hides shows faintly. */
 export class CageView {
@@ -28,15 +29,9 @@ export class CageView {
 
   constructor(cage: TriangleMesh) {
     const { positions, triangles } = cage;
-    const vertices = positions.length / 3;
-    const keys = new Float64Array(triangles.length);
-    for (let corner = 0; corner < triangles.length; corner++) {
-      const [a, b] = [triangles[corner], triangles[corner - (corner % 3) + ((corner + 1) % 3)]];
-      keys[corner] = Math.min(a, b) * vertices + Math.max(a, b);
-    }
     this.places = new BufferAttribute(new Float32Array(positions.length), 3).setUsage(DynamicDrawUsage);
     this.geometry.setAttribute('position', this.places);
-    this.geometry.setIndex(new BufferAttribute(uniqueEdges(keys, vertices), 1));
+    this.geometry.setIndex(new BufferAttribute(edgesOf(polygonsOf(triangles), positions.length / 3), 1));
     this.dots.setAttribute('position', this.places);
     const drawn = (uniforms: Record<string, { value: unknown }>, hidden = false) => {
       const material = shaderMaterial(

@@ -1,4 +1,5 @@
 import type { PerspectiveCamera } from 'three';
+import { type boundsOf, middleOf } from '../coordinates/topology';
 
 /** A camera that turns around a point. Lengths are in units of the rest pose's diagonal, angles in radians. */
 export interface CameraState {
@@ -19,7 +20,6 @@ const ROOM = 1.16;
 
 export const HOME: CameraState = { target: [0, 0, 0], azimuth: 0.5, elevation: 0.16, distance: 2.2 };
 
-/** Turns the camera around its target. */
 export function orbited(camera: CameraState, azimuth: number, elevation: number): CameraState {
   const steep = Math.min(STEEPEST, Math.max(-STEEPEST, camera.elevation + elevation));
   return { ...camera, azimuth: wrapped(camera.azimuth + azimuth), elevation: steep };
@@ -38,59 +38,42 @@ export function panned(camera: CameraState, right: number, up: number): CameraSt
   return { ...camera, target: [move(0), move(1), move(2)] };
 }
 
-/** A box along the axes. */
-export interface Box {
-  readonly low: readonly [number, number, number];
-  readonly high: readonly [number, number, number];
+/** Corners of a box, x y z each. */
+export function cornersOf({ low, high }: ReturnType<typeof boundsOf>): Float64Array {
+  return Float64Array.from({ length: 24 }, (_, at) => (Math.floor(at / 3) & (1 << (at % 3)) ? high : low)[at % 3]);
 }
 
-/** Corners of a box, x y z each. */
-export function cornersOf({ low, high }: Box): Float64Array {
-  return Float64Array.from({ length: 24 }, (_, at) => (Math.floor(at / 3) & (1 << (at % 3)) ? high : low)[at % 3]);
+/** Points, x y z each, along the axes of a camera: to the right, upwards and towards it. */
+export function seenFrom(camera: Pick<CameraState, 'azimuth' | 'elevation'>, points: ArrayLike<number>): Float64Array {
+  const { right, up, back } = axesOf(camera);
+  return Float64Array.from({ length: points.length }, (_, at) => {
+    const [axis, first] = [[right, up, back][at % 3], at - (at % 3)];
+    return points[first] * axis[0] + points[first + 1] * axis[1] + points[first + 2] * axis[2];
+  });
 }
 
 /** Looks at points, x y z each, so that all of them fit into the picture, whose width is `aspect` times its height, with some room around them. */
 export function framed(camera: CameraState, points: ArrayLike<number>, aspect: number): CameraState {
-  const { right, up, back } = axesOf(camera);
-  const axes = [right, up, back];
-  const [low, high] = [
-    [Infinity, Infinity, Infinity],
-    [-Infinity, -Infinity, -Infinity],
-  ];
-  const along = (at: number, axis: readonly number[]) =>
-    points[at] * axis[0] + points[at + 1] * axis[1] + points[at + 2] * axis[2];
-  for (let at = 0; at < points.length; at += 3) {
-    for (const [k, axis] of axes.entries()) {
-      low[k] = Math.min(low[k], along(at, axis));
-      high[k] = Math.max(high[k], along(at, axis));
-    }
-  }
   if (points.length === 0) return camera;
-  const middle = low.map((value, k) => (value + high[k]) / 2);
+  const seen = seenFrom(camera, points);
+  const [x, y, z] = middleOf(seen);
   const slope = Math.tan(FIELD_OF_VIEW / 2) / ROOM;
   let distance = NEAREST;
-  for (let at = 0; at < points.length; at += 3) {
-    const [x, y, z] = axes.map((axis, k) => along(at, axis) - middle[k]);
-    distance = Math.max(distance, Math.max(Math.abs(y), Math.abs(x) / aspect) / slope + z);
+  for (let at = 0; at < seen.length; at += 3) {
+    const [across, high] = [Math.abs(seen[at] - x), Math.abs(seen[at + 1] - y)];
+    distance = Math.max(distance, Math.max(high, across / aspect) / slope + seen[at + 2] - z);
   }
-  const target = moved(
-    [0, 0, 0],
-    axes.map((axis, k) => axis.map((value) => value * middle[k])),
-  );
-  return { ...camera, target, distance: Math.min(FARTHEST, distance) };
+  const { right, up, back } = axesOf(camera);
+  const along = (k: number) => x * right[k] + y * up[k] + z * back[k];
+  return { ...camera, target: [along(0), along(1), along(2)], distance: Math.min(FARTHEST, distance) };
 }
 
 /** The same camera beside a model that has moved. */
 export function shifted(camera: CameraState, by: readonly number[]): CameraState {
-  return { ...camera, target: moved(camera.target, [by]) };
+  const [x, y, z] = camera.target;
+  return { ...camera, target: [x + by[0], y + by[1], z + by[2]] };
 }
 
-function moved(from: readonly number[], steps: readonly (readonly number[])[]): [number, number, number] {
-  const at = (k: number) => steps.reduce((sum, step) => sum + step[k], from[k]);
-  return [at(0), at(1), at(2)];
-}
-
-/** Where the camera is. */
 export function eyeOf(camera: CameraState): [number, number, number] {
   const { back } = axesOf(camera);
   const at = (k: number) => camera.target[k] + camera.distance * back[k];

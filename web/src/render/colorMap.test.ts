@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { heatColor, heatGradient, heatTexels } from './colorMap';
+import { HEAT } from './colorMap';
 
 /** Relative luminance of an sRGB colour. */
 function luminance(color: readonly number[]): number {
@@ -10,21 +10,21 @@ function luminance(color: readonly number[]): number {
 describe('colours of the heat map', () => {
   it('become lighter with every step, so that they can be read without colour vision too', () => {
     for (let k = 1; k <= 50; k++) {
-      expect(luminance(heatColor(k / 50))).toBeGreaterThan(luminance(heatColor((k - 1) / 50)));
+      expect(luminance(HEAT.color(k / 50))).toBeGreaterThan(luminance(HEAT.color((k - 1) / 50)));
     }
   });
 
   it('end where values end, and show what was not measured in grey', () => {
-    expect(heatColor(-3)).toEqual(heatColor(0));
-    expect(heatColor(7)).toEqual(heatColor(1));
-    expect(new Set(heatColor(NaN)).size).toBe(1);
+    expect(HEAT.color(-3)).toEqual(HEAT.color(0));
+    expect(HEAT.color(7)).toEqual(HEAT.color(1));
+    expect(new Set(HEAT.color(NaN)).size).toBe(1);
   });
 
   it('are the same in the picture and in the colour bar', () => {
-    const texels = heatTexels(256);
-    expect([...texels.slice(0, 3)]).toEqual(heatColor(0));
-    expect([...texels.slice(-4, -1)]).toEqual(heatColor(1));
-    expect(heatGradient()).toContain(`rgb(${heatColor(0).join(' ')})`);
-    expect(heatGradient()).toContain(`rgb(${heatColor(1).join(' ')})`);
+    const texels = HEAT.texels(256);
+    expect([...texels.slice(0, 3)]).toEqual(HEAT.color(0));
+    expect([...texels.slice(-4, -1)]).toEqual(HEAT.color(1));
+    expect(HEAT.gradient).toContain(`rgb(${HEAT.color(0).join(' ')})`);
+    expect(HEAT.gradient).toContain(`rgb(${HEAT.color(1).join(' ')})`);
   });
 });

@@ -1,4 +1,3 @@
-/** What is drawn. */
 export interface Layers {
   readonly model: boolean;
   readonly wireframe: boolean;

@@ -4,7 +4,6 @@ import {
   LinearFilter,
   Matrix3,
   Mesh,
-  NoBlending,
   RGBAFormat,
   UnsignedByteType,
   Vector2,
@@ -13,8 +12,8 @@ import {
   type Texture,
   type WebGLRenderer,
 } from 'three';
-import { coverVertexShader } from './decodeShaders';
 import { numberedGeometry, shaderMaterial } from './materials';
+import { Pass } from './pass';
 import {
   blurShader,
   groundFragmentShader,
@@ -37,9 +36,8 @@ export class Ground {
   private readonly sharp = shadowTarget();
   private readonly soft = shadowTarget();
   private readonly caster: Mesh;
-  private readonly blur: Mesh;
-  private readonly source: { value: Texture | null } = { value: null };
-  private readonly way = { value: new Vector2() };
+  private readonly blurred = { source: { value: null as Texture | null }, way: { value: new Vector2() } };
+  private readonly blur = new Pass(blurShader, this.blurred);
   private readonly turn = { value: new Matrix3() };
   private readonly eye = new Camera();
 
@@ -72,16 +70,7 @@ export class Ground {
       numberedGeometry(triangles),
       shaderMaterial(shadowVertexShader, shadowFragmentShader, casting),
     );
-    this.blur = new Mesh(
-      numberedGeometry(Uint32Array.of(0, 1, 2)),
-      shaderMaterial(
-        coverVertexShader,
-        blurShader,
-        { source: this.source, way: this.way },
-        { depthTest: false, depthWrite: false, blending: NoBlending },
-      ),
-    );
-    for (const mesh of [this.mesh, this.caster, this.blur]) mesh.frustumCulled = false;
+    for (const mesh of [this.mesh, this.caster]) mesh.frustumCulled = false;
   }
 
   setColors(ink: Color, shadowStrength: number) {
@@ -108,17 +97,17 @@ export class Ground {
   dispose() {
     this.sharp.dispose();
     this.soft.dispose();
-    for (const mesh of [this.mesh, this.caster, this.blur]) {
+    this.blur.dispose();
+    for (const mesh of [this.mesh, this.caster]) {
       mesh.geometry.dispose();
       (mesh.material as { dispose(): void }).dispose();
     }
   }
 
   private pass(renderer: WebGLRenderer, from: WebGLRenderTarget, to: WebGLRenderTarget, x: number, y: number) {
-    this.source.value = from.texture;
-    this.way.value.set(x, y);
-    renderer.setRenderTarget(to);
-    renderer.render(this.blur, this.eye);
+    this.blurred.source.value = from.texture;
+    this.blurred.way.value.set(x, y);
+    this.blur.render(renderer, to);
   }
 }
 

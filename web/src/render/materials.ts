@@ -14,9 +14,8 @@ import {
   type IUniform,
   type ShaderMaterialParameters,
 } from 'three';
-import { heatTexels } from './colorMap';
+import { type ColorMap, HEAT } from './colorMap';
 
-/** A material of our own shaders. */
 export function shaderMaterial(
   vertexShader: string,
   fragmentShader: string,
@@ -46,7 +45,7 @@ export function modelUniforms() {
     heat: { value: null },
     heatScale: { value: 1 },
     heatShare: { value: 0 },
-    heatColors: { value: heatTexture() },
+    heatColors: { value: colorTexture(HEAT) },
     color: { value: new Color() },
     colors: { value: null },
     hasColors: { value: false },
@@ -60,8 +59,8 @@ export function ink(color: Color, opacity: number): Vector4 {
   return new Vector4(r, g, b, opacity);
 }
 
-function heatTexture(): DataTexture {
-  const texture = new DataTexture(heatTexels(256), 256, 1, RGBAFormat, UnsignedByteType);
+export function colorTexture(map: ColorMap): DataTexture {
+  const texture = new DataTexture(map.texels(256), 256, 1, RGBAFormat, UnsignedByteType);
   texture.minFilter = texture.magFilter = LinearFilter;
   texture.needsUpdate = true;
   return texture;

@@ -1,6 +1,8 @@
 import type { FrameBlock } from '../capture';
+import { boundsOf } from '../coordinates/topology';
 import { errorsOf } from '../originals/pointErrors';
 import type { Decoder } from './decoder';
+import { meanOf } from './packing';
 
 /** Points of the model whose ways stand for those of all. */
 const SAMPLES = 192;
@@ -191,13 +193,6 @@ export function farthestPoints(points: ArrayLike<number>, count: number): Uint32
 }
 
 function extentOf(positions: Float32Array): Extent {
-  const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-  const mean = [0, 0, 0];
-  for (let k = 0; k < positions.length; k++) {
-    const axis = k % 3;
-    box[axis] = Math.min(box[axis], positions[k]);
-    box[3 + axis] = Math.max(box[3 + axis], positions[k]);
-    mean[axis] += (3 * positions[k]) / positions.length;
-  }
-  return { box, mean, positions };
+  const { low, high } = boundsOf(positions);
+  return { box: [...low, ...high], mean: meanOf(positions, positions.length / 3), positions };
 }

@@ -2,7 +2,7 @@ import { BufferAttribute, BufferGeometry, Color, Group, Mesh, Points, type IUnif
 import type { Surface } from '../observed/surface';
 import type { Side } from './drawn';
 import { ink, shaderMaterial } from './materials';
-import { cageVertexShader, inkFragmentShader, modelFragmentShader, observedVertexShader } from './sceneShaders';
+import { cageVertexShader, inkFragmentShader, modelFragmentShader, shapeVertexShader } from './sceneShaders';
 
 const OPACITY = 0.4;
 
@@ -23,7 +23,7 @@ export class ObservedView {
   constructor(light: Readonly<Record<string, IUniform>>) {
     const shaded = (asPoints: boolean) => {
       const own = { asPoints: { value: asPoints }, pointSize: this.cloudSize, heatShare: { value: 0 } };
-      return shaderMaterial(observedVertexShader, modelFragmentShader, { ...light, ...own });
+      return shaderMaterial(shapeVertexShader, modelFragmentShader, { ...light, ...own });
     };
     this.cloud = new Points(new BufferGeometry(), shaded(true));
     this.dots = new Points(

@@ -1,12 +1,10 @@
 import {
-  BufferAttribute,
-  BufferGeometry,
+  type BufferGeometry,
   Camera,
-  GLSL3,
   Mesh,
   NearestFilter,
   NoBlending,
-  RawShaderMaterial,
+  type RawShaderMaterial,
   RGBAFormat,
   WebGLRenderTarget,
   type FloatType,
@@ -16,6 +14,7 @@ import {
   type WebGLRenderer,
 } from 'three';
 import { coverVertexShader } from './decodeShaders';
+import { numberedGeometry, shaderMaterial } from './materials';
 import { WIDTH } from './packing';
 
 /** A fragment shader that runs once for every texel of a target. */
@@ -26,16 +25,9 @@ export class Pass {
 
   constructor(fragmentShader: string, uniforms: Record<string, IUniform>) {
     this.uniforms = uniforms;
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: coverVertexShader,
-      fragmentShader,
-      uniforms,
-      depthTest: false,
-      depthWrite: false,
-      blending: NoBlending,
-    });
-    this.mesh = new Mesh(new BufferGeometry().setIndex(new BufferAttribute(Uint32Array.of(0, 1, 2), 1)), material);
+    const drawing = { depthTest: false, depthWrite: false, blending: NoBlending };
+    const material = shaderMaterial(coverVertexShader, fragmentShader, uniforms, drawing);
+    this.mesh = new Mesh(numberedGeometry(Uint32Array.of(0, 1, 2)), material);
     this.mesh.frustumCulled = false;
   }
 

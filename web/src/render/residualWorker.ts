@@ -1,4 +1,5 @@
 import type { Residual } from '../capture';
+import { addResidual } from '../codec/residual';
 
 /** What the page sends: the residual of a block, frames of it to compute, and when it is needed no more. */
 export type ToResidualWorker =
@@ -28,21 +29,9 @@ self.addEventListener('message', ({ data }: MessageEvent<ToResidualWorker>) => {
 });
 
 function offsetsOf(residual: Residual, points: number, index: number): Float32Array<ArrayBuffer> {
-  const { rank, trajectories, shapes, correctionStarts, correctedPoints, correctionVectors } = residual;
   const sums = new Float32Array(3 * points);
-  for (let r = 0; r < rank; r++) {
-    const weight = trajectories[index * rank + r];
-    if (weight === 0) continue;
-    const first = r * sums.length;
-    for (let k = 0; k < sums.length; k++) sums[k] += weight * shapes[first + k];
-  }
-  const last = correctionStarts.length > index + 1 ? correctionStarts[index + 1] : 0;
-  for (let c = last > 0 ? correctionStarts[index] : 0; c < last; c++) {
-    for (let k = 0; k < 3; k++) sums[3 * correctedPoints[c] + k] += correctionVectors[3 * c + k];
-  }
+  addResidual(residual, index, sums);
   const offsets = new Float32Array(4 * points);
-  for (let p = 0; p < points; p++) {
-    for (let k = 0; k < 3; k++) offsets[4 * p + k] = sums[3 * p + k];
-  }
+  for (let p = 0; p < points; p++) for (let k = 0; k < 3; k++) offsets[4 * p + k] = sums[3 * p + k];
   return offsets;
 }

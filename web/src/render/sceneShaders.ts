@@ -131,13 +131,15 @@ void main() {
   gl_PointSize = pointSize;
 }`;
 
-/** A surface that is no model: without normals, so that its faces are flat, and in one colour. */
-export const observedVertexShader = `${header}
+/** Places a point of a surface that is given by attributes; without normals its faces are flat, and without heat it has one colour. */
+export const shapeVertexShader = `${header}
 uniform mat4 modelViewMatrix;
 uniform mat4 projectionMatrix;
-uniform vec3 color;
 uniform float pointSize;
+uniform vec3 color;
 in vec3 position;
+in vec3 normal;
+in float heat;
 out vec3 viewPosition;
 out vec3 viewNormal;
 out float heatValue;
@@ -145,8 +147,8 @@ out vec3 ownColor;
 void main() {
   vec4 place = modelViewMatrix * vec4(position, 1.0);
   viewPosition = place.xyz;
-  viewNormal = vec3(0.0);
-  heatValue = 0.0;
+  viewNormal = mat3(modelViewMatrix) * normal;
+  heatValue = heat;
   ownColor = color;
   gl_Position = projectionMatrix * place;
   gl_PointSize = pointSize / max(0.05, -place.z);

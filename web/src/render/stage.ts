@@ -1,8 +1,8 @@
 import { Color, Group, Matrix3, Matrix4, PerspectiveCamera, Scene, Vector2, Vector3, type WebGLRenderer } from 'three';
 import type { StaticPart } from '../capture';
 import type { Surface } from '../observed/surface';
+import { boundsOf } from '../coordinates/topology';
 import { Backdrop } from './backdrop';
-import { boxOf } from './box';
 import { CageView } from './cageView';
 import { aim, cornersOf, FIELD_OF_VIEW, type CameraState } from './camera';
 import { Decoder, type Pose } from './decoder';
@@ -38,10 +38,6 @@ export class Stage {
   private observedColor = new Color();
   /** Pixels of the picture that something as large as its distance has, and those of a CSS pixel. */
   private pixels = { perUnit: 1, ratio: 1 };
-  /** What others draw together with the model, in its axes and in diagonals. */
-  readonly extras = new Group();
-  /** Called with the vertices of the cage whenever these have changed. */
-  onCage: (vertices: Float32Array) => void = () => undefined;
   /** Vertices of the cage as it is shown, x y z each, in diagonals and in the model's axes. */
   readonly cageVertices: Float32Array;
   private side: Side = 'decoded';
@@ -75,7 +71,7 @@ export class Stage {
     this.ground = new Ground(this.decoder.positions, surface.triangles);
     this.cageVertices = new Float32Array(capture.cage.positions.length);
     this.upright.matrixAutoUpdate = false;
-    this.upright.add(this.model.group, this.extras, this.cage.group);
+    this.upright.add(this.model.group, this.cage.group);
     this.scene.add(this.backdrop.mesh, this.upright, this.ground.mesh);
     this.showRest();
     canvas.addEventListener('webglcontextrestored', () => {
@@ -269,7 +265,7 @@ export class Stage {
   }
 
   /** Points, x y z each, in diagonals and in the model's axes, as they are in the scene. */
-  inScene(points: Float64Array | readonly number[]): Float64Array {
+  inScene(points: ArrayLike<number>): Float64Array {
     const turned = Float64Array.from(points);
     const point = new Vector3();
     for (let k = 0; k < turned.length; k += 3)
@@ -281,7 +277,7 @@ export class Stage {
   restCorners(): Float64Array {
     const rest = Float32Array.from(this.capture.rest);
     this.decoder.place(rest);
-    return cornersOf(boxOf(rest, this.upright.matrix));
+    return cornersOf(boundsOf(this.inScene(rest)));
   }
 
   /** Has the ground and its shadow go along with the model, whose middle is at this place of the scene. */
@@ -328,11 +324,10 @@ export class Stage {
     for (let k = 0; k < this.cageVertices.length; k++) this.cageVertices[k] = vertices[k];
     this.decoder.place(this.cageVertices);
     this.cage.setVertices(this.cageVertices);
-    this.onCage(this.cageVertices);
   }
 
   private putGroundBelow(positions: Float32Array) {
-    const { low, high } = boxOf(positions, this.upright.matrix);
+    const { low, high } = boundsOf(this.inScene(positions));
     if (!Number.isFinite(low[1])) return;
     this.ground.middle.set((low[0] + high[0]) / 2, low[1] - CLEARANCE, (low[2] + high[2]) / 2);
     this.shadowIsOld = this.pictureIsOld = true;

@@ -8,7 +8,7 @@ export function createRenderer(canvas: HTMLCanvasElement): WebGLRenderer {
   const context = canvas.getContext('webgl2', { antialias, alpha: false, powerPreference: 'high-performance' });
   if (!context) {
     throw new Error(
-      'This browser has no WebGL 2, which draws the model: turn on hardware acceleration in its settings, or use a newer one.',
+      'This browser does not support WebGL 2: turn on hardware acceleration in its settings, or use a newer browser.',
     );
   }
   const renderer = new WebGLRenderer({ canvas, context });
@@ -16,9 +16,7 @@ export function createRenderer(canvas: HTMLCanvasElement): WebGLRenderer {
   renderer.sortObjects = false;
   if (!renderer.extensions.has('EXT_color_buffer_float')) {
     renderer.dispose();
-    throw new Error(
-      'This device cannot compute in floating point on its graphics processor; open the capture on another one.',
-    );
+    throw new Error('This GPU does not support floating-point textures; open the capture on another device.');
   }
   return renderer;
 }

@@ -1,7 +1,7 @@
 import { html, LitElement, nothing } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
 import { controls } from '../style/controls';
-import { grouped } from '../viewer/text';
+import { count } from '../text';
 import type { CageFigures, Report } from './data';
 import { footer } from './footer';
 import { joined, RestPose } from './geometry/modelInCage';
@@ -40,8 +40,8 @@ export class CageReportPage extends LitElement {
       <main>
         <h1>Cage ${geometry.name ?? ''}</h1>
         <p class="lead">
-          ${grouped(figures.vertices)} vertices and ${grouped(figures.faces)} triangles around a model of
-          ${grouped(geometry.mesh.of)} points.
+          ${count(figures.vertices)} vertices and ${count(figures.faces)} triangles around a model of
+          ${count(geometry.mesh.of)} points.
         </p>
         ${(['warnings', 'findings', 'changes'] as const).map((name) => sentences(name, figures[name] ?? []))}
         ${viewsOf('Model and cage', this, 'large-views')}
@@ -74,7 +74,7 @@ function counts(figures: CageFigures): string[][] {
     if (key === 'seconds') return [['time', seconds(value)]];
     if (key === 'condition_number') return [[name, condition(value)]];
     if (key === 'outside_distance') return [[name, `${percents(value, 3)} % of the diagonal`]];
-    return [[name, grouped(value)]];
+    return [[name, value.toLocaleString('en-US')]];
   });
 }
 
@@ -88,7 +88,7 @@ function design(found: CageFigures['design']) {
     </p>
     ${table(found.stages, [
       ['stage', (stage) => stage.name],
-      ['vertices', (stage) => grouped(stage.vertices)],
+      ['vertices', (stage) => count(stage.vertices)],
       ['error seen %', (stage) => percents(stage.designed_error, 4)],
       ['error not seen %', (stage) => percents(stage.held_back_error, 4)],
       ['condition', (stage) => condition(stage.condition_number)],

@@ -80,7 +80,6 @@ export class ComparisonPage extends LitElement {
     `;
   }
 
-  /** Which coordinates the sections show. */
   private systemChoice(systems: readonly SystemReport[]) {
     return html`<fieldset class="segments">
       <legend class="visually-hidden">Coordinates</legend>

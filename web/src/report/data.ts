@@ -27,7 +27,6 @@ export interface ComparisonGeometry extends ModelInCage {
   readonly frames: readonly { readonly frame: number; readonly points: Quantised }[];
   /** Frames of the methods' cages. */
   readonly clip: readonly number[];
-  /** The systems that could be computed. */
   readonly systems: readonly SystemGeometry[];
 }
 

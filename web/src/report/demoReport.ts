@@ -59,7 +59,7 @@ export class DemoReportPage extends LitElement {
         <h1>The built-in capture, encoded into cages</h1>
         <p class="lead">
           A capture that <code>cager demo</code> makes was sent to a real service, encoded there, decoded again and
-          measured anew. Errors are percentages of the diagonal of the rest pose's bounding box.
+          measured. Errors are percentages of the diagonal of the rest pose's bounding box.
         </p>
         ${viewsOf('The decoded model and its cage', this.motion, 'large-views')}
         <p class="caption">

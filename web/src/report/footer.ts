@@ -4,8 +4,8 @@ import { html, type TemplateResult } from 'lit';
 export function footer(origin: TemplateResult) {
   return html`<footer>
     <p>
-      Drag a view to turn all of its group, with the right button to move it; click it and turn the wheel, or pinch, to
-      zoom. Drag across a chart to zoom in, double-click to see all of it, and click a name below it to hide a series.
+      Drag a view to orbit its whole group, drag with the right button to pan; click it and scroll, or pinch, to zoom.
+      Drag across a chart to zoom in, double-click to zoom out, and click a name below it to hide a series.
     </p>
     <p>${origin}</p>
   </footer>`;

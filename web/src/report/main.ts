@@ -1,4 +1,5 @@
 import { page, tokens } from '../style/tokens';
+import { sentence } from '../text';
 import '../charts/chart';
 import './views';
 import { CageReportPage } from './cageReport';
@@ -18,7 +19,7 @@ function elementOf(): HTMLElement {
     case 'cage':
       return Object.assign(new CageReportPage(), { report });
     default:
-      throw new Error('it holds none of the reports that this page knows');
+      throw new Error('it is of an unknown kind');
   }
 }
 
@@ -27,7 +28,7 @@ try {
 } catch (error) {
   const message = document.createElement('p');
   message.setAttribute('role', 'alert');
-  const cause = error instanceof Error ? error.message : String(error);
-  message.textContent = `This report cannot be read (${cause}): the file is damaged or was changed; write it again with cager.`;
+  const cause = sentence(error);
+  message.textContent = `This report cannot be read (${cause}): the file is damaged or was changed; create it again with cager.`;
   document.body.append(message);
 }

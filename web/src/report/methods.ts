@@ -28,7 +28,6 @@ export const OTHER_COLORS = {
 
 type Look = Pick<Method, 'handles' | 'regularizer'>;
 
-/** Its colour, as CSS. */
 export function methodColor({ handles, regularizer }: Look): string {
   return COLORS[`${handles} ${regularizer}`] ?? 'light-dark(#7a5230, #cfa27a)';
 }

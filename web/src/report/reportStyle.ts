@@ -1,6 +1,5 @@
 import { css } from 'lit';
 
-/** Looks of a report: its text, tables, and where charts and views stand. */
 export const reportStyle = css`
   :host {
     display: block;

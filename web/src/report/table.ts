@@ -42,7 +42,6 @@ export function folded(title: string, content: TemplateResult) {
   </details>`;
 }
 
-/** Charts beside each other. */
 export function charts(...all: readonly ChartOptions[]) {
   return html`<div class="charts">${all.map((options) => html`<cager-chart .options=${options}></cager-chart>`)}</div>`;
 }

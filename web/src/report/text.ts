@@ -16,12 +16,10 @@ export function anyPercents(fraction: Known): string {
   return told(fraction, (x) => (x < 1 ? percents(x, 4) : (100 * x).toExponential(1)));
 }
 
-/** A number with so many decimals. */
 export function decimals(value: Known, count: number): string {
   return told(value, (x) => x.toFixed(count));
 }
 
-/** A condition number. */
 export function condition(value: Known): string {
   return told(value, (x) => (x < 1e5 ? x.toFixed(1) : x.toExponential(1)));
 }

@@ -7,6 +7,7 @@ import { CameraControls } from '../render/cameraControls';
 import { resolvedColor } from '../style/resolvedColor';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
+import { sentence } from '../text';
 import { Quality } from '../viewer/quality';
 import { stageColors } from '../viewer/stageColors';
 import { DrawingScene, type Drawing, type DrawingColors } from './geometry/drawing';
@@ -16,7 +17,6 @@ import { Painter } from './geometry/painter';
 import { saveSideBySide } from './savedSheet';
 import { viewsStyle } from './viewsStyle';
 
-/** One of the pictures of a group. */
 export interface View {
   readonly title: string;
   readonly note: string;
@@ -36,7 +36,6 @@ export interface Moments {
   readonly rate: number;
   /** Whether there is something to see between two moments. */
   readonly smooth: boolean;
-  /** Name of a moment. */
   readonly name: (place: number) => string;
 }
 
@@ -146,7 +145,6 @@ export class Views extends LitElement {
     this.ask();
   }
 
-  /** Binds the canvases to their views. */
   private follow() {
     this.forget();
     this.renderRoot.querySelectorAll('canvas').forEach((canvas, k) => {
@@ -241,7 +239,7 @@ export class Views extends LitElement {
     try {
       this.paint(busy ? this.quality.moving : 1);
     } catch (error) {
-      this.problem = error instanceof Error ? error.message : String(error);
+      this.problem = sentence(error);
       return;
     }
     if (busy) this.ask();
@@ -280,7 +278,6 @@ export class Views extends LitElement {
     return { model: new Color(model), cage: new Color(cage), mark: new Color(handle), solid, edge };
   }
 
-  /** Saves all views beside each other. */
   private save() {
     for (const canvas of this.shown.keys()) this.visible.add(canvas);
     this.paint(1);
@@ -290,11 +287,5 @@ export class Views extends LitElement {
       canvases,
       resolvedColor(this.renderRoot, getComputedStyle(this).getPropertyValue('--cager-surface')),
     );
-  }
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'report-views': Views;
   }
 }

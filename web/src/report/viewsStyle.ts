@@ -1,6 +1,5 @@
 import { css } from 'lit';
 
-/** Looks of a group of views. */
 export const viewsStyle = css`
   :host {
     display: block;

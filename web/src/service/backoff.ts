@@ -16,7 +16,6 @@ export class Backoff {
     return Math.max(asked ?? 0, most * (0.5 + 0.5 * Math.random()));
   }
 
-  /** To be called when something succeeded. */
   reset(): void {
     this.#attempts = 0;
   }

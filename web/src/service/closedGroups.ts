@@ -17,15 +17,12 @@ import type { Service } from './service';
 /** Seconds after which a group is decoded again that could not be decoded; a damaged one is not. */
 const RETRY_SECONDS = 10;
 
-/** What is told of closed groups. */
 export interface GroupListener {
-  /** A group came. */
   readonly arrived: () => void;
   /** A group cannot be shown as it was coded. */
   readonly failed: (error: unknown) => void;
 }
 
-/** Follows the groups of one session. */
 export class ClosedGroups {
   readonly #store = new GroupStore();
   readonly #follower: GroupFollower;
@@ -102,7 +99,6 @@ export class ClosedGroups {
     return this.#store.source(source, frames);
   }
 
-  /** Receives and decodes nothing any more. */
   close(): void {
     this.#closing.abort();
     this.#follower.close();

@@ -3,7 +3,8 @@
 import { Backoff, pause } from './backoff';
 import type { Progress } from './messages';
 import { ServiceProblem, problemBehind } from './problem';
-import { type Service, piecesOf } from './service';
+import { piecesOf } from './answers';
+import { type Service } from './service';
 import { EventParser } from './sse';
 
 /**

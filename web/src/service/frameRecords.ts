@@ -54,10 +54,10 @@ export class CageRecordReader {
     const view = this.#view;
     const [magic, version, kind] = [view.getUint32(0, true), view.getUint16(4, true), view.getUint16(6, true)];
     if (magic !== MAGIC || version !== VERSION || kind !== CAGE || view.getUint32(12, true) !== this.rows) {
-      throw new BrokenRecord('The service sent something else than cages of this session.');
+      throw new BrokenRecord('The service sent unexpected data.');
     }
     const payload = this.#record.slice(HEADER_BYTES);
-    if (crc32c(payload) !== view.getUint32(24, true)) throw new BrokenRecord('A frame was damaged on its way.');
+    if (crc32c(payload) !== view.getUint32(24, true)) throw new BrokenRecord('A frame was corrupted in transit.');
     // Platforms that run browsers are little-endian, as records are.
     const rows = new Float32Array(payload.buffer);
     return { frame: view.getUint32(8, true), l2: view.getFloat32(16, true), linf: view.getFloat32(20, true), rows };

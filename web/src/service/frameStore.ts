@@ -16,7 +16,6 @@ interface Chunk {
 
 /** Keeps cages in chunks of up to 64 frames. */
 export class FrameStore {
-  /** Frames of a chunk. */
   readonly chunkFrames: number;
   readonly #stride: number;
   readonly #most: number;

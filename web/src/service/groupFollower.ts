@@ -1,6 +1,6 @@
 /** Receives the coded groups of a running session as they close, over broken connections. */
 
-import { ChunkStream, type StoredChunk } from '../container/chunkStream';
+import type { ContainerStream, StoredChunk } from '../container/stream';
 import { Backoff } from './backoff';
 import { endOf } from './groupStore';
 import type { Session } from './messages';
@@ -64,12 +64,12 @@ export class GroupFollower {
 
   /** Reads a connection until it ends, whyever. */
   async #receive(connection: ContainerConnection): Promise<void> {
-    const stream = new ChunkStream();
+    const { stream, pieces } = connection;
     this.#connection = connection;
     this.#lastPieceAt = performance.now();
     try {
-      for (const piece of connection.begun) this.#take(stream, piece);
-      for await (const piece of connection.pieces) {
+      this.#take(stream, new Uint8Array(0));
+      for await (const piece of pieces) {
         this.#lastPieceAt = performance.now();
         this.#take(stream, piece);
       }
@@ -82,7 +82,7 @@ export class GroupFollower {
     }
   }
 
-  #take(stream: ChunkStream, piece: Uint8Array): void {
+  #take(stream: ContainerStream, piece: Uint8Array): void {
     for (const group of stream.push(piece)) {
       if (endOf(group) <= this.frames) continue;
       this.frames = endOf(group);

@@ -1,7 +1,7 @@
 /** Coded groups of frames as the service sent them, as far as they fit into memory. */
 
 import { GROUP_BYTES } from '../cacheBytes';
-import type { StoredChunk, StoredSection } from '../container/chunkStream';
+import type { StoredChunk, StoredSection } from '../container/stream';
 import { HEADER_BYTES } from '../container/section';
 import type { Source } from '../container/source';
 

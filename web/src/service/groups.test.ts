@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
-import { LocalCodec } from '../codec/localCodec';
-import { ChunkStream, type StoredChunk } from '../container/chunkStream';
+import { LocalCodec } from '../../tests/support/localCodec';
+import { ContainerStream, type StoredChunk } from '../container/stream';
 import { openContainer } from '../container/open';
 import { HEADER_BYTES, parseFields, viewOf } from '../container/section';
 import { bytesSource, type Source } from '../container/source';
@@ -12,7 +12,7 @@ import {
   putTogether,
   rawPart,
   takeApart,
-} from '../container/testSupport';
+} from '../../tests/support/containers';
 import { GroupFollower } from './groupFollower';
 import { endOf, GroupStore } from './groupStore';
 import type { Session } from './messages';
@@ -21,7 +21,7 @@ import type { Service } from './service';
 
 /** A coded container of three groups, which are the same one. */
 const container = ofGroups(goldenBytes('coded-mvc'), 3);
-const groups = [...new ChunkStream().push(container)];
+const groups = [...new ContainerStream().push(container)];
 const [count, frames] = [endOf(groups[0]), endOf(groups[2])];
 
 beforeEach(() => vi.useFakeTimers());
@@ -29,7 +29,7 @@ afterEach(() => vi.useRealTimers());
 
 test('groups_are_found_in_pieces_of_any_size_as_they_are_in_the_file', () => {
   expect(groups.map(endOf)).toEqual([count, 2 * count, 3 * count]);
-  const stream = new ChunkStream();
+  const stream = new ContainerStream();
   const found: StoredChunk[] = [];
   for (let at = 0; at < container.length; at += 7) found.push(...stream.push(container.subarray(at, at + 7)));
   expect(found).toEqual(groups);
@@ -43,7 +43,7 @@ test('groups_are_found_in_pieces_of_any_size_as_they_are_in_the_file', () => {
 test('a_damaged_group_is_not_handed_out', () => {
   const damaged = container.slice();
   damaged[groups[1].frames.entry.offset + 60] ^= 1;
-  const stream = new ChunkStream();
+  const stream = new ContainerStream();
   expect(() => [...stream.push(damaged)]).toThrow(/damaged/);
 });
 
@@ -119,7 +119,7 @@ test('a_connection_that_brings_nothing_is_given_up', async () => {
 test('a_long_container_is_not_received_again_and_again_where_connections_keep_breaking', async () => {
   const step = 10_000;
   const long = ofGroups(goldenBytes('coded-mvc'), 100, step / 2);
-  const ends = [...new ChunkStream().push(long)].map(({ frames: { entry, payload } }) => {
+  const ends = [...new ContainerStream().push(long)].map(({ frames: { entry, payload } }) => {
     return entry.offset + HEADER_BYTES + payload.length;
   });
   const service = new SlowService(long);

@@ -2,7 +2,7 @@
 
 import type { Capture } from '../capture';
 import { openContainer, type OpenOptions } from '../container/open';
-import { httpSource, type Source } from '../container/source';
+import type { Source } from '../container/source';
 import { type Retry, pause, persistently } from './backoff';
 import { basisRows } from './basisRows';
 import { LiveCapture, type OpenFinished, type SessionCapture } from './liveCapture';
@@ -14,7 +14,6 @@ import { pageToken } from './token';
 
 export type { SessionCapture } from './liveCapture';
 
-/** Choices of {@link openSession}. */
 export interface OpenSessionOptions {
   readonly service?: Service;
   readonly signal?: AbortSignal;
@@ -52,7 +51,6 @@ export async function openSession(id: string, options: OpenSessionOptions = {}):
   }
 }
 
-/** Waits until a session is prepared. */
 async function whenPrepared(
   look: () => Promise<Session>,
   onWaiting: OpenSessionOptions['onWaiting'],
@@ -62,7 +60,7 @@ async function whenPrepared(
     const session = await look();
     if (session.problem) throw problemFrom(session.problem);
     if (session.state !== 'preparing') return session;
-    onWaiting?.('The session is being prepared; large models take minutes.');
+    onWaiting?.('Preparing the session. Large models can take minutes.');
     await pause(PREPARING_SECONDS, signal);
   }
 }
@@ -88,9 +86,7 @@ export async function openStored(
   known: (source: Source) => Source = (source) => source,
 ): Promise<Capture> {
   try {
-    const headers = () => service.authorization();
-    const source = await httpSource(service.address(path), { headers, signal: options.signal });
-    return await openContainer(known(steady(source)), options);
+    return await openContainer(known(steady(await service.source(path, options.signal))), options);
   } catch (error) {
     throw told(error);
   }

@@ -11,7 +11,8 @@ import { LiveFollower } from './liveFollower';
 import { type Session, solvedFromStart } from './messages';
 import { isAbort, sentenceOf } from './problem';
 import type { RunningContainer } from './runningContainer';
-import { type Service, piecesOf, sessionPath } from './service';
+import { piecesOf } from './answers';
+import { type Service, sessionPath } from './service';
 
 /** A capture of a session; `live` while it is followed. */
 export interface SessionCapture extends Capture {
@@ -224,13 +225,12 @@ export class LiveCapture implements SessionCapture {
         for await (const piece of piecesOf(response, signal)) {
           this.#follower.bytes.add(piece.length);
           for (const { frame, rows } of reader.push(piece)) {
-            if (frame < first || frame >= first + count)
-              throw new Error('The service sent another frame than was asked for.');
+            if (frame < first || frame >= first + count) throw new Error('The service sent the wrong frame.');
             this.#store.put(frame, rows);
             received += 1;
           }
         }
-        if (received < count) throw new Error('The service sent fewer frames than were asked for.');
+        if (received < count) throw new Error('The service sent too few frames.');
       },
       { signal, attempts: 4 },
     );

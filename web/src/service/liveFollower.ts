@@ -6,7 +6,8 @@ import { BrokenRecord, type CageRecord, CageRecordReader, RECORDS_MEDIA_TYPE } f
 import { LatencyMeter, RateMeter } from './measures';
 import { type Session, solvedFromStart } from './messages';
 import { ServiceProblem, problemBehind, problemFrom } from './problem';
-import { type Service, piecesOf, sessionPath } from './service';
+import { piecesOf } from './answers';
+import { type Service, sessionPath } from './service';
 import { pageToken } from './token';
 
 const LOOK_SECONDS = 3;
@@ -21,13 +22,10 @@ const MIN_SKIPPED = 30;
 /** Why the stream is left: the page goes on at the newest frame. */
 class TooFarBehind extends Error {}
 
-/** What a follower tells. */
 export interface Following {
-  /** A frame arrived. */
   readonly record: (record: CageRecord) => void;
   /** Frames up to `end` are solved, and will not be sent unless they are asked for. */
   readonly skipped: (end: number) => void;
-  /** A look at the session. */
   readonly looked: (session: Session) => void;
   /** The state or a measure changed. */
   readonly changed: () => void;
@@ -138,7 +136,7 @@ export class LiveFollower {
 
   #take(record: CageRecord): void {
     // Frames come in order; anything else is another session's, or a fault on the way.
-    if (record.frame !== this.#next) throw new BrokenRecord('A frame arrived out of its order.');
+    if (record.frame !== this.#next) throw new BrokenRecord('A frame arrived out of order.');
     this.#next += 1;
     this.frames.add(1);
     this.latency.arrived(record.frame);

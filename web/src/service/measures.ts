@@ -16,7 +16,6 @@ export class RateMeter {
     else this.#samples.push({ at: now, amount });
   }
 
-  /** Amount per second over the last seconds. */
   perSecond(): number {
     const now = performance.now();
     this.#samples = this.#samples.filter((sample) => now - sample.at < 1000 * WINDOW_SECONDS);

@@ -19,7 +19,6 @@ export interface Session {
   /** Only of sessions whose frames are coded in groups. */
   readonly coding?: CodedFrames;
   readonly warnings: readonly string[];
-  /** Why it failed. */
   readonly problem?: ProblemDetails;
 }
 
@@ -33,7 +32,6 @@ export interface FrameCounts {
   readonly missing_next?: number;
 }
 
-/** How far the coding of a session's frames is. */
 export interface CodedFrames {
   readonly group_frames: number | null;
   readonly frames: number;

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import { ServiceProblem, isAbort, problemBehind, problemOf, sentenceOf } from './problem';
-import { piecesOf } from './service';
+import { piecesOf } from './answers';
 
 function answer(status: number, body: unknown, headers: Record<string, string> = {}): Response {
   return new Response(JSON.stringify(body), {
@@ -37,9 +37,7 @@ test('what_passes_by_itself_is_told_from_what_does_not', async () => {
 
 test('answers_of_proxies_and_broken_networks_are_sentences_too', async () => {
   const proxy = await problemOf(new Response('<html>502 Bad Gateway</html>', { status: 502 }));
-  expect(proxy.message).toBe(
-    'The service cannot be reached through the proxy at the moment (status 502). Try again later.',
-  );
+  expect(proxy.message).toBe('The service is unreachable through its proxy (status 502). Try again later.');
   const lying = await problemOf(
     new Response('{', { status: 500, headers: { 'Content-Type': 'application/problem+json' } }),
   );
@@ -47,7 +45,7 @@ test('answers_of_proxies_and_broken_networks_are_sentences_too', async () => {
   expect(problemBehind(new TypeError('Failed to fetch'))).toMatchObject({ word: 'unreachable', passes: true });
   expect(sentenceOf(new Error('the file has no points'))).toBe('The file has no points.');
   expect(sentenceOf(new Error('walk.npy has 3 points'))).toBe('walk.npy has 3 points.');
-  expect(sentenceOf(new ServiceProblem('unreachable', 0))).toContain('does not answer');
+  expect(sentenceOf(new ServiceProblem('unreachable', 0))).toContain('Cannot reach');
 });
 
 test('an_aborted_request_failed_for_the_reason_of_its_abort_whatever_the_browser_says', async () => {

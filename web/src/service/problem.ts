@@ -18,11 +18,10 @@ const PASSING_WORDS = new Set(['not-ready', 'idempotency-key-in-use']);
 
 /** What to say instead of the service's detail, which is written for those who write programs. */
 const INSTEAD: Readonly<Record<string, string>> = {
-  unreachable: 'The service does not answer. Check that it runs and that this machine is on the network.',
-  'not-found':
-    'There is no such thing here: it was deleted, it expired, or it belongs to somebody else. Choose another one from the list.',
+  unreachable: 'Cannot reach the service. Check that it is running and that you are online.',
+  'not-found': 'Not found: it was deleted, has expired, or belongs to someone else. Choose another one from the list.',
   'session-deleted': 'This session was deleted. Choose another one from the list.',
-  stopping: 'The service is stopping. This page goes on when it is back.',
+  stopping: 'The service is restarting. This page reconnects automatically.',
 };
 
 /** What to add to the service's detail. */
@@ -30,9 +29,9 @@ const ADVICE: Readonly<Record<string, string>> = {
   unauthorized: 'Sign in with an access token; ask your administrator for one.',
   'quota-exceeded': 'Delete sessions that are no longer needed, or ask for more space.',
   'too-many-sessions': 'Delete sessions that are no longer needed.',
-  'storage-full': 'Ask your administrator to free space on its disk.',
-  'storage-failed': 'Ask your administrator to check its disk.',
-  'frame-conflict': 'Upload into a new session.',
+  'storage-full': 'Ask your administrator to free disk space.',
+  'storage-failed': 'Ask your administrator to check the disk.',
+  'frame-conflict': 'Upload to a new session.',
 };
 
 /** A request that failed. `message` is a sentence to show. */
@@ -97,7 +96,6 @@ export function problemBehind(failure: unknown, signal?: AbortSignal | null): Er
   return error instanceof Error ? error : new Error(String(error));
 }
 
-/** Whether an error is that of an aborted request. */
 export function isAbort(error: unknown): boolean {
   return error instanceof DOMException && error.name === 'AbortError';
 }
@@ -105,16 +103,14 @@ export function isAbort(error: unknown): boolean {
 /** The sentence of any error, for `problem` fields and messages. */
 export function sentenceOf(error: unknown): string {
   const behind = problemBehind(error);
-  return behind instanceof ServiceProblem ? behind.message : finished(behind.message || 'Something failed in the page');
+  return behind instanceof ServiceProblem ? behind.message : finished(behind.message || 'Something went wrong');
 }
 
 function sentence(word: string, status: number, details: ProblemDetails): string {
   if (INSTEAD[word]) return INSTEAD[word];
   const detail = details.detail ?? details.title;
   if (!detail) {
-    const what = PASSING.has(status)
-      ? 'cannot be reached through the proxy at the moment'
-      : 'gave an answer nobody expected';
+    const what = PASSING.has(status) ? 'is unreachable through its proxy' : 'sent an unexpected answer';
     return `The service ${what} (status ${status}). Try again later.`;
   }
   return [finished(detail), ADVICE[word]].filter(Boolean).join(' ');

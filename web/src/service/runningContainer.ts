@@ -2,17 +2,17 @@
 
 import type { StaticPart } from '../capture';
 import { createCodec } from '../codec/client';
-import { StaticStream } from '../container/stream';
+import { ContainerStream } from '../container/stream';
+import { piecesOf } from './answers';
 import { ServiceProblem } from './problem';
-import { type Service, piecesOf, sessionPath } from './service';
+import { type Service, sessionPath } from './service';
 
 /** A connection by which the container arrives, from its front on. */
 export interface ContainerConnection {
-  /** The pieces that are read already. */
-  readonly begun: readonly Uint8Array[];
-  /** Those that follow. */
+  /** What came, taken apart. */
+  readonly stream: ContainerStream;
+  /** What follows. */
   readonly pieces: AsyncGenerator<Uint8Array, void, undefined>;
-  /** Ends it. */
   readonly stop: AbortController;
 }
 
@@ -30,25 +30,22 @@ export function connect(service: Service, id: string): ContainerConnection {
   async function* pieces(): AsyncGenerator<Uint8Array, void, undefined> {
     yield* piecesOf(await service.request(path, { cache: 'no-store', signal: stop.signal }), stop.signal);
   }
-  return { begun: [], pieces: pieces(), stop };
+  return { stream: new ContainerStream(), pieces: pieces(), stop };
 }
 
 /** Reads a running session's container as far as its model and cage, or a little further. */
 export async function openRunning(service: Service, id: string, signal: AbortSignal): Promise<RunningContainer> {
-  const { pieces, stop } = connect(service, id);
+  const connection = connect(service, id);
+  const { stream, pieces, stop } = connection;
   const abort = (): void => stop.abort(signal.reason);
   signal.addEventListener('abort', abort);
   const codec = createCodec();
-  const stream = new StaticStream(codec);
   try {
     signal.throwIfAborted();
-    const begun: Uint8Array[] = [];
     for (;;) {
       const { done, value } = await pieces.next();
       if (done) throw new ServiceProblem('unreachable', 0);
-      begun.push(value);
-      const part = await stream.push(value);
-      if (part) return { part, connection: { begun, pieces, stop } };
+      if (stream.begin(value)) return { part: await stream.decodeStatic(codec), connection };
     }
   } catch (error) {
     stop.abort();

@@ -1,13 +1,14 @@
 /** Requests to the service: addresses, the token, and errors as {@link ServiceProblem}. */
 
-import type { FrameResult, Session, SessionPage } from './messages';
+import type { Source } from '../container/source';
+import { bodyOf, fetched, piecesOf } from './answers';
 import { persistently } from './backoff';
+import { httpSource } from './httpSource';
+import type { FrameResult, Session, SessionPage } from './messages';
 import { ServiceProblem, problemBehind, problemOf } from './problem';
 import { pageToken, type TokenStore } from './token';
 
-/** Φ of a session. */
 export interface Coordinates {
-  /** Points of the model. */
   readonly rows: number;
   readonly columns: number;
   /** `rows × columns`, row by row. */
@@ -40,12 +41,7 @@ export class Service {
     const sent = this.#token.token;
     const headers = new Headers(init.headers);
     new Headers(this.authorization()).forEach((value, name) => headers.set(name, value));
-    let response: Response;
-    try {
-      response = await fetch(this.address(path), { ...init, headers });
-    } catch (error) {
-      throw problemBehind(error, init.signal);
-    }
+    const response = await fetched(this.address(path), { ...init, headers });
     if (response.ok) return response;
     const problem = await problemOf(response);
     // An answer to a token that was replaced meanwhile says nothing about the present one.
@@ -53,7 +49,6 @@ export class Service {
     throw problem;
   }
 
-  /** The address of what is at `path`. */
   address(path: string): string {
     return new URL(path, this.#base).href;
   }
@@ -63,7 +58,12 @@ export class Service {
     return this.#token.token === null ? {} : { Authorization: `Bearer ${this.#token.token}` };
   }
 
-  /** A request whose answer is JSON. */
+  /** The container at `path`, to be read at random; `signal` ends opening it. */
+  source(path: string, signal?: AbortSignal, firstBytes?: number): Promise<Source> {
+    const headers = () => this.authorization();
+    return httpSource(this.address(path), { headers, signal, ...(firstBytes !== undefined && { firstBytes }) });
+  }
+
   async json<T>(path: string, init: RequestInit = {}): Promise<T> {
     const response = await this.request(path, init);
     try {
@@ -171,34 +171,4 @@ export function patiently(signal?: AbortSignal): AbortSignal {
 export function sessionPath(id: string, below?: string): string {
   const path = `sessions/${encodeURIComponent(id)}`;
   return below === undefined ? path : `${path}/${below}`;
-}
-
-/** The body of an answer to a request with this signal. */
-export async function bodyOf(response: Response, signal: AbortSignal | undefined): Promise<ArrayBuffer> {
-  try {
-    return await response.arrayBuffer();
-  } catch (error) {
-    throw problemBehind(error, signal);
-  }
-}
-
-/** The pieces of an answer's body as they arrive; what breaks off is a problem like any other, and an abort of the request's signal has its reason. */
-export async function* piecesOf(
-  response: Response,
-  signal: AbortSignal | undefined,
-): AsyncGenerator<Uint8Array, void, undefined> {
-  const reader = response.body?.getReader();
-  if (!reader) return;
-  try {
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) return;
-      yield value;
-    }
-  } catch (error) {
-    throw problemBehind(error, signal);
-  } finally {
-    // Whoever stops reading ends the request; of a body that ended this does nothing.
-    await reader.cancel().catch(() => undefined);
-  }
 }

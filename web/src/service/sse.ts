@@ -1,6 +1,5 @@
 /** Server-sent events read through `fetch`, since `EventSource` cannot send a token (HTML standard, "Server-sent events"). */
 
-/** One event. */
 export interface ServerEvent {
   readonly type: string;
   /** The last id seen, which `Last-Event-ID` takes. */

@@ -23,7 +23,6 @@ export class TokenStore extends EventTarget {
     this.dispatchEvent(new Event('change'));
   }
 
-  /** Forgets the token. */
   clear(): void {
     this.#token = null;
     guarded(() => this.storage?.removeItem(KEY));
@@ -36,7 +35,6 @@ export class TokenStore extends EventTarget {
   }
 }
 
-/** The token of the page. */
 export const pageToken = new TokenStore(guarded(() => globalThis.sessionStorage));
 
 /** What is read of storage, which throws where a browser's settings forbid it, or where it is full; null then. */

@@ -280,9 +280,3 @@ export class Sessions extends LitElement {
     this.requestUpdate();
   };
 }
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-sessions': Sessions;
-  }
-}

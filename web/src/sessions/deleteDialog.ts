@@ -4,7 +4,6 @@ import { glyphs } from '../style/glyphs';
 import { nameOf } from './row';
 import { isUnfinished } from './sessionList';
 
-/** What the dialog shows, and what its buttons do. */
 export interface DeleteDialog {
   /** Whether the service is being asked. */
   readonly isRunning: boolean;
@@ -17,19 +16,19 @@ export interface DeleteDialog {
 
 /** Asks whether a session is to be deleted. Whoever renders it opens it as a modal dialog. */
 export function deleteDialog(session: Session, dialog: DeleteDialog) {
-  const stops = isUnfinished(session) ? 'Work on it stops. ' : '';
-  const what = session.state === 'completed' ? 'Its container and all its frames are' : 'All its frames are';
+  const stops = isUnfinished(session) ? 'Encoding stops. ' : '';
+  const what = session.state === 'completed' ? 'Its file and frames' : 'Its frames';
   return html`
     <dialog aria-labelledby="delete-title" aria-describedby="delete-what" @close=${dialog.onClose}>
       <h2 id="delete-title">Delete “${nameOf(session)}”?</h2>
-      <p id="delete-what">${stops}${what} deleted for good.</p>
+      <p id="delete-what">${stops}${what} are permanently deleted.</p>
       ${
         dialog.failure
           ? html`<p class="problem" role="alert">${glyphs.alert}<span>${dialog.failure}</span></p>`
           : nothing
       }
       <div class="buttons">
-        <button type="button" autofocus @click=${dialog.onKeep}>Keep it</button>
+        <button type="button" autofocus @click=${dialog.onKeep}>Cancel</button>
         <button type="button" class="danger" ?disabled=${dialog.isRunning} @click=${dialog.onDelete}>Delete</button>
       </div>
     </dialog>

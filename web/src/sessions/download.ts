@@ -1,6 +1,7 @@
 import { save } from '../save';
 import type { Service } from '../service/service';
-import { piecesOf, sessionPath } from '../service/service';
+import { piecesOf } from '../service/answers';
+import { sessionPath } from '../service/service';
 
 /** What a session can be downloaded as beside its container, by the ending of the file's name. */
 export const FORMATS = { abc: 'Alembic', usdc: 'USD', glb: 'glTF', npy: 'NumPy' };
@@ -30,7 +31,7 @@ export async function download(
     received += piece.length;
     if (total > 0) onProgress(Math.min(1, received / total));
   }
-  if (total > 0 && received < total) throw new Error('The download broke off. Start it again.');
+  if (total > 0 && received < total) throw new Error('The download was interrupted. Start it again.');
   // Signs that file systems do not take.
   const file = `${name.replace(/[\\/:*?"<>|\p{Cc}]+/gu, '-')}.${format}`;
   save(new Blob(pieces, { type: response.headers.get('content-type') ?? '' }), file);

@@ -13,35 +13,35 @@ export function emptyList() {
     <section class="first" aria-labelledby="first-title">
       <div>
         <h2 id="first-title">No sessions yet</h2>
-        <p>A session turns one animated mesh into a small capture that plays here. There are three ways to see one.</p>
+        <p>A session turns one animated mesh into a small capture that plays here. There are three ways to start.</p>
       </div>
       <ul class="ways">
         <li class="card">
           <div>
             <h3>Upload from this browser</h3>
-            <p>Drop a rest pose and its frames; the cage is made where you have none.</p>
+            <p>Drop a rest pose and its frames; a cage is created if you have none.</p>
           </div>
           <a class="button primary" href="#/upload">${glyphs.upload} Upload</a>
         </li>
         <li class="card">
           <div>
             <h3>Encode from the command line</h3>
-            <p>The frames go to this service, and the session shows up here.</p>
+            <p>Frames go to this service, and the session appears here.</p>
           </div>
           <span></span>
           <div class="command row">
             <code class="grow">${command}</code>
-            <button type="button" class="icon" aria-label="Copy the command" title="Copy the command" @click=${copy}>
+            <button type="button" class="icon" aria-label="Copy command" title="Copy command" @click=${copy}>
               ${glyphs.copy}
             </button>
           </div>
         </li>
         <li class="card">
           <div>
-            <h3>Look at a file you have</h3>
-            <p>A .cager file plays in the page; it is not sent anywhere.</p>
+            <h3>Open a file</h3>
+            <p>A .cager file plays in this page and is not uploaded.</p>
           </div>
-          <a class="button" href="#/file">${glyphs.file} Open a file</a>
+          <a class="button" href="#/file">${glyphs.file} Open file</a>
         </li>
       </ul>
     </section>

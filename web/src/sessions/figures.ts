@@ -1,18 +1,10 @@
 /** Sizes and errors of sessions, which the list itself does not have: fetched for those that are seen. */
 
+import { readContents, readSections } from '../container/sectionReader';
+import { EndsCache } from '../container/source';
 import { decodeReport } from '../container/tail';
-import {
-  ENTRY_BYTES,
-  type Entry,
-  FOOTER_BYTES,
-  HEADER_BYTES,
-  checkFooter,
-  parseFields,
-  safeInteger,
-  viewOf,
-} from '../container/section';
 import type { Session } from '../service/messages';
-import { type Service, bodyOf, sessionPath } from '../service/service';
+import { type Service, sessionPath } from '../service/service';
 
 /** Errors are fractions of the diagonal; null: not measured. */
 export interface Figures {
@@ -113,58 +105,22 @@ async function frameFigures(service: Service, session: Session): Promise<Figures
 
 /** What the report at the end of a completed session's container says (docs/FORMAT.md, `summ`). */
 export async function containerFigures(service: Service, session: Session): Promise<Figures> {
-  let tail = await readTail(service, session.id, TAIL_BYTES);
-  const contents = checkFooter(tail.bytes.subarray(-FOOTER_BYTES), tail.total);
-  if (contents < tail.first) tail = await readTail(service, session.id, tail.total - contents);
-  const entries = contentsOf(tail, contents);
-  const summary = entries.get('summ');
-  if (summary && summary.offset < tail.first) tail = await readTail(service, session.id, tail.total - summary.offset);
-  const report = summary ? reportAt(tail.bytes.subarray(summary.offset - tail.first), summary) : {};
+  const source = await service.source(sessionPath(session.id, 'capture.cager'), undefined, 1);
+  const tail = await EndsCache.of(source, 0, TAIL_BYTES);
+  const contents = await readContents(tail);
+  const summary = contents.get('summ');
+  const report = summary ? decodeReport((await readSections(tail, [summary]))[0]) : {};
   const error = (report.error ?? {}) as Record<string, unknown>;
   // Faces and corners of the model from the size of both, and from the triangles, of which each face has its corners less two.
-  const facesAndCorners = (entries.get('RFAC')?.fields.rawBytes ?? 0) / 4;
+  const facesAndCorners = (contents.get('RFAC')?.fields.rawBytes ?? 0) / 4;
   const corners = (2 * facesAndCorners + (numberOf(report.triangles) ?? 0)) / 3;
   const capture = 12 * (session.points ?? 0) * session.frames.solved + 4 * corners;
   return {
     meanL2: numberOf(error.l2_mean),
     worst: numberOf(error.linf_max),
-    bytes: tail.total,
-    ratio: capture > 0 ? capture / tail.total : null,
+    bytes: source.size,
+    ratio: capture > 0 ? capture / source.size : null,
   };
-}
-
-/** Entries of the table of contents by their tags, the last of each; the table begins at the offset `contents`. */
-function contentsOf(tail: Tail, contents: number): Map<string, Entry> {
-  const entries = new Map<string, Entry>();
-  const end = tail.bytes.length - FOOTER_BYTES - ENTRY_BYTES;
-  for (let at = contents - tail.first + HEADER_BYTES; at <= end; at += ENTRY_BYTES) {
-    const bytes = tail.bytes.subarray(at, at + ENTRY_BYTES);
-    const fields = parseFields(bytes.subarray(8), contents);
-    entries.set(fields.tag, { offset: safeInteger(viewOf(bytes), 0, contents), fields });
-  }
-  return entries;
-}
-
-function reportAt(bytes: Uint8Array, entry: Entry): Readonly<Record<string, unknown>> {
-  return decodeReport({ entry, payload: bytes.subarray(HEADER_BYTES, HEADER_BYTES + entry.fields.payloadBytes) });
-}
-
-/** The end of a container. */
-interface Tail {
-  readonly bytes: Uint8Array;
-  /** Offset of the first of these bytes. */
-  readonly first: number;
-  /** Bytes of the whole container. */
-  readonly total: number;
-}
-
-async function readTail(service: Service, id: string, bytes: number): Promise<Tail> {
-  const headers = { Range: `bytes=-${bytes}` };
-  const response = await service.request(sessionPath(id, 'capture.cager'), { headers });
-  const range = /^bytes (\d+)-\d+\/(\d+)$/.exec(response.headers.get('content-range') ?? '');
-  const body = new Uint8Array(await bodyOf(response, undefined));
-  const total = range ? Number(range[2]) : body.length;
-  return { bytes: body, first: range ? Number(range[1]) : 0, total };
 }
 
 function numberOf(value: unknown): number | null {

@@ -1,11 +1,8 @@
-/** What of the sessions is shown. */
-
 import type { Session } from '../service/messages';
 
 /** States as people ask for them: `running` is everything that is not over. */
 export type StateFilter = 'all' | 'running' | 'completed' | 'failed';
 
-/** What a person asked for. */
 export interface Filter {
   readonly text: string;
   readonly state: StateFilter;

@@ -9,7 +9,6 @@ const STATES: readonly (readonly [StateFilter, string])[] = [
   ['failed', 'Failed'],
 ];
 
-/** Where sessions are searched and chosen by their state. */
 export function filterBar({ text, state: chosen }: Filter, onFilter: (filter: Filter) => void) {
   return html`
     <div class="bar">

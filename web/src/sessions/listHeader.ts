@@ -5,15 +5,15 @@ import { pageToken } from '../service/token';
 import { currentJob } from '../upload/currentJob';
 import { glyphs } from '../style/glyphs';
 import { isUnfinished, type SessionList } from './sessionList';
-import { counted } from './text';
+import { counted } from '../text';
 
 /** How many sessions there are, and what else can be done than look at one. */
 export function listHeader(sessions: readonly Session[], hasOlder: boolean) {
   const running = sessions.filter(isUnfinished).length;
   const failed = sessions.filter((session) => session.state === 'failed').length;
   const summary = [
-    `${counted(sessions.length, 'session')}${hasOlder ? ' and older ones' : ''}`,
-    running > 0 ? `${running} not finished` : '',
+    hasOlder ? `${sessions.length}+ sessions` : counted(sessions.length, 'session'),
+    running > 0 ? `${running} in progress` : '',
     failed > 0 ? `${failed} failed` : '',
   ];
   const isUploading = (currentJob()?.stage ?? 'completed') !== 'completed';
@@ -27,9 +27,9 @@ export function listHeader(sessions: readonly Session[], hasOlder: boolean) {
           ? nothing
           : html`<button type="button" class="quiet" @click=${() => pageToken.clear()}>Sign out</button>`
       }
-      <a class="button" href="#/file">${glyphs.file} Open a file</a>
+      <a class="button" href="#/file">${glyphs.file} Open file</a>
       <a class="button primary" href="#/upload"
-        >${glyphs.upload} ${isUploading ? 'Back to the upload' : 'Upload a capture'}</a
+        >${glyphs.upload} ${isUploading ? 'Back to upload' : 'Upload a capture'}</a
       >
     </header>
   `;

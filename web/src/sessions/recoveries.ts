@@ -3,7 +3,7 @@ import { customElement, state } from 'lit/decorators.js';
 import type { Recovery } from '../service/messages';
 import { patiently, Service } from '../service/service';
 import { controls } from '../style/controls';
-import { counted } from './text';
+import { counted } from '../text';
 
 const POLL_SECONDS = 5;
 
@@ -77,15 +77,9 @@ function progressOf({ state, frames }: Recovery): string {
   if (state === 'failed') return 'Failed';
   const followed = frames.followed === frames.received ? '' : `${frames.followed} of `;
   const parts = [
-    state === 'completed' ? '' : state === 'ready' ? 'waiting for frames' : state,
+    state === 'completed' ? '' : state === 'ready' ? 'waiting for frames' : 'running',
     `${followed}${counted(frames.received, 'frame')}`,
     frames.lost > 0 ? `${frames.lost} lost` : '',
   ];
   return parts.filter(Boolean).join(' · ');
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-recoveries': Recoveries;
-  }
 }

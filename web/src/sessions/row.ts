@@ -4,9 +4,8 @@ import { problemFrom, sentenceOf } from '../service/problem';
 import type { Figures } from './figures';
 import { glyphs } from '../style/glyphs';
 import { FORMATS, type Format } from './download';
-import * as text from './text';
+import * as text from '../text';
 
-/** What a row shows, and what its buttons do. */
 export interface Row {
   readonly session: Session;
   readonly figures: Figures | null;
@@ -20,7 +19,6 @@ export interface Row {
   readonly onRemove: () => void;
 }
 
-/** The head of the table. */
 export const tableHead = html`
   <thead role="rowgroup">
     <tr role="row">
@@ -31,7 +29,7 @@ export const tableHead = html`
         role="columnheader"
         scope="col"
         class="number"
-        title="Root mean square over the points, mean over the frames; of the rest pose's diagonal"
+        title="RMS over all points, averaged over frames; relative to the rest pose's diagonal"
       >
         Mean error
       </th>
@@ -39,7 +37,7 @@ export const tableHead = html`
         role="columnheader"
         scope="col"
         class="number"
-        title="Of the point and frame that are farthest off; of the rest pose's diagonal"
+        title="Worst point of all frames; relative to the rest pose's diagonal"
       >
         Worst error
       </th>
@@ -50,7 +48,6 @@ export const tableHead = html`
   </thead>
 `;
 
-/** A session's name for people. */
 export function nameOf(session: Session): string {
   return session.name ?? `Session ${session.id.slice(0, 8)}`;
 }
@@ -59,6 +56,7 @@ export function nameOf(session: Session): string {
 export function row(row: Row): TemplateResult {
   const { session, figures, now } = row;
   const name = nameOf(session);
+  const created = new Date(1000 * session.created);
   return html`
     <tbody role="rowgroup" data-id=${session.id}>
       <tr class="session" role="row">
@@ -68,11 +66,17 @@ export function row(row: Row): TemplateResult {
         </td>
         <td role="cell">${state(session, row.rate)}</td>
         <td role="cell">${frames(session)}</td>
-        <td role="cell" class="number" data-label="Mean error">${figures ? text.fraction(figures.meanL2) : nothing}</td>
-        <td role="cell" class="number" data-label="Worst error">${figures ? text.fraction(figures.worst) : nothing}</td>
+        <td role="cell" class="number" data-label="Mean error">
+          ${figures ? text.percent(figures.meanL2, 2) : nothing}
+        </td>
+        <td role="cell" class="number" data-label="Worst error">
+          ${figures ? text.percent(figures.worst, 2) : nothing}
+        </td>
         <td role="cell" class="number" data-label="Size">${sizes(session, figures)}</td>
         <td role="cell" class="number">
-          <time datetime=${new Date(1000 * session.created).toISOString()} title=${text.moment(session.created)}
+          <time
+            datetime=${created.toISOString()}
+            title=${created.toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'medium' })}
             >${text.age(session.created, now)}</time
           >
         </td>
@@ -117,7 +121,7 @@ function frames(session: Session) {
   if (received === 0) return html`<span class="muted">no frames yet</span>`;
   const gaps = missing.reduce((sum, [first, end]) => sum + end - first, 0);
   const remarks = [
-    session.coding ? `${text.count(session.coding.frames)} coded` : null,
+    session.coding ? `${text.count(session.coding.frames)} compressed` : null,
     gaps > 0 ? `${text.count(gaps)} missing` : null,
   ].filter((remark) => remark !== null);
   const known = received + gaps;
@@ -156,8 +160,8 @@ function download(row: Row, name: string) {
     </button>
     <select
       class="formats"
-      title="Download for other programs"
-      aria-label="Download ${name} for other programs"
+      title="Export"
+      aria-label="Export ${name}"
       ?disabled=${downloaded !== null}
       @change=${({ target }: Event) => {
         const chosen = target as HTMLSelectElement;
@@ -165,7 +169,7 @@ function download(row: Row, name: string) {
         chosen.value = '';
       }}
     >
-      <option value="" hidden selected>as…</option>
+      <option value="" hidden selected>Export</option>
       ${Object.entries(FORMATS).map(([ending, program]) => html`<option value=${ending}>${program} (.${ending})</option>`)}
     </select>
   `;

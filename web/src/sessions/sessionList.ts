@@ -37,12 +37,10 @@ export class SessionList extends EventTarget {
     return [...this.#sessions.values()].sort((a, b) => b.created - a.created || (a.id < b.id ? 1 : -1));
   }
 
-  /** Whether there are older sessions than those here. */
   get hasOlder(): boolean {
     return typeof this.#next === 'string';
   }
 
-  /** Begins to keep the list up to date. */
   start(): void {
     if (this.#running) return;
     this.#running = new AbortController();
@@ -74,7 +72,6 @@ export class SessionList extends EventTarget {
     this.refresh();
   }
 
-  /** Fetches a page of older sessions. */
   async older(): Promise<void> {
     if (typeof this.#next !== 'string') return;
     const asked = this.#next;
@@ -85,7 +82,6 @@ export class SessionList extends EventTarget {
     this.#changed();
   }
 
-  /** Deletes a session on the service and here. */
   async remove(id: string): Promise<void> {
     await this.service.remove(id);
     this.#forget(id);

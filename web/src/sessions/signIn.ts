@@ -4,9 +4,7 @@ import { controls } from '../style/controls';
 import { tokens } from '../style/tokens';
 import { pageToken } from '../service/token';
 
-/**
- * Asks for an access token and gives it to the page. Whoever shows it listens to `change` of `pageToken`, and hides it then.
- */
+/** Asks for an access token and gives it to the page. Whoever shows it listens to `change` of `pageToken`, and hides it then. */
 @customElement('cager-sign-in')
 export class SignIn extends LitElement {
   static override styles = [
@@ -35,7 +33,7 @@ export class SignIn extends LitElement {
 
   override render() {
     // A token that is there although this is shown was refused.
-    const refused = pageToken.token !== null ? 'The service refused the token. Check it, or ask for another one.' : '';
+    const refused = pageToken.token !== null ? 'The token was not accepted. Check it, or ask for a new one.' : '';
     const error = this.wrong || refused;
     return html`
       <form class="card" @submit=${this.#submit}>
@@ -69,17 +67,11 @@ export class SignIn extends LitElement {
     event.preventDefault();
     const token = this.input.value.trim().replace(/^Bearer\s+/i, '');
     if (!/^[\x21-\x7e]+$/.test(token)) {
-      this.wrong = 'A token has letters, digits and signs without spaces. Copy it once more.';
+      this.wrong = 'A token has no spaces or special letters. Copy it again.';
       return;
     }
     this.wrong = '';
     this.input.value = '';
     pageToken.set(token, this.keep.checked);
   };
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-sign-in': SignIn;
-  }
 }

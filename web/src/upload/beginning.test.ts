@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import { captureName } from './beginning';
-import { classify } from './classify';
+import { classify } from '../files/classify';
 import type { Plan } from './plan';
 
 test.each([

@@ -1,14 +1,13 @@
 /** The beginning of an upload, from files and what was chosen for them. */
 
 import type { Service } from '../service/service';
-import type { Dropped, Item } from './classify';
+import type { Dropped, Item } from '../files/classify';
 import { marksOf } from './fileMarks';
 import { KeptUpload, newKey } from './keptUpload';
 import { type Choices, designOf, optionsOf } from './optionsForm';
 import type { Plan } from './plan';
 import { UploadJob } from './uploadJob';
 
-/** The record of an upload that begins now. */
 export function newUpload(service: Service, plan: Plan, choices: Choices, items: readonly Item[]): KeptUpload {
   return new KeptUpload({
     key: newKey(),

@@ -9,9 +9,9 @@ import { plotStyle } from '../charts/plot';
 import { controls, pageLayout } from '../style/controls';
 import { tokens } from '../style/tokens';
 import { captureName, jobOf, newUpload } from './beginning';
-import { type Dropped, type Item, type Role, classify, reassigned } from './classify';
+import { type Dropped, type Item, type Role, classify, reassigned } from '../files/classify';
 import { currentJob, setCurrentJob } from './currentJob';
-import { droppedFiles, pickFiles } from './drop';
+import { droppedFiles, pickFiles } from '../files/drop';
 import { marksOf, withEarlierRoles } from './fileMarks';
 import {
   type Interrupted,
@@ -24,7 +24,7 @@ import {
 } from './interrupted';
 import { type JobActions, jobView } from './jobView';
 import type { KeptUpload } from './keptUpload';
-import { extensionOf } from './meshes';
+import { extensionOf } from '../files/meshes';
 import { type Choices, DEFAULT_CHOICES, optionsForm } from './optionsForm';
 import { type Plan, planOf } from './plan';
 import type { Stage } from './uploadJob';
@@ -109,7 +109,7 @@ export class Upload extends LitElement {
     }
     return html`
       <form class="card" @submit=${this.#submit}>
-        <h2>What these files are</h2>
+        <h2>Files</h2>
         <ul class="items">
           ${this.items.map((item) => itemRow(item, (role) => this.#reassign(item, role)))}
         </ul>
@@ -132,8 +132,8 @@ export class Upload extends LitElement {
   }
 
   readonly #choosing: ChoosingFiles = {
-    onFiles: () => pickFiles(false, (files) => void this.#take(files)),
-    onFolder: () => pickFiles(true, (files) => void this.#take(files)),
+    onFiles: () => pickFiles((files) => void this.#take(files)),
+    onFolder: () => pickFiles((files) => void this.#take(files), { isFolder: true }),
     onStartOver: () => this.#startOver(),
   };
 
@@ -282,11 +282,5 @@ export class Upload extends LitElement {
   #note401(error: unknown): void {
     const problem = problemBehind(error);
     if (!(problem instanceof ServiceProblem && problem.status === 401)) this.finding = sentenceOf(problem);
-  }
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-upload': Upload;
   }
 }

@@ -1,7 +1,7 @@
 import { html } from 'lit';
 import { axisOf } from '../charts/axis';
 import { plot, thinned, type Series } from '../charts/plot';
-import { fraction } from '../sessions/text';
+import { percent } from '../text';
 import type { Measured } from './uploadJob';
 
 /** Errors of the frames so far, as two lines over the frame number: the mean error of each frame's points, and its worst point. */
@@ -18,13 +18,13 @@ export function errorChart(measured: Measured) {
   return html`
     <figure class="errors">
       <figcaption class="row fine">
-        <span class="key linf"></span>Worst point <span class="key"></span>Mean of the points
-        <span class="scale figures">up to ${fraction(top)} of the diagonal</span>
+        <span class="key linf"></span>Worst point <span class="key"></span>RMS of all points
+        <span class="scale figures">up to ${percent(top, 2)} of the diagonal</span>
       </figcaption>
       <div
         class="area"
         role="img"
-        aria-label="Errors of the frames so far: the worst point is ${fraction(top)} of the diagonal off"
+        aria-label="Errors of the frames so far: worst point ${percent(top, 2)} of the diagonal"
       >
         ${plot({ x: axisOf([0, 1], 0), y: axisOf([0, 1.05 * top], 0), series: lines })}
       </div>

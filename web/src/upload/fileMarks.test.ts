@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { classify } from './classify';
+import { classify } from '../files/classify';
 import { difference, marksOf, shareNames, withEarlierRoles } from './fileMarks';
 import { sampledFrames } from './motionCage';
 
@@ -12,11 +12,11 @@ test('the_same_files_are_known_again_and_others_are_told_apart', () => {
   expect(difference(marksOf(drop({ ...FILES })), earlier)).toBeNull();
   const later = marksOf(drop({ ...FILES, 'walk.npy': 'other numbers' }));
   expect(difference(later, earlier)).toBe(
-    'The frames were walk.npy (7 bytes) then; walk.npy (13 bytes) is something else.',
+    'The frames of the interrupted upload: walk.npy (7 bytes), not walk.npy (13 bytes).',
   );
-  expect(difference(marksOf(drop({ 'rest.obj': 'v 0 0 0' })), earlier)).toMatch(/missing here/);
+  expect(difference(marksOf(drop({ 'rest.obj': 'v 0 0 0' })), earlier)).toMatch(/file missing/);
   expect(difference(marksOf(drop({ ...FILES, 'cage.obj': 'v' })), earlier)).toBe(
-    'There was no file of a cage then; leave cage.obj out.',
+    'The interrupted upload had no cage: remove cage.obj.',
   );
   expect(shareNames(later, earlier)).toBe(true);
   expect(shareNames(marksOf(drop({ 'other.npy': 'numbers' })), earlier)).toBe(false);

@@ -1,7 +1,7 @@
 /** What tells the files of one upload from those of another, by their names and sizes. */
 
-import { counted, size } from '../sessions/text';
-import type { Item, Role } from './classify';
+import { counted, size } from '../text';
+import type { Item, Role } from '../files/classify';
 
 /** Files with one role. */
 export interface FileMark {
@@ -14,8 +14,7 @@ export interface FileMark {
 /** The files of an upload; what was not there is null. */
 export type FileMarks = Readonly<Record<Exclude<Role, 'unused'>, FileMark | null>>;
 
-const WERE = { rest: 'The rest pose was', cage: 'The cage was', frames: 'The frames were' } as const;
-const NAMES = { rest: 'a rest pose', cage: 'a cage', frames: 'frames' } as const;
+const NAMES = { rest: 'rest pose', cage: 'cage', frames: 'frames' } as const;
 
 export function marksOf(items: readonly Item[]): FileMarks {
   const mark = (role: Role): FileMark | null => {
@@ -32,10 +31,10 @@ export function difference(marks: FileMarks, earlier: FileMarks): string | null 
   for (const role of ['frames', 'rest', 'cage'] as const) {
     const [now, then] = [marks[role], earlier[role]];
     if (!now && !then) continue;
-    if (!then) return `There was no file of ${NAMES[role]} then; leave ${now!.name} out.`;
-    if (!now) return `${WERE[role]} ${described(then)} then, which is missing here.`;
+    if (!then) return `The interrupted upload had no ${NAMES[role]}: remove ${now!.name}.`;
+    if (!now) return `The ${NAMES[role]} ${described(then)} of the interrupted upload: file missing.`;
     const isSame = now.files === then.files && now.bytes === then.bytes;
-    if (!isSame) return `${WERE[role]} ${described(then)} then; ${described(now)} is something else.`;
+    if (!isSame) return `The ${NAMES[role]} of the interrupted upload: ${described(then)}, not ${described(now)}.`;
   }
   return null;
 }

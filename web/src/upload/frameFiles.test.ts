@@ -1,10 +1,10 @@
 import { expect, test } from 'vitest';
-import { ObjFrames, pointsOf } from './meshes';
-import { mddFrames } from './mdd';
-import { npyFrames } from './npy';
-import { pc2Frames } from './pc2';
+import { ObjFrames, pointsOf } from '../files/meshes';
+import { mddFrames } from '../files/mdd';
+import { npyFrames } from '../files/npy';
+import { pc2Frames } from '../files/pc2';
 import { planOf } from './plan';
-import { classify } from './classify';
+import { classify } from '../files/classify';
 
 const NUMBERS = Array.from({ length: 2 * 4 * 3 }, (_, i) => i / 8);
 
@@ -58,7 +58,7 @@ test('arrays_that_are_something_else_say_what_to_save', async () => {
   await expect(npyFrames(npy(header('<i8'), data))).rejects.toThrow('astype');
   await expect(npyFrames(npy(header('<f4', 'False', '(8, 3)'), data))).rejects.toThrow('(frames, points, 3)');
   await expect(npyFrames(npy(header('<f4', 'False', '(9, 4, 3)'), data))).rejects.toThrow('shorter');
-  await expect(npyFrames(new File(['PK\x03\x04'], 'walk.npz'))).rejects.toThrow('no NumPy file');
+  await expect(npyFrames(new File(['PK\x03\x04'], 'walk.npz'))).rejects.toThrow('not a NumPy file');
 });
 
 test('a_point_cache_is_read_behind_its_header', async () => {
@@ -80,10 +80,10 @@ test('a_motion_designer_cache_is_read_behind_its_times_and_told_by_its_length', 
   expect([frames.frames, frames.points]).toEqual([2, 4]);
   expect([...(await frames.read(0, 2))]).toEqual(NUMBERS);
   expect([...(await frames.read(1, 1))]).toEqual(NUMBERS.slice(12));
-  await expect(mddFrames(new File(parts.slice(0, 2), 'walk.mdd'))).rejects.toThrow('does not fit its length');
-  await expect(mddFrames(new File([...parts, new Uint8Array(4)], 'walk.mdd'))).rejects.toThrow('export it once more');
+  await expect(mddFrames(new File(parts.slice(0, 2), 'walk.mdd'))).rejects.toThrow('its size does not match');
+  await expect(mddFrames(new File([...parts, new Uint8Array(4)], 'walk.mdd'))).rejects.toThrow('export it again');
   await expect(mddFrames(new File([new Uint8Array(8)], 'walk.mdd'))).rejects.toThrow('no frames');
-  await expect(mddFrames(new File([new Uint8Array(5)], 'walk.mdd'))).rejects.toThrow('ends within its header');
+  await expect(mddFrames(new File([new Uint8Array(5)], 'walk.mdd'))).rejects.toThrow('the header is incomplete');
   counts.setInt32(0, 0x7fffffff, false);
   await expect(mddFrames(new File(parts, 'walk.mdd'))).rejects.toThrow('2147483647 frames');
 });
@@ -97,7 +97,7 @@ test('meshes_are_counted_and_read', async () => {
   expect(await pointsOf(new File(['ply\nformat ascii 1.0\nelement vertex 17\n'], 'a.ply'))).toBe(17);
   expect(await pointsOf(new File(['OFF\n# made by hand\n12 20 0\n'], 'a.off'))).toBe(12);
   expect(await pointsOf(new File([new Uint8Array(84)], 'a.stl'))).toBeNull();
-  await expect(ObjFrames.of([new File(['v 1 nan 2'], 'a.obj')])).rejects.toThrow('no position');
+  await expect(ObjFrames.of([new File(['v 1 nan 2'], 'a.obj')])).rejects.toThrow('not a position');
   const uneven = await ObjFrames.of([obj(1), new File(['v 0 0 0'], '2.obj')]);
   await expect(uneven.read(0, 2)).rejects.toThrow('2.obj: it has 1 points');
 });

@@ -3,7 +3,7 @@
 import type { FrameResult } from '../service/messages';
 import { type ProblemDetails, problemBehind, problemFrom } from '../service/problem';
 import type { Service } from '../service/service';
-import type { FrameSource } from './frameSource';
+import type { FrameSource } from '../files/frameSource';
 
 const AT_ONCE = 2;
 const FIRST_BYTES = 1 << 20;
@@ -11,7 +11,6 @@ const MAX_BYTES = 16 << 20;
 /** How long a batch should take: long enough to be worth a request, short enough for progress to be seen. */
 const BATCH_SECONDS = 1.5;
 
-/** What happens to frames. */
 export interface Heard {
   /** A frame is solved and on the service's disk. */
   readonly solved: (result: FrameResult) => void;
@@ -19,7 +18,6 @@ export interface Heard {
   readonly sent: (frames: number, bytes: number) => void;
 }
 
-/** Posts frames of a capture. */
 export class FrameSender {
   #batchBytes = FIRST_BYTES;
 

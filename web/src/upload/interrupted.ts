@@ -3,7 +3,7 @@ import { unsolved } from '../service/messages';
 import { ServiceProblem, problemBehind } from '../service/problem';
 import type { Service } from '../service/service';
 import { glyphs } from '../style/glyphs';
-import { age, count, counted } from '../sessions/text';
+import { age, count, counted } from '../text';
 import { type FileMark, type FileMarks, difference, shareNames } from './fileMarks';
 import { type KeptUpload, unfinishedUploads } from './keptUpload';
 import { readDesign, removeDesign } from './motionCage';
@@ -73,15 +73,15 @@ export function interruptedCard(interrupted: Interrupted, why: string, onDelete:
   const files = [rest, cage, frames].filter((mark): mark is FileMark => Boolean(mark));
   return html`
     <section class="card" aria-label="Interrupted upload">
-      <h2>“${nameOf(interrupted)}” was interrupted</h2>
+      <h2>Upload of “${nameOf(interrupted)}” was interrupted</h2>
       <p>
-        ${progressOf(interrupted)} It was begun ${age(present.begun / 1000, Date.now() / 1000)}. To send the rest, drop
-        the same ${files.length === 1 && files[0].files === 1 ? 'file' : 'files'} here again:
+        ${progressOf(interrupted)} Started ${age(present.begun / 1000, Date.now() / 1000)}. To resume, drop the same
+        ${files.length === 1 && files[0].files === 1 ? 'file' : 'files'} here again:
         ${files.map((mark, k) => html`${k > 0 ? ', ' : ''}<b>${mark.name}</b>`)}.
       </p>
       ${why ? html`<p class="note bad" role="alert">${glyphs.alert}<span>${why}</span></p>` : nothing}
       <div class="buttons">
-        <button type="button" @click=${onDelete}>${present.session ? 'Delete what was sent' : 'Forget it'}</button>
+        <button type="button" @click=${onDelete}>${present.session ? 'Delete upload' : 'Dismiss'}</button>
       </div>
     </section>
   `;
@@ -90,19 +90,19 @@ export function interruptedCard(interrupted: Interrupted, why: string, onDelete:
 /** Offers to go on, now that the files are there. */
 export function goOnCard(interrupted: Interrupted, onGoOn: () => void, onAnew: () => void) {
   return html`
-    <section class="card" aria-label="Go on">
-      <h2>These are the files of “${nameOf(interrupted)}”</h2>
-      <p>${progressOf(interrupted)} Only the others are sent.</p>
+    <section class="card" aria-label="Resume upload">
+      <h2>Resume “${nameOf(interrupted)}”?</h2>
+      <p>${progressOf(interrupted)} Only the rest is sent.</p>
       <div class="buttons">
-        <button type="button" class="primary" @click=${onGoOn}>${glyphs.upload} Go on</button>
-        <button type="button" @click=${onAnew}>Encode them anew instead</button>
+        <button type="button" class="primary" @click=${onGoOn}>${glyphs.upload} Resume</button>
+        <button type="button" @click=${onAnew}>Start a new upload</button>
       </div>
     </section>
   `;
 }
 
 function progressOf({ kept, solved }: Interrupted): string {
-  return `The service has ${count(solved)} of ${counted(kept.present.frames, 'frame')}.`;
+  return `${count(solved)} of ${counted(kept.present.frames, 'frame')} uploaded.`;
 }
 
 function nameOf({ kept }: Interrupted): string {

@@ -1,12 +1,11 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
 import type { Figures } from '../sessions/figures';
-import { count, counted, fraction, perSecond, ratio as times, size, span } from '../sessions/text';
+import { count, counted, percent, perSecond, ratio as times, size, span } from '../text';
 import { errorChart } from './errorChart';
 import { sampledFrames } from './motionCage';
 import type { Stage, UploadJob } from './uploadJob';
 
-/** What the buttons of a running upload do. */
 export interface JobActions {
   readonly stop: () => void;
   readonly takeBest: () => void;
@@ -16,19 +15,19 @@ export interface JobActions {
 }
 
 const STEPS: readonly (readonly [Stage, string])[] = [
-  ['designing', 'Design the cage'],
-  ['creating', 'Send the meshes'],
+  ['designing', 'Design cage'],
+  ['creating', 'Upload meshes'],
   ['preparing', 'Prepare'],
-  ['sending', 'Send frames'],
-  ['completing', 'Write the container'],
+  ['sending', 'Upload frames'],
+  ['completing', 'Finish file'],
 ];
 
 const TITLES: Readonly<Record<Stage, string>> = {
   designing: 'Designing the cage',
-  creating: 'Sending the rest pose',
+  creating: 'Uploading the rest pose',
   preparing: 'Preparing the cage',
   sending: 'Encoding',
-  completing: 'Writing the container',
+  completing: 'Finishing the file',
   completed: 'Encoded',
   stopped: 'Stopped',
   failed: 'Upload failed',
@@ -83,23 +82,21 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
         }
         ${
           stage === 'designing' && job.design?.vertices
-            ? html`<button type="button" @click=${actions.takeBest}>Go on with this cage</button>`
+            ? html`<button type="button" @click=${actions.takeBest}>Use this cage</button>`
             : nothing
         }
         ${job.isActive ? html`<button type="button" @click=${actions.stop}>Stop</button>` : nothing}
         ${
           stage === 'stopped' || stage === 'failed'
             ? html`<button type="button" class="primary" @click=${actions.goOn}>
-                  ${job.isAnew ? 'Start again' : stage === 'stopped' ? 'Go on' : 'Try again'}
+                  ${job.isAnew ? 'Start again' : stage === 'stopped' ? 'Resume' : 'Try again'}
                 </button>
-                <button type="button" @click=${actions.discard}>
-                  ${session ? 'Delete what was sent' : 'Dismiss'}
-                </button>`
+                <button type="button" @click=${actions.discard}>${session ? 'Delete upload' : 'Dismiss'}</button>`
             : nothing
         }
         ${stage === 'completed' ? html`<button type="button" @click=${actions.another}>Upload another capture</button>` : nothing}
       </div>
-      ${stage === 'sending' ? html`<p class="muted">You can watch it meanwhile. The upload continues while this tab is open, and can be resumed later.</p>` : nothing}
+      ${stage === 'sending' ? html`<p class="muted">You can watch while it uploads. The upload continues while this tab is open, and can be resumed later.</p>` : nothing}
     </section>
   `;
 }
@@ -107,13 +104,13 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
 function designFacts({ design, plan }: UploadJob) {
   if (!design) {
     const sent = sampledFrames(plan.frames.frames, plan.frames.points).length;
-    return html`<span>Sending ${counted(sent, 'frame')} of the motion</span>`;
+    return html`<span>Uploading ${counted(sent, 'sample frame')}</span>`;
   }
   const { vertices, error, stage, state } = design;
   return html`
-    ${state === 'queued' ? html`<span>Waiting for its turn</span>` : nothing}
+    ${state === 'queued' ? html`<span>Queued</span>` : nothing}
     ${vertices ? html`<span>cage of <b>${count(vertices)} vertices</b> so far</span>` : nothing}
-    ${typeof error === 'number' ? html`<span>mean error <b>${fraction(error)}</b></span>` : nothing}
+    ${typeof error === 'number' ? html`<span>mean error <b>${percent(error, 2)}</b></span>` : nothing}
     ${stage ? html`<span>${stage}</span>` : nothing}
   `;
 }
@@ -122,8 +119,8 @@ function containerFacts(figures: Figures | null) {
   const { bytes, ratio, meanL2 } = figures ?? { bytes: null, ratio: null, meanL2: null };
   if (bytes === null) return nothing;
   return html`
-    <span>container of <b>${size(bytes)}</b></span>
+    <span>file of <b>${size(bytes)}</b></span>
     ${ratio === null ? nothing : html`<span><b>${times(ratio)}</b> smaller than the frames</span>`}
-    ${meanL2 === null ? nothing : html`<span>mean error <b>${fraction(meanL2)}</b></span>`}
+    ${meanL2 === null ? nothing : html`<span>mean error <b>${percent(meanL2, 2)}</b></span>`}
   `;
 }

@@ -4,7 +4,7 @@ import { followProgress } from '../service/events';
 import type { CageDesign, DesignOptions, DesignProgress } from '../service/messages';
 import { ServiceProblem, problemBehind, problemFrom } from '../service/problem';
 import { type Service, patiently } from '../service/service';
-import type { FrameSource } from './frameSource';
+import type { FrameSource } from '../files/frameSource';
 import type { KeptUpload } from './keptUpload';
 
 /** A design looks at no more frames. */
@@ -22,13 +22,11 @@ export function sampledFrames(frames: number, points: number): number[] {
   return Array.from({ length: sampled }, (_, k) => Math.round((k * (frames - 1)) / Math.max(1, sampled - 1)));
 }
 
-/** What a design is made of. */
 interface Motion {
   readonly rest: File;
   readonly frames: FrameSource;
 }
 
-/** The design of one upload. */
 export class MotionCage {
   /** How far it is; null while none is at work. */
   progress: DesignProgress | null = null;

@@ -1,4 +1,4 @@
-import { html } from 'lit';
+import { html, nothing } from 'lit';
 import type { CoordinateSystem } from '../capture';
 import type { DesignOptions, SessionOptions } from '../service/messages';
 
@@ -36,7 +36,6 @@ export const DEFAULT_CHOICES: Choices = {
 /** Largest error of the accuracy `standard`, as a fraction of the diagonal: nobody sees it. */
 const STANDARD_ERROR = 0.001;
 
-/** The options of a session. */
 export function optionsOf(choices: Choices, frames: number, hasCage: boolean): SessionOptions {
   const isDesigned = !hasCage && choices.cage === 'motion';
   const options: SessionOptions = { frames, coordinates: isDesigned ? 'mvc' : choices.coordinates };
@@ -66,163 +65,107 @@ export function designOf(choices: Choices, hasCage: boolean): DesignOptions | nu
   return options;
 }
 
+interface NumberField {
+  readonly min: number;
+  readonly max?: number;
+  readonly step?: number;
+  readonly placeholder?: string;
+  readonly isRequired?: boolean;
+}
+
 /** The fields of the form. `onChange` gets the choices anew whenever one is changed. */
 export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choices: Choices) => void) {
   const set = (key: keyof Choices) => (event: Event) =>
     onChange({ ...choices, [key]: (event.target as HTMLInputElement | HTMLSelectElement).value });
-  const option = (key: keyof Choices, value: string, word: string) =>
-    html`<option value=${value} ?selected=${choices[key] === value}>${word}</option>`;
-  const isCoded = choices.accuracy !== 'cages';
+  const choice = (
+    key: keyof Choices,
+    label: string,
+    words: Readonly<Record<string, string>>,
+    hint = '',
+    isFixed = false,
+  ) =>
+    html`<div class="field">
+      <label for=${key}>${label}</label>
+      <select id=${key} aria-describedby=${hint ? `${key}-hint` : nothing} ?disabled=${isFixed} @change=${set(key)}>
+        ${Object.entries(words).map(([value, word]) => html`<option value=${value} ?selected=${choices[key] === value}>${word}</option>`)}
+      </select>
+      ${hint ? html`<span class="fine" id="${key}-hint">${hint}</span>` : nothing}
+    </div>`;
+  const number = (key: keyof Choices, label: string, { min, max, step, placeholder, isRequired }: NumberField) =>
+    html`<div class="field">
+      <label for=${key}>${label}</label>
+      <input
+        id=${key}
+        type="number"
+        min=${min}
+        max=${max ?? nothing}
+        step=${step ?? 'any'}
+        placeholder=${placeholder ?? nothing}
+        ?required=${isRequired === true}
+        .value=${choices[key]}
+        @input=${set(key)}
+      />
+    </div>`;
+  const percent = { min: 0.0001, max: 99, isRequired: true };
   const isDesigned = !hasCage && choices.cage === 'motion';
+  const cageFields = () => html`
+    ${choice(
+      'cage',
+      'Cage',
+      { rest: 'From the rest pose', motion: 'From the motion' },
+      isDesigned ? 'Several times more accurate; takes about a minute longer.' : 'Ready within seconds.',
+    )}
+    ${isDesigned ? choice('cageGoal', 'Target', { vertices: 'vertex count', error: 'error' }) : nothing}
+    ${
+      isDesigned && choices.cageGoal === 'error'
+        ? number('cageError', 'Mean error, in % of the diagonal', percent)
+        : number('cageVertices', 'Maximum cage vertices', { min: 4, max: 20_000, step: 1, placeholder: '350' })
+    }
+    ${
+      isDesigned
+        ? number('cageSeconds', 'Design time limit, in seconds', {
+            min: 1,
+            max: 86_400,
+            placeholder: 'service default',
+          })
+        : nothing
+    }
+  `;
   return html`
     <div class="options">
       <div class="field wide">
         <label for="name">Name</label>
         <input id="name" maxlength="200" autocomplete="off" .value=${choices.name} @input=${set('name')} />
       </div>
-      <div class="field">
-        <label for="accuracy">Accuracy</label>
-        <select id="accuracy" aria-describedby="accuracy-hint" @change=${set('accuracy')}>
-          ${option('accuracy', 'standard', 'Standard: visually lossless, 0.1 % at most')}
-          ${option('accuracy', 'master', 'Master: 0.01 % at most')} ${option('accuracy', 'bound', 'Custom limit')}
-          ${option('accuracy', 'preview', 'Preview: small, cages only')}
-          ${option('accuracy', 'cages', 'Cages only, no error limit')}
-        </select>
-        <span class="fine" id="accuracy-hint">
-          ${isCoded ? 'Frames are coded in groups, and the container is small.' : 'Cages are kept exactly; details that they cannot follow are lost.'}
-        </span>
-      </div>
-      ${
-        choices.accuracy === 'bound'
-          ? html`<div class="field">
-              <label for="bound">Largest error, in % of the diagonal</label>
-              <input
-                id="bound"
-                type="number"
-                min="0.0001"
-                max="99"
-                step="any"
-                required
-                .value=${choices.bound}
-                @input=${set('bound')}
-              />
-            </div>`
-          : ''
-      }
-      ${hasCage ? '' : cageFields(choices, set, option)}
-      <div class="field">
-        <label for="frame-rate">Frames per second</label>
-        <input
-          id="frame-rate"
-          type="number"
-          min="0.001"
-          step="any"
-          placeholder="auto"
-          .value=${choices.frameRate}
-          @input=${set('frameRate')}
-        />
-      </div>
+      ${choice(
+        'accuracy',
+        'Accuracy',
+        {
+          standard: 'Standard: visually lossless, 0.1 % at most',
+          master: 'Master: 0.01 % at most',
+          bound: 'Custom limit',
+          preview: 'Preview: small, cages only',
+          cages: 'Cages only, no error limit',
+        },
+        choices.accuracy === 'cages'
+          ? 'Cages are kept exactly; detail that they cannot follow is lost.'
+          : 'Frames are compressed in groups; files are small.',
+      )}
+      ${choices.accuracy === 'bound' ? number('bound', 'Maximum error, in % of the diagonal', percent) : nothing}
+      ${hasCage ? nothing : cageFields()}
+      ${number('frameRate', 'Frames per second', { min: 0.001, placeholder: 'auto' })}
     </div>
     <details>
       <summary>More options</summary>
       <div class="options">
-        <div class="field">
-          <label for="coordinates">Coordinates</label>
-          <select
-            id="coordinates"
-            aria-describedby="coordinates-hint"
-            ?disabled=${isDesigned}
-            @change=${set('coordinates')}
-          >
-            ${option('coordinates', 'mvc', 'Mean value')} ${option('coordinates', 'harmonic', 'Harmonic')}
-            ${option('coordinates', 'green', 'Green')} ${option('coordinates', 'green-free', 'Green, free normals')}
-          </select>
-          <span class="fine" id="coordinates-hint">
-            ${isDesigned ? 'Cages are designed for mean value coordinates.' : 'How points follow the cage.'}
-          </span>
-        </div>
+        ${choice(
+          'coordinates',
+          'Coordinates',
+          { mvc: 'Mean value', harmonic: 'Harmonic', green: 'Green', 'green-free': 'Green, free normals' },
+          isDesigned ? 'Cages are designed for mean value coordinates.' : 'How points follow the cage.',
+          isDesigned,
+        )}
       </div>
     </details>
   `;
-}
-
-type Set = (key: keyof Choices) => (event: Event) => void;
-type Option = (key: keyof Choices, value: string, word: string) => unknown;
-
-/** Where the cage comes from, and what it is to be. */
-function cageFields(choices: Choices, set: Set, option: Option) {
-  const isDesigned = choices.cage === 'motion';
-  const isError = isDesigned && choices.cageGoal === 'error';
-  const number = (key: 'cageVertices' | 'cageError' | 'cageSeconds', label: string, rest: NumberField) =>
-    html`<div class="field">
-      <label for=${key}>${label}</label>
-      <input
-        id=${key}
-        type="number"
-        min=${rest.min}
-        max=${rest.max}
-        step=${rest.step}
-        placeholder=${rest.placeholder}
-        ?required=${rest.isRequired}
-        .value=${choices[key]}
-        @input=${set(key)}
-      />
-    </div>`;
-  return html`
-    <div class="field">
-      <label for="cage">Cage</label>
-      <select id="cage" aria-describedby="cage-hint" @change=${set('cage')}>
-        ${option('cage', 'rest', 'Made around the rest pose')} ${option('cage', 'motion', 'Designed from the motion')}
-      </select>
-      <span class="fine" id="cage-hint">
-        ${isDesigned ? 'Several times more accurate; it takes about a minute more.' : 'Ready within seconds.'}
-      </span>
-    </div>
-    ${
-      isDesigned
-        ? html`<div class="field">
-            <label for="cage-goal">Target</label>
-            <select id="cage-goal" @change=${set('cageGoal')}>
-              ${option('cageGoal', 'vertices', 'vertex count')} ${option('cageGoal', 'error', 'error')}
-            </select>
-          </div>`
-        : ''
-    }
-    ${
-      isError
-        ? number('cageError', 'Mean error, in % of the diagonal', {
-            min: '0.0001',
-            max: '99',
-            step: 'any',
-            placeholder: '',
-            isRequired: true,
-          })
-        : number('cageVertices', 'Vertices of the cage, at most', {
-            min: '4',
-            max: '20000',
-            step: '1',
-            placeholder: '350',
-            isRequired: false,
-          })
-    }
-    ${
-      isDesigned
-        ? number('cageSeconds', 'Seconds for the design, at most', {
-            min: '1',
-            max: '86400',
-            step: 'any',
-            placeholder: 'as the service allows',
-            isRequired: false,
-          })
-        : ''
-    }
-  `;
-}
-
-interface NumberField {
-  readonly min: string;
-  readonly max: string;
-  readonly step: string;
-  readonly placeholder: string;
-  readonly isRequired: boolean;
 }

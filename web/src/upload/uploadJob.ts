@@ -17,7 +17,6 @@ import { type KeptUpload, newKey } from './keptUpload';
 import { MotionCage } from './motionCage';
 import type { Plan } from './plan';
 
-/** Where an upload is. */
 export type Stage =
   'designing' | 'creating' | 'preparing' | 'sending' | 'completing' | 'completed' | 'stopped' | 'failed';
 
@@ -29,7 +28,6 @@ export interface Measured {
 
 const PREPARING_POLL_SECONDS = 0.5;
 
-/** What is asked of the service. */
 export interface UploadRequest {
   readonly options: SessionOptions;
   /** What the cage is to be that is designed first; null where none is. */
@@ -90,12 +88,10 @@ export class UploadJob extends EventTarget {
     this.#stopping.abort();
   }
 
-  /** Goes on with the best cage that the design has found so far. */
   takeBest(): void {
     this.#cage.takeBest();
   }
 
-  /** How far the design of the cage is. */
   get design(): DesignProgress | null {
     return this.#cage.progress;
   }
@@ -161,7 +157,7 @@ export class UploadJob extends EventTarget {
     this.done = 0;
     this.measured.l2.fill(Number.NaN);
     this.measured.linf.fill(Number.NaN);
-    return 'The session was deleted while it was uploaded to, here or elsewhere. Start again to send all of it to a new one.';
+    return 'The session was deleted during the upload. Start again to upload everything to a new one.';
   }
 
   /** Whether nothing of it is at the service any more, or yet. */
@@ -192,7 +188,7 @@ export class UploadJob extends EventTarget {
     const { points } = this.session;
     if (points !== null && points !== this.plan.frames.points) {
       throw new Error(
-        `The rest pose has ${points} points and the frames have ${this.plan.frames.points}: both have to be the same mesh. Nothing was sent but the rest pose.`,
+        `The rest pose has ${points} points and the frames have ${this.plan.frames.points}: they must be the same mesh. Only the rest pose was uploaded.`,
       );
     }
   }
@@ -261,7 +257,7 @@ export class UploadJob extends EventTarget {
   }
 
   #say({ problem, seconds }: Retry): void {
-    this.trouble = `${problem.message} The upload tries again in ${Math.ceil(seconds)} s.`;
+    this.trouble = `${problem.message} Retrying in ${Math.ceil(seconds)} s.`;
     this.#changed();
   }
 

@@ -1,11 +1,10 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
-import { counted, size } from '../sessions/text';
-import type { Item, Role } from './classify';
+import { counted, size } from '../text';
+import type { Item, Role } from '../files/classify';
 import type { Choices } from './optionsForm';
 import type { Plan } from './plan';
 
-/** What the buttons of the drop zone do. */
 export interface ChoosingFiles {
   readonly onFiles: () => void;
   readonly onFolder: () => void;
@@ -26,15 +25,15 @@ export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder,
       ${
         isFirst
           ? html`${glyphs.upload}
-              <h2>Drop a rest pose, its frames and a cage here</h2>
-              <p class="muted">All at once or one after another. Nothing is sent before you start it.</p>`
+              <h2>Drop a rest pose, frames and, if you have one, a cage</h2>
+              <p class="muted">Together or one by one. Nothing is uploaded until you start.</p>`
           : nothing
       }
       <div class="buttons">
         <button type="button" class=${isFirst ? 'primary' : ''} @click=${onFiles}>
           ${isFirst ? 'Choose files' : 'Add files'}
         </button>
-        <button type="button" @click=${onFolder}>${isFirst ? 'Choose a folder' : 'Add a folder'}</button>
+        <button type="button" @click=${onFolder}>${isFirst ? 'Choose folder' : 'Add folder'}</button>
         ${isFirst ? nothing : html`<button type="button" class="quiet" @click=${onStartOver}>Start over</button>`}
       </div>
     </div>
@@ -42,15 +41,15 @@ export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder,
       isFirst
         ? html`<ul class="kinds">
             <li class="card">
-              <b>Rest pose</b><span class="fine">The mesh that moves: .obj, .ply, .off, .stl or .glb</span>
+              <b>Rest pose</b><span class="fine">The undeformed mesh: .obj, .ply, .off, .stl or .glb</span>
             </li>
             <li class="card">
               <b>Frames</b
               ><span class="fine">.npy (frames × points × 3), .pc2, .mdd, or a folder with one .obj per frame</span>
             </li>
             <li class="card">
-              <b>Cage, if you have one</b
-              ><span class="fine">A coarse closed mesh around the rest pose; otherwise one is made</span>
+              <b>Cage (optional)</b
+              ><span class="fine">A coarse closed mesh around the rest pose; created for you if missing</span>
             </li>
           </ul>`
         : nothing
@@ -68,7 +67,7 @@ export function itemRow(item: Item, onRole: (role: Role) => void) {
       ${
         item.choices.length > 1
           ? html`<select
-              aria-label="What ${item.name} is"
+              aria-label="Role of ${item.name}"
               .value=${item.role}
               @change=${(event: Event) => onRole((event.target as HTMLSelectElement).value as Role)}
             >
@@ -81,12 +80,11 @@ export function itemRow(item: Item, onRole: (role: Role) => void) {
   `;
 }
 
-/** What will be sent. */
 export function planSummary({ frames, cage, remarks }: Plan, choices: Choices) {
   const bytes = 12 * frames.frames * frames.points;
   const sentences = [
     `${counted(frames.frames, 'frame')} of ${counted(frames.points, 'point')}, ${size(bytes)} in single precision.`,
-    cage || choices.cage === 'motion' ? '' : 'The service makes a cage around the rest pose.',
+    cage || choices.cage === 'motion' ? '' : 'A cage is created around the rest pose.',
     ...remarks,
   ];
   return html`<div class="note">

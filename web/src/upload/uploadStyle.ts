@@ -1,6 +1,5 @@
 import { css } from 'lit';
 
-/** Looks of the upload page, beside {@link pageLayout}. */
 export const uploadStyle = css`
   .page {
     display: grid;

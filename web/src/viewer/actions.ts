@@ -7,13 +7,12 @@ import type { Player } from './player';
 import { save } from '../save';
 import { recordTurntable } from './recording';
 import type { Action } from './shortcuts';
-import { sentence } from './text';
+import { sentence } from '../text';
 import { sought, spedUp, started, stepped, worstFrame } from './transport';
 
 /** Angle and factor of one press of a key. */
 const [TURN, ZOOM] = [Math.PI / 12, 1.15];
 
-/** Does what a key or a button asks for. */
 export function perform(action: Action, viewer: CagerViewer) {
   const { player } = viewer;
   if (!player) return;
@@ -118,7 +117,7 @@ async function toggleRecording(viewer: CagerViewer, player: Player) {
   viewer.recording = recording;
   try {
     const showProgress = (fraction: number) => {
-      player.progress = { doing: 'Recording one turn', fraction };
+      player.progress = { doing: 'Recording turntable', fraction };
       viewer.requestUpdate();
     };
     const { video, ending } = await recordTurntable(player, recording.signal, showProgress);
@@ -135,7 +134,7 @@ async function toggleFullscreen(viewer: CagerViewer) {
   try {
     await (document.fullscreenElement ? document.exitFullscreen() : viewer.requestFullscreen());
   } catch {
-    viewer.report('This browser does not allow full screen here.');
+    viewer.report('Full screen is not available here.');
   }
 }
 

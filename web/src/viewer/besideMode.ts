@@ -1,6 +1,6 @@
 import { html, nothing } from 'lit';
 import type { Capture, FrameErrors } from '../capture';
-import type { Dropped } from '../upload/classify';
+import type { Dropped } from '../files/classify';
 import { Beside } from './beside';
 import { paintCorrespondence } from './correspondence';
 import { numberAt, numberText } from './frameNumbers';
@@ -8,9 +8,8 @@ import { glyphs } from '../style/glyphs';
 import { openFile } from './opener';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
-import { percent, sentence } from './text';
+import { percent, sentence } from '../text';
 
-/** What showing a second capture needs of the viewer around it. */
 export interface BesideHost extends HTMLElement {
   readonly player: Player | null;
   readonly renderRoot: ParentNode;
@@ -60,7 +59,6 @@ export class BesideMode {
     this.host.dispatchEvent(new CustomEvent('besideclosed', { bubbles: true, composed: true }));
   }
 
-  /** The player of the second picture. */
   get player(): Player | null {
     return this.pair?.player ?? null;
   }
@@ -96,7 +94,7 @@ export class BesideMode {
     const canvas = document.createElement('canvas');
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'img');
-    canvas.setAttribute('aria-label', `${beside.name}: the model beside, drawn.`);
+    canvas.setAttribute('aria-label', `${beside.name}: second 3D view`);
     pane.prepend(canvas);
     try {
       this.pair = new Beside(canvas, beside, player);
@@ -111,7 +109,7 @@ export class BesideMode {
   paint(correspondence: readonly number[]) {
     const { player: first } = this.host;
     const { player: second } = this;
-    if (!first || !second) throw new Error('Show source and target beside each other first: drop the other one here.');
+    if (!first || !second) throw new Error('Show source and target side by side first: drop the other one here.');
     paintCorrespondence(correspondence, first, second);
     this.isPainted = true;
     first.layers = { ...first.layers, colors: true };
@@ -133,22 +131,22 @@ export class BesideMode {
     const progress = pair?.player.progress;
     return html`<div class="pane second">
       ${this.marks?.template ?? nothing}
-      <section class="caption corner glass" aria-label="Capture beside">
+      <section class="caption corner glass" aria-label="Second capture">
         <h2 class="heading clip" title=${this.host.beside.name}>${this.host.beside.name}</h2>
         <button
           class="quiet icon"
-          title="Show the first capture alone"
-          aria-label="Show the first capture alone"
+          title="Close the second capture"
+          aria-label="Close the second capture"
           @click=${() => this.leave()}
         >
           ${glyphs.close}
         </button>
         <p class="figures fine">
-          <i class="dashes" title="Dashed in the timeline"></i
+          <i class="dashes" title="Dashed line in the timeline"></i
           >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
           <span data-beside ?hidden=${Boolean(progress)}></span>
         </p>
-        ${this.isPainted ? html`<p class="fine">Places of one colour correspond</p>` : nothing}
+        ${this.isPainted ? html`<p class="fine">Matching colours mark corresponding points</p>` : nothing}
       </section>
     </div>`;
   }
@@ -187,7 +185,6 @@ export class BesideMode {
   }
 }
 
-/** Frame and errors of the second capture. */
 function figures({ frame, player }: Beside, lead: Player): string {
   const { numbers, position } = lead.transport;
   const number = numberText(numberAt(numbers, Math.floor(position)));

@@ -4,7 +4,7 @@ import { customElement, property, query, state } from 'lit/decorators.js';
 import { EditMode } from '../editing/editMode';
 import { controls } from '../style/controls';
 import { tokens } from '../style/tokens';
-import { isContainer, type Dropped } from '../upload/classify';
+import { isContainer, type Dropped } from '../files/classify';
 import { perform, stem } from './actions';
 import { BesideMode } from './besideMode';
 import { CaptureElement } from './captureElement';
@@ -24,7 +24,7 @@ import { canRecord } from './recording';
 import { correspondenceOf, readReport, trackingOf } from './reports';
 import { actionOfKey, type Action } from './shortcuts';
 import { followLooks, stageColors } from './stageColors';
-import { sentence } from './text';
+import { sentence } from '../text';
 import type { Timeline } from './timeline';
 import { viewerStyle } from './viewerStyle';
 
@@ -127,7 +127,6 @@ export class CagerViewer extends CaptureElement {
     if (this.dispatchEvent(wanted)) this.files.pickBeside();
   }
 
-  /** Begins or ends to edit the cage. */
   toggleEditing(): Promise<void> {
     this.poses.leave();
     return this.editing.toggle();
@@ -139,7 +138,6 @@ export class CagerViewer extends CaptureElement {
     await this.poses.toggle();
   }
 
-  /** Shows the keyboard shortcuts. */
   openHelp() {
     this.sheet.showModal();
   }
@@ -167,10 +165,7 @@ export class CagerViewer extends CaptureElement {
     this.files.follow();
     // The canvas is replaced with every capture, so no binding of the template can reach it.
     this.canvas.hidden = !this.player;
-    this.canvas.setAttribute(
-      'aria-label',
-      `${this.heading}: the model, drawn. Drag or use the keys A, D, W, X to turn it.`,
-    );
+    this.canvas.setAttribute('aria-label', `${this.heading}: 3D view. Drag, or press A, D, W or X, to orbit.`);
     if (this.layout.hasChanged(this.pair.player, this.coveredShare)) this.resize();
     this.writePlace();
   }

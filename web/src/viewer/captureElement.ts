@@ -3,7 +3,7 @@ import { property, query, state } from 'lit/decorators.js';
 import type { Capture } from '../capture';
 import { Opener } from './opener';
 import { Player } from './player';
-import { sentence } from './text';
+import { sentence } from '../text';
 import { sought, started } from './transport';
 import { ViewLink } from './viewLink';
 import { viewFromText } from './viewState';
@@ -67,7 +67,7 @@ export abstract class CaptureElement extends LitElement {
 
   /** Positions of a frame as they are decoded for the picture, x y z of each point. */
   readPositions(frame: number): Promise<Float32Array> {
-    if (!this.player) return Promise.reject(new Error('There is no capture to read from; open one first.'));
+    if (!this.player) return Promise.reject(new Error('No capture is open.'));
     return this.player.readPositions(frame);
   }
 

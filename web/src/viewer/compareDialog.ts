@@ -1,13 +1,13 @@
 import { css, html, LitElement, nothing } from 'lit';
 import { customElement, query, state } from 'lit/decorators.js';
+import { pickFiles } from '../files/drop';
 import type { Session } from '../service/messages';
 import { problemBehind, sentenceOf, ServiceProblem } from '../service/problem';
 import type { Service } from '../service/service';
 import { nameOf } from '../sessions/row';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
-import { pressLabel } from './messages';
-import { grouped } from './text';
+import { count } from '../text';
 
 /** What to show beside a capture: a session by its id, or a file. */
 export type CompareChoice = { readonly session: string } | { readonly file: File };
@@ -80,8 +80,8 @@ export class CompareDialog extends LitElement {
       </header>
       <input
         type="search"
-        placeholder="Name of a session"
-        aria-label="Name of a session"
+        placeholder="Search sessions"
+        aria-label="Search sessions"
         autofocus
         .value=${this.wanted}
         @input=${(event: Event) => (this.wanted = (event.target as HTMLInputElement).value)}
@@ -94,7 +94,7 @@ export class CompareDialog extends LitElement {
               <button class="quiet" @click=${() => this.choose({ session: session.id })}>
                 <span class="clip">${nameOf(session)}</span>
                 <small class="figures fine"
-                  >${grouped(session.points ?? 0)} points, ${grouped(session.frames.solved)} frames</small
+                  >${count(session.points ?? 0)} points, ${count(session.frames.solved)} frames</small
                 >
               </button>
             </li>`,
@@ -104,19 +104,16 @@ export class CompareDialog extends LitElement {
         problem !== null
           ? html`<p role="alert">${problem}</p>`
           : isLoading
-            ? html`<p class="muted" role="status">Loading sessions</p>`
+            ? html`<p class="muted" role="status">Loading sessions…</p>`
             : found.length === 0
-              ? html`<p class="muted" role="status">
-                  There is no other session${wanted === '' ? '' : ' of this name'}.
-                </p>`
+              ? html`<p class="muted" role="status">${wanted === '' ? 'No other sessions' : 'No matching sessions'}</p>`
               : nothing
       }
       <footer class="buttons">
-        ${next !== null ? html`<button @click=${() => void this.load()}>More sessions</button>` : nothing}
-        <label class="button" tabindex="0" @keydown=${pressLabel}>
-          ${glyphs.file} Open a file
-          <input class="visually-hidden" type="file" accept=".cager" tabindex="-1" @change=${this.takeFile} />
-        </label>
+        ${next !== null ? html`<button @click=${() => void this.load()}>Load more</button>` : nothing}
+        <button @click=${() => pickFiles(([{ file }]) => this.choose({ file }), { accept: '.cager' })}>
+          ${glyphs.file} Open file
+        </button>
       </footer>
     </dialog>`;
   }
@@ -141,19 +138,8 @@ export class CompareDialog extends LitElement {
     this.isLoading = false;
   }
 
-  private readonly takeFile = (event: Event) => {
-    const file = (event.target as HTMLInputElement).files?.[0];
-    if (file) this.choose({ file });
-  };
-
   private choose(detail: CompareChoice) {
     this.dialog.close();
     this.dispatchEvent(new CustomEvent('compare', { detail }));
-  }
-}
-
-declare global {
-  interface HTMLElementTagNameMap {
-    'cager-compare-dialog': CompareDialog;
   }
 }

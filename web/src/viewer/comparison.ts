@@ -3,7 +3,7 @@ import type { ObservedSurfaces } from '../observed/surfaces';
 import type { Original } from '../originals/original';
 import type { Side } from '../render/drawn';
 import type { Stage } from '../render/stage';
-import type { Dropped } from '../upload/classify';
+import type { Dropped } from '../files/classify';
 
 /** The capture beside the frames that it was encoded from, or the surfaces that it was recovered from, where somebody has given them to the page. */
 export class Comparison {
@@ -11,7 +11,6 @@ export class Comparison {
   onChange: () => void = () => undefined;
   original: Original | null = null;
   surfaces: ObservedSurfaces | null = null;
-  /** The files of the original or the surfaces. */
   files: readonly Dropped[] = [];
   private shownSide: Side = 'decoded';
   private place = 0.5;

@@ -1,15 +1,13 @@
 import { html, nothing, type TemplateResult } from 'lit';
-import { heatGradient } from '../render/colorMap';
+import { HEAT } from '../render/colorMap';
 import type { Side } from '../render/drawn';
-import type { Dropped } from '../upload/classify';
-import { pickedFiles } from '../upload/drop';
+import type { Dropped } from '../files/classify';
+import { pickFiles } from '../files/drop';
 import { glyphs } from '../style/glyphs';
 import type { HeatRange, MeasuredFrame } from './heatMap';
-import { pressLabel } from './messages';
 import type { Player } from './player';
-import { grouped, percent, threeDigits } from './text';
+import { count, percent, threeDigits } from '../text';
 
-/** What the parts of a comparison ask the viewer to do. */
 export interface ComparisonActs {
   open(files: readonly Dropped[]): void;
   close(): void;
@@ -32,26 +30,25 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
   const compared = original ?? surfaces;
   if (!compared) {
     const wanted = player.capture.tracking ? 'surfaces that it was recovered from' : 'original frames';
-    return html`<p>
-        Drop the ${wanted} here to see where the error is; neither the service nor the file keeps them. They are not
-        sent anywhere.
-      </p>
-      ${chooser(`Choose the ${wanted}`, acts)}`;
+    return html`<p>Drop the ${wanted} here to see the error of each point. They are not uploaded.</p>
+      <button @click=${() => pickFiles((files) => acts.open(files), { accept: '.npy,.pc2,.mdd,.obj,.ply' })}>
+        ${glyphs.file} Choose files
+      </button>`;
   }
   const names = surfaces ? SURFACE_NAMES : SIDE_NAMES;
-  const what = surfaces ? 'Distance from the surface' : 'Distance from the original';
+  const what = surfaces ? 'Distance from the surface' : 'Error against the original';
   const { measured } = heatMap;
   const sides = Object.keys(SIDE_NAMES) as Side[];
   const showsErrors = heatMap.kind === 'error' && measured !== null;
   return html`
     <div class="source row">
       <span class="grow clip" title=${compared.name}>${showsErrors ? what : compared.name}</span>
-      <button class="quiet icon" aria-label="Put the original away" title="Put the original away" @click=${acts.close}>
+      <button class="quiet icon" aria-label="Close the original" title="Close the original" @click=${acts.close}>
         ${glyphs.close}
       </button>
     </div>
     ${showsErrors ? [errorFigures(player, measured), surfaces ? nothing : rangeChoice(player)] : nothing}
-    <div class="segments" role="group" aria-label="What is shown">
+    <div class="segments" role="group" aria-label="Show">
       ${sides.map(
         (side) =>
           html`<button aria-pressed=${String(comparison.side === side)} @click=${() => (comparison.side = side)}>
@@ -67,7 +64,7 @@ const RANGE_NAMES: Readonly<Record<HeatRange, string>> = { clip: 'Whole clip', f
 /** Which points the warm end of the colours is of: 99 of 100 stay below it. */
 export function rangeChoice(player: Player) {
   const { kind, range } = player.heatMap;
-  return html`<div class="segments" role="group" aria-label="What 99 of 100 points stay below, over">
+  return html`<div class="segments" role="group" aria-label="Colour range (99th percentile)">
     ${(Object.keys(RANGE_NAMES) as HeatRange[]).map(
       (each) =>
         html`<button aria-pressed=${String(each === range)} @click=${() => player.setHeat(kind, each)}>
@@ -79,39 +76,28 @@ export function rangeChoice(player: Player) {
 
 function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {
   const { diagonal, precision } = stage.decoder;
-  const more = heatMap.largest < largest ? ' and more' : '';
-  return html`<div class="bar" .style=${`background: ${heatGradient()}`}></div>
+  const more = heatMap.largest < largest ? ' and above' : '';
+  return html`<div class="bar" .style=${`background: ${HEAT.gradient}`}></div>
     <div class="spread muted figures">
       <span>0</span
       ><span>${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})${more}</span>
     </div>
     <dl class="pairs">
-      <dt>Worst point, ${grouped(worst)}</dt>
+      <dt>Worst point, ${count(worst)}</dt>
       <dd>${percent(largest)} (${threeDigits(largest * diagonal)})</dd>
-      <dt>Root mean square</dt>
+      <dt>RMS</dt>
       <dd>${percent(l2)} (${threeDigits(l2 * diagonal)})</dd>
     </dl>
     ${
       l2 > UNLIKELY_ERROR
         ? html`<p class="muted">
-            That is far off: the files may have another unit, or
-            ${comparison.surfaces ? 'be other frames' : 'their points in another order'}.
+            This is far off: the files may use another unit, or have
+            ${comparison.surfaces ? 'other frames' : 'another point order'}.
           </p>`
         : precision.error > TELLING_PART * largest
-          ? html`<p class="muted">Up to ${percent(precision.error)} of it is the rounding of this picture.</p>`
+          ? html`<p class="muted">Up to ${percent(precision.error)} of this is rounding in this view.</p>`
           : nothing
     }`;
-}
-
-function chooser(label: string, acts: ComparisonActs) {
-  const take = (event: Event) => {
-    const { files } = event.target as HTMLInputElement;
-    if (files && files.length > 0) acts.open(pickedFiles(files));
-  };
-  return html`<label class="button" tabindex="0" @keydown=${pressLabel}>
-    ${glyphs.file} ${label}
-    <input class="visually-hidden" type="file" multiple accept=".npy,.pc2,.obj,.ply" tabindex="-1" @change=${take} />
-  </label>`;
 }
 
 /** The line between the original and the decoded model, to be dragged. */
@@ -136,7 +122,7 @@ export function divider({ comparison }: Player) {
     class="divider"
     role="slider"
     tabindex="0"
-    aria-label="Where the original ends and the decoded model begins"
+    aria-label="Divider between original and decoded model"
     aria-valuemin="0"
     aria-valuemax="100"
     aria-valuenow=${share}

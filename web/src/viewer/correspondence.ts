@@ -1,4 +1,5 @@
 import type { Capture } from '../capture';
+import { boundsOf } from '../coordinates/topology';
 import type { Player } from './player';
 
 /** Darkest and brightest value of a colour's channels: light and shadow are seen on all. */
@@ -16,7 +17,7 @@ export function paintCorrespondence(correspondence: readonly number[], first: Pl
   const [source, target] = pointsOf(second) === correspondence.length ? [first, second] : [second, first];
   const count = pointsOf(source);
   if (pointsOf(target) !== correspondence.length || correspondence.some((point) => point >= count)) {
-    throw new Error('The report is of other models than these two: show the source and what was made of the target.');
+    throw new Error('This report is about other models: open the source and the transferred target.');
   }
   const colors = placeColors(source.capture.static);
   const taken = new Uint8Array(3 * correspondence.length);
@@ -27,11 +28,7 @@ export function paintCorrespondence(correspondence: readonly number[], first: Pl
 
 /** Red, green and blue of each point by where it is between the ends of the model: along x, y and z. */
 export function placeColors({ rest }: Pick<Capture['static'], 'rest'>): Uint8Array {
-  const [low, high] = [Array<number>(3).fill(Infinity), Array<number>(3).fill(-Infinity)];
-  for (let k = 0; k < rest.length; k++) {
-    low[k % 3] = Math.min(low[k % 3], rest[k]);
-    high[k % 3] = Math.max(high[k % 3], rest[k]);
-  }
+  const { low, high } = boundsOf(rest);
   return Uint8Array.from(rest, (x, k) => {
     const share = (x - low[k % 3]) / (high[k % 3] - low[k % 3] || 1);
     return Math.round(DARK + (BRIGHT - DARK) * share);

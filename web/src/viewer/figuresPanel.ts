@@ -1,13 +1,20 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
 import type { Player } from './player';
-import { bitrate, grouped, percent, SYSTEM_NAMES } from './text';
+import { bitrate, count, percent } from '../text';
 
-/** Figures about the capture and the playing. */
+const SYSTEM_NAMES = {
+  mvc: 'mean value coordinates',
+  harmonic: 'harmonic coordinates',
+  green: 'Green coordinates',
+  'green-free': 'Green coordinates, free normals',
+} as const;
+
 export function figuresPanel(player: Player, close: () => void) {
   const { static: part, frames, frameBytes } = player.capture;
   const { decoder } = player.stage;
   const points = part.rest.length / 3;
+  const isGreen = part.system === 'green-free';
   const cageRate = part.rowsPerFrame * 12 * player.transport.rate;
   const fileRate = frameBytes === undefined || frames === 0 ? null : (frameBytes / frames) * player.transport.rate;
   const rawRate = points * 12 * player.transport.rate;
@@ -16,45 +23,46 @@ export function figuresPanel(player: Player, close: () => void) {
       <dd>${value}</dd>`;
   const { bits, error } = decoder.precision;
   const { live = null } = player.capture;
-  return html`<aside class="panel glass" aria-label="Figures">
+  return html`<aside class="panel glass" aria-label="Statistics">
     <header class="spread">
       <h2>Capture</h2>
-      <button class="quiet icon" title="Close" aria-label="Close the figures" @click=${close}>${glyphs.close}</button>
+      <button class="quiet icon" title="Close" aria-label="Close" @click=${close}>${glyphs.close}</button>
     </header>
     <dl class="pairs">
-      ${row('Points', grouped(points))} ${row('Polygons', grouped(part.cornerCounts.length))}
-      ${row('Frames', grouped(frames))}
+      ${row('Points', count(points))} ${row('Polygons', count(part.cornerCounts.length))}
+      ${row('Frames', count(frames))}
       ${row('Frames per second', `${player.transport.rate}${part.frameRate === null ? ' (assumed)' : ''}`)}
     </dl>
     <h2>Cage</h2>
     <dl class="pairs">
-      ${row('Vertices', grouped(part.cage.positions.length / 3))}
-      ${row('Triangles', grouped(part.cage.triangles.length / 3))} ${row('Unknowns', grouped(part.rowsPerFrame))}
+      ${row('Vertices', count(part.cage.positions.length / 3))}
+      ${row('Triangles', count(part.cage.triangles.length / 3))}
+      ${isGreen ? row('Vertices and normals', count(part.rowsPerFrame)) : nothing}
     </dl>
     <p class="muted">${SYSTEM_NAMES[part.system]}</p>
     <h2>Bandwidth</h2>
     <dl class="pairs">
-      ${fileRate === null ? nothing : row('Frames of this file', bitrate(fileRate))}
-      ${row('Cages before compression', bitrate(cageRate))} ${row('All points, not compressed', bitrate(rawRate))}
+      ${fileRate === null ? nothing : row('This file', bitrate(fileRate))}
+      ${row('Cages, uncompressed', bitrate(cageRate))} ${row('All points, uncompressed', bitrate(rawRate))}
     </dl>
     ${
       live
         ? html`<h2>Live</h2>
             <dl class="pairs">
-              ${row('Behind the service', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
-              ${row('Arriving', bitrate(live.bitsPerSecond / 8))}
-              ${row('Frames arriving per second', live.framesPerSecond.toFixed(1))}
-              ${row('Frames not here yet', grouped(live.behindFrames))}
-              ${row('Frames waited for', grouped(live.lateFrames))}
-              ${row('Frames dropped', grouped(live.droppedFrames))}
+              ${row('Latency', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
+              ${row('Download rate', bitrate(live.bitsPerSecond / 8))}
+              ${row('Frames received per second', live.framesPerSecond.toFixed(1))}
+              ${row('Frames pending', count(live.behindFrames))} ${row('Stalls', count(live.lateFrames))}
+              ${row('Skipped frames', count(live.droppedFrames))}
             </dl>`
         : nothing
     }
     <h2>This browser</h2>
     <dl class="pairs">
       ${row('FPS', player.picturesPerSecond > 0 ? player.picturesPerSecond.toFixed(0) : '–')}
-      ${row('Dropped frames', grouped(player.playback.dropped))} ${row('Weights', decoder.ready ? `${bits} bits` : '–')}
-      ${error > 0 ? row('Rounding moves a point by', `< ${percent(error)}`) : nothing}
+      ${row('Dropped frames', count(player.playback.dropped))}
+      ${row('Weight precision', decoder.ready ? `${bits} bits` : '–')}
+      ${error > 0 ? row('Rounding error', `< ${percent(error)}`) : nothing}
     </dl>
   </aside>`;
 }

@@ -1,7 +1,7 @@
 import type { Capture } from '../capture';
 import type { FrameData, FrameStore } from '../render/frameStore';
 import { Holes } from './holes';
-import { sentence } from './text';
+import { sentence } from '../text';
 import { framesAhead, framesAround, type Transport } from './transport';
 
 /** Frames that are loaded ahead of the one that is shown. */

@@ -29,7 +29,6 @@ export function placeOf(numbers: FrameNumbers, number: number): number {
   return low + (number - numbers[low]) / (numbers[high] - numbers[low]);
 }
 
-/** A number for people. */
 export function numberText(number: number): string {
   return String(Number(number.toFixed(3)));
 }

@@ -23,7 +23,6 @@ const MEASURED_FRAMES = 12;
 
 /** Colours the model by a value of each point that belongs to the frame that is shown. */
 export class HeatMap {
-  /** Called when the colours have changed. */
   onChange: () => void = () => undefined;
   /** Called when colours mean something else: those of the picture are to be computed anew. */
   onRange: () => void = () => undefined;
@@ -45,7 +44,6 @@ export class HeatMap {
     private readonly motion: Motion,
   ) {}
 
-  /** The maps that there are. */
   readonly kinds: readonly Heat[] = ['none', 'motion', 'error'];
 
   /** What the warmest colour stands for, in diagonals: the worst point alone would leave all others dark. */

@@ -16,7 +16,6 @@ export class Holes {
     if (!this.at(hole.first)) this.holes.set(hole.first, hole);
   }
 
-  /** The hole that has the frame. */
   at(frame: number): Hole | null {
     for (const hole of this.holes.values()) {
       if (frame >= hole.first && frame < hole.first + hole.count) return hole;

@@ -1,16 +1,13 @@
 import { html, nothing } from 'lit';
-import { isContainer, type Dropped } from '../upload/classify';
-import { droppedFiles, pickedFiles } from '../upload/drop';
+import { isContainer, type Dropped } from '../files/classify';
+import { droppedFiles, pickFiles } from '../files/drop';
 import { dropHint, dropQuestion } from './messages';
 import { checkContainer } from './opener';
-import { sentence } from './text';
+import { sentence } from '../text';
 
-/** What taking files needs of the viewer around it. */
 export interface FilesHost extends HTMLElement {
   readonly renderRoot: ParentNode;
-  /** Whether a capture is shown. */
   readonly isShowing: boolean;
-  /** Whether one is being opened. */
   readonly isOpening: boolean;
   openFiles(files: readonly Dropped[], beside?: boolean): Promise<void>;
   fail(error: unknown): void;
@@ -26,7 +23,6 @@ export class IncomingFiles {
 
   constructor(private readonly host: FilesHost) {}
 
-  /** Whether somebody is asked what is to be done with a file. */
   get isAsking(): boolean {
     return this.asked !== null;
   }
@@ -63,7 +59,7 @@ export class IncomingFiles {
 
   /** Asks for a file to show beside the capture. */
   pickBeside() {
-    this.host.renderRoot.querySelector<HTMLInputElement>('.beside-file')!.click();
+    pickFiles((files) => void this.host.openFiles(files, true), { accept: '.cager,.json' });
   }
 
   /** To be called after every render. */
@@ -76,7 +72,6 @@ export class IncomingFiles {
     return html`
       ${this.isHeldAbove ? dropHint(this.host.isShowing) : nothing}
       ${this.asked ? dropQuestion(this.asked.find(isContainer)!.file.name, (choice) => void this.answer(choice)) : nothing}
-      <input class="beside-file" type="file" accept=".cager,.json" multiple hidden @change=${this.takeBeside} />
     `;
   }
 
@@ -102,13 +97,6 @@ export class IncomingFiles {
     if (choice === 'instead') await this.openInstead(files);
     if (choice === 'beside') await this.host.openFiles(files, true);
   }
-
-  private readonly takeBeside = (event: Event) => {
-    const input = event.target as HTMLInputElement;
-    const files = pickedFiles(input.files ?? []);
-    input.value = '';
-    if (files.length > 0) void this.host.openFiles(files, true);
-  };
 
   private async openInstead(files: readonly Dropped[]) {
     const chosen = new CustomEvent('filechosen', { detail: files, bubbles: true, composed: true, cancelable: true });

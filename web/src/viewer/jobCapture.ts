@@ -4,7 +4,7 @@ import { openStored, type OpenSessionOptions } from '../service/live';
 import type { Recovery, Transfer } from '../service/messages';
 import { problemFrom } from '../service/problem';
 import { patiently, type Service } from '../service/service';
-import { counted } from '../sessions/text';
+import { counted } from '../text';
 import { correspondenceOf, trackingOf } from './reports';
 
 const LOOK_SECONDS = 2;
@@ -51,9 +51,9 @@ export async function jobCapture(
 /** How far a job is, in a sentence. */
 function progressOf(job: Recovery | Transfer): string {
   if ('moved' in job)
-    return `Moved ${job.moved} of ${counted(job.frames, 'frame')}. They can be played when all are encoded.`;
+    return `Transferred ${job.moved} of ${counted(job.frames, 'frame')}. Playback starts when all are encoded.`;
   const { followed, received } = job.frames;
   return job.state === 'finishing' && followed === received
-    ? 'The recovery goes over all frames a second time, then it can be played.'
-    : `Followed ${followed} of ${counted(received, 'frame')}. It can be played when it is complete.`;
+    ? 'Refining all frames; playback starts when this is done.'
+    : `Recovered ${followed} of ${counted(received, 'frame')}. Playback starts when all are done.`;
 }

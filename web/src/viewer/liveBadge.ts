@@ -1,7 +1,7 @@
 import { html, type TemplateResult } from 'lit';
 import type { LiveStatus } from '../capture';
 import type { Player } from './player';
-import { threeDigits } from './text';
+import { threeDigits } from '../text';
 import { sought, started, type Transport } from './transport';
 
 /** What is shown counts as live while it is no more seconds than this behind the newest frame. */
@@ -32,7 +32,6 @@ export function liveFrame({ frames, rate }: Transport): number {
   return Math.max(0, frames - 1 - Math.min(MARGIN_FRAMES, Math.floor(MARGIN_SECONDS * rate)));
 }
 
-/** The badge of a session that is still running. */
 export class LiveBadge {
   /** Kind of the place that the badge was rendered for last. */
   private shown = '';

@@ -1,13 +1,13 @@
 import { html, type TemplateResult } from 'lit';
-import type { Dropped } from '../upload/classify';
-import { pickedFiles } from '../upload/drop';
+import type { Dropped } from '../files/classify';
+import { pickFiles } from '../files/drop';
 import { glyphs } from '../style/glyphs';
 
 /** A sentence about something that went wrong, while the capture can still be looked at. */
 export function notice(problem: string, close: () => void): TemplateResult {
   return html`<div class="toast glass row" role="alert">
     <span>${problem}</span>
-    <button class="quiet icon" aria-label="Close this message" @click=${close}>${glyphs.close}</button>
+    <button class="quiet icon" aria-label="Dismiss" @click=${close}>${glyphs.close}</button>
   </div>`;
 }
 
@@ -24,8 +24,8 @@ export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside'
     <form method="dialog">
       <h2 id="question-title">Open ${name}?</h2>
       <div class="buttons">
-        <button class="primary" value="instead" autofocus>Open instead</button>
-        <button value="beside">Show beside</button>
+        <button class="primary" value="instead" autofocus>Replace current</button>
+        <button value="beside">Open side by side</button>
         <button class="quiet" value="">Cancel</button>
       </div>
     </form>
@@ -35,7 +35,7 @@ export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside'
 /** What happens to files that are held above the viewer. */
 export function dropHint(isShowing: boolean): TemplateResult {
   return html`<div class="drop">
-    ${isShowing ? 'Drop another capture to play it or to see it beside this one, the original frames to compare with, or a report' : 'Drop a capture to play it'}
+    ${isShowing ? 'Drop a capture to open or compare, original frames, or a report' : 'Drop a capture to play it'}
   </div>`;
 }
 
@@ -61,29 +61,17 @@ export function emptyState(
       <p>Opening ${opening}</p>
     </div>`;
   }
-  const take = (event: Event) => {
-    const files = pickedFiles((event.target as HTMLInputElement).files ?? []);
-    if (files.length > 0) choose(files);
-  };
   return html`<div class="empty">
     <div class="lead"><slot name="lead"></slot></div>
     ${glyphs.cage}
-    <h1>${failure === null ? 'Drop a capture here' : 'This cannot be shown'}</h1>
+    <h1>${failure === null ? 'Drop a capture here' : 'Could not open'}</h1>
     ${
       failure === null
-        ? html`<p>A .cager file plays in this page. It is not sent anywhere.</p>`
+        ? html`<p>A .cager file plays in this page and is not uploaded.</p>`
         : html`<p class="notice" role="alert">${failure}</p>`
     }
-    <label class="button primary" tabindex="0" @keydown=${pressLabel}>
-      ${glyphs.file} Choose a file
-      <input class="visually-hidden" type="file" accept=".cager,.json" multiple tabindex="-1" @change=${take} />
-    </label>
+    <button class="primary" @click=${() => pickFiles(choose, { accept: '.cager,.json' })}>
+      ${glyphs.file} Choose file
+    </button>
   </div>`;
-}
-
-/** A label that looks like a button is pressed like one. */
-export function pressLabel(event: KeyboardEvent) {
-  if (event.key !== 'Enter' && event.key !== ' ') return;
-  event.preventDefault();
-  (event.currentTarget as HTMLElement).click();
 }

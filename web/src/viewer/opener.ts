@@ -1,16 +1,13 @@
 import type { Capture } from '../capture';
 import { openContainer } from '../container/open';
 import { checkPrelude, PRELUDE_BYTES } from '../container/section';
-import { blobSource, httpSource } from '../container/source';
-import { fileNameOf, sentence } from './text';
+import { blobSource } from '../container/source';
+import { httpSource } from '../service/httpSource';
+import { fileNameOf, sentence } from '../text';
 
-/** What opening captures needs of the viewer around it. */
 export interface OpenerHost {
-  /** Whether a capture is shown. */
   readonly isShowing: boolean;
-  /** Shows a capture in place of the present one. */
   show(capture: Capture): void;
-  /** Shows nothing, and why. */
   fail(error: unknown): void;
   report(problem: string): void;
   requestUpdate(): void;
@@ -45,7 +42,6 @@ export class Opener {
     return this.file !== null;
   }
 
-  /** Stops opening. */
   stop() {
     this.load.abort();
     this.name = null;
@@ -89,7 +85,6 @@ export class Opener {
   }
 }
 
-/** The capture in a file. */
 export function openFile(file: File, signal?: AbortSignal): Promise<Capture> {
   return openContainer(blobSource(file), { name: file.name, ...(signal && { signal }) });
 }

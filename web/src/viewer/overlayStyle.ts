@@ -129,10 +129,6 @@ export const overlayStyle = css`
   .legend .segments button {
     padding: 0 4px;
   }
-  .legend label {
-    width: 100%;
-    white-space: normal;
-  }
   .source {
     margin: -8px -8px 0 0;
   }

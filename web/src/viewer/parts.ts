@@ -1,6 +1,6 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import type { FrameErrors } from '../capture';
-import { heatGradient } from '../render/colorMap';
+import { HEAT } from '../render/colorMap';
 import type { FrameRange } from '../editing/cageEdit';
 import type { Layers } from '../render/drawn';
 import { comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
@@ -9,32 +9,21 @@ import { glyphs, type GlyphName } from '../style/glyphs';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
 import { isLost } from './reports';
-import { keyLabel, SHORTCUTS, type Action } from './shortcuts';
-import { grouped, percent } from './text';
+import { keyLabel, labelOf, SHORTCUTS, type Action } from './shortcuts';
+import { count, percent } from '../text';
 import './timeline';
 import { sought, SPEEDS } from './transport';
 
-/** What the parts ask the viewer to do. */
 export type Act = (action: Action) => void;
-
-const LAYER_NAMES: Readonly<Record<keyof Layers, string>> = {
-  model: 'Model',
-  wireframe: 'Wireframe',
-  points: 'Points',
-  cage: 'Cage',
-  handles: 'Handles',
-  ground: 'Ground',
-  colors: 'Colours',
-};
 
 const HEAT_NAMES: Readonly<Record<Heat, string>> = {
   none: 'Heat map',
-  motion: 'Heat map: movement from frame to frame',
-  error: 'Heat map: error of each point',
+  motion: 'Heat map: motion',
+  error: 'Heat map: error',
 };
 
 /** A button with a drawing; `pressed` makes it a switch. */
-function tool(action: Action, name: GlyphName, label: string, act: Act, pressed?: boolean): TemplateResult {
+function tool(action: Action, name: GlyphName, act: Act, pressed?: boolean, label = labelOf(action)): TemplateResult {
   return html`<button
     class="quiet icon"
     data-action=${action}
@@ -61,39 +50,31 @@ export function toolbar(
     recordable: boolean;
   },
 ) {
-  const layers = Object.keys(LAYER_NAMES) as (keyof Layers)[];
+  const layers = Object.keys(player.layers) as (keyof Layers)[];
   const isPossible: Partial<Record<keyof Layers, boolean>> = {
     handles: player.capture.handles !== undefined,
     colors: shown.colors,
   };
   const possible = layers.filter((layer) => isPossible[layer] ?? true);
   return html`<div class="tools glass" role="toolbar" aria-label="View" aria-orientation="vertical">
-    ${possible.map((layer) => tool(layer, layer, LAYER_NAMES[layer], act, player.layers[layer]))}
-    ${tool('heat', 'heat', HEAT_NAMES[player.heatMap.kind], act, player.heatMap.kind !== 'none')}
-    ${tool('edit', 'edit', 'Edit the cage', act, shown.editing)}
-    ${player.capture.container ? tool('poses', 'poses', 'Blend poses', act, shown.poses) : nothing}
-    ${tool('beside', 'beside', 'Compare with another capture', act, shown.beside)}
+    ${possible.map((layer) => tool(layer, layer, act, player.layers[layer]))}
+    ${tool('heat', 'heat', act, player.heatMap.kind !== 'none', HEAT_NAMES[player.heatMap.kind])}
+    ${tool('edit', 'edit', act, shown.editing)}
+    ${player.capture.container ? tool('poses', 'poses', act, shown.poses) : nothing}
+    ${tool('beside', 'beside', act, shown.beside)}
     <hr />
-    ${tool('frame', 'frame', 'Frame all of the motion', act)}
-    ${tool('follow', 'follow', 'Follow the model', act, player.isFollowing)}
-    ${tool('picture', 'camera', 'Save a picture', act)}
+    ${tool('frame', 'frame', act)} ${tool('follow', 'follow', act, player.isFollowing)}
+    ${tool('picture', 'camera', act)}
     ${
       shown.recordable
-        ? tool(
-            'turntable',
-            'turntable',
-            shown.recording ? 'Stop recording' : 'Record a turntable video',
-            act,
-            shown.recording,
-          )
+        ? tool('turntable', 'turntable', act, shown.recording, shown.recording ? 'Stop recording' : undefined)
         : nothing
     }
-    ${tool('fullscreen', 'fullscreen', 'Full screen', act)} ${tool('figures', 'figures', 'Figures', act, shown.figures)}
-    ${tool('help', 'keyboard', 'Keyboard shortcuts', act)}
+    ${tool('fullscreen', 'fullscreen', act)} ${tool('figures', 'figures', act, shown.figures)}
+    ${tool('help', 'keyboard', act)}
   </div>`;
 }
 
-/** Name and size of the capture. */
 export function titleBox(heading: string, { capture }: Player, isEdited: boolean) {
   const { static: part, frames, tracking, frameNumbers } = capture;
   // Frames are counted from 0 unless they have numbers of their own: the place beside the timeline is one of these.
@@ -102,10 +83,10 @@ export function titleBox(heading: string, { capture }: Player, isEdited: boolean
   return html`<div class="title glass">
     <h1 class="heading clip" title=${heading}>${heading}</h1>
     <p class="figures fine clip">
-      ${grouped(part.rest.length / 3)} points, ${grouped(frames)}
-      frames${frames > 1 ? ` (${first}–${last})` : nothing}<span class="more"
-        >, cage of ${grouped(part.cage.positions.length / 3)} vertices</span
-      >${lost > 0 ? html`, <span class="lost">${grouped(lost)} lost</span>` : nothing}${isEdited ? ', edited' : nothing}
+      ${count(part.rest.length / 3)} points, ${count(frames)} frames${frames > 1 ? ` (${first}–${last})` : nothing}<span
+        class="more"
+        >, cage of ${count(part.cage.positions.length / 3)} vertices</span
+      >${lost > 0 ? html`, <span class="lost">${count(lost)} lost</span>` : nothing}${isEdited ? ', edited' : nothing}
     </p>
   </div>`;
 }
@@ -116,7 +97,6 @@ interface TimelineParts {
   readonly range: FrameRange | null;
 }
 
-/** The transport above the timeline. */
 export function deck(player: Player, act: Act, { besideErrors, range }: TimelineParts) {
   const { capture, transport } = player;
   const figures = capture.tracking ? scoreFigure : capture.errors.linf.some(Number.isFinite) ? errorFigures : null;
@@ -135,7 +115,6 @@ export function deck(player: Player, act: Act, { besideErrors, range }: Timeline
   </div>`;
 }
 
-/** Play, step, speed, place and errors. */
 function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, figures: TemplateResult | null) {
   const { transport } = player;
   return html`<div class="transport row">
@@ -147,9 +126,8 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
     >
       ${glyphs[transport.playing ? 'pause' : 'play']}
     </button>
-    ${tool('previous', 'previous', 'Previous frame', act)} ${tool('next', 'next', 'Next frame', act)}
-    ${tool('loop', 'loop', 'Loop', act, transport.loop)}
-    ${figures ? tool('worst', 'worst', 'Frame with the largest error', act) : nothing}
+    ${tool('previous', 'previous', act)} ${tool('next', 'next', act)} ${tool('loop', 'loop', act, transport.loop)}
+    ${figures ? tool('worst', 'worst', act) : nothing}
     <select
       class="figures"
       aria-label="Speed"
@@ -164,12 +142,12 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
 }
 
 const errorFigures = html`<dl class="errors row figures">
-  <div class="row" title="Root mean square of the distances of all points, as part of the diagonal">
+  <div class="row" title="RMS distance over all points, relative to the diagonal">
     <dt><i class="key"></i></dt>
     <dt>L2</dt>
     <dd data-l2></dd>
   </div>
-  <div class="row" title="Largest distance of a point, as part of the diagonal">
+  <div class="row" title="Largest distance of any point, relative to the diagonal">
     <dt><i class="key linf"></i></dt>
     <dt>L∞</dt>
     <dd data-linf></dd>
@@ -177,7 +155,7 @@ const errorFigures = html`<dl class="errors row figures">
 </dl>`;
 
 const scoreFigure = html`<dl class="errors row figures">
-  <div class="row" title="How well the template lies on the surface, as part of the diagonal: less is better">
+  <div class="row" title="Distance of the template from the surface, relative to the diagonal; lower is better">
     <dt><i class="key"></i></dt>
     <dt>Score</dt>
     <dd data-score></dd>
@@ -193,10 +171,10 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
   return html`<div class="legend glass ${compares ? 'comparison' : ''} ${beside ? 'beside' : ''}">
     ${
       isMotion
-        ? html`Movement from frame to frame
-            <div class="bar" .style=${`background: ${heatGradient()}`}></div>
+        ? html`Motion between frames
+            <div class="bar" .style=${`background: ${HEAT.gradient}`}></div>
             <div class="spread muted figures">
-              <span>0</span><span>${percent(heatMap.largest)} of the diagonal and more</span>
+              <span>0</span><span>${percent(heatMap.largest)} of the diagonal and above</span>
             </div>
             ${rangeChoice(player)}`
         : nothing
@@ -205,7 +183,6 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
   </div>`;
 }
 
-/** All shortcuts, in a dialog. */
 export function helpSheet(close: () => void) {
   return html`<dialog
     class="sheet"
@@ -232,8 +209,8 @@ export function helpSheet(close: () => void) {
       )}
     </div>
     <p class="muted">
-      Drag to turn, drag with the right button or two fingers to move, turn the wheel or pinch to zoom. Double-click to
-      frame all of the motion.
+      Drag to orbit; drag with the right button or two fingers to pan; scroll or pinch to zoom; double-click to frame
+      all.
     </p>
   </dialog>`;
 }

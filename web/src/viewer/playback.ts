@@ -6,18 +6,8 @@ import type { Stage } from '../render/stage';
 import { Comparison } from './comparison';
 import { blendedRows, FrameFeed, type Blend } from './frameFeed';
 import { HeatMap } from './heatMap';
-import { sentence } from './text';
+import { sentence } from '../text';
 import { framesAhead, sought, standing, USUAL_RATE, type Transport } from './transport';
-
-/** Rows of a cage, `rowsPerFrame × 3`, that are drawn in place of those of a frame. */
-export interface Deformation {
-  /** Whether they change from picture to picture. */
-  readonly isMoving: boolean;
-  /** Whether rows are of no frame: its residual is left out. */
-  readonly isWhole?: boolean;
-  /** @param seconds of a clock that goes on while nothing plays */
-  rows(rows: Float32Array | Float64Array, seconds: number): Float64Array;
-}
 
 /** What is shown together with a capture, in step with it. */
 export interface Companion {
@@ -51,9 +41,9 @@ export class Playback {
   readonly heatMap: HeatMap;
   /** The original frames, where they are at hand. */
   readonly comparison: Comparison;
-  /** What is shown together with this capture. */
   companion: Companion | null = null;
-  deformation: Deformation | null = null;
+  /** Rows of a cage, `rowsPerFrame × 3`, that are drawn in place of those of frames; residuals are left out then. */
+  shape: Float64Array | null = null;
   /** Whether the frame that should be shown has not come yet. */
   buffering = false;
   /** Frames that were passed over because pictures came too slowly. */
@@ -131,11 +121,11 @@ export class Playback {
   /** Goes to a place that somebody else has moved on to, whether or not its frames are there. */
   follow(transport: Transport) {
     this.state = transport;
-    this.moveTo(transport, 0);
+    this.moveTo(transport);
   }
 
-  /** Moves on to a place if its frames are there, and sees to those that will be needed; `now` is the time of a {@link Deformation} in seconds. */
-  moveTo(advancing: Transport, now: number) {
+  /** Moves on to a place if its frames are there, and sees to those that will be needed. */
+  moveTo(advancing: Transport) {
     const news = this.feed.holes.news(Math.floor(advancing.position));
     if (news !== null) this.listener.problem(news);
     const next = advancing.playing ? this.feed.holes.past(advancing) : advancing;
@@ -161,7 +151,7 @@ export class Playback {
     const ended = this.state.playing && !next.playing;
     this.state = next;
     if (ended) this.listener.changed();
-    this.pose(found, original, now);
+    this.pose(found, original);
   }
 
   close() {
@@ -170,16 +160,19 @@ export class Playback {
     this.comparison.surfaces?.close();
   }
 
-  private pose(found: Blend, original: Original | null, now: number) {
+  private pose(found: Blend, original: Original | null) {
     const { before, mix, here, there } = found;
     if (!this.poseIsOld && before + mix === this.shownPosition) return;
     this.poseIsOld = false;
     this.shownPosition = before + mix;
     this.heatMap.update(before, this.state.frames);
-    const rows = this.deformation?.rows(blendedRows(found), now) ?? blendedRows(found);
-    const isWhole = this.deformation?.isWhole === true;
-    const [offsets, next] = isWhole ? [null, null] : [here.offsets, there?.offsets ?? null];
-    this.stage.setPose({ rows, before: offsets, after: next, mix });
+    const { shape } = this;
+    this.stage.setPose({
+      rows: shape ?? blendedRows(found),
+      before: shape ? null : here.offsets,
+      after: shape ? null : (there?.offsets ?? null),
+      mix,
+    });
     this.comparison.update(before);
     this.heatMap.measure(before, this.state.frames, original);
     if (this.isObserving && this.observing !== before) void this.observe(before);

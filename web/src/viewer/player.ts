@@ -1,4 +1,6 @@
 import type { Capture, FrameBlock } from '../capture';
+import { canCompute } from '../coordinates/compute';
+import { computePhi } from '../coordinates/pool';
 import { framed, HOME, nearlySame, shifted, zoomed, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
 import type { Covered, Layers } from '../render/drawn';
@@ -7,12 +9,11 @@ import { Motion } from '../render/motion';
 import { Stage } from '../render/stage';
 import type { Comparison } from './comparison';
 import type { Heat, HeatMap, HeatRange } from './heatMap';
-import { isFetched, phiOf } from './phi';
-import { Playback, type Deformation } from './playback';
+import { Playback } from './playback';
 import { Quality } from './quality';
 import { Resolution } from './resolution';
 import { surveyMotion } from './survey';
-import { sentence } from './text';
+import { sentence } from '../text';
 import { advanced, type Transport } from './transport';
 import { USUAL_LAYERS } from './viewState';
 
@@ -39,10 +40,8 @@ export class Player {
   readonly controls: CameraControls;
   readonly resolution: Resolution;
   progress: Progress | null = null;
-  /** The place that is shown. */
   readonly playback: Playback;
   readonly heatMap: HeatMap;
-  /** The original frames, where they are at hand. */
   readonly comparison: Comparison;
   private readonly motion: Motion;
   /** The camera that frames the motion as it was known last, and whether it does so from the usual side. */
@@ -146,10 +145,10 @@ export class Player {
     this.setHeat(this.heatMap.kind);
   }
 
-  /** Draws frames deformed; null draws them as they are. */
-  deform(deformation: Deformation | null) {
-    if (deformation === this.playback.deformation) return;
-    this.playback.deformation = deformation;
+  /** Draws a cage with these rows, `rowsPerFrame × 3`, in place of those of frames; null draws frames as they are. */
+  deform(rows: Float64Array | null) {
+    if (rows === this.playback.shape) return;
+    this.playback.shape = rows;
     this.refresh();
   }
 
@@ -228,13 +227,12 @@ export class Player {
     return positions;
   }
 
-  /** The picture as it is now. */
   picture(): Promise<Blob> {
     this.resolution.share = 1;
     this.stage.renew();
     this.stage.draw(this.camera);
     return new Promise((resolve, reject) => {
-      this.stage.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The picture could not be made.'))));
+      this.stage.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The image could not be saved.'))));
     });
   }
 
@@ -248,11 +246,16 @@ export class Player {
 
   private async prepare() {
     const { signal } = this.stop;
+    const { capture } = this;
     try {
-      const doing = isFetched(this.capture) ? 'Fetching coordinates' : 'Computing coordinates';
+      // What the page cannot compute comes from the service.
+      const isFetched = !canCompute(capture.static.system) && capture.coordinates !== undefined;
+      const doing = isFetched ? 'Loading coordinates' : 'Computing coordinates';
       const onProgress = (fraction: number) => this.report({ doing, fraction });
       onProgress(0);
-      const phi = await phiOf(this.capture, onProgress, signal);
+      const phi = isFetched
+        ? await capture.coordinates!(onProgress, signal)
+        : await (capture.phi?.(onProgress, signal) ?? computePhi(capture.static, { signal, onProgress }));
       await this.stage.decoder.setPhi(phi);
       signal.throwIfAborted();
       this.motion.setPhi(phi);
@@ -305,13 +308,11 @@ export class Player {
     const seconds = Math.min(LONGEST_STEP, sinceLast);
     const turned = this.controls.advance(seconds);
     const waited = playback.buffering;
-    const isDeforming = playback.deformation?.isMoving === true;
-    playback.poseIsOld ||= isDeforming;
     // While Φ is computed, pictures would take the processor from it.
-    playback.moveTo(this.isPrepared ? advanced(playback.transport, seconds) : playback.transport, now / 1000);
+    playback.moveTo(this.isPrepared ? advanced(playback.transport, seconds) : playback.transport);
     const { playing, frames, position } = playback.transport;
     const wasMoving = this.isMoving;
-    this.isMoving = turned || isDeforming || (playing && frames > 1 && this.isPrepared);
+    this.isMoving = turned || (playing && frames > 1 && this.isPrepared);
     if (this.isMoving && wasMoving) this.quality.measure(sinceLast);
     // Pictures become fine again one picture after everything has come to rest.
     this.resolution.share = this.isMoving || wasMoving ? this.quality.moving : this.resting;

@@ -1,7 +1,9 @@
 import { html } from 'lit';
-import { pointAt, spotOf, type Picture, type Spot } from '../originals/pointAt';
+import { pointAt as positionOf } from '../coordinates/vector';
+import { pointAt, type Picture, type Spot } from '../originals/pointAt';
+import { Projection } from '../render/projection';
 import type { Player } from './player';
-import { grouped, percent, threeDigits } from './text';
+import { count, percent, threeDigits } from '../text';
 
 /** How far from the pointer a point may be, in CSS pixels. */
 const REACH = 14;
@@ -46,16 +48,17 @@ export class PointMarks {
       width: stage.canvas.clientWidth,
       height: stage.canvas.clientHeight,
     };
+    const projection = new Projection(stage.clipMatrix, picture.width, picture.height);
     const begin = comparison.original && comparison.side === 'both' ? comparison.split * picture.width : 0;
     const put = (mark: HTMLElement, point: number) => {
-      const spot = spotOf(measured.places, point, picture);
+      const spot = projection.place(positionOf(measured.places, point));
       mark.hidden = !spot || spot.x < begin;
       if (!spot) return;
       mark.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
       mark.classList.toggle('flipped', spot.x > 0.6 * picture.width);
       const value = measured.values[point];
       const distance = `${percent(value)} (${threeDigits(value * stage.decoder.diagonal)})`;
-      mark.querySelector('b')!.textContent = `Point ${grouped(point)}: `;
+      mark.querySelector('b')!.textContent = `Point ${count(point)}: `;
       mark.querySelector('data')!.textContent = distance;
     };
     put(worst, measured.worst);

@@ -2,7 +2,6 @@ import { html, nothing } from 'lit';
 import type { PoseView } from '../poses';
 import type { Player } from './player';
 
-/** What showing shapes between frames needs of the viewer around it. */
 interface PoseHost {
   readonly player: Player | null;
   requestUpdate(): void;
@@ -34,7 +33,7 @@ export class PoseMode {
       this.view ??= new PoseView(player);
       this.view.moveTo(this.view.place);
     } catch {
-      this.host.report('This part of the page could not be loaded; reload it when the service answers again.');
+      this.host.report('This part of the page could not be loaded. Check your connection and reload.');
       return;
     }
     this.isOn = true;
@@ -52,7 +51,6 @@ export class PoseMode {
     this.host.requestUpdate();
   }
 
-  /** Forgets the capture. */
   close() {
     this.view?.dispose();
     this.view = null;

@@ -1,7 +1,7 @@
 import { numberAt, numberText } from './frameNumbers';
 import type { Player } from './player';
 import { isLost } from './reports';
-import { clock, percent } from './text';
+import { clock, percent } from '../text';
 
 /**
  * Writes frame, time and errors of the place that is shown. Rendering the template sixty times a second would cost more.

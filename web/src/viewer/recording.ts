@@ -6,7 +6,6 @@ const TURN_SECONDS = 8;
 const PICTURES_PER_SECOND = 30;
 const TYPES = ['video/mp4;codecs=avc1.640028', 'video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm'];
 
-/** Whether this browser can record its own pictures. */
 export function canRecord(): boolean {
   return typeof MediaRecorder !== 'undefined' && 'captureStream' in HTMLCanvasElement.prototype;
 }

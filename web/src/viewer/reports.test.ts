@@ -19,12 +19,10 @@ test('a_report_tells_how_each_frame_was_found', () => {
 });
 
 test('reports_of_something_else_are_refused_in_words', async () => {
-  expect(() => trackingOf({ frames: [frame('followed')] }, 2)).toThrow(
-    'tells of 1 frame, and the capture has 2 frames',
-  );
+  expect(() => trackingOf({ frames: [frame('followed')] }, 2)).toThrow('has 1 frame and the capture 2 frames');
   for (const report of [null, {}, { frames: 3 }, { frames: [{ outcome: 'lost' }] }])
-    expect(() => trackingOf(report, 1)).toThrow('tells nothing that can be shown here');
-  await expect(readReport(new File(['v 0 0 0'], 'a.json'))).rejects.toThrow('a.json is no report');
+    expect(() => trackingOf(report, 1)).toThrow('Nothing in this report can be shown here');
+  await expect(readReport(new File(['v 0 0 0'], 'a.json'))).rejects.toThrow('a.json is not a report');
 });
 
 test('a_correspondence_is_points_of_the_source', () => {

@@ -1,5 +1,5 @@
 import type { Tracking } from '../capture';
-import { counted } from '../sessions/text';
+import { counted } from '../text';
 
 interface FrameReport {
   readonly file: string;
@@ -12,7 +12,7 @@ export async function readReport(file: File): Promise<unknown> {
   try {
     return JSON.parse(await file.text());
   } catch {
-    throw new Error(`${file.name} is no report: there is no JSON in it.`);
+    throw new Error(`${file.name} is not a report: it is not JSON.`);
   }
 }
 
@@ -21,12 +21,12 @@ export function trackingOf(report: unknown, frames: number): Tracking {
   const found = (report as { frames?: unknown } | null)?.frames;
   if (!Array.isArray(found) || !found.every(isFrame)) {
     throw new Error(
-      'This report tells nothing that can be shown here: those of `cager recover`, and of `cager transfer` by the fitted cage, do.',
+      'Nothing in this report can be shown here. Use one of `cager recover`, or of `cager transfer` by the fitted cage.',
     );
   }
   if (found.length !== frames) {
     throw new Error(
-      `The report tells of ${counted(found.length, 'frame')}, and the capture has ${counted(frames, 'frame')}: they are not of one recovery.`,
+      `The report has ${counted(found.length, 'frame')} and the capture ${counted(frames, 'frame')}: they do not belong together.`,
     );
   }
   return {

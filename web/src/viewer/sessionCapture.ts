@@ -1,5 +1,4 @@
 import type { Capture } from '../capture';
-import { httpSource } from '../container/source';
 import { openSession, type OpenSessionOptions } from '../service/live';
 import { type Service, sessionPath } from '../service/service';
 
@@ -12,10 +11,7 @@ export async function sessionCapture(
   const capture: Capture = await openSession(id, options);
   const below = (path: string) => sessionPath(id, path);
   capture.coordinates = async (onProgress, until) => (await service.coordinates(id, onProgress, until)).values;
-  capture.container ??= (until) => {
-    const headers = () => service.authorization();
-    return httpSource(service.address(below('capture.cager')), { headers, signal: until });
-  };
+  capture.container ??= (until) => service.source(below('capture.cager'), until);
   capture.decode = (cages, until) => {
     const headers = { 'Content-Type': 'application/octet-stream' };
     return service.request(below('decode'), { method: 'POST', headers, body: cages, signal: until ?? null });

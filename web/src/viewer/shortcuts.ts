@@ -1,88 +1,47 @@
-/** What keys do in the viewer: the help sheet lists them, and key presses are looked up here. */
-export type Action =
-  | 'play'
-  | 'previous'
-  | 'next'
-  | 'back'
-  | 'forth'
-  | 'first'
-  | 'last'
-  | 'slower'
-  | 'faster'
-  | 'loop'
-  | 'smooth'
-  | 'worst'
-  | 'frame'
-  | 'home'
-  | 'follow'
-  | 'turnLeft'
-  | 'turnRight'
-  | 'turnUp'
-  | 'turnDown'
-  | 'zoomIn'
-  | 'zoomOut'
-  | 'up'
-  | 'model'
-  | 'wireframe'
-  | 'points'
-  | 'cage'
-  | 'handles'
-  | 'ground'
-  | 'colors'
-  | 'heat'
-  | 'compare'
-  | 'picture'
-  | 'turntable'
-  | 'fullscreen'
-  | 'figures'
-  | 'edit'
-  | 'beside'
-  | 'poses'
-  | 'help';
-
 interface Shortcut {
-  readonly action: Action;
+  readonly action: string;
   /** Values of `KeyboardEvent.key`; the first one is shown. */
   readonly keys: readonly string[];
   readonly label: string;
 }
 
-export const SHORTCUTS: readonly { readonly title: string; readonly entries: readonly Shortcut[] }[] = [
+/** What keys do in the viewer: the help sheet lists them, and key presses are looked up here. */
+const TABLE = [
   {
-    title: 'Play',
+    title: 'Playback',
     entries: [
-      { action: 'play', keys: [' ', 'k'], label: 'Play or pause' },
+      { action: 'play', keys: [' ', 'k'], label: 'Play / pause' },
       { action: 'previous', keys: ['ArrowLeft', ','], label: 'Previous frame' },
       { action: 'next', keys: ['ArrowRight', '.'], label: 'Next frame' },
-      { action: 'back', keys: ['PageUp', 'j'], label: 'Ten frames back' },
-      { action: 'forth', keys: ['PageDown'], label: 'Ten frames forward' },
+      { action: 'back', keys: ['PageUp', 'j'], label: 'Back 10 frames' },
+      { action: 'forth', keys: ['PageDown'], label: 'Forward 10 frames' },
       { action: 'first', keys: ['Home'], label: 'First frame' },
       { action: 'last', keys: ['End'], label: 'Last frame' },
       { action: 'slower', keys: ['<', '['], label: 'Slower' },
       { action: 'faster', keys: ['>', ']'], label: 'Faster' },
-      { action: 'loop', keys: ['l'], label: 'Loop on or off' },
-      { action: 'smooth', keys: ['s'], label: 'Blend between frames on or off' },
-      { action: 'worst', keys: ['m'], label: 'Frame with the largest error' },
+      { action: 'loop', keys: ['l'], label: 'Loop' },
+      { action: 'smooth', keys: ['s'], label: 'Interpolate between frames' },
+      { action: 'worst', keys: ['m'], label: 'Go to worst frame' },
     ],
   },
   {
-    title: 'Look',
+    title: 'View',
     entries: [
-      { action: 'frame', keys: ['f'], label: 'Frame all of the motion' },
-      { action: 'follow', keys: ['y'], label: 'Follow the model on or off' },
-      { action: 'home', keys: ['0'], label: 'Look from the front again' },
-      { action: 'turnLeft', keys: ['a'], label: 'Turn left' },
-      { action: 'turnRight', keys: ['d'], label: 'Turn right' },
-      { action: 'turnUp', keys: ['w'], label: 'Turn up' },
-      { action: 'turnDown', keys: ['x'], label: 'Turn down' },
+      { action: 'frame', keys: ['f'], label: 'Frame all' },
+      { action: 'follow', keys: ['y'], label: 'Follow the model' },
+      { action: 'home', keys: ['0'], label: 'Reset view' },
+      { action: 'turnLeft', keys: ['a'], label: 'Orbit left' },
+      { action: 'turnRight', keys: ['d'], label: 'Orbit right' },
+      { action: 'turnUp', keys: ['w'], label: 'Orbit up' },
+      { action: 'turnDown', keys: ['x'], label: 'Orbit down' },
       { action: 'zoomIn', keys: ['+', '='], label: 'Zoom in' },
       { action: 'zoomOut', keys: ['-'], label: 'Zoom out' },
-      { action: 'up', keys: ['z'], label: 'Which axis is up: y or z' },
+      { action: 'up', keys: ['z'], label: 'Up axis: Y or Z' },
       { action: 'fullscreen', keys: ['Enter'], label: 'Full screen' },
     ],
   },
   {
-    title: 'Show',
+    title: 'Display',
     entries: [
       { action: 'model', keys: ['1'], label: 'Model' },
       { action: 'wireframe', keys: ['2'], label: 'Wireframe' },
@@ -92,20 +51,24 @@ export const SHORTCUTS: readonly { readonly title: string; readonly entries: rea
       { action: 'ground', keys: ['6', 'g'], label: 'Ground' },
       { action: 'colors', keys: ['7'], label: 'Colours' },
       { action: 'heat', keys: ['h'], label: 'Heat map' },
-      { action: 'compare', keys: ['o'], label: 'Original, decoded model, or both' },
-      { action: 'figures', keys: ['i'], label: 'Figures' },
-      { action: 'edit', keys: ['e'], label: 'Edit the cage' },
-      { action: 'beside', keys: ['b'], label: 'Another capture beside this one' },
+      { action: 'compare', keys: ['o'], label: 'Original, decoded or both' },
+      { action: 'figures', keys: ['i'], label: 'Statistics' },
+      { action: 'edit', keys: ['e'], label: 'Edit cage' },
+      { action: 'beside', keys: ['b'], label: 'Compare with another capture' },
       { action: 'poses', keys: ['n'], label: 'Blend poses' },
-      { action: 'picture', keys: ['p'], label: 'Save a picture' },
-      { action: 'turntable', keys: ['t'], label: 'Record a turntable video' },
+      { action: 'picture', keys: ['p'], label: 'Save image' },
+      { action: 'turntable', keys: ['t'], label: 'Record turntable' },
       { action: 'help', keys: ['?'], label: 'Keyboard shortcuts' },
     ],
   },
-];
+] as const satisfies readonly { readonly title: string; readonly entries: readonly Shortcut[] }[];
+
+export type Action = (typeof TABLE)[number]['entries'][number]['action'];
+type Entry = Shortcut & { readonly action: Action };
+export const SHORTCUTS: readonly { readonly title: string; readonly entries: readonly Entry[] }[] = TABLE;
 
 const ACTIONS = new Map(
-  SHORTCUTS.flatMap(({ entries }) => entries).flatMap(({ action, keys }) => keys.map((key) => [key, action])),
+  SHORTCUTS.flatMap(({ entries }) => entries).flatMap(({ action, keys }) => keys.map((key) => [key, action] as const)),
 );
 
 /** What a key press asks for; nothing with a control, alt or command key, which belong to the browser. */
@@ -123,19 +86,23 @@ export function actionOfKey(event: KeyboardEvent): Action | null {
   return actionOf(event);
 }
 
+const ENTRIES = new Map(SHORTCUTS.flatMap(({ entries }) => entries.map((entry) => [entry.action, entry] as const)));
+
+/** What an action does, for people. */
+export function labelOf(action: Action): string {
+  return ENTRIES.get(action)!.label;
+}
+
+const KEY_NAMES: Readonly<Record<string, string>> = {
+  ' ': 'Space',
+  ArrowLeft: '←',
+  ArrowRight: '→',
+  PageUp: 'Page ↑',
+  PageDown: 'Page ↓',
+};
+
 /** The key for an action as it is written on keyboards. */
 export function keyLabel(action: Action): string {
-  const names: Record<string, string> = {
-    ' ': 'Space',
-    ArrowLeft: '←',
-    ArrowRight: '→',
-    PageUp: 'Page ↑',
-    PageDown: 'Page ↓',
-  };
-  for (const { entries } of SHORTCUTS) {
-    const found = entries.find((entry) => entry.action === action);
-    if (found)
-      return names[found.keys[0]] ?? (found.keys[0].length === 1 ? found.keys[0].toUpperCase() : found.keys[0]);
-  }
-  return '';
+  const [key] = ENTRIES.get(action)!.keys;
+  return KEY_NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key);
 }

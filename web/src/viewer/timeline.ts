@@ -6,7 +6,7 @@ import type { FrameErrors, Tracking } from '../capture';
 import type { FrameRange } from '../editing/cageEdit';
 import { numberAt, numberText, placeOf, type FrameNumbers } from './frameNumbers';
 import { isLost, lostRuns } from './reports';
-import { percent } from './text';
+import { percent } from '../text';
 import { timelineStyle } from './timelineStyle';
 import { controls } from '../style/controls';
 
@@ -24,7 +24,6 @@ const COLUMNS = 600;
 export class Timeline extends LitElement {
   static override styles = [controls, plotStyle, timelineStyle];
 
-  /** Frames there are. */
   @property({ type: Number }) frames = 0;
   @property({ attribute: false }) errors: FrameErrors | null = null;
   /** Errors of a capture that is shown beside this one, at the frames of this one. */
@@ -52,7 +51,6 @@ export class Timeline extends LitElement {
     if (this.hasUpdated) this.movePlace();
   }
 
-  /** The frame nearest to the place. */
   private get frame(): number {
     return Math.max(0, Math.min(this.frames - 1, Math.round(this.place)));
   }
@@ -110,7 +108,6 @@ export class Timeline extends LitElement {
     this.placeTrack();
   }
 
-  /** A mark of lost frames. */
   private mark([first, last]: [number, number]) {
     const [left, right] = [this.shareOf(first), this.shareOf(last)];
     return html`<i class="lost" .style=${`left: ${100 * left}%; width: ${100 * (right - left)}%`}></i>`;

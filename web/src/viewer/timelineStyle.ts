@@ -1,6 +1,5 @@
 import { css } from 'lit';
 
-/** Looks of the timeline. */
 export const timelineStyle = css`
   :host {
     display: block;

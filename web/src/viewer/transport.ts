@@ -12,7 +12,6 @@ export interface Transport {
   readonly rate: number;
   /** Frame, or a place between two frames: 2.5 is halfway from frame 2 to frame 3. */
   readonly position: number;
-  /** Frames there are. */
   readonly frames: number;
   /** Numbers of the frames, by which they are shown. */
   readonly numbers: FrameNumbers;

@@ -32,7 +32,6 @@ export class ViewLink {
     if (view.frame === null && !player.transport.playing) player.transport = sought(player.transport, 0);
   }
 
-  /** The view as text. */
   textOf(player: Player): string {
     const { playing, position } = player.transport;
     const frame = Math.floor(position);

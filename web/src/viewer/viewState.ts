@@ -6,7 +6,6 @@ export interface ViewState {
   readonly frame: number | null;
   readonly camera: CameraState | null;
   readonly up: 'y' | 'z';
-  /** Whether the camera follows the model. */
   readonly follow: boolean;
   readonly layers: Layers;
 }

@@ -7,7 +7,7 @@ import { pageToken } from '../service/token';
 import '../sessions/signIn';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
-import type { Dropped } from '../upload/classify';
+import type { Dropped } from '../files/classify';
 import './cagerViewer';
 import type { CagerViewer } from './cagerViewer';
 import './compareDialog';
@@ -82,7 +82,6 @@ export class ViewerPage extends LitElement {
     if (!this.wantsToken && this.dialog?.isOpen !== true) this.viewer?.pressKey(event);
   };
 
-  /** Goes to another view of what is shown. */
   goTo(view: string) {
     this.followBeside(view);
     if (this.viewer) this.viewer.goTo(view);
@@ -147,7 +146,7 @@ export class ViewerPage extends LitElement {
     return html`<main class="message">
       ${
         this.failure === null
-          ? html`<p role="status">${this.waiting || `Opening the ${this.kind}`}</p>`
+          ? html`<p role="status">${this.waiting || `Opening ${this.kind}`}</p>`
           : html`<p role="alert">${this.failure.message}</p>`
       }
       ${isGone ? nothing : html`<button class="primary" ?hidden=${this.failure === null} @click=${this.retry}>Try again</button>`}
@@ -223,7 +222,7 @@ export class ViewerPage extends LitElement {
       else {
         this.besideId = null;
         this.tellLink();
-        this.viewer?.report(`The session to compare with: ${problem.message}`);
+        this.viewer?.report(`Could not open the second session: ${problem.message}`);
       }
     }
   }

@@ -119,7 +119,7 @@ describe.skipIf(missing)('two captures in step', { timeout: 90_000 }, () => {
     const page = await opened(`#/session/${ids.long}?frame=3`);
     const gaps = await captureWithGaps();
     await dropOnViewer(page, { 'gaps.cager': gaps });
-    await page.getByRole('button', { name: 'Show beside' }).click();
+    await page.getByRole('button', { name: 'Open side by side' }).click();
     await besideShown(page);
     // Halfway between the frames 1 and 5.
     await page.getByText('No frame 3 here').waitFor();
@@ -129,7 +129,7 @@ describe.skipIf(missing)('two captures in step', { timeout: 90_000 }, () => {
     await expect.poll(() => places(page)).toEqual([5, 2]);
 
     await dropOnViewer(page, { 'gaps.cager': gaps });
-    await page.getByRole('button', { name: 'Open instead' }).click();
+    await page.getByRole('button', { name: 'Replace current' }).click();
     await page.waitForURL(/#\/file/);
     await whenShown(page);
     await inViewer(page, (viewer) => viewer.pause(), null);
@@ -158,7 +158,7 @@ describe.skipIf(missing)('two captures in step', { timeout: 90_000 }, () => {
     );
     await page
       .getByRole('alert')
-      .getByText(/^The session to compare with/)
+      .getByText(/^Could not open the second session/)
       .waitFor();
     await expect.poll(() => page.locator('cager-viewer .pane canvas').count()).toBe(1);
   });

@@ -45,11 +45,11 @@ describe.skipIf(chromium === undefined)('captures that follow one another', { ti
       await dropOnViewer(page, { [name]: Buffer.from('a picture of a beach') });
       await page.getByRole('alert').waitFor();
       expect(await inViewer(page, (viewer) => viewer.heading, null)).toBe('first.cager');
-      await page.getByRole('button', { name: 'Close this message' }).click();
+      await page.getByRole('button', { name: 'Dismiss' }).click();
     }
     await dropOnViewer(page, { 'second.cager': capture });
-    await page.getByRole('button', { name: 'Open instead' }).click();
-    await page.getByRole('img', { name: /^second\.cager: the model/ }).waitFor();
+    await page.getByRole('button', { name: 'Replace current' }).click();
+    await page.getByRole('img', { name: /^second\.cager: 3D view/ }).waitFor();
   });
 
   test('a_link_that_differs_in_its_view_moves_what_is_shown_and_going_back_returns', async () => {

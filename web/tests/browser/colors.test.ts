@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import { describe, expect, test } from 'vitest';
-import { openBytes, rawPart, withPart } from '../../src/container/testSupport';
+import { openBytes, rawPart, withPart } from '../support/containers';
 import { seriousFindings } from './harness/axe';
 import { chromium } from './harness/programs';
 import { FilePages, goldenBytes, inViewer } from './harness/viewing';
@@ -57,7 +57,7 @@ describe.skipIf(chromium === undefined)('colours of the model', { timeout: 90_00
     // From the front, x goes to the right.
     expect(orangePlace).toBeLessThan(bluePlace);
     await page.keyboard.press('h');
-    await page.getByText('Movement from frame to frame').waitFor();
+    await page.getByText('Motion between frames').waitFor();
     expect((await colorsOf(page)).orange).toBe(0);
     expect(pages.errors).toEqual([]);
   });

@@ -51,7 +51,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     const { page } = watched;
     await whenShown(page);
     await page.keyboard.press('e');
-    await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
+    await page.getByRole('region', { name: 'Edit cage' }).waitFor();
     return page;
   }
 
@@ -279,17 +279,17 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     await reload();
     const plain = await readPositions(page, 12);
     expect(farthest(plain, edited)).toBeGreaterThan(0.01);
-    await page.getByText(/An edit from .* is still in this browser/).waitFor();
+    await page.getByText(/^1 edit kept in this browser, from/).waitFor();
     // Known by the session's address: that of a running one has no container yet.
     expect(await withViewer(page, ({ player }) => Promise.resolve(player!.capture.identity))).toMatch(session);
     expect(await seriousFindings(page)).toEqual([]);
     // Whoever edits before answering loses neither.
     await page.keyboard.press('e');
-    await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
+    await page.getByRole('region', { name: 'Edit cage' }).waitFor();
     await dragVertex(page, -40, 10);
     await page.waitForTimeout(600);
     await reload();
-    await page.getByText(/2 edits from .* are still in this browser/).waitFor();
+    await page.getByText(/^2 edits kept in this browser, from/).waitFor();
     await page.getByRole('button', { name: 'Restore' }).click();
     await page
       .getByRole('checkbox', { name: /^Vertex/ })
@@ -324,18 +324,18 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     };
     const second = await open();
     await second.keyboard.press('e');
-    const sentence = second.getByText('not kept while another tab keeps its own');
+    const sentence = second.getByText('Another tab keeps its edits');
     await sentence.waitFor();
     await dragVertex(second, -40, 10);
     await second.waitForTimeout(600);
     expect(await second.locator('cager-kept-offer').count()).toBe(0);
     await first.close();
     // What the first tab kept is still there, and from now on the second one keeps its own beside it.
-    await second.getByText(/An edit from .* is still in this browser/).waitFor();
+    await second.getByText(/^1 edit kept in this browser, from/).waitFor();
     await expect.poll(() => sentence.count()).toBe(0);
     await second.waitForTimeout(600);
     await second.close();
-    await (await open()).getByText(/2 edits from .* are still in this browser/).waitFor();
+    await (await open()).getByText(/^2 edits kept in this browser, from/).waitFor();
     expect(watched?.errors).toEqual([]);
   });
 
@@ -346,7 +346,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     await page.goto(`${site.page}#/session/${session}?frame=12`);
     await whenShown(page);
     await page.keyboard.press('e');
-    await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
+    await page.getByRole('region', { name: 'Edit cage' }).waitFor();
     const before = await readPositions(page, 12);
     await dragVertex(page, 40, 20);
     expect(farthest(before, await readPositions(page, 12))).toBeGreaterThan(0.01);

@@ -32,14 +32,14 @@ describe.skipIf(chromium === undefined)('a capture that travels', { timeout: 90_
 
   test('has_its_head_below_the_title_of_a_phone_while_figures_are_shown_and_the_cage_is_edited', async () => {
     const page = await pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') }, undefined, PHONE);
-    await page.getByRole('button', { name: 'Figures', exact: true }).tap();
-    const panel = page.getByRole('complementary', { name: 'Figures' });
+    await page.getByRole('button', { name: 'Statistics', exact: true }).tap();
+    const panel = page.getByRole('complementary', { name: 'Statistics' });
     const [shown, tools] = [(await panel.boundingBox())!, (await page.locator('.tools').boundingBox())!];
     expect(shown.x + shown.width).toBeLessThanOrEqual(tools.x);
-    await page.getByRole('button', { name: 'Close the figures' }).tap();
+    await page.getByRole('button', { name: 'Close' }).tap();
     await expect.poll(() => panel.count()).toBe(0);
-    await page.getByRole('button', { name: 'Edit the cage' }).tap();
-    await page.getByRole('region', { name: 'Edit the cage' }).waitFor();
+    await page.getByRole('button', { name: 'Edit cage' }).tap();
+    await page.getByRole('region', { name: 'Edit cage' }).waitFor();
     expect((await places(page)).outside).toBeLessThan(0);
     await page.keyboard.press('e');
     await page.keyboard.press('o');

@@ -103,7 +103,7 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     await eventually(watched, 'frames', 2);
     site.server.stall();
     await client.post(id, capture, 2, 5);
-    await expect.poll(async () => (await state(watched)).problem, { timeout: 20_000 }).toMatch(/does not answer/);
+    await expect.poll(async () => (await state(watched)).problem, { timeout: 20_000 }).toMatch(/Cannot reach/);
     expect((await state(watched)).frames).toBe(2);
     site.server.recover();
     await expect.poll(async () => (await state(watched)).frames, { timeout: 30_000 }).toBe(7);
@@ -202,12 +202,12 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     expect(await page.evaluate(() => location.hash)).toContain(id);
     const file = await readFile(new URL('../../../tests/golden/definition3-mvc.cager', import.meta.url));
     await dropOnViewer(page, { 'walk.cager': file });
-    await page.getByRole('button', { name: 'Open instead' }).click();
-    await page.getByRole('img', { name: /^walk\.cager: the model/ }).waitFor({ timeout: 20_000 });
+    await page.getByRole('button', { name: 'Replace current' }).click();
+    await page.getByRole('img', { name: /^walk\.cager: 3D view/ }).waitFor({ timeout: 20_000 });
     expect(await page.evaluate(() => location.hash)).toMatch(/^#\/file/);
     await site.service.run();
     await page.goBack();
-    await page.getByRole('img', { name: /^dead: the model/ }).waitFor({ timeout: 20_000 });
+    await page.getByRole('img', { name: /^dead: 3D view/ }).waitFor({ timeout: 20_000 });
     await close();
   });
 

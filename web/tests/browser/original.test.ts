@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { openBytes } from '../../src/container/testSupport';
+import { openBytes } from '../support/containers';
 import { diagonalOf } from '../../src/coordinates/topology';
 import { npyHeader } from '../../src/editing/decodedFrames';
 import { seriousFindings } from './harness/axe';
@@ -22,12 +22,12 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     await page.keyboard.press('Home');
     await page.keyboard.press('h');
     await page.keyboard.press('h');
-    await page.getByText('neither the service nor the file keeps them').waitFor();
+    await page.getByText('They are not uploaded').waitFor();
     expect(await seriousFindings(page)).toEqual([]);
 
     const { bytes, points } = await movedOriginal();
     await dropOnViewer(page, { 'walk.npy': bytes });
-    await page.getByText('Distance from the original').waitFor();
+    await page.getByText('Error against the original').waitFor();
     for (const frame of [0, 2]) {
       await inViewer(page, (viewer, wanted) => void (viewer.pause(), (viewer.frame = wanted)), frame);
       await expect.poll(async () => (await measured(page))?.frame).toBe(frame);
@@ -50,7 +50,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     await inViewer(page, (viewer) => viewer.pause(), null);
     await page.keyboard.press('Home');
     await page.keyboard.press('h');
-    await page.getByRole('group', { name: /^What 99 of 100 points/ }).waitFor();
+    await page.getByRole('group', { name: /^Colour range/ }).waitFor();
     const largest = async (frame: number) => {
       await inViewer(page, (viewer, wanted) => (viewer.frame = wanted), frame);
       await page.waitForTimeout(300);
@@ -64,7 +64,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     expect(ofFrames[0]).not.toBe(ofFrames[1]);
     expect([await largest(0), await largest(1)]).toEqual(ofFrames);
     await dropOnViewer(page, { 'walk.npy': (await movedOriginal()).bytes });
-    await page.getByText('Distance from the original').waitFor();
+    await page.getByText('Error against the original').waitFor();
     await page.getByRole('button', { name: 'Whole clip' }).click();
     // Once frames of the whole clip have been measured.
     await expect
@@ -76,19 +76,19 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
   it('shows original and decoded model with one camera, and the line between them moves by keyboard', async () => {
     const page = await opened();
     await dropOnViewer(page, { 'walk.npy': (await movedOriginal()).bytes });
-    await page.getByText('Distance from the original').waitFor();
+    await page.getByText('Error against the original').waitFor();
     await page.keyboard.press('o');
     await expect.poll(() => page.getByRole('button', { name: 'Both' }).getAttribute('aria-pressed')).toBe('true');
-    const line = page.getByRole('slider', { name: 'Where the original ends' });
+    const line = page.getByRole('slider', { name: 'Divider between original and decoded' });
     await line.focus();
     await page.keyboard.press('ArrowLeft');
     await expect.poll(() => line.getAttribute('aria-valuenow')).toBe('48');
     expect(await seriousFindings(page)).toEqual([]);
-    const canvas = page.getByRole('img', { name: 'the model, drawn' });
+    const canvas = page.getByRole('img', { name: '3D view' });
     const both = await canvas.screenshot();
     await page.getByRole('button', { name: 'Original', exact: true }).click();
     await expect.poll(async () => both.equals(await canvas.screenshot())).toBe(false);
-    await page.getByRole('button', { name: 'Put the original away' }).click();
+    await page.getByRole('button', { name: 'Close the original' }).click();
     await expect.poll(() => page.getByRole('button', { name: 'Both' }).count()).toBe(0);
     expect(pages.errors).toEqual([]);
   });
@@ -103,7 +103,7 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     await dropOnViewer(page, { 'notes.txt': Buffer.from('nothing') });
     await page
       .getByRole('alert')
-      .getByText(/These are no frames/)
+      .getByText(/No frames found/)
       .waitFor();
     expect(pages.errors).toEqual([]);
   });

@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
-import { openBytes } from '../../src/container/testSupport';
+import { openBytes } from '../support/containers';
 import { seriousFindings } from './harness/axe';
 import { chromium } from './harness/programs';
 import { FilePages, goldenBytes, inViewer } from './harness/viewing';
@@ -24,14 +24,14 @@ describe.skipIf(chromium === undefined)('poses of a capture', { timeout: 120_000
     expect(asked.frames).toEqual([[0, 1]]);
     // The service of this test answers with the cage at rest, as large as the first weight.
     await expect.poll(() => shown(page)).toBeCloseTo(0.5, 4);
-    const slider = page.getByRole('slider', { name: 'From the first pose to the second' });
+    const slider = page.getByRole('slider', { name: 'Blend from the first pose to the second' });
     await slider.press('ArrowRight');
     await expect.poll(() => shown(page)).toBeCloseTo(0.49, 4);
     expect(await seriousFindings(page)).toEqual([]);
 
     await page.keyboard.press('End');
     await add.click();
-    const pad = page.getByRole('application', { name: /^Pad of poses/ });
+    const pad = page.getByRole('application', { name: /^Pose pad/ });
     const { x, y, width, height } = (await pad.boundingBox())!;
     // The first corner, and half way from there to the middle.
     await page.mouse.click(x + width / 2, y + 0.1 * height);
@@ -51,7 +51,7 @@ describe.skipIf(chromium === undefined)('poses of a capture', { timeout: 120_000
     await page.getByRole('button', { name: 'Remove frame 0' }).click();
     await page.getByRole('button', { name: 'Remove frame 1' }).click();
     await page.getByText('Go to a frame and add it').waitFor();
-    expect(await inViewer(page, (viewer) => viewer.player!.playback.deformation, null)).toBeNull();
+    expect(await inViewer(page, (viewer) => viewer.player!.playback.shape, null)).toBeNull();
     expect(pages.errors.filter((error) => !error.includes('404'))).toEqual([]);
   });
 });

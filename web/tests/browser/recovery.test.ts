@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { openBytes } from '../../src/container/testSupport';
+import { openBytes } from '../support/containers';
 import { diagonalOf } from '../../src/coordinates/topology';
 import { seriousFindings } from './harness/axe';
 import { openPage } from './harness/browser';
@@ -32,9 +32,9 @@ describe.skipIf(chromium === undefined)('a recovery in files', { timeout: 90_000
     expect(await seriousFindings(page)).toEqual([]);
 
     await dropOnViewer(page, { 'walk.json': Buffer.from('{"frames": []}') });
-    await page.getByText('The report tells of 0 frames, and the capture has').waitFor();
+    await page.getByText('The report has 0 frames and the capture').waitFor();
     await dropOnViewer(page, { 'notes.json': Buffer.from('nothing') });
-    await page.getByText('notes.json is no report').waitFor();
+    await page.getByText('notes.json is not a report').waitFor();
     expect(pages.errors).toEqual([]);
   });
 
@@ -58,13 +58,13 @@ describe.skipIf(chromium === undefined)('a recovery in files', { timeout: 90_000
     }
     await page.setViewportSize(PHONE);
     expect(await seriousFindings(page)).toEqual([]);
-    const canvas = page.getByRole('img', { name: 'the model, drawn' });
+    const canvas = page.getByRole('img', { name: '3D view' });
     const both = await canvas.screenshot();
     await page.getByRole('button', { name: 'Observed' }).click();
     await expect.poll(async () => both.equals(await canvas.screenshot())).toBe(false);
     await inViewer(page, (viewer) => viewer.play(), null);
     await expect.poll(() => measured(page).then((found) => found?.frame)).toBe(1);
-    await page.getByRole('button', { name: 'Put the original away' }).click();
+    await page.getByRole('button', { name: 'Close the original' }).click();
     await expect.poll(() => page.getByRole('button', { name: 'Observed' }).count()).toBe(0);
     expect(pages.errors).toEqual([]);
   });
@@ -102,7 +102,7 @@ describe.skipIf(missing)('a recovery in the service', { timeout: 240_000 }, () =
     body.append('options', JSON.stringify({ name: 'scanned dance', points: 1000 }));
     const { id } = await call('', { method: 'POST', body });
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/recovery/${id}`);
-    await page.getByText('Followed 0 of 0 frames').waitFor();
+    await page.getByText('Recovered 0 of 0 frames').waitFor();
     const frames = new FormData();
     for (let k = 0; k < 3; k++) frames.append('frame', new Blob([sphere.frameObj(k)]), `scan_${k}.obj`);
     await call(`/${id}/frames?first=0`, { method: 'POST', body: frames });

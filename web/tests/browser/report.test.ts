@@ -162,7 +162,7 @@ describe.skipIf(missing !== null)('reports that are opened as files', { timeout:
     const html = readFileSync(join(folder, 'cage.html'), 'utf8');
     writeFileSync(join(folder, 'damaged.html'), html.replace(/"kind":"cage"[^<]*/, ''));
     watched = await openPage(browser, pathToFileURL(join(folder, 'damaged.html')).href);
-    expect(await watched.page.getByRole('alert').textContent()).toContain('write it again with cager');
+    expect(await watched.page.getByRole('alert').textContent()).toContain('create it again with cager');
   });
 });
 

@@ -113,7 +113,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     await tabTo(page, 'Delete doomed');
     await page.keyboard.press('Enter');
     await page.getByRole('dialog', { name: 'Delete “doomed”?' }).waitFor();
-    expect(await focused(page)).toBe('Keep it');
+    expect(await focused(page)).toBe('Cancel');
     await page.keyboard.press('Escape');
     await expect.poll(() => page.getByRole('dialog').count()).toBe(0);
     expect(await focused(page)).toBe('Delete doomed');
@@ -148,7 +148,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     const there = Buffer.from(await (await client.call(`/${id}/capture.cager`)).arrayBuffer());
     expect(there.equals(await readFile(await file.path()))).toBe(true);
     const decoded = page.waitForEvent('download');
-    await page.getByLabel('Download fetched/1 for other programs').selectOption('abc');
+    await page.getByLabel('Export fetched/1').selectOption('abc');
     const archive = await decoded;
     expect(archive.suggestedFilename()).toBe('fetched-1.abc');
     expect((await readFile(await archive.path())).subarray(0, 5).toString()).toBe('Ogawa');
@@ -239,7 +239,7 @@ describe.skipIf(missing)('a service with tokens', { timeout: 120_000 }, () => {
     expect(await seriousFindings(page)).toEqual([]);
     await field.fill('wrong');
     await page.keyboard.press('Enter');
-    await page.getByText('The service refused the token').waitFor();
+    await page.getByText('The token was not accepted').waitFor();
     await field.fill(TOKEN_A);
     await page.keyboard.press('Enter');
     await row(page, 'mine').waitFor();
@@ -273,7 +273,7 @@ describe.skipIf(missing)('a service with tokens', { timeout: 120_000 }, () => {
       },
       [TOKEN_A, theirs],
     );
-    expect(said).toMatch(/^There is no such thing here: .* belongs to somebody else\./);
+    expect(said).toMatch(/^Not found: .* belongs to someone else\./);
     await close();
   });
 });

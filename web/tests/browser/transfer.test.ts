@@ -17,7 +17,7 @@ describe.skipIf(chromium === undefined)('source and target of a transfer', { tim
       'walk.json': report(reversed),
     });
     await page.getByRole('heading', { name: 'man.cager', exact: true }).waitFor();
-    await page.getByText('Places of one colour correspond').waitFor();
+    await page.getByText('Matching colours mark corresponding points').waitFor();
     const colors = await inViewer(
       page,
       (viewer) =>
@@ -38,11 +38,11 @@ describe.skipIf(chromium === undefined)('source and target of a transfer', { tim
     expect(await seriousFindings(page)).toEqual([]);
 
     await dropOnViewer(page, { 'other.json': report([points, 0]) });
-    await page.getByText('The report is of other models').waitFor();
+    await page.getByText('This report is about other models').waitFor();
     await page.keyboard.press('b');
-    await expect.poll(() => page.getByText('Places of one colour correspond').count()).toBe(0);
+    await expect.poll(() => page.getByText('Matching colours mark corresponding points').count()).toBe(0);
     await dropOnViewer(page, { 'walk.json': report(reversed) });
-    await page.getByText('Show source and target beside each other first').waitFor();
+    await page.getByText('Show source and target side by side first').waitFor();
     expect(pages.errors).toEqual([]);
   });
 
@@ -62,14 +62,14 @@ describe.skipIf(chromium === undefined)('source and target of a transfer', { tim
       }
     });
     await page.evaluate(() => (location.hash = '#/transfer/abc'));
-    await page.getByText('Moved 1 of 3 frames').waitFor();
+    await page.getByText('Transferred 1 of 3 frames').waitFor();
     state = 'completed';
     await whenShown(page);
     expect(looks).toBeGreaterThan(1);
     await page.getByRole('heading', { name: 'walk of a woman' }).waitFor();
     await dropOnViewer(page, { 'man.cager': await goldenBytes('coded-mvc.cager') });
-    await page.getByRole('button', { name: 'Show beside' }).click();
-    await page.getByText('Places of one colour correspond').waitFor();
+    await page.getByRole('button', { name: 'Open side by side' }).click();
+    await page.getByText('Matching colours mark corresponding points').waitFor();
     expect(pages.errors).toEqual([]);
   });
 });

@@ -54,8 +54,8 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
     const files = Object.fromEntries([8, 9, 10, 11].map((frame) => [`shot_${frame}.obj`, small.frameObj(frame)]));
     await drop(page, files);
-    await page.getByText('The first frame, shot_8.obj, is taken as the rest pose.').waitFor();
-    await page.getByText('The service makes a cage around the rest pose').waitFor();
+    await page.getByText('The first frame, shot_8.obj, is used as the rest pose.').waitFor();
+    await page.getByText('A cage is created around the rest pose').waitFor();
     await encodeCages(page);
     const id = await encoded(page);
     expect((await site.client().session(id)).frames.solved).toBe(4);
@@ -81,7 +81,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await page.getByText(/Fortran order.*ascontiguousarray/).waitFor();
     const integers = Buffer.from(text.replace('<f4', '<i4'), 'latin1');
     await drop(page, { 'wave.npy': integers });
-    await page.getByText(/numbers are of the type <i4/).waitFor();
+    await page.getByText(/data type is <i4/).waitFor();
     await close();
   });
 
@@ -91,11 +91,11 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await dropLarge(page);
     await page.getByText(`${LARGE_FRAMES} frames of 2,562 points`).waitFor();
     await encodeCages(page);
-    await page.getByText('You can watch it meanwhile').waitFor();
+    await page.getByText('You can watch while it uploads').waitFor();
     await site.service.kill();
     await page
       .getByRole('alert')
-      .getByText(/tries again/)
+      .getByText(/Retrying in/)
       .waitFor();
     await site.service.run();
     await slow(page, {});
@@ -143,8 +143,8 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['404']);
     await drop(page, { 'rest.obj': small.rest, 'wave.npy': small.npy(FRAMES) });
     await page.getByLabel('Cage', { exact: true }).selectOption('motion');
-    await page.getByLabel('Vertices of the cage, at most').fill('40');
-    await page.getByLabel('Seconds for the design, at most').fill('10');
+    await page.getByLabel('Maximum cage vertices').fill('40');
+    await page.getByLabel('Design time limit, in seconds').fill('10');
     expect(await seriousFindings(page)).toEqual([]);
     await encodeCages(page);
     await page.getByRole('heading', { name: 'Designing the cage: wave' }).waitFor();
@@ -170,14 +170,14 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     const files = { 'rest.obj': large.rest, 'wave.npy': large.npy(24) };
     await drop(page, files);
     await page.getByLabel('Cage', { exact: true }).selectOption('motion');
-    await page.getByLabel('Vertices of the cage, at most').fill('300');
+    await page.getByLabel('Maximum cage vertices').fill('300');
     await encodeCages(page);
     await expect.poll(() => designs(site), { timeout: 20_000 }).toBe(1);
     await page.reload();
-    await page.getByRole('heading', { name: '“wave” was interrupted' }).waitFor();
+    await page.getByRole('heading', { name: 'Upload of “wave” was interrupted' }).waitFor();
     await drop(page, files);
-    await page.getByRole('button', { name: 'Go on' }).click();
-    await page.getByRole('button', { name: 'Go on with this cage' }).click({ timeout: 30_000 });
+    await page.getByRole('button', { name: 'Resume' }).click();
+    await page.getByRole('button', { name: 'Use this cage' }).click({ timeout: 30_000 });
     const id = await encoded(page);
     expect((await site.client().session(id)).frames.solved).toBe(24);
     expect(await designs(site)).toBe(0);
@@ -197,7 +197,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await site.client().call(`/${deleted}`, { method: 'DELETE' });
     await page
       .getByRole('alert')
-      .getByText(/The session was deleted while it was uploaded to/)
+      .getByText(/The session was deleted during the upload/)
       .waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     await slow(page, {});
@@ -213,14 +213,14 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await slow(page, SLOW);
     await dropLarge(page);
     await encodeCages(page);
-    await page.getByText('You can watch it meanwhile').waitFor();
+    await page.getByText('You can watch while it uploads').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
     await page.getByRole('heading', { name: /Stopped/ }).waitFor();
-    await page.getByRole('button', { name: 'Go on' }).click();
-    await page.getByText('You can watch it meanwhile').waitFor();
+    await page.getByRole('button', { name: 'Resume' }).click();
+    await page.getByText('You can watch while it uploads').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
     const before = await sessions(site);
-    await page.getByRole('button', { name: 'Delete what was sent' }).click();
+    await page.getByRole('button', { name: 'Delete upload' }).click();
     await page
       .getByRole('button', { name: 'Choose files' })
       .or(page.getByRole('button', { name: 'Add files' }))
@@ -250,22 +250,22 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
     await dropLarge(page);
     await page.getByLabel('Name').fill('broken off');
     await encodeCages(page);
-    await page.getByText('You can watch it meanwhile').waitFor();
+    await page.getByText('You can watch while it uploads').waitFor();
     const list = async () =>
       ((await (await site.client(TOKEN).call('')).json()) as { sessions: { id: string; name: string }[] }).sessions;
     const [{ id }] = await list();
     await expect.poll(async () => (await site.client(TOKEN).session(id)).frames.solved).toBeGreaterThan(10);
     await page.reload();
 
-    await page.getByRole('heading', { name: '“broken off” was interrupted' }).waitFor();
+    await page.getByRole('heading', { name: 'Upload of “broken off” was interrupted' }).waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     const kept = await page.evaluate(() => JSON.stringify(Object.entries(localStorage)));
     expect(kept).toContain(id);
     expect(kept).not.toContain(TOKEN);
     await drop(page, { ...LARGE, 'wave.npy': large.npy(5) });
-    await page.getByText(/The frames were wave\.npy \(.*\) then; wave\.npy \(.*\) is something else\./).waitFor();
+    await page.getByText(/The frames of the interrupted upload: wave\.npy \(.*\), not wave\.npy \(.*\)\./).waitFor();
     await dropLarge(page);
-    await page.getByRole('heading', { name: 'These are the files of “broken off”' }).waitFor();
+    await page.getByRole('heading', { name: 'Resume “broken off”?' }).waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     // What was solved before is known by now, and is not sent again.
     const firstMissing = solvedFromStart((await site.client(TOKEN).session(id)).frames);
@@ -275,7 +275,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
       if (first) posted.push(Number(first[1]));
     });
     await slow(page, {});
-    await page.getByRole('button', { name: 'Go on' }).click();
+    await page.getByRole('button', { name: 'Resume' }).click();
     expect(await encoded(page)).toBe(id);
     expect(Math.min(...posted)).toBe(firstMissing);
     expect((await site.client(TOKEN).session(id)).frames).toMatchObject({ solved: LARGE_FRAMES, missing: [] });
@@ -299,7 +299,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
     await signIn(page);
     await drop(page, { 'rest.obj': large.rest, 'wave.npy': large.npy(24) });
     await page.getByLabel('Cage', { exact: true }).selectOption('motion');
-    await page.getByLabel('Vertices of the cage, at most').fill('300');
+    await page.getByLabel('Maximum cage vertices').fill('300');
     await encodeCages(page);
     await expect
       .poll(() => page.evaluate(() => JSON.stringify(Object.entries(localStorage))))
@@ -316,8 +316,8 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
     await other.waitForTimeout(500);
     expect(await other.getByRole('heading', { name: /was interrupted/ }).count()).toBe(0);
     const own = await open(TOKEN);
-    await own.getByRole('heading', { name: '“wave” was interrupted' }).waitFor();
-    await own.getByRole('button', { name: 'Forget it' }).click();
+    await own.getByRole('heading', { name: 'Upload of “wave” was interrupted' }).waitFor();
+    await own.getByRole('button', { name: 'Dismiss' }).click();
     await expect.poll(() => own.getByRole('heading', { name: /was interrupted/ }).count()).toBe(0);
     await close();
   });
@@ -329,7 +329,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
     await slow(page, SLOW);
     await dropLarge(page, 2 * LARGE_FRAMES);
     await encodeCages(page);
-    await page.getByText('You can watch it meanwhile').waitFor();
+    await page.getByText('You can watch while it uploads').waitFor();
     const other = await page.context().newPage();
     await other.goto(`${site.page}#/upload`);
     await signIn(other);
@@ -339,8 +339,8 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
     const before = (await (await site.client(TOKEN).call('')).json()) as { sessions: unknown[] };
     await page.close();
     await other.reload();
-    await other.getByRole('heading', { name: '“wave” was interrupted' }).waitFor();
-    await other.getByRole('button', { name: 'Delete what was sent' }).click();
+    await other.getByRole('heading', { name: 'Upload of “wave” was interrupted' }).waitFor();
+    await other.getByRole('button', { name: 'Delete upload' }).click();
     await expect.poll(() => other.getByRole('heading', { name: /was interrupted/ }).count()).toBe(0);
     const after = (await (await site.client(TOKEN).call('')).json()) as { sessions: unknown[] };
     expect(after.sessions.length).toBe(before.sessions.length - 1);
@@ -374,7 +374,7 @@ describe.skipIf(missing)('an upload to a service with little room', { timeout: 1
     await page.getByRole('button', { name: 'Delete other' }).click();
     await page.getByRole('dialog').getByRole('button', { name: 'Delete', exact: true }).click();
     await expect.poll(() => page.getByRole('button', { name: 'Delete other' }).count()).toBe(0);
-    await page.getByRole('link', { name: 'Back to the upload' }).click();
+    await page.getByRole('link', { name: 'Back to upload' }).click();
     await page.getByRole('button', { name: 'Try again' }).click();
     const id = await encoded(page);
     expect((await site.client().session(id)).frames).toMatchObject({ solved: 1000, missing: [] });
@@ -398,7 +398,7 @@ describe.skipIf(missing)('an upload to a service with as many sessions as it tak
     await encodeCages(page);
     await page
       .getByRole('alert')
-      .getByText(/Delete sessions that are no longer needed\. The upload tries again in \d+ s\./)
+      .getByText(/Delete sessions that are no longer needed\. Retrying in \d+ s\./)
       .waitFor();
     await site.client().call(`/${other}`, { method: 'DELETE' });
     const id = await encoded(page);
@@ -462,7 +462,7 @@ async function roles(page: Page): Promise<Record<string, string>> {
   return selects.evaluateAll((found) =>
     Object.fromEntries(
       (found as HTMLSelectElement[]).map((select) => [
-        select.getAttribute('aria-label')!.replace(/^What (.*) is$/, '$1'),
+        select.getAttribute('aria-label')!.replace(/^Role of /, ''),
         select.value,
       ]),
     ),

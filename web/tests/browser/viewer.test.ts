@@ -134,7 +134,7 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
       ['2', 'Wireframe'],
       ['3', 'Points'],
       ['4', 'Cage'],
-      ['i', 'Figures'],
+      ['i', 'Statistics'],
     ]) {
       await page.keyboard.press(key);
       await expect
@@ -142,7 +142,7 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
         .toBe('true');
     }
     await page.keyboard.press('h');
-    await page.getByText('Movement from frame to frame').waitFor();
+    await page.getByText('Motion between frames').waitFor();
     await page.keyboard.press('?');
     await page.getByRole('dialog', { name: 'Keyboard shortcuts' }).waitFor();
     expect(await seriousFindings(page)).toEqual([]);

@@ -1,5 +1,5 @@
 import { html } from 'lit';
-import { paleGradient } from '../../render/colorMap';
+import { PALE } from '../../render/colorMap';
 import type { ChartOptions, Series } from '../../charts/chart';
 import type { Comparison, Figure, MethodFigures, Totals } from '../data';
 import { familyName, isPaperMethod, methodColor, OTHER_COLORS } from '../methods';
@@ -20,7 +20,7 @@ export function cages(report: ComparisonReport, system: SystemReport) {
       eye sees as shaking: its mean over vertices and frames measures how much a cage jitters, its largest value the
       worst spike. The change of the cage's edges against the rest cage measures how far it has lost its shape.
     </p>
-    ${viewsOf('Cages of the methods', found)} ${colorScale('0', `${percents(found.top, 2)} % and more`, paleGradient())}
+    ${viewsOf('Cages of the methods', found)} ${colorScale('0', `${percents(found.top, 2)} % and more`, PALE.gradient)}
     ${caption(
       `Cages around frame ${shown}, coloured by each vertex’s second difference in time.`,
       `Frame ${shown} is that of plain least squares’ largest spike; play the frames before and after it to see the cages shake. All views have the same camera and scale. Spikes that reach far beyond the picture are cut off.`,
@@ -73,7 +73,6 @@ function byThreshold(
   return { title, x: { label: 'spectrum threshold s' }, y: { label, cover: 'around' }, series };
 }
 
-/** A line at one height. */
 function level(label: string, color: string, ends: readonly number[], value: Figure): Series {
   return { label, color, mark: 'dashes', points: ends.map((x) => [x, inPercent(value)]) };
 }

@@ -1,12 +1,11 @@
 import { html } from 'lit';
-import { paleGradient } from '../../render/colorMap';
+import { PALE } from '../../render/colorMap';
 import type { MethodFigures } from '../data';
 import { caption, charts, colorScale, folded, methodName, table, viewsOf, type Column } from '../table';
 import { percents } from '../text';
 import { modelViews, rowViews } from './modelViews';
 import { curves, type ComparisonReport, type SystemReport } from './system';
 
-/** Errors of the reconstructed model, by method. */
 export function errors(report: ComparisonReport, system: SystemReport) {
   const { figures } = report;
   const { shown, measured } = figures.capture;
@@ -26,7 +25,7 @@ export function errors(report: ComparisonReport, system: SystemReport) {
       'Paper: Figs. 14 and 18.',
     )}
     ${methodTable(methods)} ${viewsOf(`Frame ${shown} as the methods reconstruct it`, models)}
-    ${colorScale('0', `${percents(models.top, 2)} % and more`, paleGradient())}
+    ${colorScale('0', `${percents(models.top, 2)} % and more`, PALE.gradient)}
     ${caption(
       `Frame ${shown} reconstructed, coloured by the distance of every point from the capture.`,
       'It is the frame in which the cage of plain least squares spikes most. One scale for all views but for the first, whose points were drawn at random and whose errors may be off the scale.',

@@ -6,7 +6,6 @@ import { caption, charts, methodName, table } from '../table';
 import { percents } from '../text';
 import { ofAll, overFrames, type ComparisonReport, type SystemReport } from './system';
 
-/** The noise test. */
 export function noise({ figures, systems }: ComparisonReport, system: SystemReport) {
   const radius = percents(figures.capture.noise_radius, 1);
   const series = system.figures.noise

@@ -1,23 +1,22 @@
 import { html, nothing } from 'lit';
-import { grouped } from '../../viewer/text';
+import { count } from '../../text';
 import type { Choice, Comparison } from '../data';
 import { percents, quoted } from '../text';
 
-/** Title, facts and advice. */
 export function summary({ capture, recommendation }: Comparison) {
   const measured = capture.measured.length;
-  const frames = `${grouped(capture.frames)} frame${capture.frames === 1 ? '' : 's'}`;
+  const frames = `${count(capture.frames)} frame${capture.frames === 1 ? '' : 's'}`;
   const sampled = measured === capture.frames ? frames : `${frames} (${measured} of them, evenly spaced, are measured)`;
   const model =
     capture.triangles === 0
-      ? `a cloud of ${grouped(capture.points)} points`
-      : `${grouped(capture.points)} points and ${grouped(capture.triangles)} triangles`;
+      ? `a cloud of ${count(capture.points)} points`
+      : `${count(capture.points)} points and ${count(capture.triangles)} triangles`;
   const bound = `${(100 * (recommendation.accurate - 1)).toFixed(0)} %`;
   return html`
     <h1>Encoding methods compared</h1>
     <p class="lead">
-      <b>${capture.source}</b>: ${sampled} of ${model}; cage <b>${capture.cage}</b> of ${grouped(capture.cage_vertices)}
-      vertices and ${grouped(capture.cage_faces)} faces. Lengths are percentages of the diagonal of the rest pose's
+      <b>${capture.source}</b>: ${sampled} of ${model}; cage <b>${capture.cage}</b> of ${count(capture.cage_vertices)}
+      vertices and ${count(capture.cage_faces)} faces. Lengths are percentages of the diagonal of the rest pose's
       bounding box (${capture.diagonal.toFixed(4)} in the capture's unit).
     </p>
     <div class="cards">
@@ -34,7 +33,7 @@ export function summary({ capture, recommendation }: Comparison) {
         recommendation.accuracy &&
         card(
           capture,
-          'For the lowest error',
+          'Lowest error',
           recommendation.accuracy,
           `The lowest mean L2 of all methods here: ${percents(recommendation.accuracy.l2_mean, 3)} %; ${smoothness(recommendation.accuracy)}.`,
         )
@@ -79,7 +78,7 @@ function card(capture: Comparison['capture'], title: string, choice: Choice, why
     <p class="choice">${choice.system}: ${choice.method}</p>
     <p>${why}</p>
     <pre tabindex="0"><code>${command}</code></pre>
-    <button @click=${copy}>Copy the command</button>
+    <button @click=${copy}>Copy command</button>
   </article>`;
 }
 

@@ -1,5 +1,5 @@
 import { html } from 'lit';
-import { grouped } from '../../viewer/text';
+import { count } from '../../text';
 import { folded, methodName, table, type Column } from '../table';
 import { percents, seconds } from '../text';
 import { methodOf, ofAll, type ComparisonReport } from './system';
@@ -23,9 +23,9 @@ export function times({ figures: { capture }, systems }: ComparisonReport) {
     const { coordinates, maxvol, svd, per_frame } = figures.seconds;
     return [
       `${capture.source}, ${name}`,
-      grouped(capture.points),
+      count(capture.points),
       `${capture.cage_vertices} / ${capture.cage_faces}`,
-      grouped(capture.frames),
+      count(capture.frames),
       seconds(coordinates),
       seconds(maxvol !== null && svd !== null ? maxvol + svd : null),
       seconds(per_frame),
@@ -35,7 +35,7 @@ export function times({ figures: { capture }, systems }: ComparisonReport) {
     ];
   });
   const theirs = PAPER.map(([input, points, cage, frames, prepare, frame, total, l2]) => [
-    ...[`the paper: ${input}`, grouped(points), cage, String(frames), '–'],
+    ...[`the paper: ${input}`, count(points), cage, String(frames), '–'],
     ...[prepare, frame, total].map((milliseconds) => seconds(milliseconds / 1e3)),
     ...[l2, '–'],
   ]);

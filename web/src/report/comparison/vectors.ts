@@ -1,5 +1,5 @@
 import { html } from 'lit';
-import { signedGradient } from '../../render/colorMap';
+import { SIGNED } from '../../render/colorMap';
 import { floats } from '../geometry/numbers';
 import { methodColor } from '../methods';
 import { caption, charts, colorScale, table, viewsOf } from '../table';
@@ -15,7 +15,7 @@ export function vectors({ systems, rest }: ComparisonReport, system: SystemRepor
   const { spread } = system.figures.vectors;
   return html`
     ${viewsOf('Singular vectors on the cage', { views: vectorViews(rest, system), framed: rest.cageVertices })}
-    ${colorScale('largest negative', 'largest positive', signedGradient())}
+    ${colorScale('largest negative', 'largest positive', SIGNED.gradient)}
     ${caption(
       'A few of the first and the last right singular vectors of Φ□, painted on the rest cage.',
       'Each has its own scale about zero, on which small values are raised so that they are seen. The first move the whole cage, and the points say clearly how far; the last are concentrated on a few vertices, marked by dots, that hardly influence any point, so smoothing them costs little accuracy. (Of systems with unknowns on faces, the vertices’ part is shown.)',

@@ -1,23 +1,9 @@
-import {
-  BufferAttribute,
-  BufferGeometry,
-  Color,
-  DataTexture,
-  DynamicDrawUsage,
-  LinearFilter,
-  Mesh,
-  Points,
-  RGBAFormat,
-  Scene,
-  UnsignedByteType,
-  Vector3,
-} from 'three';
+import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Mesh, Points, Scene, Vector3 } from 'three';
 import type { TriangleMesh } from '../../capture';
 import { CageView } from '../../render/cageView';
-import { paleTexels, signedTexels } from '../../render/colorMap';
-import { ink, shaderMaterial } from '../../render/materials';
-import { cageVertexShader, inkFragmentShader, modelFragmentShader } from '../../render/sceneShaders';
-import { shapeVertexShader } from './shapeShader';
+import { PALE, SIGNED } from '../../render/colorMap';
+import { colorTexture, ink, shaderMaterial } from '../../render/materials';
+import { cageVertexShader, inkFragmentShader, modelFragmentShader, shapeVertexShader } from '../../render/sceneShaders';
 
 /** What one view shows at one time. Positions are those of {@link RestPose}. */
 export interface Drawing {
@@ -38,7 +24,6 @@ export interface Drawing {
   readonly marks?: { readonly positions: Float32Array; readonly through: boolean };
 }
 
-/** Colours of what a view shows. */
 export interface DrawingColors {
   readonly model: Color;
   readonly solid: Color;
@@ -103,7 +88,7 @@ class SurfaceView {
       color: { value: new Vector3() },
       hasColors: { value: false },
       skyDirection: { value: new Vector3(0, 1, 0) },
-      heatColors: { value: colorTexture(signed ?? false) },
+      heatColors: { value: colorTexture(signed ? SIGNED : PALE) },
       heatShare: { value: values ? 1 : 0 },
       asPoints: { value: isCloud },
       pointSize: { value: 1 },
@@ -180,11 +165,4 @@ class MarksView {
     this.geometry.dispose();
     (this.points.material as { dispose(): void }).dispose();
   }
-}
-
-function colorTexture(signed: boolean): DataTexture {
-  const texture = new DataTexture((signed ? signedTexels : paleTexels)(256), 256, 1, RGBAFormat, UnsignedByteType);
-  texture.minFilter = texture.magFilter = LinearFilter;
-  texture.needsUpdate = true;
-  return texture;
 }

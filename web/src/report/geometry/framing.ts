@@ -1,4 +1,5 @@
-import { axesOf, HOME, type CameraState } from '../../render/camera';
+import { boundsOf } from '../../coordinates/topology';
+import { HOME, seenFrom, type CameraState } from '../../render/camera';
 
 /** Angle above the horizon. */
 const ELEVATION = 0.2;
@@ -7,16 +8,8 @@ const [NARROWEST, WIDEST] = [0.7, 1.6];
 
 /** How far positions, x y z each, reach along the axes of a camera: to the right, upwards and towards it. */
 function extents(view: Pick<CameraState, 'azimuth' | 'elevation'>, positions: Float32Array) {
-  const { right, up, back } = axesOf(view);
-  return [right, up, back].map((axis) => {
-    let [low, high] = [Infinity, -Infinity];
-    for (let k = 0; k < positions.length; k += 3) {
-      const along = positions[k] * axis[0] + positions[k + 1] * axis[1] + positions[k + 2] * axis[2];
-      low = Math.min(low, along);
-      high = Math.max(high, along);
-    }
-    return high >= low ? high - low : 1;
-  });
+  const { low, high } = boundsOf(seenFrom(view, positions));
+  return low.map((least, k) => (high[k] >= least ? high[k] - least : 1));
 }
 
 /** Looks at positions from the side that shows most of them, turned a little. */

@@ -1,4 +1,5 @@
 import type { TriangleMesh } from '../../capture';
+import { middleOf } from '../../coordinates/topology';
 import type { ModelInCage } from '../data';
 import { coordinates, floats, indices, type Quantised } from './numbers';
 
@@ -56,18 +57,6 @@ export class RestPose {
   }
 }
 
-/** Middle of the bounding box; the origin where there are no points. */
-function middleOf(positions: Float32Array): number[] {
-  return [0, 1, 2].map((axis) => {
-    let [low, high] = [Infinity, -Infinity];
-    for (let k = axis; k < positions.length; k += 3) {
-      low = Math.min(low, positions[k]);
-      high = Math.max(high, positions[k]);
-    }
-    return high >= low ? (low + high) / 2 : 0;
-  });
-}
-
 /** Numbers one list after another. */
 export function joined(all: readonly Float32Array[]): Float32Array {
   const found = new Float32Array(all.reduce((sum, { length }) => sum + length, 0));
@@ -79,7 +68,6 @@ export function joined(all: readonly Float32Array[]): Float32Array {
   return found;
 }
 
-/** Length of each vector. */
 export function lengths(vectors: Float32Array): Float32Array {
   return Float32Array.from({ length: vectors.length / 3 }, (_, i) =>
     Math.hypot(vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]),

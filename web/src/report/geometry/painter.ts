@@ -18,7 +18,7 @@ export class Painter {
     const context = canvas.getContext('webgl2', { antialias: true, alpha: true });
     if (!context) {
       throw new Error(
-        'This browser has no WebGL 2, which draws the models: turn on hardware acceleration in its settings, or use a newer one. Charts and tables need none.',
+        'This browser does not support WebGL 2, so 3D views are missing: turn on hardware acceleration in its settings, or use a newer browser.',
       );
     }
     this.renderer = new WebGLRenderer({ canvas, context });

@@ -1,16 +1,23 @@
 /** What the tests of containers share: golden files, containers put together by hand, and positions. */
 
 import { readdirSync, readFileSync } from 'node:fs';
-import type { Capture, FrameBlock, StaticPart } from '../capture';
-import { LocalCodec } from '../codec/localCodec';
-import { addResidual } from '../codec/residual';
-import { columnsOf, computeCoordinates } from '../coordinates/compute';
-import { TiedNormals } from '../coordinates/tiedNormals';
-import { crc32c } from './crc32c';
-import { type ContainerCapture, openContainer, type OpenOptions } from './open';
-import { ENTRY_BYTES, FOOTER_BYTES, HEADER_BYTES, parseFields, PRELUDE_BYTES, viewOf } from './section';
-import { bytesSource } from './source';
-import { StaticStream } from './stream';
+import type { Capture, FrameBlock, StaticPart } from '../../src/capture';
+import { LocalCodec } from './localCodec';
+import { addResidual } from '../../src/codec/residual';
+import { columnsOf, computeCoordinates } from '../../src/coordinates/compute';
+import { TiedNormals } from '../../src/coordinates/tiedNormals';
+import { crc32c } from '../../src/container/crc32c';
+import { type ContainerCapture, openContainer, type OpenOptions } from '../../src/container/open';
+import {
+  ENTRY_BYTES,
+  FOOTER_BYTES,
+  HEADER_BYTES,
+  parseFields,
+  PRELUDE_BYTES,
+  viewOf,
+} from '../../src/container/section';
+import { bytesSource } from '../../src/container/source';
+import { ContainerStream } from '../../src/container/stream';
 
 const FOLDER = new URL('../../../tests/golden/', import.meta.url);
 
@@ -37,12 +44,9 @@ export function openBytes(bytes: Uint8Array, options: OpenOptions = {}): Promise
 
 /** Model and cage of a container that arrives in pieces of so many bytes; null where they do not come. */
 export async function streamedPart(bytes: Uint8Array, piece = bytes.length): Promise<StaticPart | null> {
-  const stream = new StaticStream(new LocalCodec());
+  const stream = new ContainerStream();
   for (let at = 0; at < bytes.length; at += piece) {
-    const part = await stream.push(bytes.subarray(at, at + piece));
-    if (part !== null) {
-      return part;
-    }
+    if (stream.begin(bytes.subarray(at, at + piece))) return stream.decodeStatic(new LocalCodec());
   }
   return null;
 }

@@ -14,13 +14,14 @@ export async function droppedFiles(transfer: DataTransfer): Promise<Dropped[]> {
   return found;
 }
 
-/** Has the browser ask for files, or for a folder of them. */
-export function pickFiles(folder: boolean, take: (files: Dropped[]) => void): void {
-  const input = document.createElement('input');
-  input.type = 'file';
-  input.multiple = true;
-  input.webkitdirectory = folder;
-  input.addEventListener('change', () => take(pickedFiles(input.files!)));
+/** Has the browser ask for files with these endings, all where there are none, or for a folder of them. */
+export function pickFiles(
+  take: (files: Dropped[]) => void,
+  { accept = '', isFolder = false }: { readonly accept?: string; readonly isFolder?: boolean } = {},
+): void {
+  const input = Object.assign(document.createElement('input'), { type: 'file', multiple: true, accept });
+  input.webkitdirectory = isFolder;
+  input.addEventListener('change', () => input.files?.length && take(pickedFiles(input.files)));
   input.click();
 }
 
@@ -31,7 +32,7 @@ export function pickedFiles(files: Iterable<File>): Dropped[] {
 
 async function collect(entry: FileSystemEntry, found: Dropped[]): Promise<void> {
   if (found.length >= MAX_FILES)
-    throw new Error(`There are more than ${MAX_FILES} files; drop the folder of the capture alone.`);
+    throw new Error(`There are more than ${MAX_FILES} files; drop only the folder of the capture.`);
   if (entry instanceof FileSystemDirectoryEntry) {
     const reader = entry.createReader();
     for (;;) {

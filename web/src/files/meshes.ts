@@ -11,13 +11,13 @@ export async function pointsOf(file: File): Promise<number | null> {
   if (extension === 'ply') {
     const head = new TextDecoder('latin1').decode(await file.slice(0, HEAD_BYTES).arrayBuffer());
     const found = /^element vertex (\d+)/m.exec(head);
-    if (!head.startsWith('ply') || !found) throw new UnusableFile(file.name, 'this is no PLY file.');
+    if (!head.startsWith('ply') || !found) throw new UnusableFile(file.name, 'not a PLY file.');
     return Number(found[1]);
   }
   if (extension === 'off') {
     const head = await file.slice(0, HEAD_BYTES).text();
     const found = /^\s*(?:[A-Z]*OFF)?\s*(?:#.*\s+)*(\d+)\s+\d+/.exec(head);
-    if (!found) throw new UnusableFile(file.name, 'this is no OFF file.');
+    if (!found) throw new UnusableFile(file.name, 'not an OFF file.');
     return Number(found[1]);
   }
   return null;
@@ -34,13 +34,13 @@ export async function objPoints(file: File): Promise<Float32Array> {
     if (line.startsWith('v ') || line.startsWith('v\t')) {
       const [x, y, z] = line.slice(2).trim().split(/\s+/, 3).map(Number);
       if (!Number.isFinite(x) || !Number.isFinite(y) || !Number.isFinite(z)) {
-        throw new UnusableFile(file.name, `point ${values.length / 3} is “${line.trim()}”, which is no position.`);
+        throw new UnusableFile(file.name, `point ${values.length / 3} is “${line.trim()}”, which is not a position.`);
       }
       values.push(x, y, z);
     }
     at = end + 1;
   }
-  if (values.length === 0) throw new UnusableFile(file.name, 'there are no points in it.');
+  if (values.length === 0) throw new UnusableFile(file.name, 'it has no points.');
   return Float32Array.from(values);
 }
 
@@ -67,7 +67,7 @@ export class ObjFrames implements FrameSource {
       const file = this.files[first + k];
       const points = await objPoints(file);
       if (points.length !== 3 * this.points) {
-        const what = `it has ${points.length / 3} points and the frames before it ${this.points}; all frames are the same mesh.`;
+        const what = `it has ${points.length / 3} points and the frames before it ${this.points}; all frames must be the same mesh.`;
         throw new UnusableFile(file.name, what);
       }
       values.set(points, k * 3 * this.points);

@@ -9,7 +9,6 @@ export interface Dropped {
   readonly path: string;
 }
 
-/** Whether something is an encoded capture, by its name. */
 export function isContainer({ path }: Dropped): boolean {
   return /\.cager$/i.test(path);
 }
@@ -34,8 +33,8 @@ const NATURAL = new Intl.Collator('en', { numeric: true });
 
 /** Remarks on formats that the command line takes and this page does not. */
 const ELSEWHERE: Readonly<Record<string, string>> = {
-  cager: 'This is an encoded capture already: open it as a file.',
-  npz: 'Save the array of positions alone, as .npy.',
+  cager: 'Already encoded: open it with “Open file”.',
+  npz: 'Save only the position array, as .npy.',
 };
 
 /** Sorts files into items and gives each a role; at most one is the rest pose, one the cage and one the frames. */
@@ -69,7 +68,7 @@ function itemOf(files: File[]): Item {
   if (files.length > 1) return { ...base, name: `${name} and ${files.length - 1} more`, choices: ['frames', 'unused'] };
   if (ARRAYS.has(extension)) return { ...base, name, choices: ['frames', 'unused'] };
   if (MESHES.has(extension)) return { ...base, name, choices: ['rest', 'cage', 'unused'] };
-  const remark = ELSEWHERE[extension] ?? 'This kind of file is not used.';
+  const remark = ELSEWHERE[extension] ?? 'Unsupported file type.';
   return { ...base, name, choices: ['unused'], remark };
 }
 

@@ -40,7 +40,7 @@ test('a_folder_of_numbered_meshes_is_a_row_of_frames_in_natural_order', () => {
 });
 
 test('what_cannot_be_used_says_why', () => {
-  expect(drop({ 'done.cager': 1 })[0].remark).toContain('already');
+  expect(drop({ 'done.cager': 1 })[0].remark).toContain('Already encoded');
   expect(drop({ 'notes.txt': 1 })[0]).toMatchObject({ role: 'unused', choices: ['unused'] });
 });
 

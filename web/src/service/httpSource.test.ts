@@ -1,10 +1,11 @@
 import { createServer, type IncomingMessage, type Server, type ServerResponse } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { afterEach, expect, it } from 'vitest';
-import { LocalCodec } from '../codec/localCodec';
-import { openContainer, type OpenOptions } from './open';
-import { blobSource, bytesSource, EndsCache, httpSource, type Source } from './source';
-import { allBlocks, goldenBytes, openBytes } from './testSupport';
+import { LocalCodec } from '../../tests/support/localCodec';
+import { openContainer, type OpenOptions } from '../container/open';
+import { blobSource, bytesSource, EndsCache, type Source } from '../container/source';
+import { allBlocks, goldenBytes, openBytes } from '../../tests/support/containers';
+import { httpSource } from './httpSource';
 
 const options = (): OpenOptions => ({ codec: new LocalCodec() });
 const bytes = goldenBytes('coded-green');
@@ -91,7 +92,7 @@ it('a server that is gone is said to be', async () => {
   const source = await httpSource(url);
   server?.closeAllConnections();
   server?.close();
-  await expect(source.read(200_000, 10)).rejects.toThrow(/does not answer/);
+  await expect(source.read(200_000, 10)).rejects.toThrow(/Cannot reach/);
 });
 
 it('a request can be given up', async () => {

@@ -9,10 +9,8 @@ export class UnusableFile extends Error {
   }
 }
 
-/** The frames of a capture. */
 export interface FrameSource {
   readonly frames: number;
-  /** Points of each frame. */
   readonly points: number;
   /** What it is and how much of it, for people. */
   readonly description: string;
@@ -35,7 +33,7 @@ export class ArrayFrames implements FrameSource {
     const stride = 3 * this.points * width;
     const begin = offset + first * stride;
     const bytes = await this.file.slice(begin, begin + count * stride).arrayBuffer();
-    if (bytes.byteLength !== count * stride) throw new Error('The file became shorter since it was dropped.');
+    if (bytes.byteLength !== count * stride) throw new Error('The file changed after it was added. Add it again.');
     if (littleEndian) return width === 4 ? new Float32Array(bytes) : Float32Array.from(new Float64Array(bytes));
     const view = new DataView(bytes);
     const values = new Float32Array(count * 3 * this.points);

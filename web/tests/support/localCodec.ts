@@ -1,6 +1,6 @@
-import type { Codec } from './client';
-import { GroupDecoder } from './groupDecoder';
-import type { Arguments, Method, Result } from './messages';
+import type { Codec } from '../../src/codec/client';
+import { GroupDecoder } from '../../src/codec/groupDecoder';
+import type { Arguments, Method, Result } from '../../src/codec/messages';
 
 /** Decodes in the calling thread, where there are no workers, as in Node. */
 export class LocalCodec implements Codec {

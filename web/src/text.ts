@@ -1,7 +1,8 @@
-/** Figures as people read them. */
+/** Figures as people read them, and what went wrong. */
 
 const NUMBER = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
 
+/** `12,000`. */
 export function count(value: number): string {
   return NUMBER.format(value);
 }
@@ -11,12 +12,17 @@ export function counted(value: number, noun: string): string {
   return `${count(value)} ${noun}${value === 1 ? '' : 's'}`;
 }
 
-/** A fraction of the diagonal in per cent, with two significant digits: `0.031 %`. */
-export function fraction(value: number | null): string {
-  if (value === null || Number.isNaN(value)) return '–';
-  if (value === 0) return '0 %';
-  const percent = 100 * value;
-  return percent < 1e-5 ? `${percent.toExponential(0)} %` : `${decimal(percent, 2)} %`;
+/** A fraction in per cent, with as many significant digits: `0.031 %`. */
+export function percent(fraction: number | null, digits = 3): string {
+  if (fraction === null || Number.isNaN(fraction)) return '–';
+  const value = 100 * fraction;
+  if (value !== 0 && Math.abs(value) < 1e-4) return `${Number(value.toPrecision(digits)).toExponential()} %`;
+  return `${Number(decimal(value, digits))} %`;
+}
+
+/** A number with three significant digits. */
+export function threeDigits(value: number): string {
+  return String(Number(value.toPrecision(3)));
 }
 
 /** `3.4 MB`, in powers of ten as file managers have them. */
@@ -37,6 +43,12 @@ export function perSecond(value: number): string {
   return `${value < 10 ? decimal(value, 2) : count(value)} frames/s`;
 }
 
+/** Bytes per second as bits per second. */
+export function bitrate(bytesPerSecond: number): string {
+  const bits = 8 * bytesPerSecond;
+  return bits >= 1e6 ? `${(bits / 1e6).toFixed(bits >= 1e7 ? 0 : 1)} Mbit/s` : `${Math.round(bits / 1e3)} kbit/s`;
+}
+
 /** A span of time in its two largest units or less: `45 s`, `3 min`, `2 h 5 min`, `4 days`. */
 export function span(seconds: number): string {
   if (seconds < 59.5) return `${Math.max(0, Math.round(seconds))} s`;
@@ -53,9 +65,27 @@ export function age(created: number, now: number): string {
   return seconds < 5 ? 'just now' : `${span(seconds)} ago`;
 }
 
-/** A point in time with its date, for tooltips. */
-export function moment(created: number): string {
-  return new Date(1000 * created).toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'medium' });
+/** Seconds as minutes, seconds and hundredths. */
+export function clock(seconds: number): string {
+  const hundredths = Math.max(0, Math.floor(seconds * 100 + 1e-6));
+  const two = (value: number) => String(value).padStart(2, '0');
+  return `${Math.floor(hundredths / 6000)}:${two(Math.floor(hundredths / 100) % 60)}.${two(hundredths % 100)}`;
+}
+
+/** The last part of an address as it is shown to people: escapes are decoded where they can be. */
+export function fileNameOf(address: string): string {
+  const path = address.split(/[?#]/)[0];
+  const name = path.split('/').findLast((part) => part !== '') ?? address;
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name;
+  }
+}
+
+/** What went wrong, in one sentence. */
+export function sentence(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
 }
 
 function decimal(value: number, digits: number): string {
