@@ -2,7 +2,6 @@
 
 use super::{Given, KEY, SOLVER, content, prepare_with};
 use crate::store::ContentKey;
-use crate::store::Shared;
 use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 
