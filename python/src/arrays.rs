@@ -4,6 +4,7 @@ use crate::fault::{Fault, of};
 use cager_geometry::mesh::{Model, Point, Polygons};
 use numpy::ndarray::{ArrayView2, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// An array of floats, and the name of the argument that it came in.
@@ -50,8 +51,9 @@ impl<'py> Floats<'py> {
     /// What numpy makes an array of; anything but floats in the machine's byte order is converted.
     pub(crate) fn new(value: &Bound<'py, PyAny>, name: impl Into<String>) -> Result<Self, Fault> {
         let name = name.into();
-        let numpy = value.py().import("numpy")?;
-        let array = numpy.call_method1("asarray", (value,)).map_err(|error| unreadable(&name, &error))?;
+        let py = value.py();
+        let numpy = py.import("numpy")?;
+        let array = numpy.call_method1("asarray", (value,)).map_err(|error| unreadable(py, &name, error))?;
         let dtype = array.getattr("dtype")?;
         if !["f", "i", "u", "b"].contains(&dtype.getattr("kind")?.extract::<String>()?.as_str()) {
             return Err(of(&name, format!("has elements of the type {dtype}; give numbers, such as float32")));
@@ -65,7 +67,7 @@ impl<'py> Floats<'py> {
             _ if is_aligned && array.cast::<PyArrayDyn<f64>>().is_ok() => array,
             _ => numpy.call_method1("array", (&array, "float64"))?,
         };
-        let double = array.cast_into::<PyArrayDyn<f64>>().map_err(|error| unreadable(&name, &error.into()))?;
+        let double = array.cast_into::<PyArrayDyn<f64>>().map_err(|error| unreadable(py, &name, error.into()))?;
         let values = double.try_readonly().map_err(|_| written_elsewhere(&name))?;
         Ok(Self { values: Values::Double(values), name })
     }
@@ -130,7 +132,11 @@ fn each<'a, T>(all: &ArrayView3<'a, T>) -> impl Iterator<Item = ArrayView2<'a, T
     (0..all.dim().0).map(move |frame| all.clone().index_axis_move(Axis(0), frame))
 }
 
-fn unreadable(name: &str, error: &PyErr) -> Fault {
+/// What numpy or the object itself says of its values; an interrupt, or too little memory, is passed on.
+fn unreadable(py: Python<'_>, name: &str, error: PyErr) -> Fault {
+    if !error.is_instance_of::<PyTypeError>(py) && !error.is_instance_of::<PyValueError>(py) {
+        return Fault::Raised(error);
+    }
     of(name, format!("cannot be read as an array of numbers ({error}); give an array of numpy"))
 }
 

@@ -1,23 +1,24 @@
 //! A capture in a container: its frames as arrays, its cages, and other cages in their place.
 
 use crate::arrays::{frame_arrays, frame_views};
-use crate::fault::{Fault, computing, of};
+use crate::fault::{Fault, computing, detached, of};
 use crate::geometry::{array, triangles};
-use cager_capture::decode::{self, Container, DecodeError, Positions};
+use cager_capture::decode::{self, DecodeError, Positions};
 use cager_capture::edit::edit;
 use cager_capture::edited::EditedCages;
 use cager_capture::origin::move_from;
-use cager_formats::{AtomicFile, Error, FrameReader, Target, commit_together};
+use cager_formats::{Action, AtomicFile, Error, FrameReader, Target, commit_together};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use numpy::ndarray::{ArrayViewMut3, Axis};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use pyo3::exceptions::{PyIndexError, PyTypeError};
+use pyo3::exceptions::{PyIndexError, PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
 use tempfile::TempPath;
 
 /// Frames that are decoded at a time, in bytes.
@@ -26,9 +27,9 @@ const BATCH_BYTES: usize = 64 << 20;
 /// A capture in a container.
 #[pyclass(frozen, module = "cager")]
 pub(crate) struct Capture {
-    container: Mutex<Container>,
     positions: Mutex<Option<Positions>>,
     path: PathBuf,
+    stamp: Stamp,
     /// Of a capture that has no name yet.
     _temporary: Option<TempPath>,
     rest: Model,
@@ -43,7 +44,7 @@ pub(crate) struct Capture {
 /// Open a `.cager` file.
 #[pyfunction]
 pub(crate) fn open(py: Python<'_>, path: PathBuf) -> Result<Capture, Fault> {
-    computing(py, || Capture::open(path, None))
+    detached(py, || Capture::open(path, None))
 }
 
 impl Capture {
@@ -60,20 +61,19 @@ impl Capture {
         let report = serde_json::to_string(&report).map_err(|error| of(path.display(), error))?;
         let header = container.header();
         let (origin, rows, frame_rate) = (header.origin, header.rows_per_frame as usize, header.frame_rate);
-        let (frames, container, positions) = (container.frames(), Mutex::new(container), Mutex::new(None));
-        Ok(Self {
-            container,
-            positions,
-            path,
-            _temporary: temporary,
-            rest,
-            cage,
-            origin,
-            rows,
-            frames,
-            frame_rate,
-            report,
-        })
+        let (frames, positions, stamp) = (container.frames(), Mutex::new(None), stamp(&path)?);
+        // It is opened again, perhaps from another working directory.
+        let path = std::path::absolute(&path).unwrap_or(path);
+        Ok(Self { positions, path, stamp, _temporary: temporary, rest, cage, origin, rows, frames, frame_rate, report })
+    }
+
+    /// Opens the file once more, unless it is another one by now.
+    fn again<T, E: Into<Fault>>(&self, open: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, Fault> {
+        let opened = open(&self.path).map_err(Into::into)?;
+        if stamp(&self.path)? != self.stamp {
+            return Err(of(self.path.display(), "has been written anew since it was opened; open it again"));
+        }
+        Ok(opened)
     }
 
     /// Positions of these frames in single precision, about the origin.
@@ -81,14 +81,14 @@ impl Capture {
         let mut positions = self.positions.lock().unwrap_or_else(PoisonError::into_inner);
         let positions = match &mut *positions {
             Some(there) => there,
-            none => none.insert(Positions::open(&self.path)?),
+            none => none.insert(self.again(Positions::open)?),
         };
         Ok(positions.read(frames)?)
     }
 
     /// The cages of these frames, vertices × 3 each, about the origin.
     fn read_cages(&self) -> Result<Vec<f32>, Fault> {
-        let mut container = self.container.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut container = self.again(decode::open)?;
         let (mut all, mut cage) = (Vec::with_capacity(3 * self.cage.vertices.len() * self.frames), Vec::new());
         for frame in 0..self.frames {
             container.read_frame(frame, &mut cage).map_err(|cause| DecodeError::container(&self.path, cause))?;
@@ -167,6 +167,15 @@ impl Capture {
     }
 }
 
+/// What tells a file from one that was written in its place: its length, and when it was written.
+type Stamp = (u64, Option<SystemTime>);
+
+fn stamp(path: &Path) -> Result<Stamp, Fault> {
+    let found = std::fs::metadata(path);
+    let found = found.map_err(|cause| Error::Io { path: path.to_owned(), action: Action::Read, cause })?;
+    Ok((found.len(), found.modified().ok()))
+}
+
 /// Coordinates as Python gets them.
 enum Shown {
     Single(Vec<f32>),
@@ -211,12 +220,18 @@ impl Capture {
                 (0..range.slicelength as isize).map(|k| (range.start + k * range.step) as usize).collect();
             return self.decoded(py, &wanted);
         }
-        let Ok(number) = frame.extract::<isize>() else {
-            return Err(PyTypeError::new_err("frames are numbered by integers; give one, or a slice").into());
+        let number = match frame.extract::<isize>() {
+            Ok(number) => Some(number),
+            Err(error) if error.is_instance_of::<PyOverflowError>(py) => None,
+            Err(_) => {
+                return Err(PyTypeError::new_err("frames are numbered by integers; give one, or a slice").into());
+            }
         };
-        let frame = if number < 0 { number + self.frames as isize } else { number };
-        let Some(frame) = usize::try_from(frame).ok().filter(|&frame| frame < self.frames) else {
-            let what = format!("there is no frame {number}; the capture has {}, counted from 0", self.frames);
+        let counted = number.map(|number| if number < 0 { number + self.frames as isize } else { number });
+        let Some(frame) =
+            counted.and_then(|number| usize::try_from(number).ok()).filter(|&number| number < self.frames)
+        else {
+            let what = format!("there is no frame {frame}; the capture has {}, counted from 0", self.frames);
             return Err(PyIndexError::new_err(what).into());
         };
         let positions = computing(py, || Ok(self.shown(self.read(&[frame])?.pop().unwrap_or_default())))?;
@@ -248,10 +263,10 @@ impl Capture {
     /// Writes the container; a file of that name is replaced only where `overwrite` says so.
     #[pyo3(signature = (path, overwrite=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Fault> {
-        computing(py, || {
-            let read = |cause| Error::Io { path: self.path.clone(), action: cager_formats::Action::Read, cause };
-            let write = |cause| Error::Io { path: path.clone(), action: cager_formats::Action::Write, cause };
-            let mut from = File::open(&self.path).map_err(read)?;
+        detached(py, || {
+            let read = |cause| Error::Io { path: self.path.clone(), action: Action::Read, cause };
+            let write = |cause| Error::Io { path: path.clone(), action: Action::Write, cause };
+            let mut from = self.again(|path| File::open(path).map_err(read))?;
             let target = if overwrite { Target::Replacing(path.clone()) } else { Target::New(path.clone()) };
             let mut file = AtomicFile::create(target)?;
             io::copy(&mut from, &mut file).map_err(write)?;
@@ -274,8 +289,8 @@ impl Capture {
             return Err(of("cages", "has no frames; give at least one"));
         }
         let rows = self.rows;
-        computing(py, || {
-            let container = decode::open(&self.path)?;
+        detached(py, || {
+            let container = self.again(decode::open)?;
             let reopen = move || {
                 let reader: Box<dyn FrameReader> = Box::new(Cages { cages: cages.clone(), rows, next: 0 });
                 Ok(reader)
@@ -300,7 +315,7 @@ impl Capture {
     #[getter]
     fn cages<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Fault> {
         let shape = [self.frames, self.cage.vertices.len(), 3];
-        computing(py, || Ok(self.shown(self.read_cages()?)))?.of_shape(py, shape)
+        detached(py, || Ok(self.shown(self.read_cages()?)))?.of_shape(py, shape)
     }
 
     /// Triangles of the cage: k × 3.

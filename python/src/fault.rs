@@ -4,6 +4,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
 
 pyo3::create_exception!(
     cager,
@@ -46,14 +47,29 @@ impl From<Fault> for PyErr {
     fn from(fault: Fault) -> Self {
         match fault {
             // The sentences are those of the command line.
-            Fault::Told(words) => CagerError::new_err(words.replace("pass --force", "pass force=True")),
+            Fault::Told(words) => CagerError::new_err(
+                words
+                    .replace("pass --force", "pass force=True")
+                    .replace("the cages that `cager decode --cages` writes", "capture.cages"),
+            ),
             Fault::Raised(error) => error,
         }
     }
 }
 
-/// Computes while other threads of Python run. A panic is an error as well.
+/// Computes with several threads. A process that is forked off another lacks those of its parent, and would wait for them for ever.
 pub(crate) fn computing<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
+    static FIRST: OnceLock<u32> = OnceLock::new();
+    let here = std::process::id();
+    if *FIRST.get_or_init(|| here) != here {
+        let what = "this process was forked off one that had used cager before, and lacks its threads; start it with the method \"spawn\" or \"forkserver\", as multiprocessing.get_context(\"spawn\") does";
+        return Err(Fault::Told(what.to_owned()));
+    }
+    detached(py, work)
+}
+
+/// Works while other threads of Python run. A panic is an error as well.
+pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
     py.detach(|| {
         catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
             Err(Fault::Told(
