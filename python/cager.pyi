@@ -4,6 +4,9 @@ n points, f frames, m vertices of the cage, k faces. Positions are arrays of any
 are read where they lie, other numbers are converted. Vertices are counted from 0. Errors are fractions of the
 diagonal of the rest pose's bounding box. Functions release the GIL while they compute.
 
+In a process that is forked off one that has used the module, only files are opened and saved:
+threads do not survive a fork. Start workers with ``multiprocessing.get_context("spawn")``.
+
 A callback ``progress(stage, fraction)`` is told what is done and how much of it, from 0 to 1; an exception in it ends
 the computation and is passed on.
 """
@@ -19,6 +22,8 @@ Faces = ArrayLike | Sequence[Sequence[int]]
 Frames = ArrayLike | Iterable[ArrayLike]
 Progress = Callable[[str, float], object]
 Kind = Literal["mvc", "harmonic", "green", "green-free"]
+
+__version__: str
 
 class CagerError(ValueError):
     """What was given cannot be used, or a file cannot be read or written; the message says which and what to do."""

@@ -6,6 +6,7 @@ use numpy::ndarray::{ArrayView2, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 
 /// An array of floats, and the name of the argument that it came in.
 pub(crate) struct Floats<'py> {
@@ -149,9 +150,11 @@ pub(crate) fn frame_arrays<'py>(value: &Bound<'py, PyAny>, name: &str) -> Result
     if value.hasattr("__array__")? {
         return Ok((vec![Floats::new(value, name)?], true));
     }
-    let all = value
-        .try_iter()
-        .map_err(|_| of(name, "are no frames; give an array of f × n × 3, or an iterable of arrays of n × 3"))?;
+    let refused = || of(name, "are no frames; give an array of f × n × 3, or an iterable of arrays of n × 3");
+    if value.is_instance_of::<PyString>() {
+        return Err(refused());
+    }
+    let all = value.try_iter().map_err(|_| refused())?;
     let each = all.enumerate().map(|(frame, array)| Floats::new(&array?, format!("{name}[{frame}]")));
     Ok((each.collect::<Result<_, Fault>>()?, false))
 }

@@ -10,10 +10,11 @@ use cager_capture::origin::move_from;
 use cager_formats::{Action, AtomicFile, Error, FrameReader, Target, commit_together};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use numpy::ndarray::{ArrayViewMut3, Axis};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use pyo3::exceptions::{PyIndexError, PyOverflowError, PyTypeError};
+use numpy::{BorrowError, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use pyo3::exceptions::{PyIndexError, PyOverflowError, PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
+use std::ffi::CString;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,7 @@ pub(crate) struct Capture {
     frames: usize,
     frame_rate: Option<f64>,
     report: String,
+    warnings: Vec<String>,
 }
 
 /// Open a `.cager` file.
@@ -53,18 +55,40 @@ impl Capture {
         Self::open(path.to_path_buf(), Some(path))
     }
 
+    /// Tells Python of what the user should know of the encoding.
+    pub(crate) fn warn(&self, py: Python<'_>) -> PyResult<()> {
+        self.warnings.iter().try_for_each(|words| {
+            let words = CString::new(words.replace('\0', ""))?;
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &words, 1)
+        })
+    }
+
     fn open(path: PathBuf, temporary: Option<TempPath>) -> Result<Self, Fault> {
         let fail = |cause| DecodeError::container(&path, cause);
         let mut container = decode::open(&path)?;
         let (rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
         let report = container.report().map_err(fail)?;
+        let warnings = report.warnings.clone();
         let report = serde_json::to_string(&report).map_err(|error| of(path.display(), error))?;
         let header = container.header();
         let (origin, rows, frame_rate) = (header.origin, header.rows_per_frame as usize, header.frame_rate);
         let (frames, positions, stamp) = (container.frames(), Mutex::new(None), stamp(&path)?);
         // It is opened again, perhaps from another working directory.
         let path = std::path::absolute(&path).unwrap_or(path);
-        Ok(Self { positions, path, stamp, _temporary: temporary, rest, cage, origin, rows, frames, frame_rate, report })
+        Ok(Self {
+            positions,
+            path,
+            stamp,
+            _temporary: temporary,
+            rest,
+            cage,
+            origin,
+            rows,
+            frames,
+            frame_rate,
+            report,
+            warnings,
+        })
     }
 
     /// Opens the file once more, unless it is another one by now.
@@ -249,12 +273,18 @@ impl Capture {
         if !flags.is_ok_and(|aligned| aligned) || out.getattr("shape")?.extract::<Vec<usize>>()? != shape {
             return Err(refused());
         }
+        let unwritable = |error| match error {
+            BorrowError::AlreadyBorrowed => {
+                of("out", "is in use by another call; wait for that, or give another array")
+            }
+            _ => refused(),
+        };
         if let Ok(single) = out.cast::<PyArray3<f32>>() {
-            let mut single = single.try_readwrite().map_err(|_| refused())?;
+            let mut single = single.try_readwrite().map_err(unwritable)?;
             self.fill_single(py, &wanted, &mut single.as_array_mut())?;
         } else {
             let double = out.cast::<PyArray3<f64>>().map_err(|_| refused())?;
-            let mut double = double.try_readwrite().map_err(|_| refused())?;
+            let mut double = double.try_readwrite().map_err(unwritable)?;
             self.fill_double(py, &wanted, &mut double.as_array_mut())?;
         }
         Ok(out)
@@ -289,7 +319,7 @@ impl Capture {
             return Err(of("cages", "has no frames; give at least one"));
         }
         let rows = self.rows;
-        detached(py, || {
+        computing(py, || {
             let container = self.again(decode::open)?;
             let reopen = move || {
                 let reader: Box<dyn FrameReader> = Box::new(Cages { cages: cages.clone(), rows, next: 0 });
@@ -315,7 +345,7 @@ impl Capture {
     #[getter]
     fn cages<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Fault> {
         let shape = [self.frames, self.cage.vertices.len(), 3];
-        detached(py, || Ok(self.shown(self.read_cages()?)))?.of_shape(py, shape)
+        computing(py, || Ok(self.shown(self.read_cages()?)))?.of_shape(py, shape)
     }
 
     /// Triangles of the cage: k × 3.

@@ -13,7 +13,7 @@ use cager_capture::memory::Memory;
 use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::inversion::{PrepareError, Solver};
+use cager_core::inversion::{PrepareContext, PrepareError, Solver};
 use cager_formats::{Target, commit_together};
 use cager_geometry::mesh::{Model, TriMesh};
 use pyo3::prelude::*;
@@ -73,6 +73,9 @@ pub(crate) fn encode<'py>(
     let mut rest = model(rest, faces, ["rest", "faces"])?;
     let mesh = cage.map(|(vertices, faces)| cage_mesh(&vertices, &faces)).transpose()?;
     let asked = Asked { max_error, mean_error, vertices, seed, system: system(coordinates, "coordinates")? };
+    if mesh.is_some() && vertices.is_some() {
+        return Err(of("vertices", "either they are given or cage; leave one of them out"));
+    }
     // What is wrong with it is told before anything is computed.
     asked.goal(mesh.is_some())?;
     if let Some(rate) = frame_rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
@@ -81,13 +84,15 @@ pub(crate) fn encode<'py>(
     let given = frame_arrays(frames, "frames")?;
     let views = frame_views(&given)?;
     let watch = Watch::new(progress);
-    computing(py, || {
+    let capture = computing(py, || {
         let mut frames = of_rest(&mut rest, &views, &watch);
         frames.frame_rate = frame_rate;
         frames.check(&rest, force)?;
         let path = encoded(&rest, mesh, &frames, asked, &watch)?;
         Capture::of_encoding(path)
-    })
+    })?;
+    capture.warn(py)?;
+    Ok(capture)
 }
 
 /// The container, in a file that goes when nobody needs it any more.
@@ -158,14 +163,17 @@ fn design_options(
     }
     let mut vertices = asked.vertices;
     if let (Some(goal), None) = (goal, vertices) {
-        let _ = watch.tell("trying cages of several sizes", 0.0);
+        let tell = || watch.tell("trying cages of several sizes", 0.0);
+        let context = PrepareContext { before_step: &|_| tell(), ..PrepareContext::default() };
+        let _ = tell();
         let samples = sample_frames(&mut frames.open(), CAGE_SIZE_FRAMES, true).map_err(named)?;
         let (system, total) = (asked.system, frames.views.len());
         let sizes = CageSizes { goal, rest, system, frames: &samples, total, memory: Memory::half_of_free() };
         vertices = sizes.best(|cage: &Cage, rest| {
             let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
-            Solver::prepare(system, cage, &rest.points, options)
+            Solver::prepare_with(system, cage, &rest.points, options, &context)
         });
+        watch.unless_stopped(Ok(()))?;
     }
     Ok(DesignOptions {
         goal: design_goal(vertices, asked.mean_error, rest.points.len())?,

@@ -50,6 +50,10 @@ impl From<Fault> for PyErr {
             Fault::Told(words) => CagerError::new_err(
                 words
                     .replace("pass --force", "pass force=True")
+                    .replace(
+                        "is there already; name another file",
+                        "is there already; name another file, or pass overwrite=True",
+                    )
                     .replace("the cages that `cager decode --cages` writes", "capture.cages"),
             ),
             Fault::Raised(error) => error,

@@ -4,7 +4,7 @@ use crate::arrays::{FrameView, frame_arrays, frame_views, model};
 use crate::fault::{Fault, computing, of};
 use crate::frames::Frames;
 use crate::watch::Watch;
-use cager_cages::{DesignError, DesignOptions, Goal, Progress, Style, design};
+use cager_cages::{DesignError, DesignOptions, EncloseError, Goal, Progress, Style, design};
 use cager_capture::design::{FRAMES, STYLES, default_vertices, style_by_name, style_name};
 use cager_capture::encode::sample_frames;
 use cager_capture::memory::free_bytes;
@@ -65,7 +65,9 @@ pub(crate) fn designed(
     let samples = sample_frames(&mut frames.open(), FRAMES, false).map_err(|error| Fault::Told(error.to_string()))?;
     let mut tell = |now: Progress<'_>| watch.tell(now.stage, now.fraction);
     let made = design(rest, &samples, None, options, &mut tell).map_err(|error| match &error {
-        DesignError::TooManyVertices { .. } => of("vertices", error),
+        DesignError::TooManyVertices { .. } | DesignError::Enclose(EncloseError::TooFewVertices { .. }) => {
+            of("vertices", error)
+        }
         DesignError::BadGoal(_) => of("mean_error", error),
         DesignError::Enclose(_) => of("rest", error),
         _ => of(frames.name, error),

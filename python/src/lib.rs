@@ -8,8 +8,11 @@ mod frames;
 mod geometry;
 mod watch;
 
+/// Captures of animated meshes as numpy arrays, in light and editable .cager files.
 #[pyo3::pymodule]
 mod cager {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use crate::capture::{Capture, open};
     #[pymodule_export]
@@ -18,4 +21,9 @@ mod cager {
     use crate::fault::CagerError;
     #[pymodule_export]
     use crate::geometry::{coordinates, design_cage};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

@@ -1,7 +1,9 @@
 """Captures there and back: what is promised of errors, files, arrays and edits."""
 
 import gc
+import multiprocessing
 import os
+import signal
 import threading
 
 import numpy as np
@@ -34,9 +36,11 @@ def test_frames_come_one_by_one_in_slices_and_all_at_once(small, coded):
     assert np.array_equal(np.stack(list(coded)), everything)
     assert np.array_equal(coded[-1], everything[9])
     assert np.array_equal(coded[7:2:-2], everything[7:2:-2])
+    many = cager.encode(small.rest, small.faces, np.concatenate([small.frames] * 4), small.cage)
+    assert np.array_equal(many.decode(), np.stack(list(many)))
     assert coded[5:5].shape == (0, len(small.rest), 3)
     assert np.array_equal(coded[np.int64(3)], everything[3])
-    for missing in (10, -11):
+    for missing in (10, -11, 2**80):
         with pytest.raises(IndexError, match="counted from 0"):
             coded[missing]
     with pytest.raises(TypeError):
@@ -59,13 +63,19 @@ def test_frames_are_written_into_arrays_that_are_given(small, coded):
             coded.decode(out)
 
 
+def turned(faces):
+    """Faces in any order, each from its smallest vertex on."""
+    return sorted(tuple(np.roll(face, -np.argmin(face)).tolist()) for face in faces)
+
+
 def test_a_saved_capture_is_the_same_when_it_is_opened(small, coded, tmp_path):
     path = tmp_path / "walk.cager"
     coded.save(path)
     again = cager.open(path)
     assert np.array_equal(again.decode(), coded.decode())
-    assert [list(face) for face in again.faces] == small.faces
-    assert np.array_equal(again.cage_faces, small.cage[1])
+    # Coded files keep the faces in an order of their own.
+    assert turned(again.faces) == turned(small.faces)
+    assert turned(again.cage_faces) == turned(small.cage[1])
     assert np.allclose(again.rest_cage, small.cage[0], atol=1e-3 * small.diagonal)
     assert np.allclose(again.rest, small.rest, atol=1e-3 * small.diagonal)
     with pytest.raises(cager.CagerError, match="walk.cager: "):
@@ -73,6 +83,18 @@ def test_a_saved_capture_is_the_same_when_it_is_opened(small, coded, tmp_path):
     coded.save(path, overwrite=True)
     with pytest.raises(cager.CagerError, match="create its folder first"):
         coded.save(tmp_path / "nowhere" / "walk.cager")
+
+
+def test_a_file_that_is_written_anew_is_not_mixed_with_what_was_opened(small, coded, tmp_path, monkeypatch):
+    coded.save(tmp_path / "walk.cager")
+    monkeypatch.chdir(tmp_path)
+    opened = cager.open("walk.cager")
+    monkeypatch.chdir("/")
+    assert np.array_equal(opened.cages, coded.cages)
+    cager.encode(small.rest, None, small.frames[:3], small.cage).save(tmp_path / "walk.cager", overwrite=True)
+    for read in (opened.decode, lambda: opened[0], lambda: opened.cages, lambda: opened.save(tmp_path / "other.cager")):
+        with pytest.raises(cager.CagerError, match="walk.cager: has been written anew"):
+            read()
 
 
 def test_faces_of_one_size_are_an_array(small):
@@ -167,6 +189,40 @@ def test_progress_is_told_and_an_exception_in_it_ends_the_encoding(small):
         cager.design_cage(small.rest, small.faces, small.frames, 20, progress=stop)
     with pytest.raises(TypeError):
         cager.encode(small.rest, small.faces, small.frames, small.cage, progress=3)
+
+
+def test_the_user_can_interrupt_it(small):
+    frames = np.concatenate([small.frames] * 300)
+    timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        for _ in range(100):
+            cager.encode(small.rest, small.faces, frames, small.cage, max_error=1e-3)
+    timer.join()
+
+
+def read_in_child(capture, results):
+    try:
+        results.put(len(capture.decode()))
+    except cager.CagerError as error:
+        results.put(str(error))
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="processes are not forked here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_is_told_to_start_otherwise(coded):
+    coded.decode()
+    context = multiprocessing.get_context("fork")
+    results = context.Queue()
+    child = context.Process(target=read_in_child, args=(coded, results))
+    child.start()
+    assert "spawn" in results.get(timeout=30)
+    child.join()
+
+
+def test_points_outside_the_cage_are_warned_of(small):
+    with pytest.warns(UserWarning, match="386 of 386 points lie outside the cage"):
+        cager.encode(small.rest, small.faces, small.frames, (small.cage[0] + 1, small.cage[1]))
 
 
 def test_a_cage_is_designed_where_none_is_given(small):

@@ -44,6 +44,7 @@ FRAMES = [
     (lambda s: s.frames[:0], "frames: has no frames"),
     (lambda s: [], "frames: has no frames"),
     (lambda s: 7, "frames: are no frames"),
+    (lambda s: "walk.npy", "frames: are no frames"),
     (lambda s: s.frames[:, 1:], "frames: frame 0 has 385 points where 386 are expected"),
     (lambda s: [*s.frames, s.frames[0][1:]], "frames: frame 10 has 385 points"),
     (lambda s: [s.frames[0], s.frames[0].T], r"frames\[1\]: has the shape 3 × 386"),
@@ -102,6 +103,7 @@ def test_a_wrong_cage_is_named(small, change, words):
         ({"max_error": 1e-3, "mean_error": 1e-3}, "max_error: either"),
         ({"max_error": 1e-12}, "below what positions in single precision can hold"),
         ({"coordinates": "bilinear"}, 'coordinates: there is no "bilinear"; give one of mvc'),
+        ({"vertices": 30}, "vertices: either"),
         ({"frame_rate": 0}, "frame_rate: is 0"),
         ({"cage": None, "vertices": 1000}, "ask for fewer vertices"),
         ({"cage": None, "vertices": 3}, "vertices|cage"),
@@ -113,7 +115,7 @@ def test_wrong_options_are_named(small, options, words):
 
 
 def test_a_frame_that_departs_is_named_unless_it_is_forced(small):
-    frames = [*small.frames, *(50 * small.frames[3:6]), small.frames[0]]
+    frames = [*small.frames, *(100 * small.frames[[9, 9, 8]]), small.frames[0]]
     with pytest.raises(cager.CagerError, match="frames: .*pass force=True to go on"):
         cager.encode(small.rest, small.faces, frames, small.cage)
     assert len(cager.encode(small.rest, small.faces, frames, small.cage, force=True)) == 14
@@ -140,6 +142,17 @@ def test_files_that_are_no_containers_are_named(small, tmp_path):
         path.write_bytes(whole[:at])
         with pytest.raises(cager.CagerError):
             cager.open(path)
+
+
+def raising(frames, error):
+    yield frames[0]
+    raise error
+
+
+@pytest.mark.parametrize("error", [OSError("the disk is gone"), KeyboardInterrupt(), MemoryError()])
+def test_what_an_iterator_raises_is_passed_on(small, error):
+    with pytest.raises(type(error)):
+        cager.encode(small.rest, small.faces, raising(small.frames, error), small.cage)
 
 
 def test_the_error_is_a_value_error():
