@@ -13,29 +13,30 @@ the computation and is passed on.
 
 from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
-from typing import Any, Literal, overload
+from typing import Any, Literal, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Faces = ArrayLike | Sequence[Sequence[int]]
-Frames = ArrayLike | Iterable[ArrayLike]
-Progress = Callable[[str, float], object]
-Kind = Literal["mvc", "harmonic", "green", "green-free"]
+_Faces = ArrayLike | Sequence[Sequence[int]]
+_Frames = ArrayLike | Iterable[ArrayLike]
+_Progress = Callable[[str, float], object]
+_Kind = Literal["mvc", "harmonic", "green", "green-free"]
 
 __version__: str
 
 class CagerError(ValueError):
     """What was given cannot be used, or a file cannot be read or written; the message says which and what to do."""
 
+@final
 class Capture:
     """A capture in a .cager file. ``len`` is the number of frames, which ``capture[t]`` decodes one by one."""
 
     def __len__(self) -> int: ...
     @overload
-    def __getitem__(self, frame: int) -> NDArray[np.float32]: ...
+    def __getitem__(self, frame: int, /) -> NDArray[np.float32]: ...
     @overload
-    def __getitem__(self, frame: slice) -> NDArray[np.float32]:
+    def __getitem__(self, frame: slice, /) -> NDArray[np.float32]:
         """Positions of frame t, (n, 3), or of a slice of frames, (f, n, 3).
 
         float32; float64 for a capture so far from the origin that single precision would lose it.
@@ -45,7 +46,7 @@ class Capture:
         """All frames, (f, n, 3), as ``capture[:]``, or written into ``out``: float32 or float64, of any memory order."""
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Write the .cager file; it appears whole or not at all. What has that name is replaced with ``overwrite``."""
-    def with_cages(self, edited: Frames) -> Capture:
+    def with_cages(self, edited: _Frames) -> Capture:
         """The same capture with other cages, (f, m, 3): as many vertices, any number of frames.
 
         What a cage left over is dropped, and errors of changed frames are not measured.
@@ -77,16 +78,16 @@ def open(path: str | PathLike[str]) -> Capture:
 
 def encode(
     rest: ArrayLike,
-    faces: Faces | None,
-    frames: Frames,
-    cage: tuple[ArrayLike, Faces] | None = None,
+    faces: _Faces | None,
+    frames: _Frames,
+    cage: tuple[ArrayLike, _Faces] | None = None,
     max_error: float | None = None,
     mean_error: float | None = None,
-    progress: Progress | None = None,
+    progress: _Progress | None = None,
     *,
     vertices: int | None = None,
     seed: int = 0,
-    coordinates: Kind = "mvc",
+    coordinates: _Kind = "mvc",
     frame_rate: float | None = None,
     force: bool = False,
 ) -> Capture:
@@ -101,13 +102,13 @@ def encode(
         as the cage follows them.
     mean_error: the mean L2 error of the file, or of the cage that is designed for it.
     frame_rate: frames per second, kept with the capture.
-    force: go on where rest pose and frames look as if they did not belong together.
+    force: go on where rest pose, cage and frames look as if they did not belong together.
     """
 
 def design_cage(
     rest: ArrayLike,
-    faces: Faces | None,
-    frames: Frames,
+    faces: _Faces | None,
+    frames: _Frames,
     vertices: int | None = None,
     *,
     mean_error: float | None = None,
@@ -115,7 +116,7 @@ def design_cage(
     seed: int = 0,
     time_limit: float | None = None,
     force: bool = False,
-    progress: Progress | None = None,
+    progress: _Progress | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Design a cage from a capture: its vertices, (m, 3), and triangles, (k, 3).
 
@@ -124,7 +125,7 @@ def design_cage(
     """
 
 def coordinates(
-    rest: ArrayLike, cage_vertices: ArrayLike, cage_faces: Faces, kind: Kind = "mvc"
+    rest: ArrayLike, cage_vertices: ArrayLike, cage_faces: _Faces, kind: _Kind = "mvc"
 ) -> NDArray[np.float64]:
     """Coordinates of points in a cage, (n, m): ``coordinates(...) @ cage_vertices`` gives the points.
 

@@ -2,6 +2,7 @@
 
 use crate::arrays::{frame_arrays, frame_views};
 use crate::fault::{Fault, computing, detached, of};
+use crate::frames::Cages;
 use crate::geometry::{array, triangles};
 use cager_capture::decode::{self, DecodeError, Positions};
 use cager_capture::edit::edit;
@@ -389,48 +390,5 @@ impl Capture {
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         py.import("json")?.call_method1("loads", (&self.report,))
-    }
-}
-
-/// Edited cages.
-struct Cages {
-    cages: Arc<[Vec<f64>]>,
-    rows: usize,
-    next: usize,
-}
-
-impl FrameReader for Cages {
-    fn points(&self) -> usize {
-        self.rows
-    }
-
-    fn frames(&self) -> usize {
-        self.cages.len()
-    }
-
-    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
-        out.clear();
-        let Some(cage) = self.cages.get(self.next) else { return Ok(false) };
-        let (path, frame) = (|| PathBuf::from("cages"), self.next);
-        if cage.len() != 3 * self.rows {
-            return Err(Error::PointCount {
-                path: path(),
-                frame: Some(frame),
-                expected: self.rows,
-                found: cage.len() as u64 / 3,
-            });
-        }
-        if let Some(at) = cage.iter().position(|x| !x.is_finite()) {
-            return Err(Error::NonFinite { path: path(), frame, point: at / 3 });
-        }
-        out.extend_from_slice(cage);
-        self.next += 1;
-        Ok(true)
-    }
-
-    fn skip(&mut self) -> Result<bool, Error> {
-        let more = self.next < self.cages.len();
-        self.next += usize::from(more);
-        Ok(more)
     }
 }

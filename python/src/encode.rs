@@ -10,12 +10,13 @@ use cager_cages::{DesignOptions, Style};
 use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
 use cager_capture::encode::{EncodeError, EncodeProgress, Job, encode as encode_job, sample_frames};
 use cager_capture::memory::Memory;
+use cager_capture::mismatch::cage_mismatch;
 use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareContext, PrepareError, Solver};
 use cager_formats::{Target, commit_together};
-use cager_geometry::mesh::{Model, TriMesh};
+use cager_geometry::mesh::{Model, Point, TriMesh};
 use pyo3::prelude::*;
 use tempfile::TempPath;
 
@@ -27,6 +28,7 @@ struct Asked {
     vertices: Option<usize>,
     seed: u64,
     system: &'static dyn CoordinateSystem,
+    force: bool,
 }
 
 impl Asked {
@@ -72,7 +74,7 @@ pub(crate) fn encode<'py>(
 ) -> Result<Capture, Fault> {
     let mut rest = model(rest, faces, ["rest", "faces"])?;
     let mesh = cage.map(|(vertices, faces)| cage_mesh(&vertices, &faces)).transpose()?;
-    let asked = Asked { max_error, mean_error, vertices, seed, system: system(coordinates, "coordinates")? };
+    let asked = Asked { max_error, mean_error, vertices, seed, system: system(coordinates, "coordinates")?, force };
     if mesh.is_some() && vertices.is_some() {
         return Err(of("vertices", "either they are given or cage; leave one of them out"));
     }
@@ -104,13 +106,10 @@ fn encoded(
     watch: &Watch,
 ) -> Result<TempPath, Fault> {
     let goal = asked.goal(mesh.is_some())?;
-    let cage = cage(match mesh {
-        Some(mut mesh) => {
-            move_to(frames.origin, &mut mesh.vertices);
-            mesh
-        }
-        None => designed(rest, frames, &design_options(rest, frames, asked, goal, watch)?, watch)?,
-    })?;
+    let cage = match mesh {
+        Some(mesh) => cage_of(rest, mesh, frames.origin, asked.force)?,
+        None => cage(designed(rest, frames, &design_options(rest, frames, asked, goal, watch)?, watch)?)?,
+    };
     let temporary = tempfile::Builder::new().prefix("cager-").suffix(".cager").tempfile();
     let path = temporary
         .map_err(|error| {
@@ -144,6 +143,16 @@ fn encoded(
     let encoded = watch.unless_stopped(done.map_err(named))?;
     commit_together(vec![encoded.container])?;
     Ok(path)
+}
+
+/// A cage that was given, unless it looks like that of another model.
+fn cage_of(rest: &Model, mut mesh: TriMesh, origin: Option<Point>, force: bool) -> Result<Cage, Fault> {
+    move_to(origin, &mut mesh.vertices);
+    let cage = cage(mesh.clone())?;
+    match cage_mismatch(&mesh, rest).filter(|_| !force) {
+        Some(what) => Err(of("cage", format!("{what}, or pass --force to go on"))),
+        None => Ok(cage),
+    }
 }
 
 /// How a cage is designed, of as many vertices as suit what the file is to meet.

@@ -132,3 +132,46 @@ impl FrameReader for ArrayFrames<'_> {
         Ok(more)
     }
 }
+
+/// Edited cages.
+pub(crate) struct Cages {
+    pub(crate) cages: Arc<[Vec<f64>]>,
+    pub(crate) rows: usize,
+    pub(crate) next: usize,
+}
+
+impl FrameReader for Cages {
+    fn points(&self) -> usize {
+        self.rows
+    }
+
+    fn frames(&self) -> usize {
+        self.cages.len()
+    }
+
+    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
+        out.clear();
+        let Some(cage) = self.cages.get(self.next) else { return Ok(false) };
+        let (path, frame) = (|| PathBuf::from("cages"), self.next);
+        if cage.len() != 3 * self.rows {
+            return Err(Error::PointCount {
+                path: path(),
+                frame: Some(frame),
+                expected: self.rows,
+                found: cage.len() as u64 / 3,
+            });
+        }
+        if let Some(at) = cage.iter().position(|x| !x.is_finite()) {
+            return Err(Error::NonFinite { path: path(), frame, point: at / 3 });
+        }
+        out.extend_from_slice(cage);
+        self.next += 1;
+        Ok(true)
+    }
+
+    fn skip(&mut self) -> Result<bool, Error> {
+        let more = self.next < self.cages.len();
+        self.next += usize::from(more);
+        Ok(more)
+    }
+}

@@ -221,8 +221,9 @@ def test_a_forked_process_is_told_to_start_otherwise(coded):
 
 
 def test_points_outside_the_cage_are_warned_of(small):
+    beside = (small.cage[0] + 1, small.cage[1])
     with pytest.warns(UserWarning, match="386 of 386 points lie outside the cage"):
-        cager.encode(small.rest, small.faces, small.frames, (small.cage[0] + 1, small.cage[1]))
+        cager.encode(small.rest, small.faces, small.frames, beside, force=True)
 
 
 def test_a_cage_is_designed_where_none_is_given(small):

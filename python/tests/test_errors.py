@@ -121,6 +121,17 @@ def test_a_frame_that_departs_is_named_unless_it_is_forced(small):
     assert len(cager.encode(small.rest, small.faces, frames, small.cage, force=True)) == 14
 
 
+def test_a_cage_of_another_model_is_named(small):
+    vertices, faces = small.cage
+    for wrong, words in (
+        (0.3048 * vertices, "leaves 386 of 386 points of the rest pose outside, and .*scaled"),
+        (vertices + [0, 0, 0.7], "leaves [0-9]+ of 386 points of the rest pose outside"),
+        (100 * vertices, "is [0-9]+ times larger than the rest pose"),
+    ):
+        with pytest.raises(cager.CagerError, match=f"cage: {words}.*pass force=True to go on"):
+            cager.encode(small.rest, small.faces, small.frames, (wrong, faces))
+
+
 def test_files_that_are_no_containers_are_named(small, tmp_path):
     path = tmp_path / "walk.cager"
     for contents in (b"", b"not a container", bytes(100_000)):
