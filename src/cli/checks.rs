@@ -5,17 +5,13 @@ use super::warn;
 use crate::belonging::Belonging;
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
-use crate::mismatch::{self, Mismatch, Up, mismatches};
+use crate::mismatch::{self, Mismatch, Up, cage_mismatch, mismatches};
 use crate::timing::Timing;
 use anyhow::{Result, bail};
-use cager_cages::diagnosis::{alignment, weld};
+use cager_cages::diagnosis::weld;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
-use cager_geometry::spatial::outside;
 use clap::Args;
 use std::path::{Path, PathBuf};
-
-/// A cage larger than its model by this factor is checked for other units.
-const ROOMY: f64 = 5.0;
 
 /// How a capture is read, where its files do not tell.
 #[derive(Args, Debug)]
@@ -178,25 +174,8 @@ pub(super) fn check_capture(
 
 /// Checks a cage that leaves most points outside, or is far larger than the model, for other units or axes and for belonging to another model.
 pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs) -> Result<()> {
-    let missed = outside(cage.1, &rest.points).len();
-    let most_outside = 2 * missed > rest.points.len();
-    if !most_outside && diagonal(&cage.1.vertices) <= ROOMY * diagonal(&rest.points) {
-        return Ok(());
-    }
-    let alignment = alignment(cage.1, rest).filter(|found| most_outside || found.shift == [0.0; 3]);
-    let nearly_all = 10 * missed > 9 * rest.points.len();
-    let path = cage.0.display();
-    let leaves = || format!("{path}: leaves {missed} of {} points of the rest pose outside", rest.points.len());
-    let what = match alignment {
-        Some(alignment) if most_outside => format!("{}, and {alignment}", leaves()),
-        Some(alignment) => format!(
-            "{path}: is {:.0} times larger than the rest pose, and {alignment}",
-            diagonal(&cage.1.vertices) / diagonal(&rest.points)
-        ),
-        None if nearly_all => format!("{}; it looks like the cage of another model", leaves()),
-        None => return Ok(()),
-    };
-    refuse_or_warn(what, "", args.force)
+    let Some(what) = cage_mismatch(cage.1, rest) else { return Ok(()) };
+    refuse_or_warn(format!("{}: {what}", cage.0.display()), "", args.force)
 }
 
 /// What is to be said of frames that lost digits before they came here: in single precision, as far away as their rest pose.

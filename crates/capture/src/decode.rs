@@ -197,7 +197,9 @@ impl Positions {
             self.container.read_frame(frame, cage).map_err(fail)?;
         }
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-        self.model.decoder.decode(&views, &mut positions);
+        for (cages, positions) in views.chunks(BATCH).zip(positions.chunks_mut(BATCH)) {
+            self.model.decoder.decode(cages, positions);
+        }
         self.container.add_residual(frames, &mut positions).map_err(fail)?;
         Ok(positions)
     }

@@ -13,6 +13,8 @@ type Reopen = dyn Fn() -> Result<Box<dyn FrameReader>, Error> + Send;
 pub struct EditedCages {
     path: PathBuf,
     vertices: usize,
+    /// Points of the model.
+    points: u64,
     origin: Option<Point>,
     reader: Box<dyn FrameReader>,
     reopen: Box<Reopen>,
@@ -48,8 +50,8 @@ impl EditedCages {
         }
         let vertices = header.rows_per_frame as usize;
         let reader = reopen().map_err(|error| named(error, vertices, header.points))?;
-        let origin = header.origin;
-        Ok(Self { path: path.to_owned(), vertices, origin, reader, reopen, next: 0, wide: Vec::new() })
+        let (points, origin) = (header.points, header.origin);
+        Ok(Self { path: path.to_owned(), vertices, points, origin, reader, reopen, next: 0, wide: Vec::new() })
     }
 
     /// Number of frames.
@@ -69,8 +71,8 @@ impl EditedCages {
         while self.next < frame && self.reader.skip()? {
             self.next += 1;
         }
-        let vertices = self.vertices;
-        let more = self.reader.read_next(&mut self.wide).map_err(|error| named(error, vertices, 0))?;
+        let (vertices, points) = (self.vertices, self.points);
+        let more = self.reader.read_next(&mut self.wide).map_err(|error| named(error, vertices, points))?;
         if !more {
             return Err(self.fail(format!("ends before frame {frame}, though it has announced more; export it again")));
         }

@@ -1,8 +1,11 @@
 //! Detects whether the frames of a capture belong to a rest pose: units, axes and order of points, by edge lengths, extents and the
 //! correlation of positions. Deformation changes these far less than a mix-up does.
 
+mod cage;
 mod faces;
 pub mod watch;
+
+pub use cage::cage_mismatch;
 
 use cager_geometry::mesh::{Model, Point, bounds};
 use cager_geometry::vector::distance;

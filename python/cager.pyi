@@ -1,0 +1,133 @@
+"""Captures of animated meshes as numpy arrays, in light and editable .cager files.
+
+n points, f frames, m vertices of the cage, k faces. Positions are arrays of any memory order; float32 and float64
+are read where they lie, other numbers are converted. Vertices are counted from 0. Errors are fractions of the
+diagonal of the rest pose's bounding box. Functions release the GIL while they compute.
+
+In a process that is forked off one that has used the module, only files are opened and saved:
+threads do not survive a fork. Start workers with ``multiprocessing.get_context("spawn")``.
+
+A callback ``progress(stage, fraction)`` is told what is done and how much of it, from 0 to 1; an exception in it ends
+the computation and is passed on.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from os import PathLike
+from typing import Any, Literal, final, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_Faces = ArrayLike | Sequence[Sequence[int]]
+_Frames = ArrayLike | Iterable[ArrayLike]
+_Progress = Callable[[str, float], object]
+_Kind = Literal["mvc", "harmonic", "green", "green-free"]
+
+__version__: str
+
+class CagerError(ValueError):
+    """What was given cannot be used, or a file cannot be read or written; the message says which and what to do."""
+
+@final
+class Capture:
+    """A capture in a .cager file. ``len`` is the number of frames, which ``capture[t]`` decodes one by one."""
+
+    def __len__(self) -> int: ...
+    @overload
+    def __getitem__(self, frame: int, /) -> NDArray[np.float32]: ...
+    @overload
+    def __getitem__(self, frame: slice, /) -> NDArray[np.float32]:
+        """Positions of frame t, (n, 3), or of a slice of frames, (f, n, 3).
+
+        float32; float64 for a capture so far from the origin that single precision would lose it.
+        Raises IndexError for a frame that is not there.
+        """
+    def decode(self, out: NDArray[Any] | None = None) -> NDArray[Any]:
+        """All frames, (f, n, 3), as ``capture[:]``, or written into ``out``: float32 or float64, of any memory order."""
+    def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
+        """Write the .cager file; it appears whole or not at all. What has that name is replaced with ``overwrite``."""
+    def with_cages(self, edited: _Frames) -> Capture:
+        """The same capture with other cages, (f, m, 3): as many vertices, any number of frames.
+
+        What a cage left over is dropped, and errors of changed frames are not measured.
+        """
+    @property
+    def cages(self) -> NDArray[np.float32]:
+        """The cage of every frame, (f, m, 3); float64 far from the origin."""
+    @property
+    def cage_faces(self) -> NDArray[np.int64]:
+        """Triangles of the cage, (k, 3)."""
+    @property
+    def rest_cage(self) -> NDArray[np.float64]:
+        """Vertices of the cage around the rest pose, (m, 3)."""
+    @property
+    def rest(self) -> NDArray[np.float64]:
+        """Points of the rest pose, (n, 3)."""
+    @property
+    def faces(self) -> NDArray[np.int64] | list[NDArray[np.int64]]:
+        """Faces of the model: (k, 3) or (k, 4) where all have as many vertices, else an array for each."""
+    @property
+    def frame_rate(self) -> float | None:
+        """Frames per second, where known."""
+    @property
+    def report(self) -> dict[str, Any]:
+        """Sizes, errors and warnings of the encoding: the keys of ``cager inspect --json``."""
+
+def open(path: str | PathLike[str]) -> Capture:
+    """Open a .cager file. Frames are decoded when they are asked for."""
+
+def encode(
+    rest: ArrayLike,
+    faces: _Faces | None,
+    frames: _Frames,
+    cage: tuple[ArrayLike, _Faces] | None = None,
+    max_error: float | None = None,
+    mean_error: float | None = None,
+    progress: _Progress | None = None,
+    *,
+    vertices: int | None = None,
+    seed: int = 0,
+    coordinates: _Kind = "mvc",
+    frame_rate: float | None = None,
+    force: bool = False,
+) -> Capture:
+    """Encode a capture: the same bytes as ``cager encode`` writes of the same numbers.
+
+    rest: points of the rest pose, (n, 3).
+    faces: (k, 3), (k, 4), or a list of vertices for each face; None for a point cloud.
+    frames: (f, n, 3), or an iterable of (n, 3), which is read to its end first.
+    cage: its vertices, (m, 3), and faces; without it a cage is designed from the frames, of ``vertices`` vertices
+        at the most, drawn with ``seed``.
+    max_error: no point of any frame is farther from where it was; without it and ``mean_error`` frames are stored
+        as the cage follows them.
+    mean_error: the mean L2 error of the file, or of the cage that is designed for it.
+    frame_rate: frames per second, kept with the capture.
+    force: go on where rest pose, cage and frames look as if they did not belong together.
+    """
+
+def design_cage(
+    rest: ArrayLike,
+    faces: _Faces | None,
+    frames: _Frames,
+    vertices: int | None = None,
+    *,
+    mean_error: float | None = None,
+    style: Literal["free", "editable"] = "free",
+    seed: int = 0,
+    time_limit: float | None = None,
+    force: bool = False,
+    progress: _Progress | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Design a cage from a capture: its vertices, (m, 3), and triangles, (k, 3).
+
+    vertices: at the most; 350 where neither they nor ``mean_error``, the error that the cage is to meet, are given.
+    time_limit: seconds after which the best cage so far is taken.
+    """
+
+def coordinates(
+    rest: ArrayLike, cage_vertices: ArrayLike, cage_faces: _Faces, kind: _Kind = "mvc"
+) -> NDArray[np.float64]:
+    """Coordinates of points in a cage, (n, m): ``coordinates(...) @ cage_vertices`` gives the points.
+
+    With kind "green" and "green-free" columns for the normals of the faces follow those of the vertices.
+    """

@@ -1,0 +1,213 @@
+//! Encodes arrays into a container.
+
+use crate::arrays::{frame_arrays, frame_views, model};
+use crate::capture::Capture;
+use crate::fault::{Fault, computing, of};
+use crate::frames::Frames;
+use crate::geometry::{cage, cage_mesh, design_goal, designed, of_rest, system};
+use crate::watch::Watch;
+use cager_cages::{DesignOptions, Style};
+use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
+use cager_capture::encode::{EncodeError, EncodeProgress, Job, encode as encode_job, sample_frames};
+use cager_capture::memory::Memory;
+use cager_capture::mismatch::cage_mismatch;
+use cager_capture::origin::move_to;
+use cager_core::cage::Cage;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::inversion::{PrepareContext, PrepareError, Solver};
+use cager_formats::{Target, commit_together};
+use cager_geometry::mesh::{Model, Point, TriMesh};
+use pyo3::prelude::*;
+use tempfile::TempPath;
+
+/// What is asked of an encoding.
+#[derive(Clone, Copy)]
+struct Asked {
+    max_error: Option<f64>,
+    mean_error: Option<f64>,
+    vertices: Option<usize>,
+    seed: u64,
+    system: &'static dyn CoordinateSystem,
+    force: bool,
+}
+
+impl Asked {
+    /// What the file is to meet, with a cage that was given or not: a mean error is what a cage meets that is designed for it.
+    fn goal(self, has_cage: bool) -> Result<Option<Goal>, Fault> {
+        let fraction = |name, error: f64| {
+            if error > 0.0 && error < 1.0 {
+                return Ok(error);
+            }
+            Err(of(
+                name,
+                format!("is {error}; give a fraction of the rest pose's diagonal above 0 and below 1, such as 0.001"),
+            ))
+        };
+        let max_error = self.max_error.map(|error| fraction("max_error", error)).transpose()?;
+        let mean_error = self.mean_error.map(|error| fraction("mean_error", error)).transpose()?;
+        match (max_error, mean_error) {
+            (Some(_), Some(_)) => Err(of("max_error", "either it is given or mean_error; leave one of them out")),
+            (Some(error), None) => Ok(Some(Goal::MaxError(error))),
+            (None, error) => Ok(error.filter(|_| has_cage).map(Goal::MeanError)),
+        }
+    }
+}
+
+/// Encode a capture.
+#[pyfunction]
+#[pyo3(signature = (rest, faces, frames, cage=None, max_error=None, mean_error=None, progress=None, *, vertices=None, seed=0, coordinates="mvc", frame_rate=None, force=false))]
+#[expect(clippy::too_many_arguments, reason = "arguments with names")]
+pub(crate) fn encode<'py>(
+    py: Python<'py>,
+    rest: &Bound<'py, PyAny>,
+    faces: Option<&Bound<'py, PyAny>>,
+    frames: &Bound<'py, PyAny>,
+    cage: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
+    max_error: Option<f64>,
+    mean_error: Option<f64>,
+    progress: Option<Py<PyAny>>,
+    vertices: Option<usize>,
+    seed: u64,
+    coordinates: &str,
+    frame_rate: Option<f64>,
+    force: bool,
+) -> Result<Capture, Fault> {
+    let mut rest = model(rest, faces, ["rest", "faces"])?;
+    let mesh = cage.map(|(vertices, faces)| cage_mesh(&vertices, &faces)).transpose()?;
+    let asked = Asked { max_error, mean_error, vertices, seed, system: system(coordinates, "coordinates")?, force };
+    if mesh.is_some() && vertices.is_some() {
+        return Err(of("vertices", "either they are given or cage; leave one of them out"));
+    }
+    // What is wrong with it is told before anything is computed.
+    asked.goal(mesh.is_some())?;
+    if let Some(rate) = frame_rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+        return Err(of("frame_rate", format!("is {rate}; give a positive number of frames per second")));
+    }
+    let given = frame_arrays(frames, "frames")?;
+    let views = frame_views(&given)?;
+    let watch = Watch::new(progress);
+    let capture = computing(py, || {
+        let mut frames = of_rest(&mut rest, &views, &watch);
+        frames.frame_rate = frame_rate;
+        frames.check(&rest, force)?;
+        let path = encoded(&rest, mesh, &frames, asked, &watch)?;
+        Capture::of_encoding(path)
+    })?;
+    capture.warn(py)?;
+    Ok(capture)
+}
+
+/// The container, in a file that goes when nobody needs it any more.
+fn encoded(
+    rest: &Model,
+    mesh: Option<TriMesh>,
+    frames: &Frames<'_>,
+    asked: Asked,
+    watch: &Watch,
+) -> Result<TempPath, Fault> {
+    let goal = asked.goal(mesh.is_some())?;
+    let cage = match mesh {
+        Some(mesh) => cage_of(rest, mesh, frames.origin, asked.force)?,
+        None => cage(designed(rest, frames, &design_options(rest, frames, asked, goal, watch)?, watch)?)?,
+    };
+    let temporary = tempfile::Builder::new().prefix("cager-").suffix(".cager").tempfile();
+    let path = temporary
+        .map_err(|error| {
+            of("the folder of temporary files", format!("cannot be written to ({error}); set TMPDIR to another"))
+        })?
+        .into_temp_path();
+    let system = asked.system;
+    let choices = InversionChoices { is_coded: goal.is_some(), ..InversionChoices::coded(system) };
+    let total = frames.views.len().max(1) as f64;
+    let job = Job {
+        rest,
+        cage: &cage,
+        frames: &mut frames.open(),
+        output: &Target::Replacing(path.to_path_buf()),
+        system,
+        options: choices.options(system.values(&cage).unknowns()),
+        matrix: None,
+        choose: None,
+        memory: Memory::half_of_free(),
+        goal,
+        origin: frames.origin,
+        exact_rest: false,
+    };
+    let done = encode_job(job, &|now| {
+        // Reading stops where the callback has asked for it.
+        let _ = match now {
+            EncodeProgress::Preparing(step) => watch.tell(step, 0.0),
+            EncodeProgress::Frames(done) => watch.tell("encoding", done as f64 / total),
+        };
+    });
+    let encoded = watch.unless_stopped(done.map_err(named))?;
+    commit_together(vec![encoded.container])?;
+    Ok(path)
+}
+
+/// A cage that was given, unless it looks like that of another model.
+fn cage_of(rest: &Model, mut mesh: TriMesh, origin: Option<Point>, force: bool) -> Result<Cage, Fault> {
+    move_to(origin, &mut mesh.vertices);
+    let cage = cage(mesh.clone())?;
+    match cage_mismatch(&mesh, rest).filter(|_| !force) {
+        Some(what) => Err(of("cage", format!("{what}, or pass --force to go on"))),
+        None => Ok(cage),
+    }
+}
+
+/// How a cage is designed, of as many vertices as suit what the file is to meet.
+fn design_options(
+    rest: &Model,
+    frames: &Frames<'_>,
+    asked: Asked,
+    goal: Option<Goal>,
+    watch: &Watch,
+) -> Result<DesignOptions, Fault> {
+    let is_mean_value = asked.system.name() == MeanValue.name();
+    if asked.mean_error.is_some() && !is_mean_value {
+        return Err(of(
+            "mean_error",
+            "is measured with mean value coordinates; give vertices, or leave coordinates out",
+        ));
+    }
+    let mut vertices = asked.vertices;
+    if let (Some(goal), None) = (goal, vertices) {
+        let tell = || watch.tell("trying cages of several sizes", 0.0);
+        let context = PrepareContext { before_step: &|_| tell(), ..PrepareContext::default() };
+        let _ = tell();
+        let samples = sample_frames(&mut frames.open(), CAGE_SIZE_FRAMES, true).map_err(named)?;
+        let (system, total) = (asked.system, frames.views.len());
+        let sizes = CageSizes { goal, rest, system, frames: &samples, total, memory: Memory::half_of_free() };
+        vertices = sizes.best(|cage: &Cage, rest| {
+            let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
+            Solver::prepare_with(system, cage, &rest.points, options, &context)
+        });
+        watch.unless_stopped(Ok(()))?;
+    }
+    Ok(DesignOptions {
+        goal: design_goal(vertices, asked.mean_error, rest.points.len())?,
+        style: if is_mean_value { Style::Free } else { Style::Editable },
+        seed: asked.seed,
+        ..DesignOptions::default()
+    })
+}
+
+/// Errors know vertices and points; the user needs the argument.
+fn named(error: EncodeError) -> Fault {
+    match error {
+        EncodeError::Prepare(error) => {
+            let is_of_rest = matches!(
+                error,
+                PrepareError::NotFinite { .. }
+                    | PrepareError::TooFewPoints { .. }
+                    | PrepareError::NoExtent
+                    | PrepareError::TooLarge
+                    | PrepareError::NotReproduced { .. }
+                    | PrepareError::TooFar { .. }
+                    | PrepareError::OutOfMemory { .. }
+            );
+            of(if is_of_rest { "rest" } else { "cage" }, error)
+        }
+        other => Fault::Told(other.to_string()),
+    }
+}

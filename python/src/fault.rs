@@ -1,0 +1,84 @@
+//! What goes wrong, as Python gets it: one exception class, whose message names what is wrong and what to do.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::fmt::Display;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
+
+pyo3::create_exception!(
+    cager,
+    CagerError,
+    PyValueError,
+    "What was given cannot be used, or a file cannot be read or written; the message says which and what to do."
+);
+
+/// Why a call ends without a result.
+pub(crate) enum Fault {
+    /// In words for the user.
+    Told(String),
+    /// By an exception of Python, such as one in a callback.
+    Raised(PyErr),
+}
+
+/// A fault that `name` is to blame for: an argument, or a file.
+pub(crate) fn of(name: impl Display, what: impl Display) -> Fault {
+    Fault::Told(format!("{name}: {what}"))
+}
+
+macro_rules! told {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Fault {
+            fn from(error: $error) -> Self {
+                Self::Told(error.to_string())
+            }
+        }
+    )*};
+}
+told!(cager_formats::Error, cager_capture::decode::DecodeError, cager_capture::coding::CodingError);
+
+impl From<PyErr> for Fault {
+    fn from(error: PyErr) -> Self {
+        Self::Raised(error)
+    }
+}
+
+impl From<Fault> for PyErr {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            // The sentences are those of the command line.
+            Fault::Told(words) => CagerError::new_err(
+                words
+                    .replace("pass --force", "pass force=True")
+                    .replace(
+                        "is there already; name another file",
+                        "is there already; name another file, or pass overwrite=True",
+                    )
+                    .replace("the cages that `cager decode --cages` writes", "capture.cages"),
+            ),
+            Fault::Raised(error) => error,
+        }
+    }
+}
+
+/// Computes with several threads. A process that is forked off another lacks those of its parent, and would wait for them for ever.
+pub(crate) fn computing<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
+    static FIRST: OnceLock<u32> = OnceLock::new();
+    let here = std::process::id();
+    if *FIRST.get_or_init(|| here) != here {
+        let what = "this process was forked off one that had used cager before, and lacks its threads; start it with the method \"spawn\" or \"forkserver\", as multiprocessing.get_context(\"spawn\") does";
+        return Err(Fault::Told(what.to_owned()));
+    }
+    detached(py, work)
+}
+
+/// Works while other threads of Python run. A panic is an error as well.
+pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
+    py.detach(|| {
+        catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
+            Err(Fault::Told(
+                "stopped by a fault in cager itself, told above; please report it with what you gave".to_owned(),
+            ))
+        })
+    })
+}
