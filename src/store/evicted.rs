@@ -93,9 +93,11 @@ mod tests {
         assert_eq!(cached.keep_at(Path::new("s/a"), 40, at(0)), [Path::new(""); 0]);
         assert_eq!(cached.keep_at(Path::new("s/b"), 40, at(10)), [Path::new(""); 0]);
         assert_eq!(cached.keep_at(Path::new("s/c"), 40, at(20)), [Path::new(""); 0], "all were just used");
-        assert_eq!(cached.keep_at(Path::new("s/d"), 10, at(75)), [Path::new("s/a"), Path::new("s/b")]);
-        // A file that is replaced counts once.
-        assert_eq!(cached.keep_at(Path::new("s/d"), 60, at(76)), [Path::new(""); 0]);
+        assert_eq!(cached.keep_at(Path::new("s/d"), 10, at(75)), [Path::new("s/a")], "down to nine tenths");
+        // A file that is replaced counts once; one that waits to be coded stays.
+        assert_eq!(cached.keep_at(Path::new("s/d"), 60, at(76)), [Path::new("s/b")]);
+        assert_eq!(cached.keep_at(Path::new("s/frames-0000000000"), 1, at(77)), [Path::new(""); 0]);
+        assert_eq!(cached.keep_at(Path::new("s/f"), 1, at(200)), [Path::new("s/c")]);
         cached.forget(Path::new("s"));
         assert_eq!(cached.keep_at(Path::new("s/e"), 100, at(300)), [Path::new(""); 0]);
     }

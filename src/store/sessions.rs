@@ -142,8 +142,14 @@ impl Store {
     /// Length of the session's container; 0 where there is none.
     pub fn container_bytes(&self, id: &str) -> Result<u64, StoreError> {
         // Without opening it, which would fetch it where it is in a bucket.
-        let entries = self.files().list(&self.folder(Kind::Session, id)?)?;
-        Ok(entries.iter().find(|entry| entry.name == CONTAINER).map_or(0, |entry| entry.bytes))
+        let folder = self.folder(Kind::Session, id)?;
+        let entries = self.files().list(&folder)?;
+        match entries.iter().find(|entry| entry.name == CONTAINER) {
+            Some(entry) if entry.is_dir => {
+                Err(StoreError::of(&folder.join(CONTAINER), "read", io::ErrorKind::IsADirectory.into()))
+            }
+            entry => Ok(entry.map_or(0, |entry| entry.bytes)),
+        }
     }
 
     /// Bytes of the session's files, frames and content.

@@ -87,7 +87,7 @@ async fn files_of_a_folder_are_taken_over_by_a_bucket() {
 #[tokio::test(flavor = "multi_thread")]
 async fn while_the_bucket_is_away_the_service_says_so_and_it_goes_on_afterwards() {
     let Some(database) = Database::with_bucket() else { return };
-    let app = TestApp::on(&database, &[]);
+    let mut app = TestApp::on(&database, &[]);
     let capture = Capture::small();
     let (plain, coded) = (app.ready(capture).await, coded_session(&app, capture).await);
     app.upload(&coded, 0, capture.raw(0..5)).await;
@@ -107,6 +107,9 @@ async fn while_the_bucket_is_away_the_service_says_so_and_it_goes_on_afterwards(
     for id in [&plain.id, &coded] {
         app.complete(id, 40).await.expect(200);
     }
+    // The same folder is a cache after a restart too.
+    app.kill();
+    let app = app.again();
     assert!(app.container(&plain.id).await == capture.encoded(40));
     assert!(app.container(&coded).await == capture.encoded_with(40, &["--max-error", "0.001"]));
 }
