@@ -129,8 +129,8 @@ fn fixed3<T>(view: ArrayViewD<'_, T>) -> Option<ArrayView3<'_, T>> {
 }
 
 fn each<'a, T>(all: &ArrayView3<'a, T>) -> impl Iterator<Item = ArrayView2<'a, T>> {
-    let all = all.clone();
-    (0..all.dim().0).map(move |frame| all.clone().index_axis_move(Axis(0), frame))
+    let all = *all;
+    (0..all.dim().0).map(move |frame| all.index_axis_move(Axis(0), frame))
 }
 
 /// What numpy or the object itself says of its values; an interrupt, or too little memory, is passed on.

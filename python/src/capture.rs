@@ -296,11 +296,15 @@ impl Capture {
     fn save(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> Result<(), Fault> {
         detached(py, || {
             let read = |cause| Error::Io { path: self.path.clone(), action: Action::Read, cause };
-            let write = |cause| Error::Io { path: path.clone(), action: Action::Write, cause };
             let mut from = self.again(|path| File::open(path).map_err(read))?;
-            let target = if overwrite { Target::Replacing(path.clone()) } else { Target::New(path.clone()) };
-            let mut file = AtomicFile::create(target)?;
-            io::copy(&mut from, &mut file).map_err(write)?;
+            let mut file = AtomicFile::create(if overwrite {
+                Target::Replacing(path.clone())
+            } else {
+                Target::New(path.clone())
+            })?;
+            // Errors of writing name the file already.
+            let write = |cause| Error::Io { path, action: Action::Write, cause };
+            io::copy(&mut from, &mut file).map_err(|cause| cause.downcast().unwrap_or_else(write))?;
             commit_together(vec![file])?;
             Ok(())
         })
