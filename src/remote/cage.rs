@@ -123,6 +123,20 @@ fn counted(frames: &mut impl FrameSource) -> Result<u32, ClientError> {
     Ok(frame)
 }
 
+/// What is worth telling of a design that a service made.
+pub(super) fn report_of_job(job: &CageJob, options: &DesignOptions) -> DesignReport {
+    let stages = job.stages.iter().map(|stage| StageReport {
+        name: stage.name.clone(),
+        vertices: stage.vertices as usize,
+        designed_error: stage.error.designed.unwrap_or(0.0),
+        held_back_error: stage.error.held_back.unwrap_or(0.0),
+        condition_number: stage.condition_number,
+        singular: stage.singular,
+        seconds: stage.seconds,
+    });
+    of_stages(stages.collect(), options, job.sampled_frames as usize, job.timed_out)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,18 +153,4 @@ mod tests {
         let (count, _) = sample(&mut MemoryFrames::new(2, vec![0.0; 18])).expect("frames");
         assert_eq!(count, 3);
     }
-}
-
-/// What is worth telling of a design that a service made.
-pub(super) fn report_of_job(job: &CageJob, options: &DesignOptions) -> DesignReport {
-    let stages = job.stages.iter().map(|stage| StageReport {
-        name: stage.name.clone(),
-        vertices: stage.vertices as usize,
-        designed_error: stage.error.designed.unwrap_or(0.0),
-        held_back_error: stage.error.held_back.unwrap_or(0.0),
-        condition_number: stage.condition_number,
-        singular: stage.singular,
-        seconds: stage.seconds,
-    });
-    of_stages(stages.collect(), options, job.sampled_frames as usize, job.timed_out)
 }

@@ -75,7 +75,7 @@ pub(super) fn open(files: &Files, url: &str, taken: i64, kept_bytes: u64) -> Res
 
 impl Bucket {
     /// Notes that the folder's files and records are all where they belong: other machines may go on with them from now on.
-    pub(super) fn is_complete(self) -> Result<Files, StoreError> {
+    pub(super) fn completed(self) -> Result<Files, StoreError> {
         if self.blobs.bytes(NUMBER).is_none() {
             put(&self.blobs, &self.files.root.join(NUMBER), NUMBER)?;
         }

@@ -44,7 +44,7 @@ impl Database {
     /// Sees that it belongs to the folder, and takes over what the folder's own catalogue has. Gives what it is called too.
     pub(super) fn of_folder(self, files: &Files) -> Result<(Arc<dyn Catalog>, PathBuf), StoreError> {
         self.check_folder(files)?;
-        take_over(files, &*self.catalog, &self.name)?;
+        take_over(files, &self.catalog, &self.name)?;
         Ok((self.catalog, self.name))
     }
 }

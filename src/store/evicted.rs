@@ -86,19 +86,21 @@ impl Cached {
 mod tests {
     use super::*;
 
+    const NONE: [&Path; 0] = [];
+
     #[test]
     fn files_that_were_not_used_for_longest_go_first_and_none_that_was_just_used() {
         let (cached, start) = (Cached::new(100), Instant::now());
         let at = |seconds| start + Duration::from_secs(seconds);
-        assert_eq!(cached.keep_at(Path::new("s/a"), 40, at(0)), [Path::new(""); 0]);
-        assert_eq!(cached.keep_at(Path::new("s/b"), 40, at(10)), [Path::new(""); 0]);
-        assert_eq!(cached.keep_at(Path::new("s/c"), 40, at(20)), [Path::new(""); 0], "all were just used");
+        assert_eq!(cached.keep_at(Path::new("s/a"), 40, at(0)), NONE);
+        assert_eq!(cached.keep_at(Path::new("s/b"), 40, at(10)), NONE);
+        assert_eq!(cached.keep_at(Path::new("s/c"), 40, at(20)), NONE, "all were just used");
         assert_eq!(cached.keep_at(Path::new("s/d"), 10, at(75)), [Path::new("s/a")], "down to nine tenths");
         // A file that is replaced counts once; one that waits to be coded stays.
         assert_eq!(cached.keep_at(Path::new("s/d"), 60, at(76)), [Path::new("s/b")]);
-        assert_eq!(cached.keep_at(Path::new("s/frames-0000000000"), 1, at(77)), [Path::new(""); 0]);
+        assert_eq!(cached.keep_at(Path::new("s/frames-0000000000"), 1, at(77)), NONE);
         assert_eq!(cached.keep_at(Path::new("s/f"), 1, at(200)), [Path::new("s/c")]);
         cached.forget(Path::new("s"));
-        assert_eq!(cached.keep_at(Path::new("s/e"), 100, at(300)), [Path::new(""); 0]);
+        assert_eq!(cached.keep_at(Path::new("s/e"), 100, at(300)), NONE);
     }
 }

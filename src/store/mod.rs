@@ -294,7 +294,7 @@ fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(
     }
     let bucket = shared.blobs.map(|url| bucket::open(&files, url, database.taken, shared.kept_bytes)).transpose()?;
     let (catalog, name) = database.of_folder(bucket.as_ref().map_or(&files, |bucket| &bucket.files))?;
-    let files = bucket.map_or(Ok(files), Bucket::is_complete)?;
+    let files = bucket.map_or(Ok(files), Bucket::completed)?;
     let disk = Arc::new(FencedDisk { disk: files.disk, catalog: Arc::clone(&catalog) });
     Ok((Files::new(root, disk), Some((catalog, name))))
 }

@@ -110,7 +110,7 @@ impl Blobs {
             match self.bucket.remove(&keys) {
                 Ok(()) => self.index().forget(path, &old),
                 Err(error) => {
-                    tracing::warn!(%error, path, "what was replaced in the bucket takes space until the file is removed")
+                    tracing::warn!(%error, path, "what was replaced in the bucket takes space until the file is removed");
                 }
             }
         }
