@@ -153,7 +153,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     await expect.poll(() => page.locator('cager-range-strip polygon').count()).toBe(1);
     const frames = [5, 6, 8, 12, 16, 20, 21];
     const edited = await Promise.all(frames.map((frame) => readPositions(page, frame)));
-    await page.getByRole('checkbox', { name: /^Vertex/ }).uncheck();
+    await page.getByRole('checkbox', { name: /^Enable edit of Vertex/ }).uncheck();
     const plain = await Promise.all(frames.map((frame) => readPositions(page, frame)));
     const moved = frames.map((_, k) => farthest(edited[k], plain[k]));
     const whole = moved[3];
@@ -292,11 +292,11 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     await page.getByText(/^2 edits kept in this browser, from/).waitFor();
     await page.getByRole('button', { name: 'Restore' }).click();
     await page
-      .getByRole('checkbox', { name: /^Vertex/ })
+      .getByRole('checkbox', { name: /^Enable edit of Vertex/ })
       .nth(1)
       .waitFor();
     await page
-      .getByRole('checkbox', { name: /^Vertex/ })
+      .getByRole('checkbox', { name: /^Enable edit of Vertex/ })
       .nth(1)
       .uncheck();
     expect(await readPositions(page, 12)).toEqual(edited);
