@@ -85,7 +85,9 @@ impl Server {
     fn answer(&self) -> Result<(), String> {
         TcpStream::connect((Ipv4Addr::LOCALHOST, self.ports[6])).map_err(|error| error.to_string())?;
         let open = || self.open("ready", 1).map_err(|error| error.to_string());
-        open().or_else(|_| self.make_bucket().and_then(|()| open()))?.probe().map_err(|error| error.to_string())
+        let blobs = open().or_else(|_| self.make_bucket().and_then(|()| open()))?;
+        std::thread::scope(|scope| scope.spawn(|| blobs.probe()).join().expect("it writes"))
+            .map_err(|error| error.to_string())
     }
 
     fn make_bucket(&self) -> Result<(), String> {
@@ -109,8 +111,11 @@ impl Server {
         Ok(())
     }
 
+    /// By another thread, since those of asynchronous tests may not wait.
     pub(crate) fn open(&self, place: &str, taken: i64) -> Result<Blobs, BlobsError> {
-        Blobs::open(&self.url(place), taken, self.environment().map(|(name, value)| (name.to_owned(), value)))
+        let environment = self.environment().map(|(name, value)| (name.to_owned(), value));
+        let open = || Blobs::open(&self.url(place), taken, environment);
+        std::thread::scope(|scope| scope.spawn(open).join().expect("it opens"))
     }
 
     /// Kills it, as if it had crashed.
