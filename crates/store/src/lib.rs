@@ -16,7 +16,7 @@ mod sqlite;
 pub use blobs::{Blobs, BlobsError, Listed};
 pub use copy::copy;
 pub use error::CatalogError;
-pub use postgres::PostgresCatalog;
+pub use postgres::{MAX_SHARDS, Members, Membership, PostgresCatalog};
 pub use sqlite::SqliteCatalog;
 
 use std::fmt::Debug;
@@ -230,6 +230,9 @@ pub trait Catalog: Debug + Send + Sync {
     fn check_owner(&self) -> Result<(), CatalogError> {
         Ok(())
     }
+
+    /// Lets another process take it over: nothing is changed by this one afterwards.
+    fn release(&self) {}
 
     /// Whether another process has taken it over, so that nothing can be changed any more.
     fn is_taken_over(&self) -> bool {

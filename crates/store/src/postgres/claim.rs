@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Distinguishes the lock of the process that has the database, and that of changes, from those that others take.
-const OWNER: i32 = 0x6361_6766;
+pub(super) const OWNER: i32 = 0x6361_6766;
 const CHANGES: i32 = 0x6361_6767;
 /// How often the connection with the lock is looked at.
 const PAUSE: Duration = Duration::from_secs(1);

@@ -2,6 +2,7 @@
 
 mod claim;
 mod link;
+mod members;
 mod place;
 mod pool;
 mod rows;
@@ -12,6 +13,8 @@ mod trouble;
 use crate::chunks::{Chunk, add_cage, chunks, lost};
 use crate::numbers::phase_number;
 use crate::{CagePlace, Catalog, CatalogError, Change, FrameEntry, Key, Kind, NewFrame, NewRecord, Phase, Record};
+pub use members::{MAX_SHARDS, Members, Membership};
+
 use claim::Claim;
 use link::Link;
 use place::Place;
@@ -19,7 +22,7 @@ use pool::Pool;
 use rows::{kind_number, only};
 use std::fmt::Debug;
 use std::ops::Range;
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio_postgres::types::ToSql;
 use trouble::Trouble;
@@ -34,6 +37,9 @@ const REMOVED_FRAMES: i64 = 50_000;
 const READ_BYTES: u64 = 4 << 20;
 /// Most pieces of chunks that are read together.
 const READ_PIECES: usize = 1024;
+/// Most connections at once, and those of all shards of a database together.
+const CONNECTIONS: usize = 8;
+const SHARED_CONNECTIONS: usize = 32;
 /// How long preparing may take, where others may prepare much.
 const PREPARING: Duration = Duration::from_secs(60);
 
@@ -45,7 +51,7 @@ pub struct PostgresCatalog {
     /// Numbers of chunks that nobody else has.
     numbers: Mutex<Range<i64>>,
     /// Set once this process has it for itself.
-    claim: OnceLock<Claim>,
+    claim: Mutex<Option<Claim>>,
 }
 
 impl Debug for PostgresCatalog {
@@ -62,7 +68,26 @@ impl PostgresCatalog {
     /// # Errors
     /// [`CatalogError::Newer`].
     pub fn open(url: &str) -> Result<Self, CatalogError> {
+        Self::open_place(Place::parse(url)?, CONNECTIONS)
+    }
+
+    /// As [`Self::open`], for one of the shards into which [`Members`] divide the database.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn open_shard(url: &str, shard: u32, shards: u32) -> Result<Self, CatalogError> {
         let place = Place::parse(url)?;
+        let connections = (SHARED_CONNECTIONS / shards.max(1) as usize).clamp(2, CONNECTIONS);
+        if shard == 0 {
+            return Self::open_place(place, connections);
+        }
+        let link = Link::connect(&place)?;
+        let schema = link.read(PREPARING, &async |link: &Link| schema::schema(link).await);
+        let schema = schema.map_err(|trouble| trouble.explain(&place.name))?;
+        Self::open_place(place.of_schema(&members::schema_of(&schema, shard)), connections)
+    }
+
+    fn open_place(place: Place, connections: usize) -> Result<Self, CatalogError> {
         let link = Link::connect(&place)?;
         let prepared = schema::prepare(&link, PREPARING).and_then(|()| {
             link.read(PREPARING, &async |link: &Link| {
@@ -75,7 +100,7 @@ impl PostgresCatalog {
             0 => Duration::MAX,
             milliseconds => Duration::from_millis(milliseconds as u64),
         };
-        Ok(Self { pool: Pool::new(place, link, limit), numbers: Mutex::new(0..0), claim: OnceLock::new() })
+        Ok(Self { pool: Pool::new(place, link, limit, connections), numbers: Mutex::new(0..0), claim: Mutex::new(None) })
     }
 
     /// Takes it for this process alone, until this value is dropped or the process ends. What others have opened before changes nothing afterwards.
@@ -87,8 +112,12 @@ impl PostgresCatalog {
         let (claim, fence) = Claim::take(self.pool.place())?;
         let taken = fence.taken;
         self.pool.set_fence(fence);
-        let _ = self.claim.set(claim);
+        *self.claimed() = Some(claim);
         Ok(taken)
+    }
+
+    fn claimed(&self) -> MutexGuard<'_, Option<Claim>> {
+        self.claim.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What the database is called in messages.
@@ -271,8 +300,12 @@ impl Catalog for PostgresCatalog {
         if now == taken { Ok(()) } else { Err(CatalogError::TakenOver) }
     }
 
+    fn release(&self) {
+        *self.claimed() = None;
+    }
+
     fn is_taken_over(&self) -> bool {
-        self.claim.get().is_some_and(Claim::is_lost)
+        self.claimed().as_ref().is_some_and(Claim::is_lost)
     }
 }
 

@@ -80,6 +80,14 @@ impl Place {
         Ok(Self { config, tls, connect, name })
     }
 
+    /// As it is, in another schema.
+    pub(super) fn of_schema(mut self, schema: &str) -> Self {
+        let options = format!("{} -csearch_path={schema}", self.config.get_options().unwrap_or_default());
+        self.config.options(options);
+        self.name = format!("{}, schema {schema}", self.name);
+        self
+    }
+
     /// As it is, for the connection that says who has the database.
     pub(super) fn of_owner(&self) -> Self {
         let mut config = self.config.clone();

@@ -8,13 +8,13 @@ use crate::CatalogError;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-/// Most connections at once.
-const CONNECTIONS: usize = 8;
 /// How much longer than the database a call waits, for the way there and back.
 const WAY: Duration = Duration::from_secs(2);
 
 pub(super) struct Pool {
     place: Place,
+    /// Most connections at once.
+    connections: usize,
     /// How long a statement may take.
     limit: Duration,
     /// Set once this process has it for itself.
@@ -32,10 +32,11 @@ struct Links {
 
 impl Pool {
     /// Begins with a connection. `limit` is how long the database lets statements take.
-    pub(super) fn new(place: Place, link: Link, limit: Duration) -> Self {
+    pub(super) fn new(place: Place, link: Link, limit: Duration, connections: usize) -> Self {
         let links = Links { idle: vec![link], taken: 0 };
         Self {
             place,
+            connections,
             limit: limit.saturating_add(WAY),
             fence: OnceLock::new(),
             links: Mutex::new(links),
@@ -105,11 +106,11 @@ impl Pool {
     }
 
     fn wait_for_place(&self) -> Result<Taken<'_>, CatalogError> {
-        let is_full = |links: &mut Links| links.taken >= CONNECTIONS;
+        let is_full = |links: &mut Links| links.taken >= self.connections;
         let waited = self.freed.wait_timeout_while(self.links(), self.limit, is_full);
         let (mut links, waited) = waited.unwrap_or_else(PoisonError::into_inner);
         if waited.timed_out() {
-            let said = format!("{} is too slow: {CONNECTIONS} connections are busy, and others wait", self.name());
+            let said = format!("{} is too slow: {} connections are busy, and others wait", self.name(), self.connections);
             return Err(CatalogError::Failed(said));
         }
         links.taken += 1;

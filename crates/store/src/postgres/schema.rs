@@ -7,7 +7,7 @@ use crate::CatalogError;
 use std::time::Duration;
 
 /// What leads from each version to the next one, from none on.
-const STEPS: [&str; 1] = [include_str!("schema.sql")];
+const STEPS: [&str; 2] = [include_str!("schema.sql"), include_str!("members.sql")];
 
 /// The newest version.
 pub(super) const VERSION: i64 = STEPS.len() as i64;
