@@ -199,11 +199,6 @@ impl ShapeSpaces {
     pub(crate) fn count(&self) -> usize {
         lock(&self.all).spaces.len()
     }
-
-    /// Their memory, in bytes.
-    pub(crate) fn bytes(&self) -> u64 {
-        self.memory.used()
-    }
 }
 
 impl Keyed<KeptSpace> for ShapeSpaces {

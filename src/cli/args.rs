@@ -100,6 +100,14 @@ pub(crate) struct StoreArgs {
     #[arg(long, global = true, value_name = "URL")]
     pub(crate) blobs: Option<String>,
 
+    /// Into how many shards the service's database is divided, where it is.
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) shards: Option<u32>,
+
+    /// Which of them is meant, from 0.
+    #[arg(long, global = true, value_name = "K", default_value_t = 0)]
+    pub(crate) shard: u32,
+
     /// The service's file of settings, TOML.
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,

@@ -1,13 +1,17 @@
 //! `cager serve`.
 
 use super::print;
+use crate::cage_job::local_designer;
 use crate::config::{ServeConfig, ServeFlags};
 use crate::http::listen::{Limits, serve, tls_config};
-use crate::http::{admin, router, spare};
+use crate::http::{Operated, admin, router, seen, seen_by_operators, spare};
+use crate::resources::Resources;
 use crate::service::{Service, StartError};
-use crate::store::{LocalDisk, StoreError};
+use crate::shards;
+use crate::store::{LocalDisk, Shard, StoreError};
 use crate::telemetry;
 use anyhow::{Context, Result, bail};
+use axum::Router;
 use std::io::Write;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -55,31 +59,25 @@ pub(crate) async fn run_until(
     telemetry::metrics::recorder();
     tokio::spawn(telemetry::metrics::keep(stop.clone()));
     let tls = config.tls().map(|tls| tls_config(&tls)).transpose()?;
-    let scheme = if tls.is_some() { "https" } else { "http" };
+    if config.shards > 1 {
+        return serve_shards(config, tls, stop, listening).await;
+    }
     // What waits for a database that another process has listens to nobody, so that nobody is sent here.
     let Some(service) = start(config.clone(), &stop).await? else { return Ok(()) };
-    let listener = TcpListener::bind(config.listen)
-        .await
-        .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))?;
-    let operators = match config.admin_listen {
-        Some(address) => Some(TcpListener::bind(address).await.with_context(|| {
-            format!("{address}: cannot be listened on for operators; is it in use? give another --admin-listen")
-        })?),
-        None => None,
+    let listener = listen(&config).await?;
+    let operated = Operated {
+        resources: service.resources(),
+        services: Arc::new({
+            let services = vec![Arc::clone(&service)];
+            move || services.clone()
+        }),
+        stop: stop.clone(),
     };
-    let limits = config.limits();
     let drained = CancellationToken::new();
-    let address = listener.local_addr()?;
-    tracing::info!(%address, scheme, "listening");
-    if let Some(operators) = operators {
-        let address = operators.local_addr()?;
-        tracing::info!(%address, "listening for operators");
-        let limits = Limits { max_connections: OPERATORS, max_per_address: OPERATORS, ..limits.clone() };
-        let (routes, spare) = (admin(Arc::clone(&service), address.ip().is_loopback()), spare(Arc::clone(&service)));
-        tokio::spawn(serve(operators, routes, spare, limits, None, drained.clone()));
-    }
-    listening(address);
-    serve(listener, router(Arc::clone(&service)), spare(Arc::clone(&service)), limits, tls, stop).await?;
+    listen_for_operators(&config, operated, seen_by_operators(Arc::clone(&service)), drained.clone()).await?;
+    listening(told(&listener, tls.is_some())?);
+    let spare = spare(seen(Arc::clone(&service)));
+    serve(listener, router(Arc::clone(&service)), spare, config.limits(), tls, stop).await?;
     // The operators' listener closes last.
     drained.cancel();
     if service.is_taken_over() {
@@ -89,13 +87,90 @@ pub(crate) async fn run_until(
     Ok(())
 }
 
+/// Serves some of the shards of a database, beside other processes.
+async fn serve_shards(
+    config: ServeConfig,
+    tls: Option<Arc<rustls::ServerConfig>>,
+    stop: CancellationToken,
+    listening: impl FnOnce(SocketAddr),
+) -> Result<()> {
+    let listener = listen(&config).await?;
+    let address = match &config.advertise {
+        Some(address) => address.trim_end_matches('/').to_owned(),
+        None => {
+            let own = listener.local_addr()?;
+            if own.ip().is_unspecified() {
+                bail!(
+                    "{own}: other processes cannot be told to ask there; say by --advertise where they reach this one"
+                );
+            }
+            format!("{}://{own}", if tls.is_some() { "https" } else { "http" })
+        }
+    };
+    // Shards are given up while requests are still taken, which then go to the processes that get them.
+    let closing = CancellationToken::new();
+    let shards = shards::start(config.clone(), address, stop.clone()).await?;
+    let drained = CancellationToken::new();
+    let seen = shards::seen_by_operators(Arc::clone(&shards));
+    listen_for_operators(&config, shards.operated(), seen, drained.clone()).await?;
+    listening(told(&listener, tls.is_some())?);
+    let leaving = tokio::spawn({
+        let (shards, closing) = (Arc::clone(&shards), closing.clone());
+        async move {
+            stop.cancelled().await;
+            shards.leave().await;
+            closing.cancel();
+        }
+    });
+    let spare = spare(shards::seen(Arc::clone(&shards)));
+    serve(listener, shards::answered(shards), spare, config.limits(), tls, closing).await?;
+    drained.cancel();
+    leaving.await?;
+    tracing::info!("stopped");
+    Ok(())
+}
+
+async fn listen(config: &ServeConfig) -> Result<TcpListener> {
+    TcpListener::bind(config.listen)
+        .await
+        .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))
+}
+
+/// Says where it listens.
+fn told(listener: &TcpListener, is_tls: bool) -> Result<SocketAddr> {
+    let address = listener.local_addr()?;
+    tracing::info!(%address, scheme = if is_tls { "https" } else { "http" }, "listening");
+    Ok(address)
+}
+
+/// Serves operators until `drained`, where the settings say so.
+async fn listen_for_operators(
+    config: &ServeConfig,
+    operated: Operated,
+    seen: Router,
+    drained: CancellationToken,
+) -> Result<()> {
+    let Some(address) = config.admin_listen else { return Ok(()) };
+    let listener = TcpListener::bind(address).await.with_context(|| {
+        format!("{address}: cannot be listened on for operators; is it in use? give another --admin-listen")
+    })?;
+    let address = listener.local_addr()?;
+    tracing::info!(%address, "listening for operators");
+    let limits = Limits { max_connections: OPERATORS, max_per_address: OPERATORS, ..config.limits() };
+    let routes = admin(operated, seen.clone(), address.ip().is_loopback());
+    tokio::spawn(serve(listener, routes, spare(seen), limits, None, drained));
+    Ok(())
+}
+
 /// Opens the data folder. While another process has its database, waits for the end of that one; `None` where this one is stopped meanwhile.
 async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Option<Arc<Service>>> {
+    let resources = Resources::new(&config, local_designer())?;
+    tokio::spawn(resources.access.clone().watch(stop.clone()));
     let mut is_told = false;
     loop {
-        let (config, own) = (config.clone(), stop.clone());
-        let started = tokio::task::spawn_blocking(move || Service::start(config, Arc::new(LocalDisk), own)).await?;
-        let what = match started {
+        let (config, resources, own) = (config.clone(), Arc::clone(&resources), stop.clone());
+        let opening = move || Service::of_shard(resources, config, Arc::new(LocalDisk), Shard::WHOLE, own);
+        let what = match tokio::task::spawn_blocking(opening).await? {
             Err(StartError::Store(StoreError::InUse { what })) => what,
             // Who waits does so through restarts of the database too.
             Err(StartError::Store(StoreError::Catalog { what, action: "reach", .. })) if is_told => what,

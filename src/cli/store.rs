@@ -3,7 +3,7 @@
 use super::args::{StoreArgs, StoreCommand};
 use super::{print, tell};
 use crate::config::{ServeConfig, ServeFlags};
-use crate::store::{Kind, LocalDisk, Opened, Shared, Store, Verified};
+use crate::store::{Kind, LocalDisk, Opened, Shard, Shared, Store, Verified};
 use anyhow::{Context as _, Result, bail};
 use cager_formats::{AtomicFile, Target};
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,6 +26,7 @@ fn open(args: &StoreArgs) -> Result<Opened> {
         data: args.data.clone(),
         catalog: args.catalog.clone(),
         blobs: args.blobs.clone(),
+        shards: args.shards,
         config: args.config.clone(),
         ..ServeFlags::default()
     };
@@ -33,10 +34,16 @@ fn open(args: &StoreArgs) -> Result<Opened> {
     if !config.data.is_dir() && config.blobs.is_none() {
         bail!("{}: there is no such folder; name the service's by --data", config.data.display());
     }
+    let shard = Shard { number: args.shard, of: config.shards };
+    if shard.number >= shard.of {
+        bail!("--shard {}: there are {} shards, from 0", shard.number, shard.of);
+    }
+    let config = config.of_shard(shard);
     let shared = Shared {
         catalog: config.catalog.as_deref(),
         blobs: config.blobs.as_deref(),
         kept_bytes: config.blobs_kept_bytes,
+        shard,
     };
     Ok(Store::open(&config.data, Arc::new(LocalDisk), shared)?)
 }

@@ -5,12 +5,13 @@
 
 use super::audited::audited;
 use super::extract::{Query, TokenName, granted};
+use super::origin;
 use super::respond::JsonResult;
-use super::router::{finished, probes};
+use super::router::finished;
 use super::sessions::{PAGE, PageQuery};
-use super::{health, origin};
 use crate::auth::Scope;
 use crate::problem::{self, ApiError};
+use crate::resources::{ResourceUse, Resources};
 use crate::service::Service;
 use axum::extract::{Path, Request, State};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
@@ -22,24 +23,34 @@ use http::{StatusCode, header};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use tokio_util::sync::CancellationToken;
 
-/// The router; with `open_to_all` no token is needed.
-pub fn admin(service: Arc<Service>, open_to_all: bool) -> Router {
-    let operated = Router::new()
+/// What operators see and do something to: this process.
+#[derive(Clone)]
+pub struct Operated {
+    pub(crate) resources: Arc<Resources>,
+    /// Its services: one, or one for each of its shards.
+    pub(crate) services: Arc<dyn Fn() -> Vec<Arc<Service>> + Send + Sync>,
+    /// Stops it.
+    pub(crate) stop: CancellationToken,
+}
+
+/// The router, with health and metrics as `seen` has them; with `open_to_all` no token is needed.
+pub fn admin(operated: Operated, seen: Router, open_to_all: bool) -> Router {
+    let routes = Router::new()
         .route("/admin/tenants", get(tenants))
         .route("/admin/sessions", get(sessions))
         .route("/admin/sessions/{id}", delete(delete_session))
         .route("/admin/drain", post(drain))
         .route("/admin/evict", post(evict));
-    let operated = operated.route_layer(from_fn_with_state(Arc::clone(&service), audited));
-    let operated = match open_to_all {
-        true => operated.route_layer(from_fn(refuse_web_pages)),
-        false => operated.route_layer(from_fn_with_state(Arc::clone(&service), require_admin)),
+    let routes = routes.route_layer(from_fn_with_state(operated.resources.audit.clone(), audited));
+    let routes = match open_to_all {
+        true => routes.route_layer(from_fn(refuse_web_pages)),
+        false => routes.route_layer(from_fn_with_state(operated.clone(), require_admin)),
     };
-    let seen = Router::from(probes()).route("/metrics", get(health::operators_metrics));
-    let routes = seen.merge(operated);
+    let routes = seen.merge(routes.with_state(operated));
     let routes = routes.fallback(|| async { ApiError::new(problem::NOT_FOUND, "see the documentation for operators") });
-    finished(routes.with_state(service))
+    finished(routes)
 }
 
 /// Refuses requests from web pages in the operator's browser.
@@ -52,13 +63,13 @@ async fn refuse_web_pages(request: Request, next: Next) -> Result<Response, ApiE
 
 /// Refuses requests without a token of the scope `admin`, and all requests of a service without tokens.
 async fn require_admin(
-    State(service): State<Arc<Service>>,
+    State(Operated { resources, .. }): State<Operated>,
     mut request: Request,
     next: Next,
 ) -> Result<Response, ApiError> {
-    let grant = granted(&service, request.headers()).await?;
-    if !service.access.is_guarded() || grant.scope < Scope::Admin {
-        service.rejected("scope");
+    let grant = granted(&resources, request.headers()).await?;
+    if !resources.access.is_guarded() || grant.scope < Scope::Admin {
+        resources.rejected("scope");
         let detail = "operating the service from another machine needs a token whose scope is admin";
         return Err(ApiError::new(problem::FORBIDDEN, detail));
     }
@@ -76,15 +87,18 @@ struct TenantUse {
     stored_bytes: u64,
     /// Requests, streams and memory in use.
     #[serde(flatten)]
-    holds: crate::service::ResourceUse,
+    holds: ResourceUse,
 }
 
-async fn tenants(State(service): State<Arc<Service>>) -> Json<Vec<TenantUse>> {
-    let mut tenants: BTreeMap<String, (usize, u64)> =
-        service.tenants_in_use().into_iter().map(|tenant| (tenant, (0, 0))).collect();
-    tenants.extend(service.usage().into_iter().map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
+async fn tenants(State(operated): State<Operated>) -> Json<Vec<TenantUse>> {
+    let in_use = operated.resources.tenants_in_use();
+    let mut tenants: BTreeMap<String, (usize, u64)> = in_use.into_iter().map(|tenant| (tenant, (0, 0))).collect();
+    let services = (operated.services)();
+    let usage = services.iter().flat_map(|service| service.usage());
+    tenants.extend(usage.map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
+    let preparing = |tenant: &str| services.iter().map(|service| service.solvers.in_flight_of(tenant)).sum();
     let tenant = |(tenant, (sessions, stored_bytes)): (String, (usize, u64))| {
-        let holds = service.holds(&tenant);
+        let holds = operated.resources.holds(&tenant, preparing(&tenant));
         TenantUse { tenant, sessions, stored_bytes, holds }
     };
     Json(tenants.into_iter().map(tenant).collect())
@@ -104,8 +118,11 @@ struct AllSessions {
 }
 
 /// Sessions of all tenants, newest first, a hundred at a time.
-async fn sessions(State(service): State<Arc<Service>>, Query(query): Query<PageQuery>) -> JsonResult<AllSessions> {
-    let mut page = service.registry.page(None, query.after.as_deref(), PAGE + 1);
+async fn sessions(State(operated): State<Operated>, Query(query): Query<PageQuery>) -> JsonResult<AllSessions> {
+    let services = (operated.services)();
+    let pages = services.iter().flat_map(|service| service.registry.page(None, query.after.as_deref(), PAGE + 1));
+    let mut page: Vec<_> = pages.collect();
+    page.sort_by(|a, b| b.meta.id.cmp(&a.meta.id));
     let more = page.len() > PAGE;
     page.truncate(PAGE);
     let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
@@ -116,17 +133,20 @@ async fn sessions(State(service): State<Arc<Service>>, Query(query): Query<PageQ
     Ok(Json(AllSessions { sessions: page.iter().map(listed).collect(), next }))
 }
 
-async fn delete_session(State(service): State<Arc<Service>>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    let session = service.registry.find_any(&id)?;
+async fn delete_session(State(operated): State<Operated>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
+    let services = (operated.services)();
+    let found = services.iter().find_map(|service| Some((service, service.registry.find_any(&id)?)));
+    let missing = || ApiError::new(problem::NOT_FOUND, "there is no session with this id");
+    let (service, session) = found.ok_or_else(missing)?;
     tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
     service.delete(&session).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Stops the service like a signal: running requests may finish within the drain time.
-async fn drain(State(service): State<Arc<Service>>) -> StatusCode {
+/// Stops the process like a signal: running requests may finish within the drain time.
+async fn drain(State(operated): State<Operated>) -> StatusCode {
     tracing::info!("stopping, as the operator asked");
-    service.stopping().cancel();
+    operated.stop.cancel();
     StatusCode::ACCEPTED
 }
 
@@ -136,6 +156,7 @@ struct Evicted {
 }
 
 /// Drops cached solvers from memory; solvers in use stay until they are released, and all can be loaded from disk again.
-async fn evict(State(service): State<Arc<Service>>) -> Json<Evicted> {
-    Json(Evicted { bytes: service.solvers.evict() })
+async fn evict(State(operated): State<Operated>) -> Json<Evicted> {
+    let services = (operated.services)();
+    Json(Evicted { bytes: services.iter().map(|service| service.solvers.evict()).sum() })
 }

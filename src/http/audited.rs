@@ -2,7 +2,6 @@
 
 use super::extract::{Caller, TokenName, only_reads};
 use crate::audit::{Audit, Change};
-use crate::service::Service;
 use crate::tasks::blocking;
 use crate::telemetry::RequestId;
 use axum::extract::{ConnectInfo, Request, State};
@@ -14,12 +13,12 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 /// Notes the request, after it has been answered, if it may change something.
-pub(super) async fn audited(State(service): State<Arc<Service>>, request: Request, next: Next) -> Response {
-    if !service.audit.is_on() || only_reads(&request) {
+pub(super) async fn audited(State(audit): State<Audit>, request: Request, next: Next) -> Response {
+    if !audit.is_on() || only_reads(&request) {
         return next.run(request).await;
     }
     let mut noted = Noted {
-        audit: service.audit.clone(),
+        audit,
         peer: request.extensions().get::<ConnectInfo<SocketAddr>>().map(|peer| peer.0.ip()),
         tenant: request.extensions().get::<Caller>().map(|caller| caller.0.name.clone()),
         token: request.extensions().get::<TokenName>().map(|token| Arc::clone(&token.0)),

@@ -5,6 +5,7 @@ use super::listen::ConnectionHandle;
 use crate::auth::{Denied, Grant, Scope, Tenant};
 use crate::jobs::{Job, Work, kind_of};
 use crate::problem::{self, ApiError};
+use crate::resources::Resources;
 use crate::service::Service;
 use crate::session::Session;
 use crate::store::Kind;
@@ -63,9 +64,9 @@ pub(super) fn only_reads(request: &axum::extract::Request) -> bool {
 }
 
 /// Authenticates the request and records tenant and token in the log.
-pub(super) async fn granted(service: &Service, headers: &HeaderMap) -> Result<Grant, ApiError> {
-    let grant = service.access.grant(headers).await.map_err(|denied| {
-        service.rejected("unauthorized");
+pub(crate) async fn granted(resources: &Resources, headers: &HeaderMap) -> Result<Grant, ApiError> {
+    let grant = resources.access.grant(headers).await.map_err(|denied| {
+        resources.rejected("unauthorized");
         match denied {
             Denied::NoKeys => ApiError::new(problem::BUSY, denied.to_string()).retry_after(5),
             denied => ApiError::new(problem::UNAUTHORIZED, denied.to_string()),

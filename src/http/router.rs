@@ -86,7 +86,7 @@ fn streaming() -> OpenApiRouter<Arc<Service>> {
 }
 
 /// Routes without authentication and limits, for probes.
-pub(super) fn probes() -> OpenApiRouter<Arc<Service>> {
+fn probes() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new().routes(routes!(health::live)).routes(routes!(health::ready))
 }
 
@@ -126,7 +126,7 @@ pub fn router(service: Arc<Service>) -> Router {
         // Limited by memory and by the tenant's streams instead, so that slow bodies do not occupy the request slots that all tenants
         // share.
         .merge(Router::from(streaming()).layer(DefaultBodyLimit::disable()))
-        .route_layer(from_fn_with_state(Arc::clone(&service), audited))
+        .route_layer(from_fn_with_state(service.audit.clone(), audited))
         .route_layer(from_fn_with_state(Arc::clone(&service), extract::authenticate));
     let cors = origin::cors(&service.config);
     let routes = Router::from(open())
@@ -157,16 +157,27 @@ pub(super) fn finished(routes: Router) -> Router {
         .layer(from_fn(request_id))
 }
 
-/// The router for connections beyond the limit: health, and 503 for everything else.
-pub fn spare(service: Arc<Service>) -> Router {
-    Router::from(open())
-        .fallback(|| async {
-            metrics::counter!("cager_rejections_total", "reason" => "connections").increment(1);
-            ApiError::new(problem::BUSY, "too many connections are open; try again in a moment").retry_after(2)
-        })
-        .with_state(service)
-        .layer(from_fn(finish))
-        .layer(from_fn(request_id))
+/// Health and metrics of a service, for the public listener.
+pub fn seen(service: Arc<Service>) -> Router {
+    Router::from(open()).with_state(service)
+}
+
+/// Health and metrics of a service, for operators.
+pub fn seen_by_operators(service: Arc<Service>) -> Router {
+    let metrics = |State(service): State<Arc<Service>>| async move {
+        health::rendered_metrics(&service, std::slice::from_ref(&service))
+    };
+    Router::from(probes()).route("/metrics", get(metrics)).with_state(service)
+}
+
+/// The router for connections beyond the limit: health and metrics, as `seen` has them, and 503 for everything else.
+pub fn spare(seen: Router) -> Router {
+    seen.fallback(|| async {
+        metrics::counter!("cager_rejections_total", "reason" => "connections").increment(1);
+        ApiError::new(problem::BUSY, "too many connections are open; try again in a moment").retry_after(2)
+    })
+    .layer(from_fn(finish))
+    .layer(from_fn(request_id))
 }
 
 /// Without tokens, checks `Host` and `Origin`, except for probes.

@@ -5,8 +5,8 @@ use super::shared_cache::SharedCache;
 use super::{Choices, Geometry, Prepared};
 use crate::admission::{Budget, Held};
 use crate::config::ServeConfig;
-use crate::engine::threads;
 use crate::problem::{self, ApiError};
+use crate::resources::Resources;
 use crate::store::{Content, ContentKey, Store};
 use crate::sync::lock;
 use crate::telemetry::traces::TraceSpan;
@@ -68,17 +68,14 @@ struct InFlight {
 }
 
 impl Solvers {
-    /// Starts the threads that prepare. `owners` has the tenants of contents; solver files of others, whose sessions are deleted, are kept
+    /// `owners` has the tenants of contents; solver files of others, whose sessions are deleted, are kept
     /// as if they were of one tenant more. Blocks.
-    ///
-    /// # Errors
-    /// Threads cannot be started.
     pub(crate) fn new(
         store: Store,
         config: &ServeConfig,
+        resources: &Resources,
         owners: &HashMap<ContentKey, String>,
-    ) -> std::io::Result<Self> {
-        let pool = threads::pool("prepare", config.workers, threads::NICE_PREPARE)?;
+    ) -> Self {
         let solvers = Self {
             inner: Mutex::new(Inner {
                 kept: SharedCache::new(config.budget(config.cache_bytes)),
@@ -86,9 +83,9 @@ impl Solvers {
             }),
             files: Mutex::new(SharedCache::new(config.budget(config.prepared_disk_bytes))),
             max_bytes: config.max_prepare_bytes,
-            places: config.budget(config.max_preparing as u64),
+            places: Arc::clone(&resources.preparing),
             loads: config.budget(MAX_CONCURRENT_LOADS),
-            pool: Arc::new(pool),
+            pool: Arc::clone(&resources.preparers),
             store,
         };
         match solvers.store.prepared_files() {
@@ -97,7 +94,7 @@ impl Solvers {
             }),
             Err(error) => tracing::warn!(%error, "stored solvers are not counted"),
         }
-        Ok(solvers)
+        solvers
     }
 
     /// A permit to prepare.
@@ -127,8 +124,12 @@ impl Solvers {
         let mut inner = lock(&self.inner);
         let bytes = inner.kept.bytes();
         inner.kept.clear();
-        metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(0.0);
         bytes
+    }
+
+    /// Bytes of solvers in memory.
+    pub(crate) fn bytes(&self) -> u64 {
+        lock(&self.inner).kept.bytes()
     }
 
     /// Number of preparations that run or wait.
@@ -314,7 +315,6 @@ impl Solvers {
         let gone = inner.kept.insert(tenant, key, prepared.solver.size_bytes() as u64, Arc::clone(prepared));
         metrics::counter!("cager_cache_evictions_total")
             .increment(gone.iter().filter(|gone| **gone != key).count() as u64);
-        metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(inner.kept.bytes() as f64);
     }
 }
 

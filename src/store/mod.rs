@@ -109,6 +109,28 @@ pub struct Shared<'a> {
     pub blobs: Option<&'a str>,
     /// Bytes of the bucket's files that may be in the folder too.
     pub kept_bytes: u64,
+    /// Which part of the database it is.
+    pub shard: Shard,
+}
+
+/// One of the parts into which processes divide a database.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Which, from 0.
+    pub number: u32,
+    /// How many there are.
+    pub of: u32,
+}
+
+impl Shard {
+    /// All of a database that is not divided.
+    pub const WHOLE: Self = Self { number: 0, of: 1 };
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self::WHOLE
+    }
 }
 
 /// Name of the catalogue's file.
@@ -237,6 +259,11 @@ impl Store {
         *lock_of(&self.inner.at_start) = HashMap::new();
     }
 
+    /// Lets another process take the database over: this one changes nothing afterwards.
+    pub fn release(&self) {
+        self.catalog().release();
+    }
+
     /// Whether another process has taken the database over, so that this one can change nothing any more.
     pub fn is_taken_over(&self) -> bool {
         self.catalog().is_taken_over()
@@ -287,7 +314,7 @@ fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(
         make_folder(&*files.disk, folder)?;
     }
     let Some(url) = shared.catalog else { return Ok((files, None)) };
-    let database = database::open(url)?;
+    let database = database::open(url, shared.shard)?;
     // What is only here is sent nowhere before it is known to belong to the database.
     if shared.blobs.is_some() && bucket::is_own(&files)? {
         database.check_folder(&files)?;

@@ -34,10 +34,19 @@ pub struct Members {
 pub struct Membership {
     /// Addresses of the processes that live, by their numbers.
     pub processes: BTreeMap<i32, String>,
+    /// Those of them that are about to end, and take no more shards.
+    pub ending: BTreeSet<i32>,
     /// Which process serves which shard, of those that live.
     pub holders: BTreeMap<u32, i32>,
     /// Shards that no process has for itself.
     pub free: BTreeSet<u32>,
+}
+
+impl Membership {
+    /// Numbers of the processes that live and go on.
+    pub fn staying(&self) -> impl Iterator<Item = i32> {
+        self.processes.keys().filter(|number| !self.ending.contains(number)).copied()
+    }
 }
 
 impl Members {
@@ -94,10 +103,13 @@ impl Members {
                 self.enter(link).await?;
             }
             let mut now = Membership::default();
-            for row in link.query("SELECT number, address FROM processes", &[]).await? {
+            for row in link.query("SELECT number, address, is_ending FROM processes", &[]).await? {
                 let number = row.try_get(0)?;
                 if number == self.number || is_locked(MEMBER, number) {
                     now.processes.insert(number, row.try_get(1)?);
+                    if row.try_get(2)? {
+                        now.ending.insert(number);
+                    }
                 }
             }
             for row in link.query("SELECT number, holder FROM shards WHERE holder IS NOT NULL", &[]).await? {
@@ -134,6 +146,14 @@ impl Members {
         })
     }
 
+    /// Says that this process is about to end.
+    pub fn ends(&self) -> Result<(), CatalogError> {
+        self.write(&async |link: &Link| {
+            link.query("UPDATE processes SET is_ending = true WHERE number = $1", &[&self.number]).await?;
+            Ok(())
+        })
+    }
+
     /// The shard of a tenant: a new one comes to where the fewest are. `None` while it is not known yet who was there before.
     pub fn shard_of(&self, tenant: &str) -> Result<Option<u32>, CatalogError> {
         self.write(&async |link: &Link| {
@@ -156,7 +176,8 @@ impl Members {
     /// Takes the lock that says that this process lives, and says where it is.
     async fn enter(&self, link: &Link) -> Result<(), Trouble> {
         link.query("SELECT pg_try_advisory_lock($1, $2)", &[&MEMBER, &self.number]).await?;
-        let sql = "INSERT INTO processes (number, address) VALUES ($1, $2) ON CONFLICT (number) DO UPDATE SET address = $2";
+        let sql =
+            "INSERT INTO processes (number, address) VALUES ($1, $2) ON CONFLICT (number) DO UPDATE SET address = $2";
         link.query(sql, &[&self.number, &self.address]).await?;
         Ok(())
     }

@@ -1,7 +1,8 @@
 -- Of a service of several processes, which divides its tenants into shards: the processes that are there or were, which of them has which shard, and in which shard each tenant is.
 CREATE TABLE processes (
     number integer PRIMARY KEY,
-    address text NOT NULL
+    address text NOT NULL,
+    is_ending boolean NOT NULL DEFAULT false
 );
 
 -- Shard 0 is this schema's; `told` once the tenants that it had before are in the table below.

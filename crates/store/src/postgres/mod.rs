@@ -100,7 +100,11 @@ impl PostgresCatalog {
             0 => Duration::MAX,
             milliseconds => Duration::from_millis(milliseconds as u64),
         };
-        Ok(Self { pool: Pool::new(place, link, limit, connections), numbers: Mutex::new(0..0), claim: Mutex::new(None) })
+        Ok(Self {
+            pool: Pool::new(place, link, limit, connections),
+            numbers: Mutex::new(0..0),
+            claim: Mutex::new(None),
+        })
     }
 
     /// Takes it for this process alone, until this value is dropped or the process ends. What others have opened before changes nothing afterwards.
@@ -123,6 +127,11 @@ impl PostgresCatalog {
     /// What the database is called in messages.
     pub fn name(&self) -> &str {
         self.pool.name()
+    }
+
+    /// Into how many shards it is divided; 0 where it never was.
+    pub fn shards(&self) -> Result<i64, CatalogError> {
+        self.pool.read(&async |link: &Link| only(&link.query("SELECT count(*) FROM shards", &[]).await?))
     }
 
     /// Which folder has the files of its records; `None` where that was never said.

@@ -110,7 +110,8 @@ impl Pool {
         let waited = self.freed.wait_timeout_while(self.links(), self.limit, is_full);
         let (mut links, waited) = waited.unwrap_or_else(PoisonError::into_inner);
         if waited.timed_out() {
-            let said = format!("{} is too slow: {} connections are busy, and others wait", self.name(), self.connections);
+            let said =
+                format!("{} is too slow: {} connections are busy, and others wait", self.name(), self.connections);
             return Err(CatalogError::Failed(said));
         }
         links.taken += 1;

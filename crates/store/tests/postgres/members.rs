@@ -37,6 +37,9 @@ fn processes_see_each_other_and_who_serves_what() {
     shard.release();
     until("it is not free", || b.look().expect("how things are").free.contains(&3));
     assert_eq!(b.look().expect("how things are").holders.get(&3), None);
+    a.ends().expect("said");
+    let seen = b.look().expect("how things are");
+    assert_eq!((seen.processes.len(), seen.staying().collect::<Vec<_>>()), (2, vec![b.number()]));
     // Who is gone serves nothing.
     a.serves(1, &[]).expect("said");
     drop(a);

@@ -1,0 +1,163 @@
+//! Requests that another process answers.
+
+use crate::problem::{self, ApiError};
+use crate::sync::lock;
+use axum::body::Body;
+use axum::extract::Request;
+use axum::response::Response;
+use cager_store::Membership;
+use futures_util::stream;
+use http::header::{
+    CONNECTION, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER, TRANSFER_ENCODING, UPGRADE,
+};
+use http::{HeaderMap, HeaderValue};
+use http_body_util::BodyExt;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::sync::watch;
+
+/// How often a request has been sent on.
+const HOPS: HeaderName = HeaderName::from_static("cager-hops");
+/// How often it may be: while a shard moves, its last process sends requests to the next one.
+const MOST_HOPS: u32 = 3;
+/// How long connecting may take.
+const CONNECT: Duration = Duration::from_secs(2);
+/// Headers of one connection.
+const OF_CONNECTION: [HeaderName; 8] = [
+    CONNECTION,
+    PROXY_AUTHENTICATE,
+    PROXY_AUTHORIZATION,
+    TE,
+    TRAILER,
+    TRANSFER_ENCODING,
+    UPGRADE,
+    HeaderName::from_static("keep-alive"),
+];
+
+/// What became of a request that was sent on.
+pub(super) enum Sent {
+    /// The other process's response.
+    Answered(Response),
+    /// The other process has taken nothing of it.
+    NotTaken(Request),
+    /// It has taken it, and is gone.
+    Lost(ApiError),
+}
+
+/// Sends requests to other processes.
+pub(super) struct Forwarder {
+    client: reqwest::Client,
+}
+
+impl Forwarder {
+    /// `is_tls` where the processes are asked over TLS, by the authorities that this machine trusts.
+    ///
+    /// # Errors
+    /// What the library says.
+    pub(super) fn new(is_tls: bool) -> Result<Self, reqwest::Error> {
+        let _ = rustls::crypto::ring::default_provider().install_default();
+        let builder = reqwest::Client::builder().no_proxy().http1_only().connect_timeout(CONNECT);
+        let builder = if is_tls { builder } else { builder.tls_certs_only([]) };
+        Ok(Self { client: builder.redirect(reqwest::redirect::Policy::none()).build()? })
+    }
+
+    /// Sends a request to the process at `address`, for as long as `is_there` says of what is seen that it lives.
+    pub(super) async fn send(
+        &self,
+        request: Request,
+        address: &str,
+        mut seen: watch::Receiver<Membership>,
+        is_there: impl Fn(&Membership) -> bool,
+    ) -> Sent {
+        let (parts, body) = request.into_parts();
+        let hops = parts.headers.get(HOPS).and_then(|hops| hops.to_str().ok()?.parse().ok()).unwrap_or(0u32);
+        if hops >= MOST_HOPS {
+            let detail = "the sessions of this tenant are moving between processes; try again";
+            return Sent::Lost(ApiError::new(problem::BUSY, detail).retry_after(1));
+        }
+        let path = parts.uri.path_and_query().map_or("/", |path| path.as_str());
+        let mut headers = end_to_end(&parts.headers);
+        headers.insert(HOPS, HeaderValue::from(hops + 1));
+        // In HTTP/2 it is part of the address.
+        let authority = parts.uri.authority().and_then(|host| HeaderValue::from_str(host.as_str()).ok());
+        if let Some(host) = authority {
+            headers.insert(HOST, host);
+        }
+        let has_body = !http_body::Body::is_end_stream(&body);
+        let body = Arc::new(Mutex::new(Some(body)));
+        let mut sent = self.client.request(parts.method.clone(), format!("{address}{path}")).headers(headers);
+        if has_body {
+            sent = sent.body(reqwest::Body::wrap_stream(taken_when_read(Arc::clone(&body))));
+        }
+        let gone = async {
+            // An error means that this process ends.
+            let _ = seen.wait_for(|seen| !is_there(seen)).await;
+        };
+        let answered = tokio::select! {
+            answered = sent.send() => answered,
+            () = gone => return unanswered(parts, &body, has_body, "it has ended"),
+        };
+        match answered {
+            Ok(response) => {
+                metrics::counter!("cager_forwarded_total").increment(1);
+                let (mut head, body) = http::Response::<reqwest::Body>::from(response).into_parts();
+                head.headers = end_to_end(&head.headers);
+                Sent::Answered(Response::from_parts(head, Body::new(body)))
+            }
+            Err(error) => {
+                tracing::debug!(address, %error, "a request was not answered by another process");
+                // Of a request without a body it is not known whether it was seen.
+                unanswered(parts, &body, has_body || error.is_connect(), "it does not answer")
+            }
+        }
+    }
+}
+
+/// The request, where it can be sent again: nothing was read of its body, if that says whether it was `seen_by_body`, or it changes nothing.
+fn unanswered(parts: http::request::Parts, body: &Mutex<Option<Body>>, seen_by_body: bool, why: &str) -> Sent {
+    match lock(body).take() {
+        Some(body) if seen_by_body || parts.method.is_safe() => Sent::NotTaken(Request::from_parts(parts, body)),
+        _ => Sent::Lost(ended(why)),
+    }
+}
+
+fn ended(why: &str) -> ApiError {
+    let detail = format!("the process that has this tenant's sessions was asked, and {why}; send the request again");
+    ApiError::new(problem::BUSY, detail).retry_after(1)
+}
+
+/// A body that stays where it is until its first byte is wanted.
+fn taken_when_read(
+    body: Arc<Mutex<Option<Body>>>,
+) -> impl futures_util::Stream<Item = Result<bytes::Bytes, axum::Error>> + Send + 'static {
+    stream::unfold((body, None::<Body>), |(kept, reading)| async move {
+        let mut reading = match reading {
+            Some(reading) => reading,
+            None => lock(&kept).take()?,
+        };
+        loop {
+            match reading.frame().await? {
+                Ok(frame) => {
+                    if let Ok(data) = frame.into_data() {
+                        return Some((Ok(data), (kept, Some(reading))));
+                    }
+                }
+                Err(error) => return Some((Err(error), (kept, Some(reading)))),
+            }
+        }
+    })
+}
+
+/// Headers without those of the connection, and those that these name.
+fn end_to_end(headers: &HeaderMap) -> HeaderMap {
+    let mut kept = headers.clone();
+    for named in headers.get_all(CONNECTION).iter().filter_map(|value| value.to_str().ok()) {
+        for name in named.split(',') {
+            kept.remove(name.trim());
+        }
+    }
+    for name in OF_CONNECTION {
+        kept.remove(name);
+    }
+    kept
+}

@@ -1,0 +1,196 @@
+//! Several processes that serve the tenants of one database at once. Each tenant is in one shard; a process has some of the shards, each with a service of
+//! its own, answers requests of their tenants, and sends those of others on to the process that has them. Where a process ends, the others take its shards over.
+
+mod forward;
+mod hold;
+mod routes;
+
+pub(crate) use hold::start;
+pub(crate) use routes::{answered, seen, seen_by_operators};
+
+use crate::config::ServeConfig;
+use crate::http::listen::ConnectionHandle;
+use crate::http::{Operated, granted};
+use crate::problem::{self, ApiError};
+use crate::resources::Resources;
+use crate::service::Service;
+use crate::sync::lock;
+use crate::tasks::blocking;
+use axum::Router;
+use axum::body::Body;
+use axum::extract::Request;
+use axum::response::{IntoResponse, Response};
+use cager_store::{Members, Membership};
+use forward::{Forwarder, Sent};
+use http::request::Parts;
+use http_body_util::BodyExt;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::sync::watch;
+use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+use tokio_util::task::task_tracker::TaskTrackerToken;
+use tower::ServiceExt;
+
+/// How long a request waits for a process to have its shard.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// How long it waits for news at a time.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// The shards of this process, and who has the others.
+pub(crate) struct Shards {
+    config: ServeConfig,
+    resources: Arc<Resources>,
+    members: Arc<Members>,
+    own: Mutex<BTreeMap<u32, Own>>,
+    /// What was seen last.
+    seen: watch::Sender<Membership>,
+    /// Shards of tenants, which do not change.
+    tenants: Mutex<HashMap<String, u32>>,
+    forwarder: Forwarder,
+    stop: CancellationToken,
+}
+
+/// A shard that this process has.
+struct Own {
+    service: Arc<Service>,
+    router: Router,
+    stop: CancellationToken,
+    /// Requests in progress.
+    requests: TaskTracker,
+    /// It is being given up: new requests wait for the process that gets it.
+    is_leaving: bool,
+}
+
+/// Whose a request is.
+enum Asked {
+    /// That of a tenant, in its shard.
+    Shard(u32),
+    /// Nobody's: any process can answer.
+    Any,
+}
+
+impl Shards {
+    /// The services of this process.
+    pub(crate) fn services(&self) -> Vec<Arc<Service>> {
+        lock(&self.own).values().map(|own| Arc::clone(&own.service)).collect()
+    }
+
+    /// What operators see and do something to.
+    pub(crate) fn operated(self: &Arc<Self>) -> Operated {
+        let shards = Arc::clone(self);
+        Operated {
+            resources: Arc::clone(&self.resources),
+            services: Arc::new(move || shards.services()),
+            stop: self.stop.clone(),
+        }
+    }
+
+    /// Answers a request, here or by the process that has its tenant's shard.
+    async fn answer(&self, request: Request) -> Response {
+        let (parts, body) = request.into_parts();
+        let asked = match self.asked(&parts).await {
+            Ok(asked) => asked,
+            Err(error) => return error.into_response(),
+        };
+        let mut request = Request::from_parts(parts, body);
+        let mut news = self.seen.subscribe();
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            news.mark_unchanged();
+            if let Some((router, token)) = self.enter(&asked) {
+                return counted(router.oneshot(request).await.into_response(), token);
+            }
+            if let Some(address) = self.elsewhere(&asked) {
+                let is_there = |seen: &Membership| seen.processes.values().any(|known| *known == address);
+                match self.forwarder.send(request, &address, self.seen.subscribe(), is_there).await {
+                    Sent::Answered(response) => return response,
+                    Sent::Lost(error) => return error.into_response(),
+                    Sent::NotTaken(again) => request = again,
+                }
+            }
+            if self.stop.is_cancelled() && self.is_alone() {
+                return ApiError::new(problem::STOPPING, "the service is stopping").retry_after(5).into_response();
+            }
+            if Instant::now() >= deadline {
+                let detail = "no process has the sessions of this tenant at the moment; try again soon";
+                return ApiError::new(problem::BUSY, detail).retry_after(2).into_response();
+            }
+            let _ = tokio::time::timeout(PAUSE, news.changed()).await;
+        }
+    }
+
+    /// Whose the request is. One without a valid token is nobody's, and is refused where it is answered.
+    async fn asked(&self, request: &Parts) -> Result<Asked, ApiError> {
+        if !request.uri.path().starts_with("/v1/") {
+            return Ok(Asked::Any);
+        }
+        let Ok(grant) = granted(&self.resources, &request.headers).await else { return Ok(Asked::Any) };
+        if let Some(connection) = request.extensions.get::<ConnectionHandle>() {
+            connection.caller_is_known();
+        }
+        self.shard_of(&grant.tenant.name).await.map(Asked::Shard)
+    }
+
+    async fn shard_of(&self, tenant: &str) -> Result<u32, ApiError> {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            if let Some(&known) = lock(&self.tenants).get(tenant) {
+                return Ok(known);
+            }
+            let (members, name) = (Arc::clone(&self.members), tenant.to_owned());
+            let why = match blocking(move || members.shard_of(&name)).await? {
+                Ok(Some(shard)) => {
+                    lock(&self.tenants).insert(tenant.to_owned(), shard);
+                    return Ok(shard);
+                }
+                Ok(None) => "the sessions that were there before are being looked through".to_owned(),
+                Err(error) => error.to_string(),
+            };
+            if Instant::now() >= deadline {
+                tracing::error!(tenant, why, "it is not known where a tenant is");
+                let detail = "the service's database does not answer; the log has the reason";
+                return Err(ApiError::new(problem::STORAGE_FAILED, detail).retry_after(5));
+            }
+            tokio::time::sleep(PAUSE).await;
+        }
+    }
+
+    /// The routes of a shard that this process has, and what counts the request.
+    fn enter(&self, asked: &Asked) -> Option<(Router, TaskTrackerToken)> {
+        let own = lock(&self.own);
+        let own = match asked {
+            Asked::Shard(shard) => own.get(shard),
+            Asked::Any => own.values().find(|own| !own.is_leaving),
+        };
+        own.filter(|own| !own.is_leaving).map(|own| (own.router.clone(), own.requests.token()))
+    }
+
+    /// Whether no other process goes on.
+    fn is_alone(&self) -> bool {
+        self.seen.borrow().staying().all(|number| number == self.members.number())
+    }
+
+    /// Address of the other process that has it.
+    fn elsewhere(&self, asked: &Asked) -> Option<String> {
+        let seen = self.seen.borrow();
+        let holder = match asked {
+            Asked::Shard(shard) => seen.holders.get(shard),
+            Asked::Any => seen.holders.values().find(|holder| **holder != self.members.number()),
+        };
+        let holder = holder.filter(|holder| **holder != self.members.number())?;
+        seen.processes.get(holder).cloned()
+    }
+}
+
+/// The response, which counts as a request in progress until it is sent.
+fn counted(response: Response, token: TaskTrackerToken) -> Response {
+    response.map(|body| {
+        Body::new(body.map_frame(move |frame| {
+            let _ = &token;
+            frame
+        }))
+    })
+}
