@@ -10,7 +10,7 @@ use crate::resources::Resources;
 use crate::service::{Service, StartError};
 use crate::store::{LocalDisk, Shard, StoreError};
 use crate::sync::lock;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use cager_store::{Members, Membership};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex};
@@ -193,10 +193,14 @@ impl Shards {
             let service = Service::of_shard(resources, config, Arc::new(LocalDisk), part, own_stop)?;
             let tenants: BTreeSet<String> = service.usage().into_iter().map(|(tenant, ..)| tenant).collect();
             let tenants: Vec<String> = tenants.into_iter().collect();
-            members.serves(shard, &tenants).map_err(|error| anyhow!("{error}"))?;
-            anyhow::Ok(service)
+            if let Err(error) = members.serves(shard, &tenants) {
+                service.stopping().cancel();
+                service.release();
+                bail!("{error}");
+            }
+            Ok(service)
         });
-        let service = service.await?.inspect_err(|_| stop.cancel())?;
+        let service = service.await??;
         let router = router(Arc::clone(&service));
         let own = Own { service, router, stop, requests: TaskTracker::new(), is_leaving: false };
         lock(&self.own).insert(shard, own);

@@ -107,6 +107,8 @@ fn describe() {
     describe_gauge!("cager_disk_bytes", Unit::Bytes, "Disk space of cages waiting to be decoded");
     describe_counter!("cager_body_timeouts_total", "Request bodies that stopped arriving");
     describe_gauge!("cager_connections", "Open connections");
+    describe_counter!("cager_forwarded_total", "Requests sent on to the process that has the tenant's shard");
+    describe_gauge!("cager_shards", "Shards of this process");
     describe_counter!(
         "cager_cache_total",
         "Requests for solvers, by result: memory, disk, joined (already being prepared) or miss"

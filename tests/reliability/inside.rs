@@ -3,10 +3,10 @@
 use crate::capture::{Errors, Reference};
 use crate::faults::{FaultyDisk, Loss};
 use crate::gate::{Gate, GatedDisk};
-use crate::process::{HANG, client};
+use crate::process::{Door, HANG};
 use cager::config::ServeConfig;
 use cager::http::listen::serve;
-use cager::http::{router, spare};
+use cager::http::{router, seen, spare};
 use cager::service::{Service, StartError};
 use cager::store::{Disk, StoreError};
 use cager_client::messages::{FrameResult, Problem, Session};
@@ -106,11 +106,11 @@ impl Inside {
     /// A client that tells every refusal.
     pub(crate) fn impatient(&self) -> Client {
         let options = ClientOptions { retries: 0, ..ClientOptions::default() };
-        client(self.running().address).with_options(options)
+        self.client().with_options(options)
     }
 
     pub(crate) fn client(&self) -> Client {
-        client(self.running().address)
+        Door { address: self.running().address, token: None }.client()
     }
 
     /// A session that takes frames.
@@ -191,7 +191,7 @@ async fn start(config: ServeConfig, disk: Arc<dyn Disk>) -> Running {
     };
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let address = listener.local_addr().expect("an address");
-    let (app, spare) = (router(Arc::clone(&service)), spare(Arc::clone(&service)));
+    let (app, spare) = (router(Arc::clone(&service)), spare(seen(Arc::clone(&service))));
     let served = tokio::spawn(serve(listener, app, spare, limits, None, stop.clone()));
     Running { address, service: Arc::downgrade(&service), stop, served }
 }

@@ -18,11 +18,13 @@ const STREAMS: usize = 12;
 const WANTED: usize = 10 * STREAMS;
 
 pub(crate) fn tokens() -> String {
-    let entry = |name: &str, token: &str| {
-        let hash: String = Sha256::digest(token).iter().map(|byte| format!("{byte:02x}")).collect();
-        format!("[[token]]\nname = \"{name}\"\ntenant = \"{name}\"\nsha256 = \"{hash}\"\n")
-    };
     entry("loud", LOUD) + &entry("quiet", QUIET)
+}
+
+/// An entry of a tokens file, of a tenant that has its name.
+pub(crate) fn entry(name: &str, token: &str) -> String {
+    let hash: String = Sha256::digest(token).iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("[[token]]\nname = \"{name}\"\ntenant = \"{name}\"\nsha256 = \"{hash}\"\n")
 }
 
 /// How long something took, again and again.

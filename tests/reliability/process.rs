@@ -4,6 +4,7 @@ use crate::database::Database;
 use cager_client::{Client, ClientOptions};
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -11,10 +12,17 @@ use std::time::{Duration, Instant};
 /// Nothing takes this long unless it hangs.
 pub(crate) const HANG: Duration = Duration::from_secs(20);
 
+/// Where a service is reached, and with which token.
+#[derive(Clone, Debug)]
+pub(crate) struct Door {
+    pub(crate) address: SocketAddr,
+    pub(crate) token: Option<String>,
+}
+
 /// A running service; killed when dropped.
 pub(crate) struct Server {
     child: Child,
-    pub(crate) address: SocketAddr,
+    door: Door,
     /// From the start of the process until it said that it is ready.
     pub(crate) ready: Duration,
     /// Ends after it.
@@ -70,7 +78,8 @@ impl Setup {
         let line = line.await.expect("a thread").expect("its first line");
         let address = line.trim().strip_prefix("listening on ").and_then(|a| a.parse().ok());
         let address: SocketAddr = address.unwrap_or_else(|| panic!("it said {line:?} instead of its address"));
-        let mut server = Server { child, address, ready: Duration::ZERO, _database: self.database.clone() };
+        let door = Door { address, token: None };
+        let mut server = Server { child, door, ready: Duration::ZERO, _database: self.database.clone() };
         while server.get("/readyz").await != Some(200) {
             assert!(clock.elapsed() < HANG, "it is not ready");
             tokio::time::sleep(Duration::from_millis(2)).await;
@@ -80,22 +89,45 @@ impl Setup {
     }
 }
 
-impl Server {
+impl Deref for Server {
+    type Target = Door;
+
+    fn deref(&self) -> &Door {
+        &self.door
+    }
+}
+
+impl Door {
     pub(crate) fn url(&self, path: &str) -> String {
         format!("http://{}{path}", self.address)
     }
 
     /// The status of a short request; `None` where nobody answers.
     pub(crate) async fn get(&self, path: &str) -> Option<u16> {
-        let answer = reqwest::get(self.url(path)).await.ok()?;
-        Some(answer.status().as_u16())
+        let request = self.with_token(reqwest::Client::new().get(self.url(path)));
+        Some(request.send().await.ok()?.status().as_u16())
+    }
+
+    pub(crate) fn with_token(&self, request: reqwest::RequestBuilder) -> reqwest::RequestBuilder {
+        match &self.token {
+            Some(token) => request.bearer_auth(token),
+            None => request,
+        }
     }
 
     /// A client that is patient enough for restarts and quick to come back.
     pub(crate) fn client(&self) -> Client {
-        client(self.address)
+        let quick = Duration::from_millis(100);
+        let options = ClientOptions { retries: 200, max_backoff: quick, ..ClientOptions::default() };
+        let client = Client::new(&format!("http://{}", self.address)).expect("an address").with_options(options);
+        match &self.token {
+            Some(token) => client.with_token(token),
+            None => client,
+        }
     }
+}
 
+impl Server {
     /// SIGKILL: it ends where it stands.
     pub(crate) fn kill(mut self) {
         self.child.kill().expect("it is running");
@@ -160,9 +192,4 @@ impl Drop for Server {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-pub(crate) fn client(address: SocketAddr) -> Client {
-    let options = ClientOptions { retries: 200, max_backoff: Duration::from_millis(100), ..ClientOptions::default() };
-    Client::new(&format!("http://{address}")).expect("an address").with_options(options)
 }

@@ -1,7 +1,7 @@
 //! What the service has said so far, and whether it still says so.
 
 use crate::capture::{Errors, Reference};
-use crate::process::{HANG, Server};
+use crate::process::{Door, HANG};
 use cager_client::{Client, messages::SessionState};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -128,13 +128,13 @@ impl Ledger {
     }
 
     /// Whether all that was said still holds.
-    pub(crate) async fn check(&self, server: &Server) {
+    pub(crate) async fn check(&self, server: &Door) {
         self.check_some(server, None, usize::MAX).await;
     }
 
     /// As [`Self::check`], of at most so many sessions: the newest, on which somebody may have been at work, and some others. One may be
     /// `hurt`: it may fail.
-    pub(crate) async fn check_some(&self, server: &Server, hurt: Option<&str>, most: usize) {
+    pub(crate) async fn check_some(&self, server: &Door, hurt: Option<&str>, most: usize) {
         let client = server.client();
         let deleted = self.deleted.lock().unwrap().clone();
         let mut ids = self.ids();
@@ -182,7 +182,7 @@ impl Ledger {
     }
 
     /// As [`Self::check`], of one session.
-    pub(crate) async fn check_one(&self, server: &Server, id: &str) {
+    pub(crate) async fn check_one(&self, server: &Door, id: &str) {
         if let Some(known) = self.known(id) {
             self.told(id, self.check_session(&server.client(), server, id, &known).await);
         }
@@ -197,7 +197,7 @@ impl Ledger {
         }
     }
 
-    async fn check_session(&self, client: &Client, server: &Server, id: &str, known: &Known) -> Result<(), String> {
+    async fn check_session(&self, client: &Client, server: &Door, id: &str, known: &Known) -> Result<(), String> {
         let state = self.check_frames(client, id, known).await?;
         if !known.completed {
             return Ok(());
@@ -209,7 +209,7 @@ impl Ledger {
     }
 
     /// What a session whose files are not as they should be says, it has to say rightly; it may say that it cannot.
-    async fn check_hurt(&self, client: &Client, server: &Server, id: &str, known: &Known) -> Result<(), String> {
+    async fn check_hurt(&self, client: &Client, server: &Door, id: &str, known: &Known) -> Result<(), String> {
         let path = format!("/v1/sessions/{id}");
         let first = known.answered.keys().next().map(|frame| format!("{path}/cages?first={frame}&count=1"));
         for path in [path.clone(), format!("{path}/errors")].into_iter().chain(first) {
@@ -227,8 +227,8 @@ impl Ledger {
         let (clock, frames) = (Instant::now(), known.reference.count());
         let wish = serde_json::json!({ "frames": frames });
         loop {
-            let completed =
-                reqwest::Client::new().post(server.url(&format!("{path}/complete"))).json(&wish).send().await;
+            let request = server.with_token(reqwest::Client::new().post(server.url(&format!("{path}/complete"))));
+            let completed = request.json(&wish).send().await;
             match completed.map_err(|error| error.to_string())?.status().as_u16() {
                 200 => {}
                 503 => return Ok(()),
@@ -284,7 +284,7 @@ impl Ledger {
         Ok(())
     }
 
-    pub(crate) async fn check_container(&self, server: &Server, id: &str, known: &Known) -> Result<(), String> {
+    pub(crate) async fn check_container(&self, server: &Door, id: &str, known: &Known) -> Result<(), String> {
         let mut bytes = Vec::new();
         server.client().download(id, &mut bytes).await.map_err(|e| e.to_string())?;
         let reference = &known.reference;

@@ -3,10 +3,12 @@
 mod faults;
 mod ledger;
 mod posts;
+mod relay;
+mod several;
 mod workers;
 
 use crate::capture::Reference;
-use crate::process::{HANG, Server, Setup};
+use crate::process::{Door, HANG, Server, Setup};
 use fastrand::Rng;
 use ledger::{Ledger, PHASES, Phase};
 use std::collections::BTreeMap;
@@ -67,7 +69,7 @@ async fn soak(kills: u64, seed: u64) {
         .map(|(style, reference)| {
             let worker = Worker {
                 style,
-                address: server.address,
+                door: Door::clone(&server),
                 reference: Arc::clone(reference),
                 ledger: Arc::clone(&ledger),
                 stop: Arc::clone(&stop),

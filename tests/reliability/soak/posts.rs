@@ -3,13 +3,13 @@
 use super::ledger::Ledger;
 use crate::capture::{Errors, Reference};
 use crate::database::Database;
+use crate::process::Door;
 use cager_client::messages::{FrameResult, Problem};
 use cager_proto::record::{self, HEADER_BYTES, Kind};
 use fastrand::Rng;
 use reqwest::header::{ACCEPT, CONTENT_TYPE};
 use reqwest::{Body, Client, RequestBuilder};
 use std::convert::Infallible;
-use std::net::SocketAddr;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -20,6 +20,7 @@ pub(super) fn errors(result: &FrameResult) -> Option<Errors> {
 /// Posts frames of one session.
 pub(super) struct Poster<'a> {
     http: Client,
+    door: Door,
     url: String,
     id: &'a str,
     ledger: &'a Ledger,
@@ -28,17 +29,16 @@ pub(super) struct Poster<'a> {
 }
 
 impl<'a> Poster<'a> {
-    pub(super) fn new(
-        address: SocketAddr,
-        ledger: &'a Ledger,
-        reference: &'a Reference,
-        id: &'a str,
-        mut rng: Rng,
-    ) -> Self {
+    pub(super) fn new(door: &Door, ledger: &'a Ledger, reference: &'a Reference, id: &'a str, mut rng: Rng) -> Self {
         let http = Client::builder();
         let http = if rng.bool() { http.http1_only() } else { http.http2_prior_knowledge() };
-        let url = format!("http://{address}/v1/sessions/{id}/frames");
-        Self { http: http.build().expect("a client"), url, id, ledger, reference, rng }
+        let url = door.url(&format!("/v1/sessions/{id}/frames"));
+        Self { http: http.build().expect("a client"), door: door.clone(), url, id, ledger, reference, rng }
+    }
+
+    /// Whether what the service needs is killed too.
+    fn may_be_away(&self) -> bool {
+        Database::is_for_all() || self.door.token.is_some()
     }
 
     /// One raw body, answered by lines. Broken connections are no error; wrong answers are.
@@ -47,14 +47,14 @@ impl<'a> Poster<'a> {
         let body = self.reference.many(frames);
         let request = self.http.post(url).header(CONTENT_TYPE, "application/octet-stream");
         let mut text = Vec::new();
-        let (ledger, id) = (self.ledger, self.id);
+        let (ledger, id, may_be_away) = (self.ledger, self.id, self.may_be_away());
         self.post(request, body, |piece| {
             text.extend_from_slice(piece);
             while let Some(end) = text.iter().position(|&b| b == b'\n') {
                 let line: Vec<u8> = text.drain(..=end).collect();
                 // A problem may name a frame, too.
                 if let Ok(problem) = serde_json::from_slice(&line) {
-                    return expected(&problem);
+                    return expected(&problem, may_be_away);
                 }
                 let result: FrameResult = serde_json::from_slice(&line).map_err(|e| e.to_string())?;
                 ledger.answered(id, result.frame, errors(&result));
@@ -112,15 +112,16 @@ impl<'a> Poster<'a> {
             let piece = body[at..end].to_vec();
             Some((Ok::<_, Infallible>(piece), (body, end, rng)))
         });
+        let request = self.door.with_token(request);
         let Ok(mut answer) = request.body(Body::wrap_stream(pieces)).send().await else {
             // Nobody is there for a moment.
             tokio::time::sleep(Duration::from_millis(10)).await;
             return Ok(());
         };
         if !answer.status().is_success() {
-            let status = answer.status();
+            let (status, may_be_away) = (answer.status(), self.may_be_away());
             let problem = answer.json().await.map_err(|e| format!("{status}: {e}"));
-            return problem.and_then(|problem| expected(&problem));
+            return problem.and_then(|problem| expected(&problem, may_be_away));
         }
         while let Ok(Some(piece)) = answer.chunk().await {
             take(&piece)?;
@@ -130,11 +131,11 @@ impl<'a> Poster<'a> {
 }
 
 /// What may be answered in the middle of restarts; all else is a fault.
-fn expected(problem: &Problem) -> Result<(), String> {
+fn expected(problem: &Problem, may_be_away: bool) -> Result<(), String> {
     match problem.word() {
         "busy" | "stopping" | "not-ready" | "session-deleted" => Ok(()),
-        // While the database is away.
-        "storage-failed" if Database::is_for_all() => Ok(()),
+        // While the database or the bucket is away.
+        "storage-failed" if may_be_away => Ok(()),
         other => Err(format!("{other}: {}", problem.detail)),
     }
 }

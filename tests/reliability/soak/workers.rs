@@ -3,10 +3,9 @@
 use super::ledger::{Ledger, Phase};
 use super::posts::Poster;
 use crate::capture::Reference;
-use crate::process::client;
+use crate::process::Door;
 use cager_client::{Client, ClientError, FnFrames, Rows, UploadOptions, messages::Session};
 use fastrand::Rng;
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -28,7 +27,7 @@ pub(super) enum Style {
 
 pub(super) struct Worker {
     pub(super) style: Style,
-    pub(super) address: SocketAddr,
+    pub(super) door: Door,
     pub(super) reference: Arc<Reference>,
     pub(super) ledger: Arc<Ledger>,
     pub(super) stop: Arc<AtomicBool>,
@@ -38,7 +37,7 @@ pub(super) struct Worker {
 impl Worker {
     /// Session after session, the last one to its end.
     pub(super) async fn run(mut self) {
-        let client = client(self.address);
+        let client = self.door.client();
         // A client that was never answered takes a refused connection for a wrong address.
         while client.sessions().await.is_err() {
             tokio::time::sleep(Duration::from_millis(5)).await;
@@ -109,7 +108,7 @@ impl Worker {
         if self.rng.bool() {
             let ready = client.wait_ready(&session.id, Duration::from_secs(60)).await.map_err(|e| e.to_string())?;
             let _phase = self.ledger.enter(Phase::Upload);
-            let mut poster = Poster::new(self.address, &self.ledger, &self.reference, &ready.id, self.rng.fork());
+            let mut poster = Poster::new(&self.door, &self.ledger, &self.reference, &ready.id, self.rng.fork());
             let some = self.rng.u32(1..self.reference.count());
             // Deleted in the middle, where time is over.
             let _ = tokio::time::timeout(Duration::from_millis(self.rng.u64(1..150)), poster.raw(0..some)).await;
@@ -137,7 +136,7 @@ impl Worker {
     /// Goes on from what the service says is missing, until nothing is.
     async fn by_posts(&mut self, client: &Client, session: &Session) -> Result<(), String> {
         let count = self.reference.count();
-        let new_poster = |rng: Rng| Poster::new(self.address, &self.ledger, &self.reference, &session.id, rng);
+        let new_poster = |rng: Rng| Poster::new(&self.door, &self.ledger, &self.reference, &session.id, rng);
         loop {
             let now = client.session(&session.id).await.map_err(|e| e.to_string())?;
             let there = now.frames.solved + now.frames.missing.iter().map(|[a, b]| u64::from(b - a)).sum::<u64>();

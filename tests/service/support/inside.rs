@@ -4,7 +4,7 @@ use super::Api;
 use cager::cage_job::Designer;
 use cager::config::ServeConfig;
 use cager::http::listen::serve;
-use cager::http::{router, spare};
+use cager::http::{router, seen, spare};
 use cager::service::Service;
 use cager::store::LocalDisk;
 use cager_cages::{Design, DesignError, Progress};
@@ -98,7 +98,7 @@ impl Inside {
         let limits = config.limits();
         let service = Service::start_with(config, Arc::new(LocalDisk), slow.designer(), stop.clone());
         let service = service.expect("the service starts");
-        let routes = (router(Arc::clone(&service)), spare(service));
+        let routes = (router(Arc::clone(&service)), spare(seen(service)));
         let served = tokio::spawn(serve(listener, routes.0, routes.1, limits, None, stop.clone()));
         Self { api: Api::new(address, None, false), folder, stop, served: Some(served) }
     }

@@ -116,7 +116,13 @@ impl TestApp {
 
     /// Another one with the same settings, on a folder that is new.
     pub(crate) fn elsewhere(&self) -> Waiting {
-        let (flags, environment) = (self.flags.clone(), self.environment.clone());
+        self.elsewhere_with(&[])
+    }
+
+    /// As [`Self::elsewhere`], with these settings too.
+    pub(crate) fn elsewhere_with(&self, settings: &[&str]) -> Waiting {
+        let more = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]);
+        let (flags, environment) = (self.flags.iter().cloned().chain(more).collect(), self.environment.clone());
         Waiting::spawn(Arc::new(folder()), flags, environment, self.database.clone(), self.api.token.clone())
     }
 
@@ -144,12 +150,18 @@ impl TestApp {
 
     /// As [`Self::guarded`], with these settings.
     pub(crate) fn guarded_with(tokens: &[(&str, &str, &str)], settings: &[&str]) -> Self {
+        Self::guarded_on(Database::of_all(), tokens, settings)
+    }
+
+    /// As [`Self::guarded_with`], with its catalogue in a database where one is given.
+    pub(crate) fn guarded_on(database: Option<Database>, tokens: &[(&str, &str, &str)], settings: &[&str]) -> Self {
         let place = folder();
         let file = place.path().join("tokens.toml");
         write_tokens(&file, tokens);
         let settings = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]);
         let flags = ["--tokens".to_owned(), file.display().to_string()].into_iter().chain(settings).collect();
-        Self::launch(Arc::new(place), flags, Vec::new(), tokens.first().map(|(_, token, _)| (*token).to_owned()))
+        let token = tokens.first().map(|(_, token, _)| (*token).to_owned());
+        Waiting::spawn(Arc::new(place), flags, Vec::new(), database, token).ready()
     }
 
     fn launch(

@@ -53,7 +53,7 @@ impl Server {
         let log = File::options().create(true).append(true).open(log).expect("a log");
         let mut command = as_user(self.programs.join("postgres"));
         command.arg("-D").arg(self.folder.path().join("data")).arg("-k").arg(self.folder.path());
-        command.args(["-h", "", "-c", "max_connections=40", "-c", "shared_buffers=32MB", "-c", "fsync=on"]);
+        command.args(["-h", "", "-c", "max_connections=100", "-c", "shared_buffers=32MB", "-c", "fsync=on"]);
         let log_too = log.try_clone().expect("a log");
         command.stdin(Stdio::null()).stdout(log).stderr(log_too).spawn().expect("the server")
     }
