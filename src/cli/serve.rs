@@ -65,16 +65,9 @@ pub(crate) async fn run_until(
     // What waits for a database that another process has listens to nobody, so that nobody is sent here.
     let Some(service) = start(config.clone(), &stop).await? else { return Ok(()) };
     let listener = listen(&config).await?;
-    let operated = Operated {
-        resources: service.resources(),
-        services: Arc::new({
-            let services = vec![Arc::clone(&service)];
-            move || services.clone()
-        }),
-        stop: stop.clone(),
-    };
     let drained = CancellationToken::new();
-    listen_for_operators(&config, operated, seen_by_operators(Arc::clone(&service)), drained.clone()).await?;
+    let seen_by_them = seen_by_operators(Arc::clone(&service));
+    listen_for_operators(&config, Operated::one(&service), seen_by_them, drained.clone()).await?;
     listening(told(&listener, tls.is_some())?);
     let spare = spare(seen(Arc::clone(&service)));
     serve(listener, router(Arc::clone(&service)), spare, config.limits(), tls, stop).await?;

@@ -35,6 +35,18 @@ pub struct Operated {
     pub(crate) stop: CancellationToken,
 }
 
+impl Operated {
+    /// A process with one service.
+    pub fn one(service: &Arc<Service>) -> Self {
+        let services = vec![Arc::clone(service)];
+        Self {
+            resources: service.resources(),
+            services: Arc::new(move || services.clone()),
+            stop: service.stopping().clone(),
+        }
+    }
+}
+
 /// The router, with health and metrics as `seen` has them; with `open_to_all` no token is needed.
 pub fn admin(operated: Operated, seen: Router, open_to_all: bool) -> Router {
     let routes = Router::new()

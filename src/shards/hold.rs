@@ -50,13 +50,15 @@ pub(crate) async fn start(config: ServeConfig, address: String, stop: Cancellati
         members,
         own: Mutex::default(),
         seen: watch::Sender::default(),
+        trouble: Mutex::default(),
         tenants: Mutex::new(HashMap::new()),
         forwarder: Forwarder::new(is_tls)?,
         stop,
     });
-    let mut holding = Holding { shards: Arc::clone(&shards), failed: BTreeMap::new(), quiet_until: None };
-    holding.look().await?;
+    let mut holding = Holding { shards: Arc::clone(&shards), failed: BTreeMap::new() };
+    shards.look().await?;
     holding.take_share().await?;
+    tokio::spawn(Arc::clone(&shards).watch());
     tokio::spawn(holding.keep());
     Ok(shards)
 }
@@ -66,28 +68,15 @@ struct Holding {
     shards: Arc<Shards>,
     /// When what could not be taken is tried again.
     failed: BTreeMap<u32, Instant>,
-    /// Nothing is taken before.
-    quiet_until: Option<Instant>,
 }
 
 impl Holding {
     async fn keep(mut self) {
-        let mut was_seen = true;
         loop {
             tokio::time::sleep(PAUSE).await;
             self.drop_lost();
-            match self.look().await {
-                Ok(()) => was_seen = true,
-                Err(error) => {
-                    if std::mem::replace(&mut was_seen, false) {
-                        tracing::error!(%error, "it is not seen who has which shard");
-                    }
-                    self.quiet_until = Some(Instant::now() + AFTER_TROUBLE);
-                    continue;
-                }
-            }
-            // Who has what is seen until the end.
-            if self.shards.stop.is_cancelled() || self.quiet_until.is_some_and(|until| Instant::now() < until) {
+            let is_quiet = lock(&self.shards.trouble).is_some_and(|then| then.elapsed() < AFTER_TROUBLE);
+            if self.shards.stop.is_cancelled() || is_quiet {
                 continue;
             }
             let changed = match self.surplus() {
@@ -104,23 +93,45 @@ impl Holding {
     }
 
     /// Takes free shards, until this process has its share.
+    ///
+    /// # Errors
+    /// Why one of them cannot be served; the others are.
     async fn take_share(&mut self) -> Result<()> {
-        while self.take_one().await? {
-            self.look().await?;
+        let mut failed = Ok(());
+        loop {
+            let wanted = self.wanted();
+            if wanted.is_empty() {
+                return failed;
+            }
+            let mut taking = JoinSet::new();
+            for shard in wanted {
+                let shards = Arc::clone(&self.shards);
+                taking.spawn(async move { (shard, shards.take(shard).await) });
+            }
+            while let Some(taken) = taking.join_next().await {
+                let (shard, Err(error)) = taken? else { continue };
+                self.failed.insert(shard, Instant::now() + AFTER_FAILURE);
+                // Another process may have been faster.
+                if !matches!(error.downcast_ref(), Some(StartError::Store(StoreError::InUse { .. }))) {
+                    failed = Err(error.context(format!("shard {shard} cannot be served")));
+                }
+            }
+            self.shards.look().await?;
         }
-        Ok(())
     }
 
-    /// Looks at how things are.
-    async fn look(&self) -> Result<()> {
-        let members = Arc::clone(&self.shards.members);
-        let now = spawn_blocking(move || members.look()).await?.map_err(|error| anyhow!("{error}"))?;
-        self.shards.seen.send_if_modified(|seen| {
-            let is_new = *seen != now;
-            *seen = now;
-            is_new
-        });
-        Ok(())
+    /// The free shards that this process takes next. Each process begins elsewhere, so that they do not want the same.
+    fn wanted(&mut self) -> Vec<u32> {
+        let now = Instant::now();
+        self.failed.retain(|_, until| *until > now);
+        let (seen, own) = (self.shards.seen.borrow(), lock(&self.shards.own));
+        let processes = seen.staying().count().max(1);
+        let share = (self.shards.members.shards() as usize).div_ceil(processes);
+        let rank = seen.staying().position(|number| number == self.shards.members.number()).unwrap_or_default();
+        let is_open = |shard: &&u32| !own.contains_key(shard) && !self.failed.contains_key(shard);
+        let mut free: Vec<(usize, u32)> = seen.free.iter().filter(is_open).copied().enumerate().collect();
+        free.sort_by_key(|(at, _)| (at + processes - rank) % processes);
+        free.into_iter().map(|(_, shard)| shard).take(share.saturating_sub(own.len())).collect()
     }
 
     /// Forgets shards that another process has taken over.
@@ -133,29 +144,6 @@ impl Holding {
             }
             is_kept
         });
-    }
-
-    /// Takes a free shard, if this process has fewer than its share. Whether there may be more.
-    async fn take_one(&mut self) -> Result<bool> {
-        let now = Instant::now();
-        self.failed.retain(|_, until| *until > now);
-        let wanted = {
-            let (seen, own) = (self.shards.seen.borrow(), lock(&self.shards.own));
-            let share = (self.shards.members.shards() as usize).div_ceil(seen.staying().count().max(1));
-            let is_open = |shard: &&u32| !own.contains_key(shard) && !self.failed.contains_key(shard);
-            let free: Vec<u32> = seen.free.iter().filter(is_open).copied().collect();
-            // Each begins elsewhere, so that they do not want the same.
-            let rank = seen.staying().position(|number| number == self.shards.members.number()).unwrap_or_default();
-            (own.len() < share && !free.is_empty()).then(|| free[rank % free.len()])
-        };
-        let Some(shard) = wanted else { return Ok(false) };
-        let Err(error) = Arc::clone(&self.shards).take(shard).await else { return Ok(true) };
-        self.failed.insert(shard, Instant::now() + AFTER_FAILURE);
-        match error.downcast_ref() {
-            // Another process was faster.
-            Some(StartError::Store(StoreError::InUse { .. })) => Ok(true),
-            _ => Err(error.context(format!("shard {shard} cannot be served"))),
-        }
     }
 
     /// A shard to give up, for a process that has at least two fewer. One process at a time gives up, the last of those that have most.
@@ -182,6 +170,30 @@ fn most_and_least(seen: &Membership) -> Option<(i32, i32)> {
 }
 
 impl Shards {
+    /// Looks at how things are, again and again, until the process ends.
+    async fn watch(self: Arc<Self>) {
+        loop {
+            tokio::time::sleep(PAUSE).await;
+            if let Err(error) = self.look().await
+                && lock(&self.trouble).replace(Instant::now()).is_none_or(|then| then.elapsed() > AFTER_TROUBLE)
+            {
+                tracing::error!(%error, "it is not seen who has which shard");
+            }
+        }
+    }
+
+    /// Looks at how things are.
+    async fn look(&self) -> Result<()> {
+        let members = Arc::clone(&self.members);
+        let now = spawn_blocking(move || members.look()).await?.map_err(|error| anyhow!("{error}"))?;
+        self.seen.send_if_modified(|seen| {
+            let is_new = *seen != now;
+            *seen = now;
+            is_new
+        });
+        Ok(())
+    }
+
     /// Begins to serve a shard.
     async fn take(self: Arc<Self>, shard: u32) -> Result<()> {
         // Not stopped with the process, but given up by it.

@@ -47,6 +47,8 @@ pub(crate) struct Shards {
     own: Mutex<BTreeMap<u32, Own>>,
     /// What was seen last.
     seen: watch::Sender<Membership>,
+    /// When it could not be seen for the last time.
+    trouble: Mutex<Option<Instant>>,
     /// Shards of tenants, which do not change.
     tenants: Mutex<HashMap<String, u32>>,
     forwarder: Forwarder,

@@ -6,7 +6,7 @@ use crate::gate::{Gate, GatedDisk};
 use crate::process::{Door, HANG};
 use cager::config::ServeConfig;
 use cager::http::listen::serve;
-use cager::http::{router, seen, spare};
+use cager::http::{Operated, admin, router, seen, seen_by_operators, spare};
 use cager::service::{Service, StartError};
 use cager::store::{Disk, StoreError};
 use cager_client::messages::{FrameResult, Problem, Session};
@@ -127,7 +127,8 @@ impl Inside {
     pub(crate) async fn counted_bytes(&self) -> u64 {
         let service = self.running().service.upgrade().expect("it runs");
         let request = http::Request::get("/admin/tenants").header("host", "localhost").body(axum::body::Body::empty());
-        let answer = cager::http::admin(service, true).oneshot(request.expect("a request")).await.expect("an answer");
+        let routes = admin(Operated::one(&service), seen_by_operators(service), true);
+        let answer = routes.oneshot(request.expect("a request")).await.expect("an answer");
         let body = axum::body::to_bytes(answer.into_body(), 1 << 20).await.expect("a body");
         let tenants: Vec<serde_json::Value> = serde_json::from_slice(&body).expect("tenants");
         tenants.iter().filter_map(|tenant| tenant["stored_bytes"].as_u64()).sum()
