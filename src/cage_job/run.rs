@@ -240,7 +240,10 @@ fn refused(error: &DesignError) -> ApiError {
         DesignError::FrameSize { .. } | DesignError::NotFinite { .. } | DesignError::NoFrames => {
             ApiError::new(problem::INVALID_FRAME, format!("frames: {error}"))
         }
-        DesignError::Stopped => ApiError::internal(error),
+        DesignError::Stopped => {
+            let detail = "time_limit: there was no cage when the time was over; give more seconds, or try again when the service has less to do";
+            ApiError::new(problem::INVALID_OPTIONS, detail)
+        }
         _ => ApiError::new(problem::INVALID_GEOMETRY, format!("rest: {error}")),
     }
 }

@@ -64,7 +64,7 @@ pub(super) fn only_reads(request: &axum::extract::Request) -> bool {
 }
 
 /// Authenticates the request and records tenant and token in the log.
-pub(crate) async fn granted(resources: &Resources, headers: &HeaderMap) -> Result<Grant, ApiError> {
+pub(super) async fn granted(resources: &Resources, headers: &HeaderMap) -> Result<Grant, ApiError> {
     let grant = resources.access.grant(headers).await.map_err(|denied| {
         resources.rejected("unauthorized");
         match denied {

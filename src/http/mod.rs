@@ -42,7 +42,6 @@ mod spooled;
 mod transfers;
 
 pub use admin::{Operated, admin};
-pub(crate) use extract::granted;
 pub(crate) use health::{health, may_see_metrics, rendered_metrics};
 pub(crate) use page::file as page_file;
 pub use router::{document, router, seen, seen_by_operators, spare};

@@ -50,13 +50,14 @@ pub(super) struct Forwarder {
 }
 
 impl Forwarder {
-    /// `is_tls` where the processes are asked over TLS, by the authorities that this machine trusts.
+    /// `is_tls` where the processes are asked over TLS, by the authorities that this machine trusts. They close connections that stay `idle` for longer.
     ///
     /// # Errors
     /// What the library says.
-    pub(super) fn new(is_tls: bool) -> Result<Self, reqwest::Error> {
+    pub(super) fn new(is_tls: bool, idle: Duration) -> Result<Self, reqwest::Error> {
         let _ = rustls::crypto::ring::default_provider().install_default();
-        let builder = reqwest::Client::builder().no_proxy().http1_only().connect_timeout(CONNECT);
+        let builder =
+            reqwest::Client::builder().no_proxy().http1_only().connect_timeout(CONNECT).pool_idle_timeout(idle / 2);
         let builder = if is_tls { builder } else { builder.tls_certs_only([]) };
         Ok(Self { client: builder.redirect(reqwest::redirect::Policy::none()).build()? })
     }

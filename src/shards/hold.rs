@@ -44,6 +44,7 @@ pub(crate) async fn start(config: ServeConfig, address: String, stop: Cancellati
     let members = spawn_blocking(move || Members::join(&url, count, &own_address)).await?;
     let members = Arc::new(members.map_err(|error| anyhow!("{error}"))?);
     tracing::info!(shards = members.shards(), number = members.number(), address, "joined");
+    let idle = Duration::from_secs(config.idle_timeout_s);
     let shards = Arc::new(Shards {
         config,
         resources,
@@ -52,7 +53,7 @@ pub(crate) async fn start(config: ServeConfig, address: String, stop: Cancellati
         seen: watch::Sender::default(),
         trouble: Mutex::default(),
         tenants: Mutex::new(HashMap::new()),
-        forwarder: Forwarder::new(is_tls)?,
+        forwarder: Forwarder::new(is_tls, idle)?,
         stop,
     });
     let mut holding = Holding { shards: Arc::clone(&shards), failed: BTreeMap::new() };

@@ -9,8 +9,8 @@ pub(crate) use hold::start;
 pub(crate) use routes::{answered, seen, seen_by_operators};
 
 use crate::config::ServeConfig;
+use crate::http::Operated;
 use crate::http::listen::ConnectionHandle;
-use crate::http::{Operated, granted};
 use crate::problem::{self, ApiError};
 use crate::resources::Resources;
 use crate::service::Service;
@@ -129,7 +129,7 @@ impl Shards {
         if !request.uri.path().starts_with("/v1/") {
             return Ok(Asked::Any);
         }
-        let Ok(grant) = granted(&self.resources, &request.headers).await else { return Ok(Asked::Any) };
+        let Ok(grant) = self.resources.access.grant(&request.headers).await else { return Ok(Asked::Any) };
         if let Some(connection) = request.extensions.get::<ConnectionHandle>() {
             connection.caller_is_known();
         }

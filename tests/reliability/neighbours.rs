@@ -1,8 +1,10 @@
 //! One tenant does its worst; the other goes on as if nothing were.
 //!
-//! `CAGER_ATTACK_SECONDS` makes the attacks longer than the few seconds that tests have time for.
+//! `CAGER_ATTACK_SECONDS` makes the attacks longer than the few seconds that tests have time for. With `CAGER_TEST_PROCESSES=2` each of the two tenants is served
+//! by a process of its own, and one of these processes is asked for everything.
 
 use crate::capture::Reference;
+use crate::database::Database;
 use crate::overload::{LOUD, QUIET, Times, tokens, watch_health};
 use crate::process::{HANG, Server, Setup};
 use crate::wire::Wire;
@@ -27,6 +29,7 @@ pub(crate) struct House {
     before: f64,
     /// The quiet tenant's times before anything happens.
     undisturbed: String,
+    _other: Option<Server>,
     _folder: tempfile::TempDir,
 }
 
@@ -43,7 +46,16 @@ impl House {
         let file = folder.path().join("tokens.toml");
         std::fs::write(&file, tokens()).expect("tokens");
         setup.tokens = Some(file);
+        let is_one_of_two = std::env::var("CAGER_TEST_PROCESSES").as_deref() == Ok("2");
+        let other = if is_one_of_two { Some(beside(&mut setup, folder.path()).await) } else { None };
         let server = setup.start().await;
+        if let Some(database) = setup.database.as_ref().filter(|_| is_one_of_two) {
+            let clock = Instant::now();
+            while database.sql("SELECT count(DISTINCT holder) FROM shards") != "2" {
+                assert!(clock.elapsed() < HANG, "the tenants are not shared out");
+                sleep(Duration::from_millis(20)).await;
+            }
+        }
         let make = async |token: &str| {
             let client = server.client().with_token(token);
             let session = client.create(&reference.session("house", None)).await.expect("a session");
@@ -54,7 +66,7 @@ impl House {
         let before = server.rss();
         server.forget_peak();
         let undisturbed = String::new();
-        Self { server, reference, loud, quiet, http, before, undisturbed, _folder: folder }
+        Self { server, reference, loud, quiet, http, before, undisturbed, _other: other, _folder: folder }
     }
 
     /// As [`Self::new`], where the quiet tenant's times are known.
@@ -123,6 +135,15 @@ impl House {
         assert!(rounds.at(0.99) < Duration::from_secs(1), "the quiet tenant: {}", rounds.show());
         assert!(highest < before + most_mib, "memory grew from {before:.0} to {highest:.0} MiB");
     }
+}
+
+/// Another process beside the one that `setup` starts, on a database that both share.
+async fn beside(setup: &mut Setup, folder: &std::path::Path) -> Server {
+    setup.database = setup.database.take().or_else(Database::with_bucket);
+    assert!(setup.database.is_some(), "PostgreSQL and SeaweedFS");
+    setup.settings.push("shards=2".to_owned());
+    let other = Setup { data: folder.join("other"), ..setup.clone() };
+    other.start().await
 }
 
 /// A client of HTTP/2 that gives each response a window of so many bytes.

@@ -1,7 +1,7 @@
 //! Several processes on one database: any of them answers for every tenant, and what one of them had the others take over.
 
 use super::database::refused_with;
-use crate::support::{Capture, Database, OCTETS, TestApp, cages_of, eventually, folder, form};
+use crate::support::{Capture, Database, OCTETS, TestApp, cages_of, eventually, folder, form, service};
 use cager_proto::messages::Session;
 use serde_json::json;
 use std::time::{Duration, Instant};
@@ -48,7 +48,7 @@ async fn any_process_answers_for_every_tenant() {
         }
         assert_eq!(cages_of(&followed, unknowns).len(), 40);
         // Ranges and entity tags pass unchanged.
-        let path = format!("/v1/sessions/{}/container", made.id);
+        let path = format!("/v1/sessions/{}/capture.cager", made.id);
         let part = [("range", "bytes=10-19")];
         let (one, other) = (by_a.get_with(&path, &part).await, by_b.get_with(&path, &part).await);
         assert_eq!((one.status, one.header("etag")), (206, other.header("etag")));
@@ -127,14 +127,13 @@ async fn processes_are_replaced_one_after_the_other_without_a_failed_request() {
         }
         slowest
     };
-    let mut replaced = old;
+    let mut replaced = vec![old];
     let replacing = async {
-        for _ in 0..2 {
-            let new = replaced.elsewhere().ready();
+        for k in 0..2 {
+            replaced.push(replaced[k].elsewhere().ready());
             shared_out(&database, "1,1,2").await;
-            replaced.terminate();
-            assert!(replaced.ended().await.0.success());
-            replaced = new;
+            replaced[k].terminate();
+            assert!(replaced[k].ended().await.0.success());
             shared_out(&database, "2,2").await;
         }
     };
@@ -156,7 +155,7 @@ async fn who_was_there_before_it_was_divided_stays_where_the_sessions_are() {
     assert!(whole.ended().await.0.success());
     let tokens = whole.tokens_file().display().to_string();
     let flags = [&database.flags()[..], &["--tokens".to_owned(), tokens]].concat();
-    let mut flags: Vec<&str> = flags.iter().map(String::as_str).collect();
+    let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
     let app = whole.elsewhere_with(&["shards=3"]).ready();
     assert!(app.container(&before.id).await == capture.encoded(40));
     for token in &TENANTS[1..3] {
@@ -168,8 +167,14 @@ async fn who_was_there_before_it_was_divided_stays_where_the_sessions_are() {
     let environment = database.environment();
     let said = refused_with(folder().path(), &flags, &environment);
     assert!(said.contains("is divided into shards: start the service with --shards 3"), "{said}");
-    flags.extend(["--listen", "0.0.0.0:0", "--shards", "3"]);
-    let said = refused_with(folder().path(), &flags, &environment);
+    let place = folder();
+    let mut everywhere = service();
+    everywhere
+        .args(["--listen", "0.0.0.0:0", "--shards", "3", "--data"])
+        .arg(place.path())
+        .args(&flags)
+        .envs(environment);
+    let said = String::from_utf8(everywhere.output().expect("the service").stderr).expect("text");
     assert!(said.contains("say by --advertise where they reach this one"), "{said}");
     drop(app);
     let said = refused_with(folder().path(), &["--shards", "3"], &[]);
