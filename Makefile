@@ -121,7 +121,8 @@ $(FARM): Makefile
 
 buckets: $(SEAWEEDFS) ## the service with its files in S3; installs SeaweedFS, and needs PostgreSQL
 	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test blobs
-	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- process::bucket
+	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- process::bucket process::shards
+	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test reliability -- soak::several
 
 $(SEAWEEDFS): Makefile
 	$(PYTHON) -m venv $(S3)

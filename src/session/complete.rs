@@ -1,6 +1,7 @@
 //! Completing a session: writes its container once; from then on the session does not change.
 
 use super::container_frames::ContainerFrames;
+use super::facts::Outcome;
 use super::frames::{Missing, SealError};
 use super::{Phase, Session};
 use crate::coding::{CodingError, Goal};
@@ -217,7 +218,9 @@ impl Session {
 
     /// Writes the completion mark. If it fails and cannot be read back, whether the session is complete is unknown until [`Self::resolve_completion`].
     fn mark(&self, completion: &Completion) -> Result<(), StoreError> {
-        let Err(error) = self.store.complete(&self.meta.id, completion) else { return Ok(()) };
+        // The outcome of the preparation may not be stored yet, and without it a restart would prepare a session that is complete.
+        let outcome = self.facts().map(|facts| Outcome::Ready(Box::new(facts)));
+        let Err(error) = self.store.complete(&self.meta.id, completion, outcome.as_ref()) else { return Ok(()) };
         // The mark may be in place although writing it failed.
         match self.store.completion(&self.meta.id) {
             Ok(Some(found)) if found == *completion => Ok(()),

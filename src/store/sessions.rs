@@ -1,6 +1,6 @@
 //! Sessions: metadata, container, completion mark and announcement.
 
-use super::records::RecordMeta;
+use super::records::{RecordMeta, outcome_of};
 use super::{ContentKey, Kind, Store, StoreError, StoredFile};
 use cager_proto::messages::SessionOptions;
 use cager_store::{Change, Key};
@@ -126,8 +126,17 @@ impl Store {
     }
 
     /// Writes the completion mark, durably.
-    pub fn complete(&self, id: &str, completion: &Completion) -> Result<(), StoreError> {
-        self.change(key(id), &[Change::Completion(self.sealed(COMPLETION, completion)?)])
+    pub fn complete<T: Serialize>(
+        &self,
+        id: &str,
+        completion: &Completion,
+        outcome: Option<&T>,
+    ) -> Result<(), StoreError> {
+        let mut changes = vec![Change::Completion(self.sealed(COMPLETION, completion)?)];
+        if let Some(outcome) = outcome {
+            changes.push(Change::Outcome(self.sealed(outcome_of(Kind::Session), outcome)?));
+        }
+        self.change(key(id), &changes)
     }
 
     /// Reads the completion mark; `None` if there is none.

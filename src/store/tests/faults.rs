@@ -53,7 +53,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), ()> {
     let container = twice(errors, || store.write_container("a", &mut |out| write_frames(out)))?;
     told.container = true;
     assert_eq!((container.bytes, container.digest), (completion().container_bytes, completion().container_digest));
-    twice(errors, || store.complete("a", &completion()))?;
+    twice(errors, || store.complete("a", &completion(), None::<&()>))?;
     told.complete = true;
     twice(errors, || store.delete(Kind::Session, "b"))?;
     told.deleted = true;
@@ -200,7 +200,7 @@ fn a_deletion_may_be_interrupted_anywhere() {
         for id in ["a", "b"] {
             store.create_session(&meta(id)).unwrap();
             append(&store, id, &[3, 4]).unwrap();
-            store.complete(id, &completion()).unwrap();
+            store.complete(id, &completion(), None::<&()>).unwrap();
         }
         (given, store)
     };

@@ -108,7 +108,7 @@ fn names_from_outside_touch_no_path() {
             append(&store, id, &[1]).map(|_| ()),
             store.frames(id).map(|_| ()),
             store.write_container(id, &mut |_| Ok(())).map(|_| ()),
-            store.complete(id, &completion()),
+            store.complete(id, &completion(), None::<&()>),
             store.completion(id).map(|_| ()),
         ];
         assert!(refused.iter().all(|r| matches!(r, Err(StoreError::BadId { .. }))), "{id:?}: {refused:?}");
