@@ -246,7 +246,7 @@ fn small_file(mut bytes: &[u8]) {
     let store = opened.store;
     if let Ok(Some(completion)) = store.completion(ID) {
         assert_eq!(kind, "completion");
-        store.complete(ID, &completion).expect("it can be written again");
+        store.complete(ID, &completion, None::<&()>).expect("it can be written again");
     }
     // Where it says that the parts are of other bytes than are there.
     let content = store.content(&KEY);
