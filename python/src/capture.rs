@@ -120,10 +120,19 @@ impl Capture {
     fn read_pose(&self, mut cage: Vec<Point>) -> Result<Vec<f32>, Fault> {
         let (vertices, rows) = (self.cage.vertices.len(), self.rows);
         if rows != vertices {
-            return Err(of("cage", "has no normals, which this capture keeps for every face beside the vertices; encode it with the coordinates \"green\" or \"mvc\" to pose it"));
+            return Err(of(
+                "cage",
+                "has no normals, which this capture keeps for every face beside the vertices; encode it with the coordinates \"green\" or \"mvc\" to pose it",
+            ));
         }
         if cage.len() != vertices {
-            return Err(of("cage", format!("has {} vertices where the capture's has {vertices}; give as many, in the order of capture.cages", cage.len())));
+            return Err(of(
+                "cage",
+                format!(
+                    "has {} vertices where the capture's has {vertices}; give as many, in the order of capture.cages",
+                    cage.len()
+                ),
+            ));
         }
         move_to(self.origin, &mut cage);
         let single: Vec<f32> = cage.as_flattened().iter().map(|&x| x as f32).collect();
@@ -334,13 +343,7 @@ impl Capture {
 
     /// Writes the frames in a format of other programs, the one of the path's ending; what the file loses is returned in words.
     #[pyo3(signature = (path, overwrite=false, with_cage=false))]
-    fn export(
-        &self,
-        py: Python<'_>,
-        path: PathBuf,
-        overwrite: bool,
-        with_cage: bool,
-    ) -> Result<Vec<String>, Fault> {
+    fn export(&self, py: Python<'_>, path: PathBuf, overwrite: bool, with_cage: bool) -> Result<Vec<String>, Fault> {
         computing(py, || self.again(|from| export(from, &path, overwrite, with_cage)))
     }
 
