@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-ZIP = os.path.abspath(os.environ.get("CAGER_EXTENSION", "target/blender/cager.zip"))
+ZIP = os.path.abspath(os.environ.get("CAGER_EXTENSION", "target/cager-blender.zip"))
 MODULE = "bl_ext.user_default.cager"
 
 

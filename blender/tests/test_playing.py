@@ -78,12 +78,12 @@ def test_a_frame_of_twenty_thousand_points_takes_fifteen_milliseconds(scene, tmp
     def median():
         times = []
         for frame in range(1, 13):
-            start = time.perf_counter()
+            start, busy = time.perf_counter(), time.process_time()
             scene.frame_set(frame)
-            times.append(time.perf_counter() - start)
+            # On a machine that is busy with other work, time passes without any for Blender.
+            times.append(min(time.perf_counter() - start, time.process_time() - busy))
         return 1000 * float(np.median(times))
 
-    # Other work on the machine makes it slower, never faster.
     best = min(median() for _ in range(8))
     print(f"{len(capture.rest)} points in a cage of {capture.cages.shape[1]}: {best:.1f} ms a frame")
     assert best <= 15
