@@ -31,21 +31,22 @@ def stage(model):
     corners = np.array([model.matrix_world @ Vector(corner) for corner in cage.bound_box])
     center, size = corners.mean(axis=0), np.linalg.norm(np.ptp(corners, axis=0))
     model.data.materials.append(material("model", (0.55, 0.6, 0.7)))
-    cage.data.materials.append(material("cage", (0.9, 0.35, 0.05), 0.6))
+    cage.data.materials.append(material("cage", (0.9, 0.3, 0.03), 0.25))
     cage.hide_render, cage.display_type = False, "TEXTURED"
     rods = cage.modifiers.new("rods", "WIREFRAME")
-    rods.thickness = 0.004 * size
+    # Rods have other vertices than the cage, so they are of the picture alone.
+    rods.thickness, rods.show_viewport = 0.003 * size, False
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.location = center + size * np.array([0.9, -1.3, 0.35])
+    camera.location = center + size * np.array([0.55, -0.95, 0.2])
     camera.rotation_euler = (Vector(center) - camera.location).to_track_quat("-Z", "Y").to_euler()
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-    sun.data.energy, sun.rotation_euler = 3, (0.8, 0.2, 0.6)
+    sun.data.energy, sun.rotation_euler = 2, (0.8, 0.2, 0.6)
     for each in (camera, sun):
         scene.collection.objects.link(each)
     scene.camera = camera
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
-    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (0.8, 0.82, 0.85, 1)
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (0.5, 0.52, 0.55, 1)
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = 24, False
     scene.view_settings.view_transform = "Standard"
@@ -66,9 +67,9 @@ def edit(model, frame):
     """Pulls the vertices at the top of the cage, as proportional editing does."""
     key = model.cager.cage.data.shape_keys.key_blocks[f"frame {frame}"]
     points = np.array([point.co for point in key.data])
-    height = points[:, 1]
+    height = points[:, 2]
     weight = np.clip((height - np.quantile(height, 0.8)) / np.ptp(height[height > np.quantile(height, 0.8)]), 0, 1)
-    points += 0.25 * np.ptp(height) * weight[:, None] * [0.7, 0.7, 0]
+    points += 0.2 * np.ptp(height) * weight[:, None] * [0.8, 0, 0.5]
     key.data.foreach_set("co", points.astype(np.float32).ravel())
     model.cager.cage.data.update()
 
@@ -79,13 +80,10 @@ def main(capture, picture):
     )
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module=MODULE)
-    bpy.ops.cager.import_capture(filepath=os.path.abspath(capture), y_is_up=True)
+    bpy.ops.cager.import_capture(filepath=os.path.abspath(capture))
     model, frame = bpy.context.object, 12
     bpy.context.scene.frame_set(frame)
     stage(model)
-    # The rods have other vertices than the cage: each picture is taken of what was shown before they were added.
-    cage = model.cager.cage
-    cage.modifiers["rods"].show_viewport = False
     with tempfile.TemporaryDirectory() as folder:
         bpy.context.scene.frame_set(frame)
         before = render(folder, "before")
