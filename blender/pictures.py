@@ -37,7 +37,7 @@ def stage(model):
     # Rods have other vertices than the cage, so they are of the picture alone.
     rods.thickness, rods.show_viewport = 0.003 * size, False
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.location = center + size * np.array([0.55, -0.95, 0.2])
+    camera.location = center + size * np.array([0.62, -1.08, 0.25])
     camera.rotation_euler = (Vector(center) - camera.location).to_track_quat("-Z", "Y").to_euler()
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 2, (0.8, 0.2, 0.6)
@@ -69,7 +69,7 @@ def edit(model, frame):
     points = np.array([point.co for point in key.data])
     height = points[:, 2]
     weight = np.clip((height - np.quantile(height, 0.8)) / np.ptp(height[height > np.quantile(height, 0.8)]), 0, 1)
-    points += 0.2 * np.ptp(height) * weight[:, None] * [0.8, 0, 0.5]
+    points += 0.2 * np.ptp(height) * weight[:, None] * [0.8, 0, 0.1]
     key.data.foreach_set("co", points.astype(np.float32).ravel())
     model.cager.cage.data.update()
 

@@ -29,6 +29,8 @@ def add(context, path, first, y_is_up=False, with_cage=True):
         cage.hide_render = True
         key_frames(cage, opened.cages, first)
         model.cager.cage = cage
+        # Blender does not evaluate what is hidden, unless what is seen depends on it. Unbound, the modifier does nothing else.
+        model.modifiers.new("Follows its cage", "MESH_DEFORM").object = cage
     model.cager.first = first
     # From now on it is shown.
     model.cager.file = path

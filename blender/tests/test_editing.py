@@ -105,6 +105,36 @@ def test_saved_edits_are_shown_from_the_new_file(scene, small, model, tmp_path):
     assert part("edits").edited_capture(bpy.context, model)[1] == []
 
 
+def test_edits_are_rendered_and_shown_while_the_cage_is_hidden(scene, small, model, tmp_path):
+    cage = model.cager.cage
+    cage.data.shape_keys.key_blocks["frame 3"].data[5].co.x += 0.4
+    expected = small.capture.cages[2].copy()
+    expected[5, 0] += np.float32(0.4)
+    truth = {2: small.capture[1], 3: small.capture.pose(expected), 4: small.capture[3]}
+    cage.hide_set(True)
+    for frame in truth:
+        scene.frame_set(frame)
+        assert np.abs(seen(model) - truth[frame]).max() <= 1e-6 * small.diagonal
+    assert cage.hide_render
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(camera)
+    scene.camera, scene.render.engine, scene.cycles.samples = camera, "CYCLES", 1
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    scene.frame_start, scene.frame_end, scene.render.filepath = 2, 4, str(tmp_path / "rendered")
+    rendered = {}
+
+    def keep(now, *_):
+        points = np.empty(3 * len(model.data.vertices), np.float32)
+        model.data.attributes["position"].data.foreach_get("vector", points)
+        rendered[now.frame_current] = points.reshape(-1, 3)
+
+    bpy.app.handlers.render_post.append(keep)
+    bpy.ops.render.render(animation=True)
+    bpy.app.handlers.render_post.remove(keep)
+    for frame in truth:
+        assert np.abs(rendered[frame] - truth[frame]).max() <= 1e-6 * small.diagonal, frame
+
+
 @pytest.mark.parametrize("ending", ["usdc", "abc", "glb", "pc2", "npy"])
 def test_what_is_not_edited_is_exported_as_it_is(scene, small, model, tmp_path, ending):
     # The ending is that of the format.
@@ -117,7 +147,7 @@ def test_what_is_not_edited_is_exported_as_it_is(scene, small, model, tmp_path, 
 def test_blender_reads_what_was_exported(scene, small, model, tmp_path):
     bpy.ops.cager.export(filepath=str(tmp_path / "out.abc"), format="abc")
     bpy.ops.wm.alembic_import(filepath=str(tmp_path / "out.abc"), as_background_job=False)
-    (read,) = [each for each in scene.objects if each.type == "MESH" and each.modifiers]
+    (read,) = [each for each in scene.objects if each.modifiers and each != model]
     scene.frame_set(scene.frame_start + 4)
     matrix = np.array(read.matrix_world)
     there = seen(read) @ matrix[:3, :3].T
