@@ -26,6 +26,9 @@ def platform(wheel):
 
 def build(target, wheels):
     manifest = (SOURCE / "blender_manifest.toml").read_text()
+    for wheel in wheels:
+        if f'\nversion = "{wheel.name.split("-")[1]}"\n' not in manifest:
+            raise SystemExit(f"{wheel.name}: has another version than {SOURCE / 'blender_manifest.toml'}; make them the same")
     platforms = sorted({platform(wheel) for wheel in wheels})
     names = [f"./wheels/{wheel.name}" for wheel in wheels]
     lists = f"platforms = {platforms}\nwheels = {names}\n".replace("'", '"')

@@ -1,5 +1,6 @@
 """Cages as they are edited in the scene, in every frame of their capture."""
 
+import bpy
 import numpy as np
 
 from . import captures, live
@@ -7,8 +8,6 @@ from . import captures, live
 
 def leave_edit_mode(context):
     """What is edited counts once Edit Mode is left."""
-    import bpy
-
     if context.object and context.object.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
 

@@ -5,7 +5,7 @@ import cager
 from bpy.props import BoolProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from . import live, objects
+from . import captures, objects
 
 
 class ImportCapture(bpy.types.Operator, ImportHelper):
@@ -42,7 +42,7 @@ def imported(context, path, first, y_is_up=False, with_cage=True, set_range=True
     scene = context.scene
     model = objects.add(context, path, first, y_is_up, with_cage)
     if set_range:
-        capture = live.captures.of_model(model).capture
+        capture = captures.of_model(model).capture
         scene.frame_start, scene.frame_end = first, first + len(capture) - 1
         if capture.frame_rate:
             # Blender keeps a whole number and what it is divided by.
