@@ -87,7 +87,7 @@ def on_edit(scene, depsgraph):
     changed = {update.id.original for update in depsgraph.updates if update.is_updated_geometry or update.is_updated_transform}
     for model in captures.models(scene) if changed else ():
         cage = model.cager.cage
-        if cage and {cage, cage.data} & changed:
+        if cage and {cage, cage.data, cage.data.shape_keys} & changed:
             show(model, scene, depsgraph, only_if_new=True)
 
 
