@@ -9,6 +9,7 @@ SCHEMATHESIS := target/schemathesis/bin/python
 DENY := target/deny/bin/cargo-deny
 
 BLENDER := target/blender/bin/python
+BLENDER_OLDEST := target/blender-oldest/bin/python
 ALEMBIC := target/alembic/bin/python
 USD := target/usd/bin/python
 GLTF := target/gltf/node_modules
@@ -22,7 +23,7 @@ LINT := target/lint-deploy
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender alembic usd gltf farm buckets python soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo test web viewer page-test page-lint captures proxies blender blender-extension blender-pictures alembic usd gltf farm buckets python soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -79,13 +80,27 @@ captures: ## run the tests that need the real captures in CAGER_CAPTURES (../sha
 proxies: ## uploads through nginx, HAProxy, Caddy and Traefik as docs/OPERATIONS.md has them; those that are not installed are left out
 	CAGER_PROXY_UPLOADS=30 $(CARGO) test --workspace --locked --test service proxies -- --nocapture --test-threads 1
 
-blender: $(BLENDER) ## the round trip through Blender itself; installs bpy, which needs Python 3.11
-	CAGER_BLENDER_PYTHON=$(abspath $(BLENDER)) $(CARGO) test --workspace --locked --test cli blender -- --nocapture
+blender-extension: $(MODULE) ## the extension for Blender with the Python module in it: target/cager-blender.zip
+	rm -rf target/wheels
+	cd python && VIRTUAL_ENV=$(abspath target/python) $(abspath target/python/bin/maturin) build --release --quiet --out $(abspath target/wheels)
+	$(PYTHON) blender/build.py target/cager-blender.zip target/wheels/*.whl
+
+blender: $(BLENDER) $(BLENDER_OLDEST) blender-extension ## the tests of the extension, in the newest Blender and the oldest that it works in; installs bpy, which needs Python 3.11
+	$(BLENDER) -m pytest --quiet blender/tests
+	$(BLENDER_OLDEST) -m pytest --quiet blender/tests
 
 $(BLENDER): Makefile
 	python3.11 -m venv target/blender
-	target/blender/bin/pip install --quiet bpy==4.5.15
+	target/blender/bin/pip install --quiet bpy==4.5.15 pytest usd-core==26.11
 	@touch $@
+
+$(BLENDER_OLDEST): Makefile
+	python3.11 -m venv target/blender-oldest
+	target/blender-oldest/bin/pip install --quiet bpy==4.2.0 pytest usd-core==26.11
+	@touch $@
+
+blender-pictures: $(BLENDER) blender-extension ## the picture of docs/BLENDER.md, of the capture of `cager demo` in cager-demo/
+	$(BLENDER) blender/pictures.py cager-demo/capture.cager docs/pictures/blender-editing.png
 
 alembic: $(ALEMBIC) ## written archives through the Alembic library; installs alembic3d
 	CAGER_ALEMBIC_PYTHON=$(abspath $(ALEMBIC)) $(CARGO) test --workspace --locked --test alembic library -- --nocapture

@@ -46,6 +46,17 @@ class Capture:
         """All frames, (f, n, 3), as ``capture[:]``, or written into ``out``: float32 or float64, of any memory order."""
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Write the .cager file; it appears whole or not at all. What has that name is replaced with ``overwrite``."""
+    def export(self, path: str | PathLike[str], overwrite: bool = False, with_cage: bool = False) -> list[str]:
+        """Write all frames in a format of other programs: .usdc, .usdz, .abc, .glb, .gltf, .npy, .pc2, .mdd, a .vat folder,
+        or a folder or pattern of mesh files, as the path says.
+
+        Returns what the file loses, in sentences. ``with_cage`` keeps the cage beside the model, in USD alone.
+        """
+    def pose(self, cage: ArrayLike) -> NDArray[np.float32]:
+        """What a cage, (m, 3), alone makes of the model, (n, 3): ``with_cages([cage])[0]`` without a file between.
+
+        float64 far from the origin.
+        """
     def with_cages(self, edited: _Frames) -> Capture:
         """The same capture with other cages, (f, m, 3): as many vertices, any number of frames.
 

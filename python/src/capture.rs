@@ -1,13 +1,14 @@
 //! A capture in a container: its frames as arrays, its cages, and other cages in their place.
 
-use crate::arrays::{frame_arrays, frame_views};
+use crate::arrays::{Floats, frame_arrays, frame_views};
+use crate::export::export;
 use crate::fault::{Fault, computing, detached, of};
 use crate::frames::Cages;
 use crate::geometry::{array, triangles};
 use cager_capture::decode::{self, DecodeError, Positions};
 use cager_capture::edit::edit;
 use cager_capture::edited::EditedCages;
-use cager_capture::origin::move_from;
+use cager_capture::origin::{move_from, move_to};
 use cager_formats::{Action, AtomicFile, Error, FrameReader, Target, commit_together};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use numpy::ndarray::{ArrayViewMut3, Axis};
@@ -101,14 +102,44 @@ impl Capture {
         Ok(opened)
     }
 
-    /// Positions of these frames in single precision, about the origin.
-    fn read(&self, frames: &[usize]) -> Result<Vec<Vec<f32>>, Fault> {
+    /// Works with the decoder, which is prepared when it is needed first.
+    fn decoding<T>(&self, work: impl FnOnce(&mut Positions) -> Result<T, Fault>) -> Result<T, Fault> {
         let mut positions = self.positions.lock().unwrap_or_else(PoisonError::into_inner);
-        let positions = match &mut *positions {
+        work(match &mut *positions {
             Some(there) => there,
             none => none.insert(self.again(Positions::open)?),
-        };
-        Ok(positions.read(frames)?)
+        })
+    }
+
+    /// Positions of these frames in single precision, about the origin.
+    fn read(&self, frames: &[usize]) -> Result<Vec<Vec<f32>>, Fault> {
+        self.decoding(|positions| Ok(positions.read(frames)?))
+    }
+
+    /// Positions in a cage, both in single precision and about the origin.
+    fn read_pose(&self, mut cage: Vec<Point>) -> Result<Vec<f32>, Fault> {
+        let (vertices, rows) = (self.cage.vertices.len(), self.rows);
+        if rows != vertices {
+            return Err(of(
+                "cage",
+                "has no normals, which this capture keeps for every face beside the vertices; encode it with the coordinates \"green\" or \"mvc\" to pose it",
+            ));
+        }
+        if cage.len() != vertices {
+            return Err(of(
+                "cage",
+                format!(
+                    "has {} vertices where the capture's has {vertices}; give as many, in the order of capture.cages",
+                    cage.len()
+                ),
+            ));
+        }
+        move_to(self.origin, &mut cage);
+        let single: Vec<f32> = cage.as_flattened().iter().map(|&x| x as f32).collect();
+        if let Some(at) = single.iter().position(|x| !x.is_finite()) {
+            return Err(of("cage", format!("vertex {} is too far away for single precision; move it closer", at / 3)));
+        }
+        self.decoding(|positions| Ok(positions.of_cage(&single)))
     }
 
     /// The cages of these frames, vertices × 3 each, about the origin.
@@ -308,6 +339,18 @@ impl Capture {
             commit_together(vec![file])?;
             Ok(())
         })
+    }
+
+    /// Writes the frames in a format of other programs, the one of the path's ending; what the file loses is returned in words.
+    #[pyo3(signature = (path, overwrite=false, with_cage=false))]
+    fn export(&self, py: Python<'_>, path: PathBuf, overwrite: bool, with_cage: bool) -> Result<Vec<String>, Fault> {
+        computing(py, || self.again(|from| export(from, &path, overwrite, with_cage)))
+    }
+
+    /// The model in a cage, m × 3: what the cage alone says of its n × 3 positions.
+    fn pose<'py>(&self, py: Python<'py>, cage: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>, Fault> {
+        let cage = Floats::new(cage, "cage")?.points()?;
+        computing(py, || Ok(self.shown(self.read_pose(cage)?)))?.of_points(py)
     }
 
     /// The capture with other cages, f × m × 3, as after editing in another program.

@@ -3,6 +3,7 @@
 mod arrays;
 mod capture;
 mod encode;
+mod export;
 mod fault;
 mod frames;
 mod geometry;

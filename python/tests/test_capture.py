@@ -140,6 +140,35 @@ def test_edited_cages_move_the_model(small, coded):
         coded.with_cages([])
 
 
+def test_a_model_is_posed_by_a_cage_as_by_an_edited_capture(small, coded):
+    cage = coded.cages[4] * [1, 1.25, 1]
+    assert np.array_equal(coded.pose(cage), coded.with_cages([cage])[0])
+    with pytest.raises(cager.CagerError, match="cage: has 7 vertices where the capture's has"):
+        coded.pose(cage[:7])
+    with pytest.raises(cager.CagerError, match="vertex 2 is too far away"):
+        coded.pose(np.where(np.arange(len(cage))[:, None] == 2, 1e39, cage))
+
+
+def test_frames_are_exported_for_other_programs(small, coded, tmp_path):
+    assert coded.export(tmp_path / "walk.npy") == []
+    assert np.array_equal(np.load(tmp_path / "walk.npy"), coded.decode())
+    for name in ("walk.usdc", "walk.abc"):
+        assert coded.export(tmp_path / name) == [] and (tmp_path / name).stat().st_size > 12 * coded.decode().size / 3
+    (loss,) = coded.export(tmp_path / "walk.glb")
+    assert "morph targets" in loss
+    coded.export(tmp_path / "caged.usdc", with_cage=True)
+    assert (tmp_path / "caged.usdc").stat().st_size > (tmp_path / "walk.usdc").stat().st_size
+    with pytest.raises(cager.CagerError, match="pass overwrite=True"):
+        coded.export(tmp_path / "walk.npy")
+    coded.export(tmp_path / "walk.npy", overwrite=True)
+    coded.save(tmp_path / "walk.cager")
+    opened = cager.open(tmp_path / "walk.cager")
+    for name, words in (("walk.cager", "is the capture itself"), ("walk.xyz", "walk.xyz")):
+        with pytest.raises(cager.CagerError, match=words):
+            opened.export(tmp_path / name, overwrite=True)
+    assert np.array_equal(cager.open(tmp_path / "walk.cager").decode(), coded.decode())
+
+
 def test_a_capture_far_away_keeps_its_digits(small):
     far = np.array([691_234.0, 5_334_987.0, 512.0])
     capture = cager.encode(small.rest + far, small.faces, small.frames + far, (small.cage[0] + far, small.cage[1]), max_error=1e-3)

@@ -1,6 +1,5 @@
 //! The program as its users meet it: command lines in, files, words and exit statuses out.
 
-mod blender;
 mod cage;
 mod cages_out;
 mod cases;

@@ -203,6 +203,17 @@ impl Positions {
         self.container.add_residual(frames, &mut positions).map_err(fail)?;
         Ok(positions)
     }
+
+    /// What a cage of vertices × 3 makes of the model, without the residual; the container's origin is subtracted from both.
+    ///
+    /// # Panics
+    /// Where the cage has not one row for each unknown.
+    pub fn of_cage(&self, cage: &[f32]) -> Vec<f32> {
+        let mut positions = [Vec::new()];
+        self.model.decoder.decode(&[cage], &mut positions);
+        let [positions] = positions;
+        positions
+    }
 }
 
 /// Frame rate and frame numbers of the output; `timing` overrides the container's, whose frames are counted from 0 where their numbers are damaged and

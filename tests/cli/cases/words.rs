@@ -23,7 +23,7 @@ fn scenes_that_are_not_read_name_the_way_out() {
     dir.write("scenes/f2.fbx", "Kaydara");
     for frames in ["walk.fbx", "scene.blend", "scenes", "scenes/*.fbx"] {
         let line = format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o out.cager");
-        refused(&dir, &line, &["not read", ".abc, .usdc, .pc2 or .mdd", "blender/export.py"]);
+        refused(&dir, &line, &["not read", ".abc, .usdc, .pc2 or .mdd", "docs/BLENDER.md"]);
     }
 }
 

@@ -75,6 +75,6 @@ pub(super) fn way_out(path: &Path) -> Option<String> {
         _ => return None,
     };
     Some(format!(
-        "is {kind}, which is not read; export the animated mesh as Alembic, USD or a point cache, .abc, .usdc, .pc2 or .mdd, or open it in Blender and run blender/export.py, which writes rest.obj and frames.npy"
+        "is {kind}, which is not read; export the animated mesh as Alembic, USD or a point cache, .abc, .usdc, .pc2 or .mdd, or open it in Blender and encode it there with the extension of docs/BLENDER.md"
     ))
 }

@@ -1,0 +1,16 @@
+"""Import, play, edit and encode .cager captures of animated meshes."""
+
+from . import captures, edit_operators, encode_operators, import_operators, live, panel, settings
+
+PARTS = (settings, import_operators, edit_operators, encode_operators, panel, live)
+
+
+def register():
+    for part in PARTS:
+        part.register()
+
+
+def unregister():
+    for part in reversed(PARTS):
+        part.unregister()
+    captures.forget()

@@ -1,0 +1,44 @@
+"""Cages as they are edited in the scene, in every frame of their capture."""
+
+import bpy
+import numpy as np
+
+from . import captures, live
+
+
+def leave_edit_mode(context):
+    """What is edited counts once Edit Mode is left."""
+    if context.object and context.object.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def edited_capture(context, model):
+    """The capture as it is seen in the scene, and the scene's frames that were edited. Raises CagerError."""
+    leave_edit_mode(context)
+    opened, scene = captures.of_model(model), context.scene
+    if model.cager.cage is None:
+        return opened.capture, []
+    cages, frames, before = np.array(opened.stored), [], scene.frame_current
+    try:
+        with live.paused():
+            for k in range(len(opened)):
+                scene.frame_set(model.cager.first + k)
+                points = live.cage_of(model, context.evaluated_depsgraph_get())
+                cage = None if points is None else opened.edited(k, points)
+                if cage is not None:
+                    cages[k] = cage
+                    frames.append(model.cager.first + k)
+    finally:
+        scene.frame_set(before)
+    return opened.capture.with_cages(cages) if frames else opened.capture, frames
+
+
+def spans(frames):
+    """Frames in words: 3, 5 to 9."""
+    parts, start = [], 0
+    for k in range(1, len(frames) + 1):
+        if k == len(frames) or frames[k] != frames[k - 1] + 1:
+            first, last = frames[start], frames[k - 1]
+            parts.append(str(first) if first == last else f"{first} to {last}")
+            start = k
+    return ", ".join(parts)

@@ -1,0 +1,84 @@
+"""File > Import > CageR capture, also by dropping a file on the 3D view."""
+
+import bpy
+import cager
+from bpy.props import BoolProperty, IntProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from . import captures, objects
+
+
+class ImportCapture(bpy.types.Operator, ImportHelper):
+    """Add a .cager capture to the scene: a model that is decoded as it plays, and the cage that moves it"""
+
+    bl_idname = "cager.import_capture"
+    bl_label = "Import CageR capture"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".cager"
+    filter_glob: StringProperty(default="*.cager", options={"HIDDEN"})
+    first: IntProperty(name="First frame", default=1, description="Frame of the scene that shows the capture's first")
+    y_is_up: BoolProperty(name="Y is up", description="Turn a capture of a program whose upward axis is Y, such as Maya")
+    with_cage: BoolProperty(name="Cage", default=True, description="Add the cage, with a shape key for each frame to edit")
+    set_range: BoolProperty(
+        name="Set frame range", default=True, description="Let the scene begin and end with the capture, at its frame rate where it has one"
+    )
+
+    def execute(self, context):
+        try:
+            model = imported(context, self.filepath, self.first, self.y_is_up, self.with_cage, self.set_range)
+        except (cager.CagerError, OSError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for each in context.selected_objects:
+            each.select_set(False)
+        model.select_set(True)
+        context.view_layer.objects.active = model
+        return {"FINISHED"}
+
+
+def imported(context, path, first, y_is_up=False, with_cage=True, set_range=True):
+    """Adds a capture to the scene and shows it; returns its model. Raises CagerError."""
+    scene = context.scene
+    model = objects.add(context, path, first, y_is_up, with_cage)
+    if set_range:
+        capture = captures.of_model(model).capture
+        scene.frame_start, scene.frame_end = first, first + len(capture) - 1
+        if capture.frame_rate:
+            # Blender keeps a whole number and what it is divided by.
+            scene.render.fps = max(1, round(capture.frame_rate))
+            scene.render.fps_base = scene.render.fps / capture.frame_rate
+    # The model is written while frames are rendered.
+    scene.render.use_lock_interface = True
+    scene.frame_set(scene.frame_current)
+    return model
+
+
+class CaptureFiles(bpy.types.FileHandler):
+    bl_idname = "CAGER_FH_capture"
+    bl_label = "CageR capture"
+    bl_import_operator = "cager.import_capture"
+    bl_file_extensions = ".cager"
+
+    @classmethod
+    def poll_drop(cls, context):
+        return context.area and context.area.type == "VIEW_3D"
+
+
+def menu(self, _):
+    self.layout.operator(ImportCapture.bl_idname, text="CageR capture (.cager)")
+
+
+CLASSES = (ImportCapture, CaptureFiles)
+
+
+def register():
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+    bpy.types.TOPBAR_MT_file_import.append(menu)
+
+
+def unregister():
+    bpy.types.TOPBAR_MT_file_import.remove(menu)
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)
