@@ -9,7 +9,6 @@ pub mod cli;
 mod compare;
 pub mod config;
 pub mod engine;
-mod far_frames;
 mod file_bodies;
 pub mod http;
 mod http_client;

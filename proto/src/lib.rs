@@ -15,7 +15,7 @@
 
 pub mod cage_messages;
 pub mod container;
-mod le;
+pub mod le;
 pub mod messages;
 pub mod record;
 pub mod recovery_messages;

@@ -4,7 +4,6 @@ use super::{CageJob, Finished, options, samples};
 use crate::admission::Held;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
-use crate::far_frames::Reach;
 use crate::idempotency::{extension, request};
 use crate::jobs::{Outcome, Phase, new_job};
 use crate::preparation::{check_extent, read_part};
@@ -13,6 +12,7 @@ use crate::service::Service;
 use crate::session::registry::Reserved;
 use crate::store::{CageJobMeta, ContentKey, Idempotency, Spool, Store, StoredPart};
 use crate::tasks::blocking;
+use cager_capture::reach::Reach;
 use cager_geometry::mesh::diagonal;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
@@ -186,8 +186,7 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
     }
     let mut far = None;
     samples::read(&mut *reader, count, |frame, points| {
-        let positions = points.as_chunks::<3>().0.iter().copied();
-        far = far.take().or_else(|| Some((frame, reach.refusal(frame, frame == 0, "point", positions)?)));
+        far = far.take().or_else(|| Some((frame, reach.refusal(frame as u64, frame == 0, "point", points)?)));
     })?;
     if let Some((frame, detail)) = far {
         let frame = u32::try_from(frame).unwrap_or(u32::MAX);

@@ -15,6 +15,7 @@ use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
+use cager_proto::le;
 use futures_util::StreamExt as _;
 use futures_util::stream::BoxStream;
 use http::{HeaderValue, header};
@@ -91,7 +92,7 @@ pub(crate) async fn post(
         let mut positions = vec![Vec::new(); cages.len()];
         decoder.decode(&views, &mut positions);
         for (positions, reply) in positions.into_iter().zip(replies) {
-            let bytes: Vec<u8> = positions.iter().flat_map(|x| x.to_le_bytes()).collect();
+            let bytes = le::f32_bytes(&positions);
             // The client may be gone.
             let _ = reply.send(bytes.into());
         }
@@ -266,13 +267,12 @@ impl Decoding {
         let _queued = self.queued.take(&self.session.meta.tenant, count).await;
         let mut replies = Vec::new();
         for cage in bytes.chunks_exact(self.frame_bytes as usize) {
-            let cage: Vec<f32> = cage.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-            if let Some(k) = cage.iter().position(|x| !x.is_finite()) {
+            if let Some(k) = le::first_not_finite(cage) {
                 let detail = format!("cage {}: vertex {} is not finite", self.next, k / 3);
                 return Err(ApiError::new(problem::INVALID_FRAME, detail));
             }
             let (reply, positions) = oneshot::channel();
-            self.lane.push(Job { cage, reply });
+            self.lane.push(Job { cage: le::f32s(cage), reply });
             replies.push(positions);
             self.next += 1;
         }

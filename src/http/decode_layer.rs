@@ -13,6 +13,7 @@ use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use cager_core::inversion::BATCH;
+use cager_proto::le;
 use http::header;
 use serde::Deserialize;
 use std::collections::VecDeque;
@@ -164,10 +165,8 @@ impl Decoding {
             let work = move || {
                 let _place = place;
                 let frames = threads.install(|| decode(&session, &source, layer, next as u32, wanted))?;
-                let owned = |positions: Vec<f32>| OwnedFrame {
-                    bytes: positions.iter().flat_map(|x| x.to_le_bytes()).collect(),
-                    _memory: Arc::clone(&memory),
-                };
+                let owned =
+                    |positions: Vec<f32>| OwnedFrame { bytes: le::f32_bytes(&positions), _memory: Arc::clone(&memory) };
                 Ok::<_, ApiError>(frames.into_iter().map(|positions| Bytes::from_owner(owned(positions))).collect())
             };
             self.ready = tokio::select! {
@@ -197,7 +196,7 @@ fn decode(
             let entries = session.frames().run(next, wanted);
             let mut bytes = Vec::new();
             session.read_cages(&entries, &mut bytes)?;
-            let numbers: Vec<f32> = bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect();
+            let numbers = le::f32s(&bytes);
             let cages: Vec<&[f32]> = numbers.chunks_exact((numbers.len() / entries.len().max(1)).max(1)).collect();
             let mut positions = vec![Vec::new(); cages.len()];
             prepared.solver.decoder().decode(&cages, &mut positions);

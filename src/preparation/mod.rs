@@ -15,10 +15,10 @@ pub(crate) use choices::{Choices, check_told, content_key, goal};
 pub(crate) use geometry::{Geometry, cage_of, read, read_cage, read_part};
 pub(crate) use solvers::{SolverRequest, SolverResponse, Solvers};
 
-use crate::far_frames::Reach;
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::ApiError;
 use crate::speed::StepClock;
+use cager_capture::reach::Reach;
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareContext, PrepareError, Solver, SolverOptions};
 use checks::{check_memory, refused};

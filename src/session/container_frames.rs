@@ -2,11 +2,11 @@
 
 use super::Session;
 use super::groups::StoredGroup;
-use super::solve::numbers;
 use crate::capture::{CaptureWriter, Encoding, StoredError};
 use crate::coding::Carried;
 use crate::preparation::{Choices, Geometry, Prepared};
 use cager_proto::container;
+use cager_proto::le;
 use std::io::{self, Write};
 
 /// Stored frames read at a time.
@@ -84,7 +84,7 @@ impl<W: Write> ContainerFrames<W> {
         session.read_cages(&entries, &mut bytes)?;
         for (entry, bytes) in entries.iter().zip(bytes.chunks_exact((bytes.len() / entries.len().max(1)).max(1))) {
             let error = StoredError { l2: entry.l2, linf: entry.linf, squared: entry.squared, spread: entry.spread };
-            self.writer.write_frame(&numbers(bytes), &error).map_err(plain)?;
+            self.writer.write_frame(&le::f32s(bytes), &error).map_err(plain)?;
         }
         Ok(!entries.is_empty())
     }

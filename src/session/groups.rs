@@ -2,7 +2,6 @@
 
 use super::container_frames::ContainerFrames;
 use super::facts::Facts;
-use super::solve::numbers;
 use super::{Phase, Session};
 use crate::capture::StoredError;
 use crate::coding::{Carried, Goal, GroupCoder, GroupDecoder, group_frames};
@@ -12,6 +11,7 @@ use crate::service::Service;
 use crate::store::{FrameEntry, SessionBytes, StoreError};
 use crate::sync::lock;
 use crate::tasks::blocking;
+use cager_proto::le;
 use cager_proto::messages::CodedFrames;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -252,7 +252,7 @@ impl Session {
                 _ => Err(self.damaged(format!("frame {} does not match its checksum", entry.frame))),
             });
             read.map_err(|error| self.fail_if_damaged(error))?;
-            coder.push(numbers(&frame).into_iter().map(f64::from).collect(), numbers(cage));
+            coder.push(le::f32s(&frame).into_iter().map(f64::from).collect(), le::f32s(cage));
         }
         let coded = coder.close().map_err(|error| {
             let mut error = cannot_be_coded(goal, &error);

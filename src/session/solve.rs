@@ -9,7 +9,7 @@ use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
 use cager_core::inversion::Rows;
-use cager_geometry::mesh::Point;
+use cager_proto::le;
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Instant;
@@ -31,6 +31,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
     let mut whole = Vec::new();
     let mut handles = Vec::new();
     let mut measured = Vec::new();
+    let mut positions = Vec::new();
     for mut job in jobs {
         if job.upload.is_abandoned() || session.is_deleted() {
             continue;
@@ -42,13 +43,15 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             continue;
         }
         let what = if job.rows == Rows::All { "point" } else { "handle" };
-        if let Some(row) = first_not_finite(&job.bytes) {
+        if let Some(number) = le::first_not_finite(&job.bytes) {
+            let row = number / 3;
             let detail = format!("frame {}: {what} {row} is not finite; export this frame again", job.frame);
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }
         let is_first = job.frame == 0 || session.frames().is_empty();
-        if let Some(detail) = prepared.reach.refusal(job.frame, is_first, what, points(&job.bytes)) {
+        le::read_f32(&job.bytes, &mut positions);
+        if let Some(detail) = prepared.reach.refusal_of_f32(job.frame.into(), is_first, what, &positions) {
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }
@@ -140,7 +143,7 @@ fn measure(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<(FrameJob, Dig
             fail_all(session, vec![(job, digests)], guard, &error);
             continue;
         }
-        let (cage, points) = (numbers(&bytes), numbers(&job.bytes));
+        let (cage, points) = (le::f32s(&bytes), le::f32s(&job.bytes));
         let errors = prepared.solver.decoder().measure(&[&cage], &[&points]);
         let error = StoredError::new(&errors[0], prepared.solver.diagonal());
         finish(session, vec![(job, digests)], vec![cage], vec![error], guard);
@@ -168,7 +171,7 @@ fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiErr
     let Some(entry) = session.frames().entry(before).copied() else { return Err(predecessor_missing(frame)) };
     let mut bytes = Vec::new();
     session.read_cages(&[entry], &mut bytes)?;
-    Ok(Some(numbers(&bytes)))
+    Ok(Some(le::f32s(&bytes)))
 }
 
 /// The error for a frame whose predecessor is not solved.
@@ -199,8 +202,7 @@ fn solve_batch(
     let mut buffers = FRAME_BUFFERS.take();
     buffers.resize_with(buffers.len().max(jobs.len()), Vec::new);
     for ((job, _), buffer) in jobs.iter().zip(&mut buffers) {
-        buffer.clear();
-        buffer.extend(job.bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)));
+        le::read_f32(&job.bytes, buffer);
     }
     let views: Vec<&[f32]> = buffers[..jobs.len()].iter().map(Vec::as_slice).collect();
     let solver = &prepared.solver;
@@ -277,26 +279,6 @@ impl Drop for ClaimGuard<'_> {
     }
 }
 
-/// Little-endian numbers.
-pub(super) fn numbers(bytes: &[u8]) -> Vec<f32> {
-    bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect()
-}
-
-fn first_not_finite(bytes: &[u8]) -> Option<usize> {
-    // NaN and infinity have an exponent of all ones; a branch-free fold finds them at memory bandwidth.
-    let suspicious = |b: &[u8]| u8::from(b[3] & 0x7f == 0x7f && b[2] & 0x80 == 0x80);
-    if bytes.chunks_exact(4).fold(0, |any, b| any | suspicious(b)) == 0 {
-        return None;
-    }
-    bytes.chunks_exact(4).position(|b| suspicious(b) == 1).map(|k| k / 3)
-}
-
-/// The points of a frame.
-fn points(bytes: &[u8]) -> impl Iterator<Item = Point> + Clone {
-    let number = |b: [u8; 4]| f64::from(f32::from_le_bytes(b));
-    bytes.as_chunks::<4>().0.as_chunks::<3>().0.iter().map(move |&[x, y, z]| [number(x), number(y), number(z)])
-}
-
 fn digests(prepared: &Prepared, job: &FrameJob) -> Digests {
     let short = |hash: blake3::Hash| {
         let mut digest = [0; 16];
@@ -312,18 +294,5 @@ fn digests(prepared: &Prepared, job: &FrameJob) -> Digests {
             }
             Digests { handles: short(blake3::hash(&rows)), full: Some(short(blake3::hash(&job.bytes))) }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_that_are_not_finite_are_found() {
-        let bytes = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-        assert_eq!(first_not_finite(&bytes(&[0.0, -1.5, f32::MAX, f32::MIN_POSITIVE, 1e-45, f32::MIN])), None);
-        assert_eq!(first_not_finite(&bytes(&[0.0, 0.0, 0.0, 1.0, f32::NAN, 0.0])), Some(1));
-        assert_eq!(first_not_finite(&bytes(&[f32::NEG_INFINITY, 0.0, 0.0])), Some(0));
     }
 }

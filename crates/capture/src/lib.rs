@@ -16,5 +16,6 @@ pub mod memory;
 pub mod mismatch;
 pub mod origin;
 pub mod preparation_warnings;
+pub mod reach;
 pub mod speed;
 pub mod timing;

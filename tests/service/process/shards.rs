@@ -88,7 +88,7 @@ async fn what_a_killed_process_had_others_go_on_with() {
         assert_eq!(api.errors(id).await, *told);
     }
     let took = clock.elapsed();
-    println!("all tenants answered {} ms after the kill", took.as_millis());
+    eprintln!("all tenants answered {} ms after the kill", took.as_millis());
     assert!(took < Duration::from_secs(5), "{took:?}");
     shared_out(&database, "4").await;
     for (api, id, _) in &made {
@@ -138,7 +138,7 @@ async fn processes_are_replaced_one_after_the_other_without_a_failed_request() {
         }
     };
     let (slowest, ()) = tokio::join!(asking, replacing);
-    println!("two processes were replaced; the slowest pair of requests took {} ms", slowest.as_millis());
+    eprintln!("two processes were replaced; the slowest pair of requests took {} ms", slowest.as_millis());
     for (api, id) in &made {
         api.complete(id, 40).await.expect(200);
         assert!(api.container(id).await == capture.encoded(40));

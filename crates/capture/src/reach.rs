@@ -10,22 +10,31 @@ const MAX_DIAGONALS: f64 = 1e5;
 
 /// Where the points of a capture's frames may lie.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Reach {
+pub struct Reach {
     centre: Point,
     diagonal: f64,
 }
 
 impl Reach {
     /// Around the middle of these points; `diagonal` is that of the rest pose.
-    pub(crate) fn around(points: &[Point], diagonal: f64) -> Self {
+    pub fn around(points: &[Point], diagonal: f64) -> Self {
         let (low, high) = bounds(points);
         Self { centre: std::array::from_fn(|k| (low[k] + high[k]) / 2.0), diagonal }
     }
 
-    /// Why a frame is none, if it is: `frame` is its number, and `what` its rows are, such as `point`.
-    pub(crate) fn refusal(
+    /// Why a frame is none, if it is: `frame` is its number, `what` its rows are, such as `point`, and `positions` three numbers for each.
+    pub fn refusal(&self, frame: u64, is_first: bool, what: &str, positions: &[f64]) -> Option<String> {
+        self.refusal_of(frame, is_first, what, positions.as_chunks().0.iter().copied())
+    }
+
+    /// As [`Self::refusal`].
+    pub fn refusal_of_f32(&self, frame: u64, is_first: bool, what: &str, positions: &[f32]) -> Option<String> {
+        self.refusal_of(frame, is_first, what, positions.as_chunks::<3>().0.iter().map(|point| point.map(f64::from)))
+    }
+
+    fn refusal_of(
         &self,
-        frame: impl std::fmt::Display,
+        frame: u64,
         is_first: bool,
         what: &str,
         points: impl Iterator<Item = Point> + Clone,
@@ -63,16 +72,16 @@ mod tests {
     fn a_capture_begins_near_its_rest_pose_and_travels_on_from_there() {
         let rest = [[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [2.0, 0.0, 0.0]];
         let reach = Reach::around(&rest, 1.0);
-        let moved = |by: f64| rest.map(|[x, y, z]| [x + by, y, z]).into_iter();
-        assert_eq!(reach.refusal(0, true, "point", moved(99.0)), None);
-        assert_eq!(reach.refusal(9, false, "point", moved(5000.0)), None);
-        let said = reach.refusal(0, true, "point", moved(300.0)).expect("too far");
+        let moved = |by: f64| rest.map(|[x, y, z]| [x + by, y, z]);
+        assert_eq!(reach.refusal(0, true, "point", moved(99.0).as_flattened()), None);
+        assert_eq!(reach.refusal(9, false, "point", moved(5000.0).as_flattened()), None);
+        let said = reach.refusal(0, true, "point", moved(300.0).as_flattened()).expect("too far");
         assert!(said.starts_with("frame 0: its first frame lies 300 diagonals"), "{said}");
         // One stray point is no reason.
         let stray = [rest[0], rest[1], [0.0, 300.0, 0.0]];
-        assert_eq!(reach.refusal(0, true, "point", stray.into_iter()), None);
-        let said = reach.refusal(7, false, "point", [rest[0], [0.0, 1e30, 0.0]].into_iter()).expect("too far");
+        assert_eq!(reach.refusal(0, true, "point", stray.as_flattened()), None);
+        let said = reach.refusal(7, false, "point", [rest[0], [0.0, 1e30, 0.0]].as_flattened()).expect("too far");
         assert!(said.starts_with("frame 7: point 1 lies 1.0e30 diagonals"), "{said}");
-        assert!(reach.refusal(7, false, "point", [rest[0], [0.0, f64::MAX, 0.0]].into_iter()).is_some());
+        assert!(reach.refusal(7, false, "point", [rest[0], [0.0, f64::MAX, 0.0]].as_flattened()).is_some());
     }
 }
