@@ -16,6 +16,8 @@ FROM rust:${RUST_VERSION}-bookworm AS build
 WORKDIR /src
 COPY . .
 COPY --from=page /web/dist web/dist
+# For `cager --version`, as the context has no history: --build-arg CAGER_COMMIT="$(git rev-parse --short=10 HEAD)"
+ARG CAGER_COMMIT
 RUN --mount=type=cache,target=/usr/local/cargo/registry \
     --mount=type=cache,target=/src/target \
     cargo build --release --locked --bin cager \
