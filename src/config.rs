@@ -235,8 +235,8 @@ impl ServeConfig {
         if self.blobs.is_some() && self.catalog.is_none() {
             return Err(ConfigError::Half { given: "blobs", missing: "catalog" });
         }
-        if self.shards > 1 && self.catalog.is_none() {
-            return Err(ConfigError::Half { given: "shards", missing: "catalog" });
+        if self.shards > 1 {
+            self.check_shards()?;
         }
         if self.oidc_keys.is_some() && self.oidc_issuer.is_none() {
             return Err(ConfigError::Half { given: "oidc_keys", missing: "oidc_issuer" });
@@ -244,11 +244,39 @@ impl ServeConfig {
         Ok(())
     }
 
+    /// Refuses what several processes cannot share.
+    fn check_shards(&self) -> Result<(), ConfigError> {
+        if self.catalog.is_none() {
+            return Err(ConfigError::Half { given: "shards", missing: "catalog" });
+        }
+        if !self.is_guarded() {
+            return Err(ConfigError::Half { given: "shards", missing: "tokens" });
+        }
+        let path = |url: &String| url.trim_end_matches('/').splitn(4, '/').nth(3).is_some_and(|path| !path.is_empty());
+        if let Some(url) = self.blobs.as_ref().filter(|url| !path(url)) {
+            return Err(ConfigError::Shards {
+                why: format!(
+                    "blobs: {url} names a bucket without a path, and each shard needs one of its own: write {}/cager",
+                    url.trim_end_matches('/')
+                ),
+            });
+        }
+        let is_address = |url: &String| {
+            let parsed = reqwest::Url::parse(url).ok();
+            parsed.is_some_and(|url| matches!(url.scheme(), "http" | "https") && url.has_host() && url.path() == "/")
+        };
+        match self.advertise.as_ref().filter(|url| !is_address(url)) {
+            Some(url) => Err(ConfigError::Shards {
+                why: format!("advertise: {url} is no address such as http://10.0.0.5:8080 or http://[fd00::5]:8080"),
+            }),
+            None => Ok(()),
+        }
+    }
+
     /// As it is for one of its shards: the first one is where all was before it was divided. What is kept is shared out among them.
     pub(crate) fn of_shard(&self, shard: Shard) -> Self {
         let of = u64::from(shard.of);
         let mut config = Self {
-            cache_bytes: self.cache_bytes / of,
             prepared_disk_bytes: self.prepared_disk_bytes / of,
             blobs_kept_bytes: self.blobs_kept_bytes / of,
             ..self.clone()

@@ -6,6 +6,7 @@ use crate::auth::{Access, Tenant};
 use crate::cage_job::{DesignPool, Designer};
 use crate::config::ServeConfig;
 use crate::engine::{Engine, threads};
+use crate::preparation::{KeptSolvers, kept_solvers};
 use crate::problem::{self, ApiError};
 use crate::session::commit::Committer;
 use crate::store::StoreError;
@@ -51,6 +52,8 @@ pub struct Resources {
     pub(crate) transferring: Arc<Budget>,
     /// Memory of shape spaces, in bytes.
     pub(crate) shape_memory: Arc<Budget>,
+    /// Solvers in memory.
+    pub(crate) kept_solvers: Arc<KeptSolvers>,
     /// Solvers being prepared and cages being made, each of both.
     pub(crate) preparing: Arc<Budget>,
     pub(crate) making_cages: Arc<Budget>,
@@ -151,6 +154,7 @@ impl Resources {
             recoveries_kept: config.budget(config.max_recoveries as u64 + RECOVERIES_KEPT),
             transferring: config.budget(config.max_transfers as u64),
             shape_memory: config.budget(config.shape_bytes),
+            kept_solvers: kept_solvers(config.budget(config.cache_bytes)),
             preparing: config.budget(config.max_preparing as u64),
             making_cages: config.budget(config.max_preparing as u64),
             preparers: Arc::new(pool("prepare", config.workers, threads::NICE_PREPARE)?),

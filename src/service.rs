@@ -10,7 +10,7 @@ use crate::resources::Resources;
 pub use crate::resources::StartError;
 use crate::session::registry::Registry;
 use crate::shape_spaces::ShapeSpaces;
-use crate::store::{ContentKey, Disk, Shard, Shared, Store, StoreError};
+use crate::store::{ContentKey, Disk, Opened, Shard, Shared, Store, StoreError};
 use crate::tasks::blocking;
 use crate::transfers::Transfer;
 use crate::webhooks::Webhooks;
@@ -107,6 +107,21 @@ impl Service {
             tracing::error!(name = %damaged.name, path = %damaged.path.display(), why = %damaged.why, "damaged, and left out");
             metrics::counter!("cager_quarantined_total").increment(1);
         }
+        let (store, stopping) = (opened.store.clone(), stop.clone());
+        Self::of_opened(resources, config, opened, stop).inspect_err(|_| {
+            // What has begun already ends, and another process may try.
+            stopping.cancel();
+            store.release();
+        })
+    }
+
+    /// The service of what is stored.
+    fn of_opened(
+        resources: Arc<Resources>,
+        config: ServeConfig,
+        opened: Opened,
+        stop: CancellationToken,
+    ) -> Result<Arc<Self>, StartError> {
         let webhooks = Webhooks::open(config.webhooks.as_deref(), opened.store.clone(), stop.clone())?;
         let owners = opened.sessions.iter().map(|meta| (meta.key, meta.tenant.clone())).collect();
         let solvers = Arc::new(Solvers::new(opened.store.clone(), &config, &resources, &owners));

@@ -97,6 +97,11 @@ async fn serve_shards(
                     "{own}: other processes cannot be told to ask there; say by --advertise where they reach this one"
                 );
             }
+            if own.ip().is_loopback() {
+                tracing::warn!(
+                    "only processes on this machine can ask this one at {own}: --advertise gives another address"
+                );
+            }
             format!("{}://{own}", if tls.is_some() { "https" } else { "http" })
         }
     };

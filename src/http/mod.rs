@@ -42,6 +42,8 @@ mod spooled;
 mod transfers;
 
 pub use admin::{Operated, admin};
+pub(crate) use guarded::until;
 pub(crate) use health::{health, may_see_metrics, rendered_metrics};
 pub(crate) use page::file as page_file;
+pub(crate) use router::finished;
 pub use router::{document, router, seen, seen_by_operators, spare};

@@ -143,7 +143,7 @@ pub fn router(service: Arc<Service>) -> Router {
 }
 
 /// Adds the middleware common to all routes: request ids, logging, problem details and content codings.
-pub(super) fn finished(routes: Router) -> Router {
+pub(crate) fn finished(routes: Router) -> Router {
     routes
         .layer(CatchPanicLayer::custom(|panic: Box<dyn std::any::Any + Send>| {
             let text = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());

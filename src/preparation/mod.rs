@@ -13,7 +13,7 @@ pub(crate) use cage_maker::{
 pub(crate) use checks::{cannot_be_coded, check, check_model};
 pub(crate) use choices::{Choices, check_told, content_key, goal};
 pub(crate) use geometry::{Geometry, cage_of, read, read_cage, read_part};
-pub(crate) use solvers::{SolverRequest, SolverResponse, Solvers};
+pub(crate) use solvers::{KeptSolvers, SolverRequest, SolverResponse, Solvers, kept_solvers};
 
 use crate::preparation_warnings::preparation_warnings;
 use crate::problem::ApiError;

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Values by content key.
-pub(super) struct SharedCache<V> {
+pub(crate) struct SharedCache<V> {
     budget: Arc<Budget>,
     entries: HashMap<ContentKey, Entry<V>>,
     clock: u64,
@@ -24,7 +24,7 @@ impl<V> SharedCache<V> {
     }
 
     /// Bytes in use.
-    pub(super) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.budget.used()
     }
 

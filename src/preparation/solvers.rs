@@ -42,9 +42,19 @@ pub(crate) struct SolverRequest {
 /// Solver files read at a time: more would compete for the same disk.
 const MAX_CONCURRENT_LOADS: u64 = 4;
 
+/// Solvers in memory.
+pub(crate) type KeptSolvers = Mutex<SharedCache<Arc<Prepared>>>;
+
+/// No solvers in memory yet, and room for so many bytes.
+pub(crate) fn kept_solvers(budget: Arc<Budget>) -> Arc<KeptSolvers> {
+    Arc::new(Mutex::new(SharedCache::new(budget)))
+}
+
 /// The cache of solvers.
 pub(crate) struct Solvers {
-    inner: Mutex<Inner>,
+    flights: Mutex<HashMap<ContentKey, InFlight>>,
+    /// Those in memory, of all services of the process.
+    kept: Arc<KeptSolvers>,
     store: Store,
     /// Solver files.
     files: Mutex<SharedCache<()>>,
@@ -55,11 +65,6 @@ pub(crate) struct Solvers {
     /// Limits concurrent reads of solver files.
     loads: Arc<Budget>,
     pool: Arc<rayon::ThreadPool>,
-}
-
-struct Inner {
-    kept: SharedCache<Arc<Prepared>>,
-    flights: HashMap<ContentKey, InFlight>,
 }
 
 struct InFlight {
@@ -77,10 +82,8 @@ impl Solvers {
         owners: &HashMap<ContentKey, String>,
     ) -> Self {
         let solvers = Self {
-            inner: Mutex::new(Inner {
-                kept: SharedCache::new(config.budget(config.cache_bytes)),
-                flights: HashMap::new(),
-            }),
+            flights: Mutex::default(),
+            kept: Arc::clone(&resources.kept_solvers),
             files: Mutex::new(SharedCache::new(config.budget(config.prepared_disk_bytes))),
             max_bytes: config.max_prepare_bytes,
             places: Arc::clone(&resources.preparing),
@@ -109,7 +112,7 @@ impl Solvers {
 
     /// The solver of a content if it is in memory.
     pub(crate) fn in_memory(&self, key: &ContentKey) -> Option<Arc<Prepared>> {
-        let prepared = lock(&self.inner).kept.get(key).cloned()?;
+        let prepared = lock(&self.kept).get(key).cloned()?;
         metrics::counter!("cager_cache_total", "result" => "memory").increment(1);
         Some(prepared)
     }
@@ -121,25 +124,20 @@ impl Solvers {
 
     /// Drops all solvers from the cache; returns their size in bytes.
     pub(crate) fn evict(&self) -> u64 {
-        let mut inner = lock(&self.inner);
-        let bytes = inner.kept.bytes();
-        inner.kept.clear();
+        let mut kept = lock(&self.kept);
+        let bytes = kept.bytes();
+        kept.clear();
         bytes
-    }
-
-    /// Bytes of solvers in memory.
-    pub(crate) fn bytes(&self) -> u64 {
-        lock(&self.inner).kept.bytes()
     }
 
     /// Number of preparations that run or wait.
     pub(crate) fn in_flight(&self) -> usize {
-        lock(&self.inner).flights.len()
+        lock(&self.flights).len()
     }
 
     /// Number of a tenant's preparations that run or wait.
     pub(crate) fn in_flight_of(&self, tenant: &str) -> usize {
-        lock(&self.inner).flights.values().filter(|flight| flight.tenant == tenant).count()
+        lock(&self.flights).values().filter(|flight| flight.tenant == tenant).count()
     }
 
     /// The solver of a content: from memory, from disk, or prepared now. If all callers give up, the preparation is cancelled before its
@@ -157,14 +155,14 @@ impl Solvers {
 
     /// Joins the running preparation of the content or starts one; and whether it was started here.
     fn join_or_start(self: &Arc<Self>, wanted: SolverRequest) -> (ResultReceiver, bool) {
-        let mut inner = lock(&self.inner);
-        if let Some(flight) = inner.flights.get(&wanted.key) {
+        let mut flights = lock(&self.flights);
+        if let Some(flight) = flights.get(&wanted.key) {
             metrics::counter!("cager_cache_total", "result" => "joined").increment(1);
             return (flight.sender.subscribe(), false);
         }
         let (sender, flight) = watch::channel(None);
         let sender = Arc::new(sender);
-        inner.flights.insert(wanted.key, InFlight { sender: Arc::clone(&sender), tenant: wanted.tenant.clone() });
+        flights.insert(wanted.key, InFlight { sender: Arc::clone(&sender), tenant: wanted.tenant.clone() });
         let solvers = Arc::clone(self);
         tokio::spawn(async move { solvers.run_preparation(wanted, &sender).await });
         (flight, true)
@@ -184,7 +182,7 @@ impl Solvers {
         if let Ok(got) = &result {
             self.keep(&wanted.tenant, key, &got.prepared);
         }
-        lock(&self.inner).flights.remove(&key);
+        lock(&self.flights).remove(&key);
         let fresh = result.as_ref().ok().filter(|got| got.cache == CacheUse::Miss).map(|got| Arc::clone(&got.prepared));
         // All receivers may be gone.
         let _ = sender.send(Some(result));
@@ -196,10 +194,10 @@ impl Solvers {
 
     /// Removes a preparation that no caller waits for; false if one has joined.
     fn cancel_if_unawaited(&self, key: &ContentKey, sender: &ResultSender) -> bool {
-        let mut inner = lock(&self.inner);
+        let mut flights = lock(&self.flights);
         let off = sender.receiver_count() == 0;
         if off {
-            inner.flights.remove(key);
+            flights.remove(key);
         }
         off
     }
@@ -311,8 +309,7 @@ impl Solvers {
     }
 
     fn keep(&self, tenant: &str, key: ContentKey, prepared: &Arc<Prepared>) {
-        let mut inner = lock(&self.inner);
-        let gone = inner.kept.insert(tenant, key, prepared.solver.size_bytes() as u64, Arc::clone(prepared));
+        let gone = lock(&self.kept).insert(tenant, key, prepared.solver.size_bytes() as u64, Arc::clone(prepared));
         metrics::counter!("cager_cache_evictions_total")
             .increment(gone.iter().filter(|gone| **gone != key).count() as u64);
     }

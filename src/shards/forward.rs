@@ -1,5 +1,6 @@
 //! Requests that another process answers.
 
+use crate::http::until;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
 use axum::body::Body;
@@ -15,6 +16,7 @@ use http_body_util::BodyExt;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
 
 /// How often a request has been sent on.
 const HOPS: HeaderName = HeaderName::from_static("cager-hops");
@@ -44,6 +46,26 @@ pub(super) enum Sent {
     Lost(ApiError),
 }
 
+/// For how long a request may go on elsewhere.
+pub(super) struct Going {
+    /// Who lives.
+    pub(super) seen: watch::Receiver<Membership>,
+    /// This process ends.
+    pub(super) ended: CancellationToken,
+}
+
+impl Going {
+    /// Ends when the process at `address` has ended, or this one.
+    async fn over(mut self, address: String) {
+        let is_gone = |seen: &Membership| !seen.processes.values().any(|known| *known == address);
+        tokio::select! {
+            // An error means that this process ends.
+            _ = self.seen.wait_for(is_gone) => {}
+            () = self.ended.cancelled() => {}
+        }
+    }
+}
+
 /// Sends requests to other processes.
 pub(super) struct Forwarder {
     client: reqwest::Client,
@@ -62,14 +84,8 @@ impl Forwarder {
         Ok(Self { client: builder.redirect(reqwest::redirect::Policy::none()).build()? })
     }
 
-    /// Sends a request to the process at `address`, for as long as `is_there` says of what is seen that it lives.
-    pub(super) async fn send(
-        &self,
-        request: Request,
-        address: &str,
-        mut seen: watch::Receiver<Membership>,
-        is_there: impl Fn(&Membership) -> bool,
-    ) -> Sent {
+    /// Sends a request to the process at `address`.
+    pub(super) async fn send(&self, request: Request, address: &str, going: Going) -> Sent {
         let (parts, body) = request.into_parts();
         let hops = parts.headers.get(HOPS).and_then(|hops| hops.to_str().ok()?.parse().ok()).unwrap_or(0u32);
         if hops >= MOST_HOPS {
@@ -90,23 +106,20 @@ impl Forwarder {
         if has_body {
             sent = sent.body(reqwest::Body::wrap_stream(taken_when_read(Arc::clone(&body))));
         }
-        let gone = async {
-            // An error means that this process ends.
-            let _ = seen.wait_for(|seen| !is_there(seen)).await;
-        };
+        let mut over = Box::pin(going.over(address.to_owned()));
         let answered = tokio::select! {
             answered = sent.send() => answered,
-            () = gone => return unanswered(parts, &body, has_body, "it has ended"),
+            () = &mut over => return unanswered(parts, &body, has_body, "one of the two has ended"),
         };
         match answered {
             Ok(response) => {
                 metrics::counter!("cager_forwarded_total").increment(1);
                 let (mut head, body) = http::Response::<reqwest::Body>::from(response).into_parts();
                 head.headers = end_to_end(&head.headers);
-                Sent::Answered(Response::from_parts(head, Body::new(body)))
+                Sent::Answered(Response::from_parts(head, until(Body::new(body), over, ())))
             }
             Err(error) => {
-                tracing::debug!(address, %error, "a request was not answered by another process");
+                tracing::warn!(address, %error, "another process does not answer");
                 // Of a request without a body it is not known whether it was seen.
                 unanswered(parts, &body, has_body || error.is_connect(), "it does not answer")
             }

@@ -3,27 +3,27 @@
 
 mod forward;
 mod hold;
+mod leave;
 mod routes;
+mod share;
 
 pub(crate) use hold::start;
 pub(crate) use routes::{answered, seen, seen_by_operators};
 
 use crate::config::ServeConfig;
-use crate::http::Operated;
 use crate::http::listen::ConnectionHandle;
+use crate::http::{Operated, until};
 use crate::problem::{self, ApiError};
 use crate::resources::Resources;
 use crate::service::Service;
 use crate::sync::lock;
 use crate::tasks::blocking;
 use axum::Router;
-use axum::body::Body;
 use axum::extract::Request;
 use axum::response::{IntoResponse, Response};
 use cager_store::{Members, Membership};
-use forward::{Forwarder, Sent};
+use forward::{Forwarder, Going, Sent};
 use http::request::Parts;
-use http_body_util::BodyExt;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -47,12 +47,19 @@ pub(crate) struct Shards {
     own: Mutex<BTreeMap<u32, Own>>,
     /// What was seen last.
     seen: watch::Sender<Membership>,
+    /// When that was.
+    seen_at: Mutex<Instant>,
     /// When it could not be seen for the last time.
     trouble: Mutex<Option<Instant>>,
+    /// Held while shards are taken.
+    taking: tokio::sync::Mutex<()>,
     /// Shards of tenants, which do not change.
     tenants: Mutex<HashMap<String, u32>>,
     forwarder: Forwarder,
+    /// The process is about to end: it gives its shards up, and goes on sending requests to others.
     stop: CancellationToken,
+    /// It has given them up: what passes through it ends.
+    ended: CancellationToken,
 }
 
 /// A shard that this process has.
@@ -60,6 +67,8 @@ struct Own {
     service: Arc<Service>,
     router: Router,
     stop: CancellationToken,
+    /// Ends requests that go on although they were told to end.
+    cut: CancellationToken,
     /// Requests in progress.
     requests: TaskTracker,
     /// It is being given up: new requests wait for the process that gets it.
@@ -69,7 +78,7 @@ struct Own {
 /// Whose a request is.
 enum Asked {
     /// That of a tenant, in its shard.
-    Shard(u32),
+    Shard(u32, String),
     /// Nobody's: any process can answer.
     Any,
 }
@@ -93,35 +102,59 @@ impl Shards {
     /// Answers a request, here or by the process that has its tenant's shard.
     async fn answer(&self, request: Request) -> Response {
         let (parts, body) = request.into_parts();
+        let path = parts.uri.path().to_owned();
         let asked = match self.asked(&parts).await {
             Ok(asked) => asked,
-            Err(error) => return error.into_response(),
+            Err(error) => return self.refuse(error, &path, "database"),
         };
         let mut request = Request::from_parts(parts, body);
         let mut news = self.seen.subscribe();
         let deadline = Instant::now() + PATIENCE;
+        // What waits counts as a request of its tenant, as what is at work does.
+        let mut place = None;
         loop {
             news.mark_unchanged();
-            if let Some((router, token)) = self.enter(&asked) {
-                return counted(router.oneshot(request).await.into_response(), token);
+            if let Some(here) = self.enter(&asked) {
+                let answered = here.cut.clone().run_until_cancelled_owned(here.router.oneshot(request)).await;
+                let Some(answered) = answered else { return self.refuse(moved(), &path, "moved") };
+                let cut = here.cut.cancelled_owned();
+                return answered.into_response().map(|body| until(body, cut, here.token));
             }
             if let Some(address) = self.elsewhere(&asked) {
-                let is_there = |seen: &Membership| seen.processes.values().any(|known| *known == address);
-                match self.forwarder.send(request, &address, self.seen.subscribe(), is_there).await {
+                let going = Going { seen: self.seen.subscribe(), ended: self.ended.clone() };
+                match self.forwarder.send(request, &address, going).await {
                     Sent::Answered(response) => return response,
-                    Sent::Lost(error) => return error.into_response(),
+                    Sent::Lost(error) => return self.refuse(error, &path, "lost"),
                     Sent::NotTaken(again) => request = again,
                 }
             }
             if self.stop.is_cancelled() && self.is_alone() {
-                return ApiError::new(problem::STOPPING, "the service is stopping").retry_after(5).into_response();
+                let stopping = ApiError::new(problem::STOPPING, "the service is stopping").retry_after(5);
+                return self.refuse(stopping, &path, "stopping");
+            }
+            if let (Asked::Shard(_, tenant), None) = (&asked, &place) {
+                match self.resources.requests.try_take(tenant, 1) {
+                    Ok(held) => place = Some(held),
+                    Err(full) => {
+                        return self.refuse(full.refusal("requests at a time").retry_after(1), &path, "requests");
+                    }
+                }
             }
             if Instant::now() >= deadline {
                 let detail = "no process has the sessions of this tenant at the moment; try again soon";
-                return ApiError::new(problem::BUSY, detail).retry_after(2).into_response();
+                return self.refuse(ApiError::new(problem::BUSY, detail).retry_after(2), &path, "no_holder");
             }
             let _ = tokio::time::timeout(PAUSE, news.changed()).await;
         }
+    }
+
+    /// The response to a request that no service has seen.
+    fn refuse(&self, mut error: ApiError, path: &str, reason: &'static str) -> Response {
+        self.resources.rejected(reason);
+        let id = uuid::Uuid::now_v7().simple().to_string();
+        tracing::warn!(request_id = id, path, reason, detail = %error.problem.detail, "a request is refused");
+        error.problem.request_id = Some(id);
+        error.into_response()
     }
 
     /// Whose the request is. One without a valid token is nobody's, and is refused where it is answered.
@@ -133,7 +166,8 @@ impl Shards {
         if let Some(connection) = request.extensions.get::<ConnectionHandle>() {
             connection.caller_is_known();
         }
-        self.shard_of(&grant.tenant.name).await.map(Asked::Shard)
+        let shard = self.shard_of(&grant.tenant.name).await?;
+        Ok(Asked::Shard(shard, grant.tenant.name.clone()))
     }
 
     async fn shard_of(&self, tenant: &str) -> Result<u32, ApiError> {
@@ -160,14 +194,15 @@ impl Shards {
         }
     }
 
-    /// The routes of a shard that this process has, and what counts the request.
-    fn enter(&self, asked: &Asked) -> Option<(Router, TaskTrackerToken)> {
+    /// Where a shard that this process has answers.
+    fn enter(&self, asked: &Asked) -> Option<Here> {
         let own = lock(&self.own);
         let own = match asked {
-            Asked::Shard(shard) => own.get(shard),
+            Asked::Shard(shard, _) => own.get(shard),
             Asked::Any => own.values().find(|own| !own.is_leaving),
         };
-        own.filter(|own| !own.is_leaving).map(|own| (own.router.clone(), own.requests.token()))
+        let own = own.filter(|own| !own.is_leaving)?;
+        Some(Here { router: own.router.clone(), token: own.requests.token(), cut: own.cut.clone() })
     }
 
     /// Whether no other process goes on.
@@ -179,7 +214,7 @@ impl Shards {
     fn elsewhere(&self, asked: &Asked) -> Option<String> {
         let seen = self.seen.borrow();
         let holder = match asked {
-            Asked::Shard(shard) => seen.holders.get(shard),
+            Asked::Shard(shard, _) => seen.holders.get(shard),
             Asked::Any => seen.holders.values().find(|holder| **holder != self.members.number()),
         };
         let holder = holder.filter(|holder| **holder != self.members.number())?;
@@ -187,12 +222,16 @@ impl Shards {
     }
 }
 
-/// The response, which counts as a request in progress until it is sent.
-fn counted(response: Response, token: TaskTrackerToken) -> Response {
-    response.map(|body| {
-        Body::new(body.map_frame(move |frame| {
-            let _ = &token;
-            frame
-        }))
-    })
+/// A shard that answers a request.
+struct Here {
+    router: Router,
+    /// Counts the request until its response is sent.
+    token: TaskTrackerToken,
+    /// Ends it before.
+    cut: CancellationToken,
+}
+
+fn moved() -> ApiError {
+    ApiError::new(problem::STOPPING, "another process serves this tenant from now on; send the request again")
+        .retry_after(1)
 }

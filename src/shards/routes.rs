@@ -2,19 +2,26 @@
 
 use super::Shards;
 use crate::http::listen::ConnectionHandle;
-use crate::http::{health, may_see_metrics, rendered_metrics};
+use crate::http::{finished, health, may_see_metrics, rendered_metrics};
 use crate::problem::{self, ApiError};
+use crate::sync::lock;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Extension, Router};
+use futures_util::future::try_join_all;
 use http::HeaderMap;
 use std::sync::Arc;
+use std::time::Duration;
+use tokio::time::timeout;
+
+/// A process that has not seen for so long who has which shard is not ready.
+const UNSEEN: Duration = Duration::from_secs(5);
 
 /// All routes.
 pub(crate) fn answered(shards: Arc<Shards>) -> Router {
     let all = async |State(shards): State<Arc<Shards>>, request: Request| shards.answer(request).await;
-    probes().route("/metrics", get(metrics)).fallback(all).with_state(shards)
+    finished(seen(Arc::clone(&shards))).merge(Router::new().fallback(all).with_state(shards))
 }
 
 /// Health and metrics, for the public listener.
@@ -33,14 +40,21 @@ fn probes() -> Router<Arc<Shards>> {
     Router::new().route("/healthz", get(live)).route("/readyz", get(ready))
 }
 
-/// Its shards take writes. One without any sends all requests on.
+/// It sees who has which shard, and its own take writes. One without any sends all requests on.
 async fn ready(State(shards): State<Arc<Shards>>) -> Result<Response, ApiError> {
     if shards.stop.is_cancelled() {
         return Err(ApiError::new(problem::STOPPING, "the process is stopping").retry_after(5));
     }
-    for service in shards.services() {
-        service.ready().await?;
+    let away = || {
+        let detail = "the database does not answer; the log has the reason";
+        ApiError::new(problem::STORAGE_FAILED, detail).retry_after(5)
+    };
+    if lock(&shards.seen_at).elapsed() > UNSEEN {
+        return Err(away());
     }
+    let services = shards.services();
+    let all = try_join_all(services.iter().map(|service| service.ready()));
+    timeout(UNSEEN, all).await.map_err(|_| away())??;
     Ok(health(&shards.resources).into_response())
 }
 

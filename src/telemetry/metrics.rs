@@ -56,7 +56,7 @@ pub(crate) fn observe(resources: &Resources, services: &[Arc<Service>]) {
     metrics::gauge!("cager_queue_frames").set(resources.engine.waiting() as f64);
     metrics::gauge!("cager_streams").set(resources.open_streams() as f64);
     metrics::gauge!("cager_preparing").set(sum(&|service| service.solvers.in_flight()));
-    metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(sum(&|service| service.solvers.bytes() as usize));
+    metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(lock(&resources.kept_solvers).bytes() as f64);
     metrics::gauge!("cager_designing").set(sum(&|service| service.cage_jobs.unfinished()));
     metrics::gauge!("cager_recovering").set(sum(&|service| service.recoveries.unfinished()));
     let kept = resources.recovering.used() + resources.recoveries_kept.used();

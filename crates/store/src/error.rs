@@ -22,7 +22,7 @@ pub enum CatalogError {
     #[error("{0}")]
     Corrupt(String),
     /// A newer version of the program wrote it.
-    #[error("it has version {0}, and this program reads up to 1: use the newer program")]
+    #[error("it has version {0}, which is newer than this program: use the one that wrote it")]
     Newer(i64),
     /// Another process has the database for itself.
     #[error("{0}")]

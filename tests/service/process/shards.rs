@@ -27,6 +27,7 @@ async fn any_process_answers_for_every_tenant() {
     shared_out(&database, "4").await;
     let b = a.elsewhere().ready();
     shared_out(&database, "2,2").await;
+    assert_eq!(a.log().matches("given up").count(), 2, "no more is moved than has to be:\n{}", a.log());
     let capture = Capture::small();
     let unknowns = capture.cage.model.points.len() as u32;
     for token in TENANTS {
@@ -177,6 +178,19 @@ async fn who_was_there_before_it_was_divided_stays_where_the_sessions_are() {
     let said = String::from_utf8(everywhere.output().expect("the service").stderr).expect("text");
     assert!(said.contains("say by --advertise where they reach this one"), "{said}");
     drop(app);
-    let said = refused_with(folder().path(), &["--shards", "3"], &[]);
-    assert!(said.contains("shards is set but catalog is not"), "{said}");
+    for (flags, why) in [
+        (&["--shards", "3"][..], "shards is set but catalog is not"),
+        (&["--shards", "3", "--catalog", "postgres://a@b/c"], "shards is set but tokens is not"),
+        (
+            &["--shards", "3", "--catalog", "postgres://a@b/c", "--tokens", "t", "--blobs", "s3://b"],
+            "write s3://b/cager",
+        ),
+        (
+            &["--shards", "3", "--catalog", "postgres://a@b/c", "--tokens", "t", "--advertise", "a:80"],
+            "a:80 is no address",
+        ),
+    ] {
+        let said = refused_with(folder().path(), flags, &[]);
+        assert!(said.contains(why), "{said}");
+    }
 }

@@ -9,6 +9,7 @@ use super::schema::{self, hash};
 use super::trouble::Trouble;
 use crate::CatalogError;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -25,8 +26,11 @@ pub struct Members {
     link: Mutex<Option<Link>>,
     number: i32,
     address: String,
-    /// Locks of the shards.
-    hashes: Vec<i32>,
+    schema: String,
+    /// How many shards were seen last.
+    shards: AtomicU32,
+    /// It is about to end.
+    is_ending: AtomicBool,
 }
 
 /// How things are.
@@ -74,8 +78,15 @@ impl Members {
             Ok((row.try_get::<_, i64>(0)?, row.try_get::<_, i32>(1)?))
         });
         let (count, number) = made.map_err(explained)?;
-        let hashes = (0..count as u32).map(|shard| hash(&schema_of(&schema, shard))).collect();
-        let members = Self { place, link: Mutex::new(Some(link)), number, address: address.to_owned(), hashes };
+        let members = Self {
+            place,
+            link: Mutex::new(Some(link)),
+            number,
+            address: address.to_owned(),
+            schema,
+            shards: AtomicU32::new(count as u32),
+            is_ending: AtomicBool::new(false),
+        };
         members.call(&async |link: &Link| members.enter(link).await)?;
         Ok(members)
     }
@@ -85,9 +96,9 @@ impl Members {
         self.number
     }
 
-    /// How many shards there are.
+    /// How many shards there are; another process may have made more.
     pub fn shards(&self) -> u32 {
-        self.hashes.len() as u32
+        self.shards.load(Ordering::Relaxed)
     }
 
     /// How things are now.
@@ -112,14 +123,18 @@ impl Members {
                     }
                 }
             }
-            for row in link.query("SELECT number, holder FROM shards WHERE holder IS NOT NULL", &[]).await? {
-                let (shard, holder): (i32, i32) = (row.try_get(0)?, row.try_get(1)?);
-                if now.processes.contains_key(&holder) {
-                    now.holders.insert(shard as u32, holder);
+            let shards = link.query("SELECT number, holder FROM shards", &[]).await?;
+            self.shards.store(shards.len() as u32, Ordering::Relaxed);
+            for row in shards {
+                let (shard, holder): (i32, Option<i32>) = (row.try_get(0)?, row.try_get(1)?);
+                let shard = shard as u32;
+                if let Some(holder) = holder.filter(|holder| now.processes.contains_key(holder)) {
+                    now.holders.insert(shard, holder);
+                }
+                if !is_locked(OWNER, hash(&schema_of(&self.schema, shard))) {
+                    now.free.insert(shard);
                 }
             }
-            let free = self.hashes.iter().zip(0u32..).filter(|(hash, _)| !is_locked(OWNER, **hash));
-            now.free = free.map(|(_, shard)| shard).collect();
             Ok(now)
         })
     }
@@ -137,24 +152,26 @@ impl Members {
         })
     }
 
-    /// Says that this process serves a shard no longer.
-    pub fn leaves(&self, shard: u32) -> Result<(), CatalogError> {
+    /// Says that this process serves these shards no longer.
+    pub fn leaves(&self, shards: &[u32]) -> Result<(), CatalogError> {
+        let shards: Vec<i32> = shards.iter().map(|shard| *shard as i32).collect();
         self.write(&async |link: &Link| {
-            let sql = "UPDATE shards SET holder = NULL WHERE number = $1 AND holder = $2";
-            link.query(sql, &[&(shard as i32), &self.number]).await?;
+            let sql = "UPDATE shards SET holder = NULL WHERE number = ANY($1) AND holder = $2";
+            link.query(sql, &[&shards, &self.number]).await?;
             Ok(())
         })
     }
 
     /// Says that this process is about to end.
     pub fn ends(&self) -> Result<(), CatalogError> {
+        self.is_ending.store(true, Ordering::Relaxed);
         self.write(&async |link: &Link| {
             link.query("UPDATE processes SET is_ending = true WHERE number = $1", &[&self.number]).await?;
             Ok(())
         })
     }
 
-    /// The shard of a tenant: a new one comes to where the fewest are. `None` while it is not known yet who was there before.
+    /// The shard of a tenant: a new one comes to where the fewest are, of those that were served before. `None` while it is not known yet who was there before.
     pub fn shard_of(&self, tenant: &str) -> Result<Option<u32>, CatalogError> {
         self.write(&async |link: &Link| {
             let find = "SELECT shard FROM tenants WHERE tenant = $1";
@@ -167,7 +184,7 @@ impl Members {
             }
             // One at a time, so that they are spread.
             link.query("SELECT pg_advisory_xact_lock($1, $2)", &[&MEMBER, &0]).await?;
-            let sql = "INSERT INTO tenants (tenant, shard) SELECT $1, number FROM shards LEFT JOIN (SELECT shard, count(*) AS tenants FROM tenants GROUP BY shard) AS counted ON shard = number ORDER BY coalesce(tenants, 0), number LIMIT 1 ON CONFLICT DO NOTHING";
+            let sql = "INSERT INTO tenants (tenant, shard) SELECT $1, number FROM shards LEFT JOIN (SELECT shard, count(*) AS tenants FROM tenants GROUP BY shard) AS counted ON shard = number WHERE told ORDER BY coalesce(tenants, 0), number LIMIT 1 ON CONFLICT DO NOTHING";
             link.query(sql, &[&tenant]).await?;
             Ok(Some(only::<i32>(&link.query(find, &[&tenant]).await?)? as u32))
         })

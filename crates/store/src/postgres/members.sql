@@ -5,7 +5,7 @@ CREATE TABLE processes (
     is_ending boolean NOT NULL DEFAULT false
 );
 
--- Shard 0 is this schema's; `told` once the tenants that it had before are in the table below.
+-- Shard 0 is this schema's; `told` once it was served, and the tenants that it had before are in the table below.
 CREATE TABLE shards (
     number integer PRIMARY KEY,
     holder integer,

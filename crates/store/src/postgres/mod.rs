@@ -77,13 +77,19 @@ impl PostgresCatalog {
     /// As there.
     pub fn open_shard(url: &str, shard: u32, shards: u32) -> Result<Self, CatalogError> {
         let place = Place::parse(url)?;
-        let connections = (SHARED_CONNECTIONS / shards.max(1) as usize).clamp(2, CONNECTIONS);
+        let connections = (SHARED_CONNECTIONS / shards.max(1) as usize).clamp(3, CONNECTIONS);
         if shard == 0 {
             return Self::open_place(place, connections);
         }
         let link = Link::connect(&place)?;
-        let schema = link.read(PREPARING, &async |link: &Link| schema::schema(link).await);
-        let schema = schema.map_err(|trouble| trouble.explain(&place.name))?;
+        let known = link.read(PREPARING, &async |link: &Link| {
+            let count = only::<i64>(&link.query("SELECT count(*) FROM shards", &[]).await?)?;
+            Ok((schema::schema(link).await?, count))
+        });
+        let (schema, count) = known.map_err(|trouble| trouble.explain(&place.name))?;
+        if i64::from(shard) >= count {
+            return Err(CatalogError::Failed(format!("{} is divided into {count} shards, from 0", place.name)));
+        }
         Self::open_place(place.of_schema(&members::schema_of(&schema, shard)), connections)
     }
 

@@ -33,7 +33,7 @@ fn processes_see_each_other_and_who_serves_what() {
     let seen = b.look().expect("how things are");
     assert_eq!((seen.holders.get(&3), seen.free.contains(&3)), (Some(&a.number()), false));
     // What is given up is free, though its catalogue is still there.
-    a.leaves(3).expect("said");
+    a.leaves(&[3, 2]).expect("said");
     shard.release();
     until("it is not free", || b.look().expect("how things are").free.contains(&3));
     assert_eq!(b.look().expect("how things are").holders.get(&3), None);
@@ -58,16 +58,26 @@ fn tenants_are_spread_and_stay_where_they_are() {
     a.serves(0, &["old".to_owned(), "older".to_owned()]).expect("said");
     assert_eq!(a.shard_of("old").expect("asked"), Some(0));
     let of = |tenant: &str| a.shard_of(tenant).expect("asked").expect("known");
+    assert_eq!(of("o"), 0, "the others were never served");
+    for shard in 1..3 {
+        a.serves(shard, &[]).expect("said");
+    }
     let spread: Vec<u32> = ["p", "q", "r", "s", "t"].map(of).to_vec();
-    assert_eq!(spread, [1, 2, 1, 2, 0]);
+    assert_eq!(spread, [1, 2, 1, 2, 1]);
     let b = join(&server, 6, "http://b");
     assert_eq!(b.shard_of("q").expect("asked"), Some(2), "more shards move nobody");
+    assert_eq!(a.look().expect("how things are").free.len(), 5, "those of the first process are seen by the other one");
+    assert_eq!(a.shards(), 6);
+    b.serves(3, &[]).expect("said");
     assert_eq!(b.shard_of("u").expect("asked"), Some(3));
+    let more = PostgresCatalog::open_shard(&server.url(), 6, 8);
+    assert!(more.is_err_and(|error| error.to_string().contains("is divided into 6 shards")));
 }
 
 #[test]
 fn shards_have_schemas_of_their_own() {
     let Some(server) = Server::start() else { return };
+    join(&server, 2, "http://a");
     let catalogs = [0, 1].map(|shard| PostgresCatalog::open_shard(&server.url(), shard, 2).expect("a shard"));
     for catalog in &catalogs {
         catalog.claim().expect("it is free");
