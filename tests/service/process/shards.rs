@@ -147,6 +147,52 @@ async fn processes_are_replaced_one_after_the_other_without_a_failed_request() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_shard_that_cannot_be_opened_keeps_nobody_from_the_others() {
+    let Some(database) = Database::with_bucket() else { return };
+    let mut a = first(&database, &["shards=4"]);
+    shared_out(&database, "4").await;
+    for token in TENANTS {
+        a.caller(Some(token)).get("/v1/sessions").await.expect(200);
+    }
+    a.kill();
+    database.sql("UPDATE cager_3.catalogue SET version = 99");
+    let a = a.again();
+    shared_out(&database, "3").await;
+    let b = a.elsewhere().ready();
+    shared_out(&database, "1,2").await;
+    assert!(a.log().contains("shard 3 cannot be served"), "{}", a.log());
+    let others = database.sql("SELECT string_agg(tenant, ',') FROM tenants WHERE shard < 3");
+    for token in TENANTS.iter().filter(|token| others.contains(token.split('-').next().expect("a name"))) {
+        b.caller(Some(token)).get("/v1/sessions").await.expect(200);
+    }
+    database.sql("UPDATE cager_3.catalogue SET version = 2");
+    shared_out(&database, "2,2").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn streams_that_pass_through_a_process_end_with_it() {
+    let Some(database) = Database::with_bucket() else { return };
+    let a = first(&database, &["shards=4"]);
+    let mut b = a.elsewhere().ready();
+    shared_out(&database, "2,2").await;
+    let capture = Capture::small();
+    let mut followers = Vec::new();
+    for token in TENANTS {
+        let session = a.caller(Some(token)).ready(capture).await;
+        let path = format!("/v1/sessions/{}/cages?first=0&follow=true", session.id);
+        followers.push(b.caller(Some(token)).open(&path).await);
+    }
+    let clock = Instant::now();
+    b.terminate();
+    for mut follower in followers {
+        // Neither looks whole.
+        while follower.chunk().await.is_ok_and(|piece| piece.is_some()) {}
+    }
+    assert!(b.ended().await.0.success());
+    assert!(clock.elapsed() < Duration::from_secs(10), "it waited for {:?}", clock.elapsed());
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn who_was_there_before_it_was_divided_stays_where_the_sessions_are() {
     let Some(database) = Database::with_bucket() else { return };
     let mut whole = first(&database, &[]);
