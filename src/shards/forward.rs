@@ -9,7 +9,7 @@ use axum::response::Response;
 use cager_store::Membership;
 use futures_util::stream;
 use http::header::{
-    CONNECTION, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER, TRANSFER_ENCODING, UPGRADE,
+    CONNECTION, CONTENT_LENGTH, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER, TRANSFER_ENCODING, UPGRADE,
 };
 use http::{HeaderMap, HeaderValue};
 use http_body_util::BodyExt;
@@ -69,6 +69,9 @@ impl Going {
 /// Sends requests to other processes.
 pub(super) struct Forwarder {
     client: reqwest::Client,
+    /// With a connection for each request: for bodies of unknown length, which the other process takes on connections alone on which all before is over, and
+    /// that it knows later than the one that sends.
+    fresh: reqwest::Client,
 }
 
 impl Forwarder {
@@ -102,7 +105,8 @@ impl Forwarder {
         }
         let has_body = !http_body::Body::is_end_stream(&body);
         let body = Arc::new(Mutex::new(Some(body)));
-        let mut sent = self.client.request(parts.method.clone(), format!("{address}{path}")).headers(headers);
+        let client = if has_body && !headers.contains_key(CONTENT_LENGTH) { &self.fresh } else { &self.client };
+        let mut sent = client.request(parts.method.clone(), format!("{address}{path}")).headers(headers);
         if has_body {
             sent = sent.body(reqwest::Body::wrap_stream(taken_when_read(Arc::clone(&body))));
         }
