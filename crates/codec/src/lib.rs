@@ -34,7 +34,7 @@ pub use frame_errors::{decode_errors, encode_errors, rounded_error};
 pub use grid::{Grid, decode_positions, encode_positions};
 pub use hierarchy::Hierarchy;
 pub use mesh::CodedMesh;
-pub use residual::{Residual, ResidualEstimate, ResidualGroup, encode_residual, estimate_residual};
+pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
 
 /// Most positions of one group of frames, points times frames: what decoding one holds in memory follows from it.
 pub const MAX_POSITIONS: usize = 1 << 26;

@@ -33,19 +33,22 @@ pub(super) struct Encoded {
 
 impl Encoded {
     pub(super) fn bytes(&self) -> u64 {
-        (self.cages.len() + SECTION + self.residual.as_ref().map_or(0, |residual| residual.len() + SECTION)) as u64
+        bytes_of(&self.cages, self.residual.as_ref())
     }
+}
+
+fn bytes_of(cages: &[u8], residual: Option<&Vec<u8>>) -> u64 {
+    (cages.len() + SECTION + residual.map_or(0, |residual| residual.len() + SECTION)) as u64
 }
 
 impl CodedGroup {
-    pub(super) fn mean(&self) -> f64 {
-        mean(&self.errors)
+    pub(super) fn bytes(&self) -> u64 {
+        bytes_of(&self.cages, self.residual.as_ref())
     }
-}
 
-/// Mean L2 error of some frames.
-fn mean(errors: &[FrameError]) -> f64 {
-    errors.iter().map(|error| error.l2).sum::<f64>() / errors.len().max(1) as f64
+    pub(super) fn mean(&self) -> f64 {
+        self.errors.iter().map(|error| error.l2).sum::<f64>() / self.errors.len().max(1) as f64
+    }
 }
 
 /// Bytes of a section beside its payload: its header, and its entry in the table of contents.
@@ -160,23 +163,8 @@ impl GroupCoder {
     pub(super) fn estimate(&self, count: usize, residual: f64, ratio: f64, part: f64) -> Result<f64, CodingError> {
         let steps = self.goal.steps((residual, ratio), self.model.points());
         let encoded = self.encode_cages(count, steps.cage)?;
-        let residual = steps.residual.map(|step| self.residual_of(&encoded.positions, step, estimate_residual));
-        Ok(encoded.cages.len() as f64 + residual.transpose()?.map_or(0.0, |residual| residual.bytes) / part)
-    }
-
-    /// About the bytes of the frames that were collected, and their mean error as [`Self::code`] would find it, without coding the residual.
-    pub(super) fn estimate_with_mean(&self, residual: f64, ratio: f64) -> Result<(f64, f64), CodingError> {
-        let steps = self.goal.steps((residual, ratio), self.model.points());
-        let Encoded { cages, mut positions, .. } = self.encode_cages(self.frames.len(), steps.cage)?;
-        let mut bytes = cages.len() as f64;
-        if let Some(step) = steps.residual {
-            let estimate = self.residual_of(&positions, step, estimate_residual)?;
-            if estimate.decoded.is_needed() {
-                bytes += estimate.bytes;
-                estimate.decoded.add(0, &mut positions);
-            }
-        }
-        Ok((bytes, mean(&self.errors_of(&positions))))
+        let bytes = steps.residual.map(|step| self.residual_of(&encoded.positions, step, estimate_residual));
+        Ok(encoded.cages.len() as f64 + bytes.transpose()?.unwrap_or(0.0) / part)
     }
 
     /// The first frames without a residual.
@@ -219,18 +207,14 @@ impl GroupCoder {
         if let Some(read) = needed {
             read.add(0, &mut positions);
         }
-        let group = CodedGroup { cages, residual, errors: self.errors_of(&positions), farthest };
+        let measured = positions.par_iter().zip(&self.frames);
+        let errors = measured.map(|(decoded, captured)| FrameError::of_positions(decoded, captured)).collect();
+        let group = CodedGroup { cages, residual, errors, farthest };
         if let Goal::MaxError(error) = self.goal
             && group.errors.iter().any(|found| found.linf.is_nan() || found.linf > error * self.diagonal)
         {
             return Err(self.uncountable());
         }
         Ok(group)
-    }
-
-    /// Errors of decoded positions of the first frames.
-    fn errors_of(&self, positions: &[Vec<f32>]) -> Vec<FrameError> {
-        let pairs = positions.par_iter().zip(&self.frames);
-        pairs.map(|(decoded, captured)| FrameError::of_positions(decoded, captured)).collect()
     }
 }

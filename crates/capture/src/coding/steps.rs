@@ -157,24 +157,25 @@ impl GroupCoder {
 
     /// In the larger steps that meet a mean error; in the first group, of two ratios that which takes fewer bytes.
     pub(super) fn code_to_mean(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
-        let usual = self.bytes_in_ratio(goal)?;
+        let usual = self.code_in_ratio(goal)?;
         let is_usual = |&(_, ratio): &(f64, f64)| self.carried.frames == 0 && ratio == USUAL_RATIO;
-        if let Some((step, _)) = self.carried.chosen.filter(is_usual) {
-            self.carried.chosen = Some((step * (USUAL_RATIO / FINER_CAGES).sqrt(), FINER_CAGES));
-            // It only may save bytes: what cannot be coded in it is coded in the usual one.
-            if self.bytes_in_ratio(goal).map_or(true, |finer| finer >= usual) {
-                self.carried.chosen = Some((step, USUAL_RATIO));
-            }
+        let Some((step, _)) = self.carried.chosen.filter(is_usual) else { return Ok(usual) };
+        self.carried.chosen = Some((step * (USUAL_RATIO / FINER_CAGES).sqrt(), FINER_CAGES));
+        // It only may save bytes: what cannot be coded in it is coded in the usual one.
+        if let Ok(finer) = self.code_in_ratio(goal)
+            && finer.bytes() < usual.bytes()
+        {
+            return Ok(finer);
         }
-        let (step, ratio) = self.carried.chosen.unwrap_or((1e-3 * self.diagonal, USUAL_RATIO));
-        self.code(self.frames.len(), step, ratio)
+        self.carried.chosen = Some((step, USUAL_RATIO));
+        Ok(usual)
     }
 
-    /// About the bytes in the larger steps that meet a mean error in the ratio at hand; leaves these steps for coding.
-    fn bytes_in_ratio(&mut self, goal: f64) -> Result<f64, CodingError> {
+    fn code_in_ratio(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
         let found = self.for_step(true, |coder, step, ratio| {
-            let (bytes, mean) = coder.estimate_with_mean(step, ratio)?;
-            Ok((bytes, mean / goal))
+            let group = coder.code(coder.frames.len(), step, ratio)?;
+            let mean = group.mean();
+            Ok((group, mean / goal))
         })?;
         let asked = goal / self.diagonal;
         found.ok_or(CodingError::BelowPrecision { asked, least: 2.0 * asked })
