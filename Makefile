@@ -223,7 +223,7 @@ paper: ## run the paper's comparisons on the captures in CAGER_CAPTURES and writ
 	$(CARGO) build --release --locked --bin cager
 	$(PYTHON) benches/paper.py
 
-cages: ## make and design cages for the captures in CAGER_CAPTURES and write their tables in docs/PAPER.md; cages in out/cages/
+cages: ## make and design cages for the captures in CAGER_CAPTURES and write their tables in docs/PAPER.md; cages in out/cages/; beside lazy_cage too where CAGER_LAZY_PYTHON is a Python with benches/peers/cages.txt (`python3 benches/cages.py --lazy` makes that table alone)
 	$(CARGO) build --release --locked --bin cager
 	$(PYTHON) benches/cages.py
 

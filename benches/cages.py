@@ -1,6 +1,7 @@
 """Makes and designs cages for the real captures and writes their tables in docs/PAPER.md.
 
-Standard library only. `make cages` builds the program and calls this. The captures are not part of the project: they are looked for
+Standard library only, but for the cages of gpytoolbox, which peers/lazy_cage.py makes with the Python named in CAGER_LAZY_PYTHON; without it their table
+stays as it is. `--lazy` makes that table alone. `make cages` builds the program and calls this. The captures are not part of the project: they are looked for
 in CAGER_CAPTURES (default ../shared/data). Cages, reports and pictures stay in the folder given as argument (default out/cages); what is
 there already is not made again.
 """
@@ -22,6 +23,9 @@ VERTICES = [50, 150, 350]
 # The largest cages take minutes: of two captures.
 LARGE, LARGE_OF = 1000, ["horse-gallop", "samba"]
 KINDS = ["rest", "editable", "free"]
+LAZY_PYTHON = os.environ.get("CAGER_LAZY_PYTHON")
+# Cells along a side of the grid: what lazy_cage takes where nothing is said, and twice as many.
+LAZY_GRIDS = [50, 100]
 
 
 def run(*arguments):
@@ -134,6 +138,49 @@ def unseen(folder):
     return table(["capture", "from the rest pose", "designed on the first half", "designed on the second half"], rows)
 
 
+def held_back(folder, capture, name, cage):
+    """Mean L2 error of a cage on the frames that designs hold back, every second one, or why it is refused."""
+    at = os.path.join(DATA, capture)
+    report = os.path.join(folder, f"{capture}-{name}-held-back.json")
+    if not os.path.exists(report):
+        frames = read(f"{at}/info.json")["frames"]
+        command = ["encode", "--rest", f"{at}/rest.obj", "--cage", cage, "--frames", f"{at}/frames.npy", "--frames-range", f"1-{frames - 1}x2"]
+        command += ["--handles", "spread", "-o", os.path.join(folder, "out.cager"), "--report", report, "--overwrite"]
+        done = subprocess.run([CAGER, *command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
+        if done.returncode:
+            return None, done.stderr.strip().splitlines()[0]
+    return read(report)["error"]["l2_mean"], None
+
+
+def lazy(folder):
+    """Beside cages of gpytoolbox's lazy_cage with as many vertices, of which the better grid counts."""
+    rows = []
+    for capture in CAPTURES:
+        for vertices in VERTICES:
+            found = []
+            for grid in LAZY_GRIDS:
+                name = f"{capture}-lazy-{vertices}-{grid}"
+                cage, told = os.path.join(folder, f"{name}.obj"), os.path.join(folder, f"{name}.json")
+                if not os.path.exists(told):
+                    script = os.path.join(ROOT, "benches", "peers", "lazy_cage.py")
+                    rest = os.path.join(DATA, capture, "rest.obj")
+                    done = subprocess.run([LAZY_PYTHON, script, rest, str(vertices), str(grid), cage], stdout=subprocess.PIPE, text=True, check=True)
+                    with open(told, "w", encoding="utf-8") as file:
+                        file.write(done.stdout)
+                made_of = read(told)["vertices"]
+                error, refusal = held_back(folder, capture, f"lazy-{vertices}-{grid}", cage)
+                found.append((error if error is not None else float("inf"), made_of, grid, refusal))
+            error, count, grid, refusal = min(found, key=lambda each: each[0])
+            row = [capture, str(count), str(grid), f"refused: {refusal}" if refusal else percent(error)]
+            for kind in ("rest", "free"):
+                report, cage = made(folder, capture, kind, count)
+                ours = held_back(folder, capture, f"{kind}-{count}", cage)[0]
+                row.append(f"{percent(ours)} ({report['vertices']})")
+            rows.append(row)
+            print(*row, flush=True)
+    return table(["capture", "vertices", "grid", "lazy_cage, %", "from the rest pose, %", "designed, free, %"], rows)
+
+
 def write(page, name, text):
     begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
     before, rest = page.split(begin, 1)
@@ -141,9 +188,14 @@ def write(page, name, text):
 
 
 def main():
-    folder = sys.argv[1] if len(sys.argv) > 1 else os.path.join(ROOT, "out", "cages")
+    arguments = [argument for argument in sys.argv[1:] if argument != "--lazy"]
+    folder = arguments[0] if arguments else os.path.join(ROOT, "out", "cages")
     os.makedirs(folder, exist_ok=True)
-    tables = {"cages": errors(folder), "cage-steps": steps(folder), "cage-unseen": unseen(folder)}
+    tables = {}
+    if len(arguments) == len(sys.argv) - 1:
+        tables = {"cages": errors(folder), "cage-steps": steps(folder), "cage-unseen": unseen(folder)}
+    if LAZY_PYTHON:
+        tables["lazy-cages"] = lazy(folder)
     with open(PAGE, encoding="utf-8") as file:
         page = file.read()
     for name, text in tables.items():

@@ -20,7 +20,7 @@ const RIDGE: f64 = 1e-4;
 const STEP: f64 = 0.001;
 /// Points sampled for a step and for remeshing: with fewer, parts with few points appear better reproduced than they are.
 const STEP_POINTS: usize = 2_200;
-const REMESH_POINTS: usize = 5_000;
+const REMESH_POINTS: usize = 3_000;
 /// Fraction of the way to the mean of its neighbours that each vertex of an editable cage moves in a step of full length.
 const FAIRING: f64 = 0.02;
 

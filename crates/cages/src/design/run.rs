@@ -12,14 +12,18 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Steps of a design with a given number of vertices.
-const STEPS: usize = 190;
+const STEPS: usize = 140;
+/// Step lengths fall along a cosine over so many times the steps of a phase; from this share of the steps on, linearly to zero as well: slow steps to the end
+/// bring little, and a cosine over fewer steps leaves larger errors.
+const COSINE_STEPS: f64 = 190.0 / 140.0;
+const FADE_FROM: f64 = 0.75;
 /// Vertices are exchanged after so many steps each, up to this share of them at a time, until this share of the steps is done.
 const REMESH_EVERY: usize = 10;
 const REMESH_SHARE: f64 = 0.08;
-const REMESH_UNTIL: f64 = 0.7;
-/// Steps between two evaluations of the cage, and between two records of the improvement.
-const EVALUATE_EVERY: usize = 30;
-const NOTE_EVERY: usize = 60;
+const REMESH_UNTIL: f64 = 0.75;
+/// Steps before the first evaluation of the cage, and between later ones.
+const FIRST_EVALUATION: usize = 10;
+const EVALUATE_EVERY: usize = 60;
 
 /// Errors above this, as a fraction of the diagonal, suggest that the frames do not deform the rest pose coherently.
 const NOT_FOLLOWED: f64 = 0.03;
@@ -125,16 +129,16 @@ impl Run<'_> {
             if share > 0.0 && step % REMESH_EVERY == 0 && step <= exchanges {
                 descent.exchange(share, phase.goal);
             }
-            descent.step(0.5 * (1.0 + (PI * step as f64 / phase.steps as f64).cos()) + 0.02);
+            descent.step(step_scale(step as f64 / phase.steps as f64));
             let done = step + 1;
             let mut better = None;
-            if done % EVALUATE_EVERY == 0 || done == phase.steps {
+            if done == FIRST_EVALUATION || done % EVALUATE_EVERY == 0 || done == phase.steps {
                 let evaluation = self.samples.evaluate(&descent.cage);
                 // A smaller cage than asked for may do; a larger one may not.
                 if descent.cage.vertices().len() <= phase.goal && self.keep(&descent.cage, evaluation) {
                     better = Some(descent.cage.mesh());
                 }
-                if done % NOTE_EVERY == 0 {
+                if done % EVALUATE_EVERY == 0 {
                     self.note(&format!("{done} steps"), &descent.cage, evaluation);
                 }
             }
@@ -185,6 +189,12 @@ impl Run<'_> {
     fn note(&mut self, name: &str, cage: &Cage, evaluation: Evaluation) {
         self.stages.push(stage(name, cage, evaluation, self.samples, self.clock));
     }
+}
+
+/// Length of a step over that of the longest, when a share of a phase's steps is done.
+fn step_scale(done: f64) -> f64 {
+    let fade = ((1.0 - done) / (1.0 - FADE_FROM)).min(1.0);
+    0.5 * fade * (1.0 + (PI * done / COSINE_STEPS).cos()) + 0.02
 }
 
 fn stage(name: &str, cage: &Cage, evaluation: Evaluation, samples: &Samples, clock: Instant) -> Stage {

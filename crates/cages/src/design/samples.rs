@@ -9,8 +9,10 @@ use faer::{Accum, Mat, MatRef};
 
 /// Maximum number of points sampled from a model.
 const MAX_POINTS: usize = 20_000;
-/// Number of principal components that the motion is reduced to.
+/// Number of principal components that the motion is reduced to, at most.
 const COLUMNS: usize = 96;
+/// Root mean square of the motion that the reduction may leave out, as a fraction of the diagonal.
+const LEFT_OUT: f64 = 1e-5;
 /// Numbers of points and frames on which a cage is evaluated.
 const VALIDATION_POINTS: usize = 8_000;
 const VALIDATION_FRAMES: usize = 40;
@@ -114,17 +116,22 @@ pub(super) fn evenly<'a>(frames: &[&'a [f64]], count: usize) -> Vec<&'a [f64]> {
     (0..count).map(|k| frames[k * frames.len() / count]).collect()
 }
 
-/// A motion in its principal directions, at most [`COLUMNS`] of them.
+/// A motion in its principal directions: the fewest that leave out no more than [`LEFT_OUT`], at most [`COLUMNS`].
 fn principal(motion: &Mat<f64>) -> Mat<f64> {
     let columns = motion.ncols();
-    if columns <= COLUMNS {
-        return motion.clone();
-    }
     let Ok(eigen) = gram(motion.as_ref(), BLOCK_ROWS).self_adjoint_eigen(faer::Side::Lower) else {
         return motion.clone();
     };
-    let mut out = Mat::zeros(motion.nrows(), COLUMNS);
-    accumulate_product(&mut out, Accum::Replace, motion.as_ref(), eigen.U().subcols(columns - COLUMNS, COLUMNS), 1.0);
+    // Sum of squares that may be left out; points have three columns in each frame. Eigenvalues ascend.
+    let may_leave = LEFT_OUT * LEFT_OUT * (motion.nrows() * columns) as f64 / 3.0;
+    let mut left_out = 0.0;
+    let needed = eigen.S().column_vector().iter().position(|square| {
+        left_out += square.max(0.0);
+        left_out > may_leave
+    });
+    let first = needed.unwrap_or(columns - 1).max(columns.saturating_sub(COLUMNS));
+    let mut out = Mat::zeros(motion.nrows(), columns - first);
+    accumulate_product(&mut out, Accum::Replace, motion.as_ref(), eigen.U().subcols(first, columns - first), 1.0);
     out
 }
 

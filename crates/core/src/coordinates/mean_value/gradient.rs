@@ -152,7 +152,7 @@ struct Adjoint {
     weights: Vec<Singles>,
     /// Derivative by each unit vector.
     directions: Vec<[Singles; 3]>,
-    /// Derivative by each edge's mean-vector term, then by its cross product where that enters on its own.
+    /// Derivative by each edge's mean-vector term, then by its cross product where that enters on its own; zeros between lane groups.
     edges: Vec<[Singles; 6]>,
     /// Derivative by the vertices, over all lane groups of a task.
     total: Vec<[Singles; 3]>,
@@ -176,7 +176,10 @@ fn store(mut rows: MatMut<'_, f32>, weights: &[Singles], scale: Singles) {
     for (column, &weight) in rows.as_mut().col_iter_mut().zip(weights) {
         let values = (weight * scale).0;
         match column.try_as_col_major_mut() {
-            Some(column) => column.as_slice_mut().copy_from_slice(&values[..filled]),
+            Some(column) => match column.as_slice_mut().as_chunks_mut() {
+                ([all], _) => *all = values,
+                (_, some) => some.copy_from_slice(&values[..filled]),
+            },
             None => unreachable!("a matrix of its own has contiguous columns"),
         }
     }
@@ -286,12 +289,13 @@ impl FaceTerms {
 
 #[inline(always)]
 fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
-    adjoint.directions.fill([Singles::ZERO; 3]);
-    adjoint.edges.fill([Singles::ZERO; 6]);
+    let Adjoint { weights, directions, edges, total } = adjoint;
+    let (weights, directions) = (weights.as_slice(), directions.as_mut_slice());
+    directions.fill([Singles::ZERO; 3]);
     for face in cage.faces() {
         let seen = FaceTerms::new(face, scratch);
         let vertices = face.vertices.map(|v| v as usize);
-        let [a0, a1, a2] = vertices.map(|v| adjoint.weights[v] * seen.inverse);
+        let by_face @ [a0, a1, a2] = vertices.map(|v| weights[v] * seen.inverse);
         let [g0, g1, g2] = &seen.g;
         // ∂E/∂m, and −∂E/∂det.
         let by_mean = [
@@ -300,21 +304,21 @@ fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
             g0[2] * a0 + g1[2] * a1 + g2[2] * a2,
         ];
         let by_det = dot(&seen.mean, &by_mean) * seen.inverse;
-        for (i, a) in [a0, a1, a2].into_iter().enumerate() {
+        for i in 0..3 {
             let sign = face.signs[i] as f32;
-            let edge = &mut adjoint.edges[face.edges[i] as usize];
-            let own = a * sign;
+            let edge = &mut edges[face.edges[i] as usize];
+            let own = by_face[i] * sign;
             for k in 0..3 {
                 edge[k] = edge[k] + by_mean[k] * sign;
                 edge[3 + k] = edge[3 + k] + seen.mean[k] * own;
             }
-            let direction = &mut adjoint.directions[vertices[i]];
+            let direction = &mut directions[vertices[i]];
             for k in 0..3 {
                 direction[k] = direction[k] - seen.g[i][k] * by_det;
             }
         }
     }
-    for ((edge, term), by) in cage.edges().iter().zip(&scratch.edges).zip(&adjoint.edges) {
+    for ((edge, term), by) in cage.edges().iter().zip(&scratch.edges).zip(edges) {
         let [a, b] = edge.vertices.map(|v| v as usize);
         let (ua, ub) = (scratch.directions[a], scratch.directions[b]);
         let slope = half_angle_over_sine_slope(dot(&ua, &ub), inverse_sine(term.square));
@@ -322,14 +326,16 @@ fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
         let by_c = [by[3] + by[0] * term.ratio, by[4] + by[1] * term.ratio, by[5] + by[2] * term.ratio];
         let (to_a, to_b) = (cross(&ub, &by_c), cross(&by_c, &ua));
         for k in 0..3 {
-            adjoint.directions[a][k] = adjoint.directions[a][k] + to_a[k] + ub[k] * by_t;
-            adjoint.directions[b][k] = adjoint.directions[b][k] + to_b[k] + ua[k] * by_t;
+            directions[a][k] = directions[a][k] + to_a[k] + ub[k] * by_t;
+            directions[b][k] = directions[b][k] + to_b[k] + ua[k] * by_t;
         }
+        // For the next lane group.
+        *by = [Singles::ZERO; 6];
     }
-    for j in 0..adjoint.total.len() {
-        let (u, by, near) = (&scratch.directions[j], &adjoint.directions[j], scratch.nearness[j]);
-        let radial = dot(u, by) * near + adjoint.weights[j] * scratch.weights[j];
-        let total = &mut adjoint.total[j];
+    for j in 0..total.len() {
+        let (u, by, near) = (&scratch.directions[j], &directions[j], scratch.nearness[j]);
+        let radial = dot(u, by) * near + weights[j] * scratch.weights[j];
+        let total = &mut total[j];
         for k in 0..3 {
             total[k] = total[k] + by[k] * near - u[k] * radial;
         }
