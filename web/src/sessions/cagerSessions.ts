@@ -17,13 +17,11 @@ import { filterBar } from './filterBar';
 import { listHeader, listNotices } from './listHeader';
 import './recoveries';
 import { nameOf, row, tableHead } from './row';
-import { SessionList, isUnfinished } from './sessionList';
+import { SessionList } from './sessionList';
 import { sessionsStyle } from './sessionsStyle';
 import './signIn';
 
 const PAGE_ROWS = 25;
-/** Sessions that are followed by streams: HTTP/1.1 has six connections to a host, for all tabs together. The others are polled. */
-const STREAMS = 2;
 
 /**
  * The sessions of the service beside the page: newest first, kept up to date while the page is seen, to be searched, opened, downloaded and
@@ -99,11 +97,6 @@ export class Sessions extends LitElement {
     const isOn = !document.hidden && this.isConnected && !this.wantsToken;
     this.#figures.want(isOn ? shown : []);
     this.#list.shown = new Set(shown.map(({ id }) => id));
-    // Those that move first: some wait for ever.
-    const unfinished = shown.filter(isUnfinished).map(({ id }) => id);
-    const moves = (id: string): number => Math.sign(this.#list.rates.of(id) ?? 0);
-    const ids = unfinished.sort((a, b) => moves(b) - moves(a)).slice(0, STREAMS);
-    this.#list.follow(isOn ? ids : []);
   }
 
   #filters() {

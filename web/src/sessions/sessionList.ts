@@ -1,13 +1,12 @@
-/** The sessions that are shown, kept up to date: the newest page by polling, running ones that are seen by their events as well. */
+/** The sessions that are shown, kept up to date by polling. */
 
 import { Backoff } from '../service/backoff';
-import { followProgress } from '../service/events';
-import type { Progress, Session } from '../service/messages';
+import type { Session } from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind } from '../service/problem';
-import { type Service, sessionPath } from '../service/service';
+import type { Service } from '../service/service';
 import { Rates } from './rates';
 
-const POLL_RUNNING_SECONDS = 3;
+const POLL_RUNNING_SECONDS = 2;
 const POLL_IDLE_SECONDS = 5;
 
 /** The sessions of a token, newest first. Fires `change`. */
@@ -21,7 +20,6 @@ export class SessionList extends EventTarget {
   loaded = false;
 
   readonly #sessions = new Map<string, Session>();
-  readonly #followed = new Map<string, AbortController>();
   readonly #backoff = new Backoff();
   /** Where older sessions begin; undefined before the first page, null after the last. */
   #next: string | null | undefined;
@@ -52,7 +50,6 @@ export class SessionList extends EventTarget {
     this.#running?.abort();
     this.#running = null;
     clearTimeout(this.#timer);
-    this.follow([]);
   }
 
   /** Asks at once. */
@@ -85,53 +82,6 @@ export class SessionList extends EventTarget {
   async remove(id: string): Promise<void> {
     await this.service.remove(id);
     this.#forget(id);
-    this.#changed();
-  }
-
-  /** Follows the events of these sessions, and of no others. */
-  follow(ids: readonly string[]): void {
-    for (const [id, following] of this.#followed) {
-      if (ids.includes(id)) continue;
-      following.abort();
-      this.#followed.delete(id);
-    }
-    for (const id of ids) {
-      if (this.#followed.has(id)) continue;
-      const following = new AbortController();
-      this.#followed.set(id, following);
-      void this.#followOne(id, following);
-    }
-  }
-
-  async #followOne(id: string, following: AbortController): Promise<void> {
-    try {
-      await followProgress(
-        this.service,
-        sessionPath(id),
-        (progress) => this.#progressed(id, progress),
-        following.signal,
-      );
-      if (!following.signal.aborted) this.#take(await this.service.session(id, following.signal));
-    } catch (error) {
-      const problem = problemBehind(error);
-      // The next poll says whatever else is wrong.
-      if (problem instanceof ServiceProblem && problem.isGone) this.#forget(id);
-    } finally {
-      // Where another one follows meanwhile, this one was replaced.
-      if (this.#followed.get(id) === following) this.#followed.delete(id);
-    }
-    this.#changed();
-  }
-
-  #progressed(id: string, progress: Progress): void {
-    const session = this.#sessions.get(id);
-    if (!session) return;
-    const frames = { ...session.frames, received: progress.received, solved: progress.solved };
-    const coding =
-      session.coding && progress.coded !== undefined ? { ...session.coding, frames: progress.coded } : undefined;
-    // The end is taken over with all figures, once they are fetched.
-    const state = progress.state === 'ready' && session.state === 'preparing' ? 'ready' : session.state;
-    this.#take({ ...session, state, frames, ...(coding && { coding }) });
     this.#changed();
   }
 
@@ -189,8 +139,6 @@ export class SessionList extends EventTarget {
   #forget(id: string): void {
     this.#sessions.delete(id);
     this.rates.forget(id);
-    this.#followed.get(id)?.abort();
-    this.#followed.delete(id);
   }
 
   #changed(): void {

@@ -1,13 +1,7 @@
 /** Sends a capture to the service: a cage's design, a session, its frames, its completion. Goes on over broken connections, and after being stopped. */
 
 import { Backoff, type Retry, pause, persistently } from '../service/backoff';
-import {
-  type DesignOptions,
-  type DesignProgress,
-  type Session,
-  type SessionOptions,
-  unsolved,
-} from '../service/messages';
+import { type DesignOptions, type CageDesign, type Session, type SessionOptions, unsolved } from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind, problemFrom, sentenceOf } from '../service/problem';
 import { type Service, sessionPath } from '../service/service';
 import { RateMeter } from '../service/measures';
@@ -92,7 +86,7 @@ export class UploadJob extends EventTarget {
     this.#cage.takeBest();
   }
 
-  get design(): DesignProgress | null {
+  get design(): CageDesign | null {
     return this.#cage.progress;
   }
 
