@@ -7,17 +7,17 @@ const MAX_SECONDS = 15;
 
 /** Grows the wait between attempts, from 0.4 s to 15 s, each at random between half and all of it. */
 export class Backoff {
-  #attempts = 0;
+  private attempts = 0;
 
   /** Seconds to wait before the next attempt; what the service asked for, if that is longer. */
   next(asked: number | null = null): number {
-    const most = Math.min(MAX_SECONDS, FIRST_SECONDS * 2 ** this.#attempts);
-    this.#attempts += 1;
+    const most = Math.min(MAX_SECONDS, FIRST_SECONDS * 2 ** this.attempts);
+    this.attempts += 1;
     return Math.max(asked ?? 0, most * (0.5 + 0.5 * Math.random()));
   }
 
-  reset(): void {
-    this.#attempts = 0;
+  reset() {
+    this.attempts = 0;
   }
 }
 
@@ -25,16 +25,16 @@ export class Backoff {
 export function pause(seconds: number, signal?: AbortSignal): Promise<void> {
   return new Promise((resolve, reject) => {
     signal?.throwIfAborted();
-    const done = (): void => {
+    const done = () => {
       clearTimeout(timer);
       globalThis.removeEventListener('online', early);
       signal?.removeEventListener('abort', aborted);
     };
-    const early = (): void => {
+    const early = () => {
       done();
       resolve();
     };
-    const aborted = (): void => {
+    const aborted = () => {
       done();
       reject(signal?.reason as Error);
     };

@@ -36,7 +36,7 @@ export class MotionCage {
   progress: CageDesign | null = null;
   /** The best cage so far, where somebody did not want to wait for the end. */
   file: File | null = null;
-  #enough = new AbortController();
+  private enough = new AbortController();
 
   /** @param kept says which design is at work, also after the page was closed */
   constructor(
@@ -52,7 +52,7 @@ export class MotionCage {
    * @throws ServiceProblem where there can be no cage
    */
   async design(options: DesignOptions, retry: Retrying, signal: AbortSignal) {
-    this.#enough = new AbortController();
+    this.enough = new AbortController();
     const { key, design } = this.kept.present;
     const begin = async (): Promise<string> => {
       const id = await retry(() => beginDesign(this.service, this.motion, options, `${key}-cage`, signal));
@@ -61,14 +61,14 @@ export class MotionCage {
     };
     let id = design ?? (await begin());
     try {
-      await this.#follow(id, retry, signal).catch(async (error: unknown) => {
+      await this.follow(id, retry, signal).catch(async (error: unknown) => {
         const problem = problemBehind(error);
         if (design === null || !(problem instanceof ServiceProblem && problem.isGone)) throw problem;
         id = await begin();
-        await this.#follow(id, retry, signal);
+        await this.follow(id, retry, signal);
       });
     } catch (error) {
-      if (signal.aborted || !this.#enough.signal.aborted) throw error;
+      if (signal.aborted || !this.enough.signal.aborted) throw error;
       this.file = await retry(() => bestCage(this.service, id, signal));
       await this.putAway();
     }
@@ -76,12 +76,12 @@ export class MotionCage {
   }
 
   /** Goes on with the best cage so far. */
-  takeBest(): void {
-    this.#enough.abort();
+  takeBest() {
+    this.enough.abort();
   }
 
   /** Deletes the design, which stops it and makes room; a session that took its cage keeps that. */
-  async putAway(): Promise<void> {
+  async putAway() {
     const { design } = this.kept.present;
     if (design === null) return;
     await removeDesign(this.service, design);
@@ -90,8 +90,8 @@ export class MotionCage {
   }
 
   /** Looks at a design until it is completed; throws where it failed, is gone or was enough. */
-  async #follow(id: string, retry: Retrying, signal: AbortSignal): Promise<void> {
-    const either = AbortSignal.any([signal, this.#enough.signal]);
+  private async follow(id: string, retry: Retrying, signal: AbortSignal) {
+    const either = AbortSignal.any([signal, this.enough.signal]);
     for (;;) {
       const found = await retry(() => readDesign(this.service, id, either));
       either.throwIfAborted();
@@ -129,7 +129,7 @@ async function beginDesign(
 /** Aborted a little after another one, so that what the service has just begun is known, and can be deleted. */
 function answered(signal: AbortSignal): AbortSignal {
   const late = new AbortController();
-  const abort = (): unknown => setTimeout(() => late.abort(signal.reason), ANSWER_MS);
+  const abort = () => setTimeout(() => late.abort(signal.reason), ANSWER_MS);
   signal.addEventListener('abort', abort, { once: true });
   return late.signal;
 }
@@ -145,7 +145,7 @@ export function readDesign(service: Service, id: string, signal?: AbortSignal): 
 }
 
 /** Deletes a design; that it could not be is no failure. */
-export async function removeDesign(service: Service, id: string): Promise<void> {
+export async function removeDesign(service: Service, id: string) {
   await service.request(pathOf(id), { method: 'DELETE' }).catch(() => undefined);
 }
 
