@@ -1,11 +1,12 @@
 /** How a running session reaches this page: rates, delay, and what came late. */
 
-const WINDOW_SECONDS = 4;
-
 /** What arrived lately, as a rate. */
 export class RateMeter {
   private samples: { at: number; amount: number }[] = [];
   private began = performance.now();
+
+  /** @param window seconds that count */
+  constructor(private readonly window = 4) {}
 
   add(amount: number) {
     const now = performance.now();
@@ -18,9 +19,9 @@ export class RateMeter {
 
   perSecond(): number {
     const now = performance.now();
-    this.samples = this.samples.filter((sample) => now - sample.at < 1000 * WINDOW_SECONDS);
+    this.samples = this.samples.filter((sample) => now - sample.at < 1000 * this.window);
     const sum = this.samples.reduce((total, sample) => total + sample.amount, 0);
-    const seconds = Math.min(WINDOW_SECONDS, Math.max(0.25, (now - this.began) / 1000));
+    const seconds = Math.min(this.window, Math.max(0.25, (now - this.began) / 1000));
     return sum / seconds;
   }
 }

@@ -123,7 +123,7 @@ export class Sessions extends LitElement {
               row({
                 session,
                 figures: this.figures.of(session.id),
-                rate: this.list.rates.of(session.id),
+                rate: this.list.rateOf(session.id),
                 now,
                 downloaded: this.downloads.get(session.id) ?? null,
                 onDownload: (format) => void this.download(session, format),

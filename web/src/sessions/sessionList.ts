@@ -1,17 +1,18 @@
 /** The sessions that are shown, kept up to date by polling. */
 
 import { Backoff } from '../service/backoff';
+import { RateMeter } from '../service/measures';
 import type { Session } from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind } from '../service/problem';
 import type { Service } from '../service/service';
-import { Rates } from './rates';
 
 const POLL_RUNNING_SECONDS = 2;
 const POLL_IDLE_SECONDS = 5;
+/** Seconds over which rates are taken. */
+const RATE_SECONDS = 15;
 
 /** The sessions of a token, newest first. Fires `change`. */
 export class SessionList extends EventTarget {
-  readonly rates = new Rates();
   /** Why the list is not up to date, and when it is asked for again, as of `Date.now()`. */
   trouble: { problem: Error; retryAt: number | null } | null = null;
   /** Sessions that are seen: unfinished ones among them are kept up to date although they are older than the newest page. */
@@ -20,6 +21,7 @@ export class SessionList extends EventTarget {
   loaded = false;
 
   private readonly known = new Map<string, Session>();
+  private readonly rates = new Map<string, RateMeter>();
   private readonly backoff = new Backoff();
   /** Where older sessions begin; undefined before the first page, null after the last. */
   private next: string | null | undefined;
@@ -33,6 +35,11 @@ export class SessionList extends EventTarget {
   /** Newest first. */
   get sessions(): Session[] {
     return [...this.known.values()].sort((a, b) => b.created - a.created || (a.id < b.id ? 1 : -1));
+  }
+
+  /** Frames per second of a session that runs. */
+  rateOf(id: string): number {
+    return this.rates.get(id)?.perSecond() ?? 0;
   }
 
   get hasOlder(): boolean {
@@ -62,6 +69,7 @@ export class SessionList extends EventTarget {
   /** Forgets everything, for another token. */
   reset() {
     this.known.clear();
+    this.rates.clear();
     this.next = undefined;
     this.loaded = false;
     this.trouble = null;
@@ -132,13 +140,17 @@ export class SessionList extends EventTarget {
   }
 
   private take(session: Session) {
+    const before = this.known.get(session.id)?.frames.solved ?? session.frames.solved;
     this.known.set(session.id, session);
-    if (session.state === 'ready') this.rates.look(session.id, session.frames.solved, performance.now());
+    if (session.state !== 'ready') return;
+    const rate = this.rates.get(session.id) ?? new RateMeter(RATE_SECONDS);
+    this.rates.set(session.id, rate);
+    rate.add(session.frames.solved - before);
   }
 
   private forget(id: string) {
     this.known.delete(id);
-    this.rates.forget(id);
+    this.rates.delete(id);
   }
 
   private changed() {
