@@ -22,27 +22,35 @@ export class Backoff {
 }
 
 /** Waits; the return of the network ends it early, and `signal` ends it with its reason. */
-export function pause(seconds: number, signal?: AbortSignal): Promise<void> {
+export async function pause(seconds: number, signal?: AbortSignal) {
+  const over = new EventTarget();
+  const timer = setTimeout(() => over.dispatchEvent(new Event('over')), 1000 * seconds);
+  try {
+    await nextEvent(signal, [over, 'over'], [globalThis, 'online']);
+  } finally {
+    clearTimeout(timer);
+  }
+}
+
+/** The first event of any target, or an abort of `signal`, with its reason. */
+export function nextEvent(signal: AbortSignal | undefined, ...targets: readonly Heard[]): Promise<void> {
   return new Promise((resolve, reject) => {
     signal?.throwIfAborted();
-    const done = () => {
-      clearTimeout(timer);
-      globalThis.removeEventListener('online', early);
-      signal?.removeEventListener('abort', aborted);
+    const end = new AbortController();
+    const ended = (act: () => void) => () => {
+      end.abort();
+      act();
     };
-    const early = () => {
-      done();
-      resolve();
-    };
-    const aborted = () => {
-      done();
-      reject(signal?.reason as Error);
-    };
-    const timer = setTimeout(early, 1000 * seconds);
-    globalThis.addEventListener('online', early);
-    signal?.addEventListener('abort', aborted);
+    for (const [target, type] of targets) target.addEventListener(type, ended(resolve), { signal: end.signal });
+    signal?.addEventListener(
+      'abort',
+      ended(() => reject(signal.reason as Error)),
+      { signal: end.signal },
+    );
   });
 }
+
+type Heard = readonly [target: Pick<EventTarget, 'addEventListener'>, type: string];
 
 /** What {@link persistently} says before it waits. */
 export interface Retry {

@@ -3,7 +3,7 @@
 import type { Capture, FrameBlock, FrameErrors, LiveStatus, StaticPart } from '../capture';
 import type { Source } from '../container/source';
 import { computePhi } from '../coordinates/pool';
-import { persistently } from './backoff';
+import { nextEvent, persistently } from './backoff';
 import { ClosedGroups } from './closedGroups';
 import { CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
 import { FrameStore, GrowingErrors } from './frameStore';
@@ -136,7 +136,7 @@ export class LiveCapture implements SessionCapture {
       else {
         this.late += isLate ? 0 : 1;
         isLate = true;
-        await this.change(signal);
+        await nextEvent(signal, [this.events, 'change'], [this.closing.signal, 'abort']);
       }
     }
   }
@@ -253,26 +253,6 @@ export class LiveCapture implements SessionCapture {
     } catch (error) {
       if (!isAbort(error)) this.errorsFetched = { coded: -1, skipped: -1, at: now };
     }
-  }
-
-  /** The next change, or the caller's abort. */
-  private change(signal?: AbortSignal): Promise<void> {
-    return new Promise((resolve, reject) => {
-      const changed = () => {
-        signal?.removeEventListener('abort', aborted);
-        this.closing.signal.removeEventListener('abort', changed);
-        this.events.removeEventListener('change', changed);
-        resolve();
-      };
-      const aborted = () => {
-        this.closing.signal.removeEventListener('abort', changed);
-        this.events.removeEventListener('change', changed);
-        reject(signal?.reason as Error);
-      };
-      this.events.addEventListener('change', changed);
-      this.closing.signal.addEventListener('abort', changed);
-      signal?.addEventListener('abort', aborted, { once: true });
-    });
   }
 
   private changed() {

@@ -1,7 +1,7 @@
 /** Receives the cages of a running session as they are solved, over broken connections and restarts of the service. */
 
 import type { LiveStatus } from '../capture';
-import { Backoff, pause } from './backoff';
+import { Backoff, nextEvent, pause } from './backoff';
 import { BrokenRecord, type CageRecord, CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
 import { LatencyMeter, RateMeter } from './measures';
 import { type Session, solvedFromStart } from './messages';
@@ -197,17 +197,7 @@ export class LiveFollower {
   }
 }
 
-function tokenChange(signal: AbortSignal): Promise<void> {
-  return new Promise((resolve, reject) => {
-    const changed = () => {
-      if (pageToken.token === null) return;
-      pageToken.removeEventListener('change', changed);
-      resolve();
-    };
-    pageToken.addEventListener('change', changed);
-    signal.addEventListener('abort', () => {
-      pageToken.removeEventListener('change', changed);
-      reject(signal.reason as Error);
-    });
-  });
+async function tokenChange(signal: AbortSignal) {
+  do await nextEvent(signal, [pageToken, 'change']);
+  while (pageToken.token === null);
 }
