@@ -98,7 +98,7 @@ function factorBy(projection: Projection, at: Vector, constraint: Constraint, fr
 }
 
 /** Where a point goes that is dragged from one place in the picture to another; the way, in the scene's unit. */
-export function draggedBy(projection: Projection, at: Vector, constraint: Constraint, from: Point, to: Point): Vector {
+function draggedBy(projection: Projection, at: Vector, constraint: Constraint, from: Point, to: Point): Vector {
   if (constraint.kind === 'axis') {
     const axis = UNITS[constraint.axis];
     const sight = normalized(sub(at, projection.ray(from.x, from.y).origin));

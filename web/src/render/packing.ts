@@ -10,7 +10,7 @@ export const WIDTH_BITS = 10;
  */
 export const WIDTH = 1 << WIDTH_BITS;
 /** Φ is kept in 16 bits where that moves no point farther than this fraction of the rest pose's diagonal. */
-export const COMPACT_TOLERANCE = 1e-4;
+const COMPACT_TOLERANCE = 1e-4;
 /** Standard deviations of rounding that the estimate of its effect allows for. */
 const DEVIATIONS = 4;
 /** Entries between two pauses: some tens of milliseconds of work. */

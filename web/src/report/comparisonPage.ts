@@ -21,7 +21,6 @@ type Content = (report: ComparisonReport, system: SystemReport) => TemplateResul
 
 /** Sections: address, name in the bar, title, and content. */
 const SECTIONS: readonly (readonly [string, string, string, Content])[] = [
-  ['claims', 'Claims', 'What the paper says, and what this capture says', claims],
   ['errors', 'Errors', 'Errors of the reconstructed model', errors],
   ['cages', 'Cages', 'Stability of the cages', cages],
   ['spectra', 'Spectra', 'Spectra of the coordinate matrices', spectra],
@@ -30,6 +29,7 @@ const SECTIONS: readonly (readonly [string, string, string, Content])[] = [
   ['noise', 'Noise', 'Noise on the capture', noise],
   ['vectors', 'Singular vectors', 'Singular vectors on the cage', vectors],
   ['times', 'Times', 'Times', times],
+  ['claims', 'Claims', 'What the paper says, and what this capture says', claims],
 ];
 
 /** The report of `cager compare`. */

@@ -99,8 +99,6 @@ export interface Claim {
 export interface SystemFigures {
   readonly unknowns: number;
   readonly rank: number;
-  readonly affine_reproduction_error: Figure;
-  readonly outside: number;
   readonly spectra: {
     readonly handles: readonly Figure[];
     readonly full: readonly Figure[];
@@ -142,7 +140,6 @@ export interface Method {
   readonly handles: string;
   readonly regularizer: string;
   readonly spectrum: number;
-  readonly lambda: number;
   /** Whether charts over frames and views show it. */
   readonly curve: boolean;
 }
@@ -157,7 +154,6 @@ export interface NoiseFigures extends Method {
   readonly totals: Totals;
   readonly per_frame: PerFrame;
   readonly clean_l2_mean: Figure;
-  readonly clean_linf_max: Figure;
 }
 
 export type Totals = Readonly<Record<`${'l2' | 'linf' | 'spike' | 'edges'}_${'mean' | 'max'}`, Figure>>;

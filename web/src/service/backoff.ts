@@ -7,42 +7,50 @@ const MAX_SECONDS = 15;
 
 /** Grows the wait between attempts, from 0.4 s to 15 s, each at random between half and all of it. */
 export class Backoff {
-  #attempts = 0;
+  private attempts = 0;
 
   /** Seconds to wait before the next attempt; what the service asked for, if that is longer. */
   next(asked: number | null = null): number {
-    const most = Math.min(MAX_SECONDS, FIRST_SECONDS * 2 ** this.#attempts);
-    this.#attempts += 1;
+    const most = Math.min(MAX_SECONDS, FIRST_SECONDS * 2 ** this.attempts);
+    this.attempts += 1;
     return Math.max(asked ?? 0, most * (0.5 + 0.5 * Math.random()));
   }
 
-  reset(): void {
-    this.#attempts = 0;
+  reset() {
+    this.attempts = 0;
   }
 }
 
 /** Waits; the return of the network ends it early, and `signal` ends it with its reason. */
-export function pause(seconds: number, signal?: AbortSignal): Promise<void> {
+export async function pause(seconds: number, signal?: AbortSignal) {
+  const over = new EventTarget();
+  const timer = setTimeout(() => over.dispatchEvent(new Event('over')), 1000 * seconds);
+  try {
+    await nextEvent(signal, [over, 'over'], [globalThis, 'online']);
+  } finally {
+    clearTimeout(timer);
+  }
+}
+
+/** The first event of any target, or an abort of `signal`, with its reason. */
+export function nextEvent(signal: AbortSignal | undefined, ...targets: readonly Heard[]): Promise<void> {
   return new Promise((resolve, reject) => {
     signal?.throwIfAborted();
-    const done = (): void => {
-      clearTimeout(timer);
-      globalThis.removeEventListener('online', early);
-      signal?.removeEventListener('abort', aborted);
+    const end = new AbortController();
+    const ended = (act: () => void) => () => {
+      end.abort();
+      act();
     };
-    const early = (): void => {
-      done();
-      resolve();
-    };
-    const aborted = (): void => {
-      done();
-      reject(signal?.reason as Error);
-    };
-    const timer = setTimeout(early, 1000 * seconds);
-    globalThis.addEventListener('online', early);
-    signal?.addEventListener('abort', aborted);
+    for (const [target, type] of targets) target.addEventListener(type, ended(resolve), { signal: end.signal });
+    signal?.addEventListener(
+      'abort',
+      ended(() => reject(signal.reason as Error)),
+      { signal: end.signal },
+    );
   });
 }
+
+type Heard = readonly [target: Pick<EventTarget, 'addEventListener'>, type: string];
 
 /** What {@link persistently} says before it waits. */
 export interface Retry {

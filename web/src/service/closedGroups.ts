@@ -24,14 +24,14 @@ export interface GroupListener {
 }
 
 export class ClosedGroups {
-  readonly #store = new GroupStore();
-  readonly #follower: GroupFollower;
-  readonly #codec: Codec = createCodec();
-  readonly #decoder: BlockDecoder;
-  readonly #cache = new BlockCache((first, signal) => this.#decode(first, signal));
+  private readonly store = new GroupStore();
+  private readonly follower: GroupFollower;
+  private readonly codec: Codec = createCodec();
+  private readonly decoder: BlockDecoder;
+  private readonly cache = new BlockCache((first, signal) => this.decode(first, signal));
   /** First frames of groups that could not be decoded, and when it is tried again, of `performance.now()`. */
-  readonly #failed = new Map<number, number>();
-  readonly #closing = new AbortController();
+  private readonly failed = new Map<number, number>();
+  private readonly closing = new AbortController();
 
   /** @param connection by which the static part came, and the groups follow */
   constructor(
@@ -42,28 +42,27 @@ export class ClosedGroups {
     private readonly listener: GroupListener,
   ) {
     // The page cannot compute these coordinates, and coded cages are decoded with them.
-    this.#decoder = new BlockDecoder(
+    this.decoder = new BlockDecoder(
       part,
-      this.#codec,
-      coordinates === 'harmonic' ? basisRows(service, id, this.#closing.signal) : null,
+      this.codec,
+      coordinates === 'harmonic' ? basisRows(service, id, this.closing.signal) : null,
     );
-    const take = (group: Parameters<GroupStore['put']>[0]): void => {
-      this.#store.put(group);
+    const take = (group: Parameters<GroupStore['put']>[0]) => {
+      this.store.put(group);
       listener.arrived();
     };
-    this.#follower = new GroupFollower(service, id, take, connection);
+    this.follower = new GroupFollower(service, id, take, connection);
   }
 
   /** Bytes that a frame takes in the groups; null before it is known. */
   get bytesPerFrame(): number | null {
-    return this.#follower.bytesPerFrame;
+    return this.follower.bytesPerFrame;
   }
 
   /** The frames of the group that a frame belongs to, where that is here and can be decoded as far as known. */
   of(frame: number): { readonly first: number; readonly count: number } | null {
-    const fields = this.#store.of(frame)?.frames.entry.fields;
-    if (this.#closing.signal.aborted || !fields || performance.now() < (this.#failed.get(fields.first) ?? 0))
-      return null;
+    const fields = this.store.of(frame)?.frames.entry.fields;
+    if (this.closing.signal.aborted || !fields || performance.now() < (this.failed.get(fields.first) ?? 0)) return null;
     return fields;
   }
 
@@ -72,14 +71,14 @@ export class ClosedGroups {
     const group = this.of(frame);
     if (!group) return null;
     try {
-      const block = await this.#cache.get(group.first, signal);
+      const block = await this.cache.get(group.first, signal);
       const next = this.of(group.first + group.count);
-      if (next) this.#cache.prefetch(next.first);
+      if (next) this.cache.prefetch(next.first);
       return block;
     } catch (error) {
       signal?.throwIfAborted();
-      if (this.#closing.signal.aborted) return null;
-      this.#failed.set(group.first, isDamage(error) ? Infinity : performance.now() + 1000 * RETRY_SECONDS);
+      if (this.closing.signal.aborted) return null;
+      this.failed.set(group.first, isDamage(error) ? Infinity : performance.now() + 1000 * RETRY_SECONDS);
       this.listener.failed(error);
       return null;
     }
@@ -87,31 +86,31 @@ export class ClosedGroups {
 
   /** Φ, which decoding needs as well. */
   phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
-    return this.#decoder.phi(onProgress, signal);
+    return this.decoder.phi(onProgress, signal);
   }
 
-  looked(session: Session): void {
-    if (!this.#closing.signal.aborted) this.#follower.looked(session);
+  looked(session: Session) {
+    if (!this.closing.signal.aborted) this.follower.looked(session);
   }
 
   /** The container once the session is completed, of which groups that are here are not read again; see {@link GroupStore.source}. */
   source(source: Source, frames: number): Source {
-    return this.#store.source(source, frames);
+    return this.store.source(source, frames);
   }
 
-  close(): void {
-    this.#closing.abort();
-    this.#follower.close();
-    this.#cache.clear();
-    this.#codec.close();
+  close() {
+    this.closing.abort();
+    this.follower.close();
+    this.cache.clear();
+    this.codec.close();
   }
 
-  async #decode(first: number, signal: AbortSignal): Promise<FrameBlock> {
-    const group = this.#store.of(first);
+  private async decode(first: number, signal: AbortSignal): Promise<FrameBlock> {
+    const group = this.store.of(first);
     if (!group) throw new Error('The group was given up.');
     const { frames, residual } = group;
     const bytes = frames.entry.offset + HEADER_BYTES + frames.payload.length;
-    const { block, problem } = await this.#decoder.decode(frames, residual, bytes, signal);
+    const { block, problem } = await this.decoder.decode(frames, residual, bytes, signal);
     if (problem) this.listener.failed(problem);
     return block;
   }

@@ -22,15 +22,15 @@ export class GroupFollower {
   frames = 0;
   /** Bytes that a frame takes in them; null before it is known. */
   bytesPerFrame: number | null = null;
-  #connection: ContainerConnection | null = null;
-  #isClosed = false;
+  private connection: ContainerConnection | null = null;
+  private isClosed = false;
   /** Bytes of the container that are known, and how many of them the last connection brought. */
-  #bytes = 0;
-  #newBytes = 0;
-  #lastPieceAt = 0;
+  private bytes = 0;
+  private newBytes = 0;
+  private lastPieceAt = 0;
   /** When the next connection may be made, of `performance.now()`. */
-  #earliest = 0;
-  readonly #backoff = new Backoff();
+  private earliest = 0;
+  private readonly backoff = new Backoff();
 
   /** @param connection by which the static part came */
   constructor(
@@ -40,58 +40,58 @@ export class GroupFollower {
     connection: ContainerConnection,
     private readonly freeBytes = FREE_BYTES,
   ) {
-    void this.#receive(connection);
+    void this.receive(connection);
   }
 
   /** A look at the session: where nothing follows it and groups have closed, they are asked for. */
-  looked({ coding }: Session): void {
+  looked({ coding }: Session) {
     if (!coding || coding.frames <= this.frames) return;
     const now = performance.now();
-    if (this.#connection) {
-      if (now - this.#lastPieceAt > 1000 * SILENT_SECONDS) this.#connection.stop.abort();
+    if (this.connection) {
+      if (now - this.lastPieceAt > 1000 * SILENT_SECONDS) this.connection.stop.abort();
       return;
     }
     const waiting = coding.bytes * (1 - this.frames / coding.frames);
-    if (this.#isClosed || now < this.#earliest || this.#bytes > this.freeBytes + this.#newBytes + waiting) return;
-    this.#newBytes = 0;
-    void this.#receive(connect(this.service, this.id));
+    if (this.isClosed || now < this.earliest || this.bytes > this.freeBytes + this.newBytes + waiting) return;
+    this.newBytes = 0;
+    void this.receive(connect(this.service, this.id));
   }
 
-  close(): void {
-    this.#isClosed = true;
-    this.#connection?.stop.abort();
+  close() {
+    this.isClosed = true;
+    this.connection?.stop.abort();
   }
 
   /** Reads a connection until it ends, whyever. */
-  async #receive(connection: ContainerConnection): Promise<void> {
+  private async receive(connection: ContainerConnection) {
     const { stream, pieces } = connection;
-    this.#connection = connection;
-    this.#lastPieceAt = performance.now();
+    this.connection = connection;
+    this.lastPieceAt = performance.now();
     try {
-      this.#take(stream, new Uint8Array(0));
+      this.take(stream, new Uint8Array(0));
       for await (const piece of pieces) {
-        this.#lastPieceAt = performance.now();
-        this.#take(stream, piece);
+        this.lastPieceAt = performance.now();
+        this.take(stream, piece);
       }
     } catch {
       // Looks at the session ask again, and whoever follows its cages says what is wrong.
     } finally {
       connection.stop.abort();
-      this.#connection = null;
-      this.#earliest = performance.now() + 1000 * this.#backoff.next();
+      this.connection = null;
+      this.earliest = performance.now() + 1000 * this.backoff.next();
     }
   }
 
-  #take(stream: ContainerStream, piece: Uint8Array): void {
+  private take(stream: ContainerStream, piece: Uint8Array) {
     for (const group of stream.push(piece)) {
       if (endOf(group) <= this.frames) continue;
       this.frames = endOf(group);
-      this.#backoff.reset();
+      this.backoff.reset();
       this.onGroup(group);
     }
     this.bytesPerFrame = stream.bytesPerFrame ?? this.bytesPerFrame;
-    const more = Math.max(0, stream.received - this.#bytes);
-    this.#bytes += more;
-    this.#newBytes += more;
+    const more = Math.max(0, stream.received - this.bytes);
+    this.bytes += more;
+    this.newBytes += more;
   }
 }

@@ -7,22 +7,21 @@ import type { Source } from '../container/source';
 
 /** Keeps groups in the order of their frames; the earliest ones go first. */
 export class GroupStore {
-  readonly #groups: StoredChunk[] = [];
-  #keptBytes = 0;
+  private readonly groups: StoredChunk[] = [];
+  private keptBytes = 0;
 
   constructor(private readonly mostBytes = GROUP_BYTES) {}
 
   /** Takes the group that follows the last one. */
-  put(group: StoredChunk): void {
-    this.#groups.push(group);
-    this.#keptBytes += bytesOf(group);
-    while (this.#keptBytes > this.mostBytes && this.#groups.length > 1)
-      this.#keptBytes -= bytesOf(this.#groups.shift()!);
+  put(group: StoredChunk) {
+    this.groups.push(group);
+    this.keptBytes += bytesOf(group);
+    while (this.keptBytes > this.mostBytes && this.groups.length > 1) this.keptBytes -= bytesOf(this.groups.shift()!);
   }
 
   /** The group that a frame belongs to, where it is here. */
   of(frame: number): StoredChunk | null {
-    return this.#groups.find((group) => isWithin(group, frame)) ?? null;
+    return this.groups.find((group) => isWithin(group, frame)) ?? null;
   }
 
   /**
@@ -32,7 +31,7 @@ export class GroupStore {
    * @param frames number of frames it has: groups beyond were left out
    */
   source(source: Source, frames: number): Source {
-    const held = this.#groups.filter((group) => endOf(group) <= frames).flatMap(piecesOf);
+    const held = this.groups.filter((group) => endOf(group) <= frames).flatMap(piecesOf);
     return {
       size: source.size,
       read: (offset, length, signal) => {

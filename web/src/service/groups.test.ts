@@ -170,7 +170,7 @@ class SlowService {
   }
 
   /** Sends the container up to its byte `end`. */
-  async send(end: number): Promise<void> {
+  async send(end: number) {
     await vi.advanceTimersByTimeAsync(10);
     for (; this.sent < end; this.sent += 1 << 20) {
       this.stream?.enqueue(this.bytes.subarray(this.sent, Math.min(end, this.sent + (1 << 20))));
@@ -179,7 +179,7 @@ class SlowService {
     await vi.advanceTimersByTimeAsync(10);
   }
 
-  breakOff(): void {
+  breakOff() {
     this.stream?.error(new TypeError('network error'));
     this.stream = null;
   }

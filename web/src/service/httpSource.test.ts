@@ -25,7 +25,7 @@ async function serve(answer: (request: IncomingMessage, response: ServerResponse
 }
 
 /** Answers as a server of files does. */
-function answerRange(content: Uint8Array, etag: string, request: IncomingMessage, response: ServerResponse): void {
+function answerRange(content: Uint8Array, etag: string, request: IncomingMessage, response: ServerResponse) {
   const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
   const condition = request.headers['if-range'];
   if (range === null || (condition !== undefined && condition !== etag)) {

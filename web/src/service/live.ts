@@ -34,7 +34,7 @@ const ATTEMPTS = 5;
  */
 export async function openSession(id: string, options: OpenSessionOptions = {}): Promise<SessionCapture> {
   const { service = new Service(), signal = new AbortController().signal, onWaiting } = options;
-  const onRetry = ({ problem }: Retry): void => onWaiting?.(problem.message);
+  const onRetry = ({ problem }: Retry) => onWaiting?.(problem.message);
   const retried = <T>(work: () => Promise<T>): Promise<T> =>
     persistently(work, { signal, onRetry, attempts: ATTEMPTS });
   const open: OpenFinished = (...finished) => openFinished(service, ...finished);

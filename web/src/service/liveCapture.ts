@@ -3,7 +3,7 @@
 import type { Capture, FrameBlock, FrameErrors, LiveStatus, StaticPart } from '../capture';
 import type { Source } from '../container/source';
 import { computePhi } from '../coordinates/pool';
-import { persistently } from './backoff';
+import { nextEvent, persistently } from './backoff';
 import { ClosedGroups } from './closedGroups';
 import { CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
 import { FrameStore, GrowingErrors } from './frameStore';
@@ -44,69 +44,69 @@ export class LiveCapture implements SessionCapture {
   static: StaticPart;
   frames: number;
   complete = false;
-  readonly #service: Service;
-  readonly #id: string;
-  readonly #openFinished: OpenFinished;
-  readonly #store: FrameStore;
-  readonly #measured = new GrowingErrors();
-  readonly #follower: LiveFollower;
+  private readonly service: Service;
+  private readonly id: string;
+  private readonly openFinished: OpenFinished;
+  private readonly store: FrameStore;
+  private readonly measured = new GrowingErrors();
+  private readonly follower: LiveFollower;
   /** Null where frames are not coded. */
-  readonly #groups: ClosedGroups | null;
-  readonly #fetching = new Map<number, Promise<void>>();
-  readonly #closing = new AbortController();
-  #finished: Capture | null = null;
-  #lastProblem: string | null = null;
-  #late = 0;
+  private readonly groups: ClosedGroups | null;
+  private readonly fetching = new Map<number, Promise<void>>();
+  private readonly closing = new AbortController();
+  private finished: Capture | null = null;
+  private lastProblem: string | null = null;
+  private late = 0;
   /** What the errors were fetched for, and when: coding a group changes them, and frames passed over bring none. */
-  #errorsFetched = { coded: -1, skipped: -1, at: -Infinity };
+  private errorsFetched = { coded: -1, skipped: -1, at: -Infinity };
 
   /** @param openFinished opens the container, once there is one */
   constructor(service: Service, session: Session, { part, connection }: RunningContainer, openFinished: OpenFinished) {
-    this.#service = service;
-    this.#id = session.id;
-    this.#openFinished = openFinished;
+    this.service = service;
+    this.id = session.id;
+    this.openFinished = openFinished;
     this.name = session.name ?? session.id;
     this.static = part;
     this.frames = solvedFromStart(session.frames);
-    this.#store = new FrameStore(part.rowsPerFrame);
-    this.#follower = new LiveFollower(service, session.id, part.rowsPerFrame, this.frames, {
+    this.store = new FrameStore(part.rowsPerFrame);
+    this.follower = new LiveFollower(service, session.id, part.rowsPerFrame, this.frames, {
       record: (record) => {
-        this.#store.put(record.frame, record.rows);
-        this.#measured.putRecord(record);
+        this.store.put(record.frame, record.rows);
+        this.measured.putRecord(record);
         this.frames = record.frame + 1;
       },
       skipped: (end) => (this.frames = end),
       looked: (look) => {
-        this.#groups?.looked(look);
-        void this.#fetchErrors(look);
+        this.groups?.looked(look);
+        void this.fetchErrors(look);
       },
-      changed: () => this.#changed(),
+      changed: () => this.changed(),
     });
-    this.#groups = session.coding ? this.#followGroups(service, session, connection) : null;
-    if (!this.#groups) connection.stop.abort();
-    void this.#run();
+    this.groups = session.coding ? this.followGroups(service, session, connection) : null;
+    if (!this.groups) connection.stop.abort();
+    void this.run();
   }
 
   get errors(): FrameErrors {
-    return this.#finished?.errors ?? this.#measured.upTo(this.frames);
+    return this.finished?.errors ?? this.measured.upTo(this.frames);
   }
 
   get frameNumbers(): Float64Array | null {
-    return this.#finished?.frameNumbers ?? null;
+    return this.finished?.frameNumbers ?? null;
   }
 
   get frameBytes(): number | undefined {
-    if (this.#finished) return this.#finished.frameBytes;
-    const bytes = this.#groups?.bytesPerFrame ?? null;
+    if (this.finished) return this.finished.frameBytes;
+    const bytes = this.groups?.bytesPerFrame ?? null;
     return bytes === null ? undefined : bytes * this.frames;
   }
 
   get problem(): string | null {
-    return this.#finished?.problem ?? this.#lastProblem ?? this.#follower.problem;
+    return this.finished?.problem ?? this.lastProblem ?? this.follower.problem;
   }
 
   get live(): LiveStatus {
-    const follower = this.#follower;
+    const follower = this.follower;
     const isOver = this.complete;
     return {
       state: isOver ? 'ended' : follower.state,
@@ -115,7 +115,7 @@ export class LiveCapture implements SessionCapture {
       behindFrames: isOver ? 0 : follower.behind,
       bitsPerSecond: 8 * follower.bytes.perSecond(),
       framesPerSecond: follower.frames.perSecond(),
-      lateFrames: this.#late,
+      lateFrames: this.late,
       droppedFrames: follower.skipped + follower.damaged,
     };
   }
@@ -124,109 +124,109 @@ export class LiveCapture implements SessionCapture {
     let isLate = false;
     for (;;) {
       signal?.throwIfAborted();
-      this.#closing.signal.throwIfAborted();
-      if (this.#finished) return this.#finished.block(frame, signal);
-      const coded = await this.#groups?.block(frame, signal);
+      this.closing.signal.throwIfAborted();
+      if (this.finished) return this.finished.block(frame, signal);
+      const coded = await this.groups?.block(frame, signal);
       if (coded) return coded;
-      const block = this.#store.block(frame);
-      if (block) return { ...block, isPreliminary: this.#groups !== null };
-      if (frame < this.frames) await this.#fetchAround(frame);
+      const block = this.store.block(frame);
+      if (block) return { ...block, isPreliminary: this.groups !== null };
+      if (frame < this.frames) await this.fetchAround(frame);
       else if (this.complete)
         throw new RangeError(this.problem ?? `The capture has ${this.frames} frames, so there is no frame ${frame}.`);
       else {
-        this.#late += isLate ? 0 : 1;
+        this.late += isLate ? 0 : 1;
         isLate = true;
-        await this.#change(signal);
+        await nextEvent(signal, [this.events, 'change'], [this.closing.signal, 'abort']);
       }
     }
   }
 
   phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
-    const from = this.#finished ?? this.#groups;
+    const from = this.finished ?? this.groups;
     return from?.phi?.(onProgress, signal) ?? computePhi(this.static, { onProgress, signal });
   }
 
   readTogether(frame: number): { readonly first: number; readonly count: number } {
-    return this.#finished?.readTogether?.(frame) ?? this.#groups?.of(frame) ?? { first: frame, count: 1 };
+    return this.finished?.readTogether?.(frame) ?? this.groups?.of(frame) ?? { first: frame, count: 1 };
   }
 
   hasFinal(frame: number): boolean {
-    return Boolean(this.#finished ?? this.#groups?.of(frame));
+    return Boolean(this.finished ?? this.groups?.of(frame));
   }
 
-  close(): void {
-    this.#closing.abort();
-    this.#groups?.close();
-    this.#finished?.close();
+  close() {
+    this.closing.abort();
+    this.groups?.close();
+    this.finished?.close();
   }
 
-  async #run(): Promise<void> {
-    const { signal } = this.#closing;
+  private async run() {
+    const { signal } = this.closing;
     try {
-      const session = await this.#follower.run(signal);
+      const session = await this.follower.run(signal);
       if (session) {
-        const known = (source: Source): Source => this.#groups?.source(source, session.coding?.frames ?? 0) ?? source;
-        const opening = () => this.#openFinished(session, signal, known);
-        const onRetry = ({ problem }: { problem: Error }): void => {
-          this.#lastProblem = problem.message;
-          this.#changed();
+        const known = (source: Source): Source => this.groups?.source(source, session.coding?.frames ?? 0) ?? source;
+        const opening = () => this.openFinished(session, signal, known);
+        const onRetry = ({ problem }: { problem: Error }) => {
+          this.lastProblem = problem.message;
+          this.changed();
         };
         const finished = await persistently(opening, { signal, onRetry });
-        this.#lastProblem = null;
-        finished.events.addEventListener('change', () => this.#changed());
+        this.lastProblem = null;
+        finished.events.addEventListener('change', () => this.changed());
         // The meshes are the same; whoever made buffers of them can keep these.
         this.static = { ...this.static, report: finished.static.report };
         this.frames = finished.frames;
-        this.#finished = finished;
-        this.#groups?.close();
+        this.finished = finished;
+        this.groups?.close();
         // Coded cages are not quite the solved ones, and have residuals that belong to them.
         this.events.dispatchEvent(new Event('replaced'));
       }
     } catch (error) {
       if (signal.aborted) return;
-      this.#lastProblem = sentenceOf(error);
+      this.lastProblem = sentenceOf(error);
     }
     this.complete = true;
-    this.#changed();
+    this.changed();
   }
 
-  #followGroups(service: Service, session: Session, connection: RunningContainer['connection']): ClosedGroups {
+  private followGroups(service: Service, session: Session, connection: RunningContainer['connection']): ClosedGroups {
     return new ClosedGroups(service, session, this.static, connection, {
-      arrived: () => this.#changed(),
+      arrived: () => this.changed(),
       failed: (error) => {
-        this.#lastProblem ??= sentenceOf(error);
-        this.#changed();
+        this.lastProblem ??= sentenceOf(error);
+        this.changed();
       },
     });
   }
 
   /** Fetches the frames of the chunk that has `frame`, once for all who wait for it. */
-  #fetchAround(frame: number): Promise<void> {
-    const { chunkFrames } = this.#store;
+  private fetchAround(frame: number): Promise<void> {
+    const { chunkFrames } = this.store;
     const chunk = Math.floor(frame / chunkFrames);
-    const known = this.#fetching.get(chunk);
+    const known = this.fetching.get(chunk);
     if (known) return known;
     const first = chunk * chunkFrames;
     const count = Math.min(chunkFrames, this.frames - first);
-    const fetching = this.#fetchFrames(first, count).finally(() => this.#fetching.delete(chunk));
-    this.#fetching.set(chunk, fetching);
+    const fetching = this.fetchFrames(first, count).finally(() => this.fetching.delete(chunk));
+    this.fetching.set(chunk, fetching);
     return fetching;
   }
 
-  async #fetchFrames(first: number, count: number): Promise<void> {
-    const { signal } = this.#closing;
-    const path = `${sessionPath(this.#id, 'cages')}?first=${first}&count=${count}`;
+  private async fetchFrames(first: number, count: number) {
+    const { signal } = this.closing;
+    const path = `${sessionPath(this.id, 'cages')}?first=${first}&count=${count}`;
     const headers = { Accept: RECORDS_MEDIA_TYPE };
     await persistently(
       async () => {
         const reader = new CageRecordReader(this.static.rowsPerFrame);
         let received = 0;
-        const response = await this.#service.request(path, { headers, cache: 'no-store', signal });
+        const response = await this.service.request(path, { headers, cache: 'no-store', signal });
         for await (const piece of piecesOf(response, signal)) {
-          this.#follower.bytes.add(piece.length);
+          this.follower.bytes.add(piece.length);
           for (const { frame, rows } of reader.push(piece)) {
             if (frame < first || frame >= first + count) throw new Error('The service sent the wrong frame.');
-            this.#store.put(frame, rows);
+            this.store.put(frame, rows);
             received += 1;
           }
         }
@@ -237,45 +237,25 @@ export class LiveCapture implements SessionCapture {
   }
 
   /** Fetches the errors of all frames where those here are not those any more. */
-  async #fetchErrors(session: Session): Promise<void> {
+  private async fetchErrors(session: Session) {
     const coded = session.coding?.frames ?? 0;
-    const { skipped } = this.#follower;
-    const fetched = this.#errorsFetched;
+    const { skipped } = this.follower;
+    const fetched = this.errorsFetched;
     const now = performance.now();
     const isKnown = fetched.coded === coded && fetched.skipped === skipped;
     if (isKnown || session.frames.solved === 0 || now - fetched.at < 1000 * ERRORS_SECONDS) return;
-    this.#errorsFetched = { coded, skipped, at: now };
+    this.errorsFetched = { coded, skipped, at: now };
     try {
-      for (const { frame, l2, linf } of await this.#service.errors(this.#id, this.#closing.signal)) {
-        this.#measured.put(frame, l2, linf);
+      for (const { frame, l2, linf } of await this.service.errors(this.id, this.closing.signal)) {
+        this.measured.put(frame, l2, linf);
       }
-      this.#changed();
+      this.changed();
     } catch (error) {
-      if (!isAbort(error)) this.#errorsFetched = { coded: -1, skipped: -1, at: now };
+      if (!isAbort(error)) this.errorsFetched = { coded: -1, skipped: -1, at: now };
     }
   }
 
-  /** The next change, or the caller's abort. */
-  #change(signal?: AbortSignal): Promise<void> {
-    return new Promise((resolve, reject) => {
-      const changed = (): void => {
-        signal?.removeEventListener('abort', aborted);
-        this.#closing.signal.removeEventListener('abort', changed);
-        this.events.removeEventListener('change', changed);
-        resolve();
-      };
-      const aborted = (): void => {
-        this.#closing.signal.removeEventListener('abort', changed);
-        this.events.removeEventListener('change', changed);
-        reject(signal?.reason as Error);
-      };
-      this.events.addEventListener('change', changed);
-      this.#closing.signal.addEventListener('abort', changed);
-      signal?.addEventListener('abort', aborted, { once: true });
-    });
-  }
-
-  #changed(): void {
+  private changed() {
     this.events.dispatchEvent(new Event('change'));
   }
 }

@@ -1,7 +1,7 @@
 /** Receives the cages of a running session as they are solved, over broken connections and restarts of the service. */
 
 import type { LiveStatus } from '../capture';
-import { Backoff, pause } from './backoff';
+import { Backoff, nextEvent, pause } from './backoff';
 import { BrokenRecord, type CageRecord, CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
 import { LatencyMeter, RateMeter } from './measures';
 import { type Session, solvedFromStart } from './messages';
@@ -43,10 +43,10 @@ export class LiveFollower {
   readonly bytes = new RateMeter();
   readonly frames = new RateMeter();
   readonly latency = new LatencyMeter();
-  readonly #backoff = new Backoff();
-  #next: number;
+  private readonly backoff = new Backoff();
+  private next: number;
   /** How far behind the page was at the last look; a skip needs two that do not get better. */
-  #behindBefore = 0;
+  private behindBefore = 0;
 
   /** @param next the first frame to receive */
   constructor(
@@ -56,7 +56,7 @@ export class LiveFollower {
     next: number,
     private readonly following: Following,
   ) {
-    this.#next = next;
+    this.next = next;
   }
 
   /**
@@ -71,58 +71,58 @@ export class LiveFollower {
         this.following.looked(session);
         if (session.problem) throw problemFrom(session.problem);
         if (session.state === 'completed') return session;
-        this.#catchUp(session);
-        this.latency.reset(this.#next);
-        await this.#receive(signal);
+        this.catchUp(session);
+        this.latency.reset(this.next);
+        await this.receive(signal);
         // It ended by itself: the session is completed or deleted, or something in between closed the connection.
-        await pause(this.#backoff.next(), signal);
+        await pause(this.backoff.next(), signal);
       } catch (error) {
         if (signal.aborted) throw error;
-        if (!(await this.#recovers(problemBehind(error), signal))) return null;
+        if (!(await this.recovers(problemBehind(error), signal))) return null;
       }
     }
   }
 
   /** Waits where that may help; otherwise nothing follows any more. */
-  async #recovers(problem: Error, signal: AbortSignal): Promise<boolean> {
+  private async recovers(problem: Error, signal: AbortSignal): Promise<boolean> {
     if (problem instanceof TooFarBehind) return true;
     this.problem = problem.message;
     if (problem instanceof ServiceProblem && problem.status === 401) {
-      this.#enter('signed-out');
+      this.enter('signed-out');
       await tokenChange(signal);
-      this.#enter('reconnecting');
+      this.enter('reconnecting');
       return true;
     }
     if (!(problem instanceof BrokenRecord) && !(problem instanceof ServiceProblem && problem.passes)) {
-      this.#enter('ended');
+      this.enter('ended');
       return false;
     }
-    const seconds = this.#backoff.next(problem instanceof ServiceProblem ? problem.retryAfter : null);
+    const seconds = this.backoff.next(problem instanceof ServiceProblem ? problem.retryAfter : null);
     this.retryAt = Date.now() + 1000 * seconds;
-    this.#enter('reconnecting');
+    this.enter('reconnecting');
     await pause(seconds, signal);
     return true;
   }
 
-  async #receive(signal: AbortSignal): Promise<void> {
+  private async receive(signal: AbortSignal) {
     const left = new AbortController();
     const either = AbortSignal.any([signal, left.signal]);
-    const response = await this.service.request(`${sessionPath(this.id, 'cages')}?follow=true&first=${this.#next}`, {
+    const response = await this.service.request(`${sessionPath(this.id, 'cages')}?follow=true&first=${this.next}`, {
       headers: { Accept: RECORDS_MEDIA_TYPE },
       cache: 'no-store',
       signal: either,
     });
     this.problem = null;
     this.retryAt = null;
-    this.#enter('following');
+    this.enter('following');
     const looking = new AbortController();
-    void this.#lookOn(left, AbortSignal.any([either, looking.signal]));
+    void this.lookOn(left, AbortSignal.any([either, looking.signal]));
     const reader = new CageRecordReader(this.rows);
     try {
       for await (const piece of piecesOf(response, either)) {
-        this.#backoff.reset();
+        this.backoff.reset();
         this.bytes.add(piece.length);
-        for (const record of reader.push(piece)) this.#take(record);
+        for (const record of reader.push(piece)) this.take(record);
         this.following.changed();
       }
     } catch (error) {
@@ -134,10 +134,10 @@ export class LiveFollower {
     either.throwIfAborted();
   }
 
-  #take(record: CageRecord): void {
+  private take(record: CageRecord) {
     // Frames come in order; anything else is another session's, or a fault on the way.
-    if (record.frame !== this.#next) throw new BrokenRecord('A frame arrived out of order.');
-    this.#next += 1;
+    if (record.frame !== this.next) throw new BrokenRecord('A frame arrived out of order.');
+    this.next += 1;
     this.frames.add(1);
     this.latency.arrived(record.frame);
     this.behind = Math.max(0, this.behind - 1);
@@ -145,7 +145,7 @@ export class LiveFollower {
   }
 
   /** Looks at the session every few seconds while its cages arrive: for the delay, for its errors, and for signs of life. */
-  async #lookOn(left: AbortController, signal: AbortSignal): Promise<void> {
+  private async lookOn(left: AbortController, signal: AbortSignal) {
     let unanswered = 0;
     try {
       for (let wait = FIRST_LOOK_SECONDS; ; wait = LOOK_SECONDS) {
@@ -160,10 +160,10 @@ export class LiveFollower {
         if (session === null) continue;
         const solved = solvedFromStart(session.frames);
         if (solved > 0) this.latency.looked(from, performance.now(), solved - 1);
-        this.behind = Math.max(0, solved - this.#next);
+        this.behind = Math.max(0, solved - this.next);
         this.following.looked(session);
         this.following.changed();
-        if (this.#isHopeless()) left.abort(new TooFarBehind());
+        if (this.isHopeless()) left.abort(new TooFarBehind());
       }
     } catch {
       // The stream ended or was left.
@@ -171,43 +171,33 @@ export class LiveFollower {
   }
 
   /** Whether frames are solved faster than they arrive, and the page is seconds behind. */
-  #isHopeless(): boolean {
-    const getsBetter = this.behind < 0.8 * this.#behindBefore;
-    this.#behindBefore = this.behind;
+  private isHopeless(): boolean {
+    const getsBetter = this.behind < 0.8 * this.behindBefore;
+    this.behindBefore = this.behind;
     const rate = this.frames.perSecond();
     return !getsBetter && this.behind > MIN_SKIPPED && this.behind > MAX_BEHIND_SECONDS * rate;
   }
 
   /** After a break, and where the connection is too slow, goes on with the newest frame. */
-  #catchUp(session: Session): void {
+  private catchUp(session: Session) {
     const solved = solvedFromStart(session.frames);
-    this.behind = Math.max(0, solved - this.#next);
+    this.behind = Math.max(0, solved - this.next);
     const rate = this.frames.perSecond();
     if (this.behind <= MIN_SKIPPED || this.behind <= MAX_BEHIND_SECONDS * rate) return;
     this.skipped += this.behind;
     this.behind = 0;
-    this.#behindBefore = 0;
-    this.#next = solved;
+    this.behindBefore = 0;
+    this.next = solved;
     this.following.skipped(solved);
   }
 
-  #enter(state: LiveStatus['state']): void {
+  private enter(state: LiveStatus['state']) {
     this.state = state;
     this.following.changed();
   }
 }
 
-function tokenChange(signal: AbortSignal): Promise<void> {
-  return new Promise((resolve, reject) => {
-    const changed = (): void => {
-      if (pageToken.token === null) return;
-      pageToken.removeEventListener('change', changed);
-      resolve();
-    };
-    pageToken.addEventListener('change', changed);
-    signal.addEventListener('abort', () => {
-      pageToken.removeEventListener('change', changed);
-      reject(signal.reason as Error);
-    });
-  });
+async function tokenChange(signal: AbortSignal) {
+  do await nextEvent(signal, [pageToken, 'change']);
+  while (pageToken.token === null);
 }

@@ -1,26 +1,27 @@
 /** How a running session reaches this page: rates, delay, and what came late. */
 
-const WINDOW_SECONDS = 4;
-
 /** What arrived lately, as a rate. */
 export class RateMeter {
-  #samples: { at: number; amount: number }[] = [];
-  #began = performance.now();
+  private samples: { at: number; amount: number }[] = [];
+  private began = performance.now();
 
-  add(amount: number): void {
+  /** @param window seconds that count */
+  constructor(private readonly window = 4) {}
+
+  add(amount: number) {
     const now = performance.now();
-    if (this.#samples.length === 0) this.#began = now;
-    const last = this.#samples.at(-1);
+    if (this.samples.length === 0) this.began = now;
+    const last = this.samples.at(-1);
     // Pieces of a fast transfer are too many to be kept one by one.
     if (last && now - last.at < 50) last.amount += amount;
-    else this.#samples.push({ at: now, amount });
+    else this.samples.push({ at: now, amount });
   }
 
   perSecond(): number {
     const now = performance.now();
-    this.#samples = this.#samples.filter((sample) => now - sample.at < 1000 * WINDOW_SECONDS);
-    const sum = this.#samples.reduce((total, sample) => total + sample.amount, 0);
-    const seconds = Math.min(WINDOW_SECONDS, Math.max(0.25, (now - this.#began) / 1000));
+    this.samples = this.samples.filter((sample) => now - sample.at < 1000 * this.window);
+    const sum = this.samples.reduce((total, sample) => total + sample.amount, 0);
+    const seconds = Math.min(this.window, Math.max(0.25, (now - this.began) / 1000));
     return sum / seconds;
   }
 }
@@ -30,40 +31,37 @@ export class RateMeter {
  * request and its answer; the delay is how much later the last of them arrived.
  */
 export class LatencyMeter {
-  #seconds: number | null = null;
-  #awaited: { frame: number; at: number } | null = null;
+  /** Null before it was measured. */
+  seconds: number | null = null;
+  private awaited: { frame: number; at: number } | null = null;
   /** Frames below this one are here, or are not sent. */
-  #next = 0;
+  private next = 0;
 
   /** Begins anew, with a stream whose first frame is `next`. */
-  reset(next: number): void {
-    this.#seconds = null;
-    this.#awaited = null;
-    this.#next = next;
+  reset(next: number) {
+    this.seconds = null;
+    this.awaited = null;
+    this.next = next;
   }
 
   /** A frame arrived; they come in order. */
-  arrived(frame: number): void {
+  arrived(frame: number) {
     const now = performance.now();
-    this.#next = frame + 1;
-    if (this.#awaited && frame >= this.#awaited.frame) {
-      this.#take((now - this.#awaited.at) / 1000);
-      this.#awaited = null;
+    this.next = frame + 1;
+    if (this.awaited && frame >= this.awaited.frame) {
+      this.take((now - this.awaited.at) / 1000);
+      this.awaited = null;
     }
   }
 
   /** A look at the session: asked at `from`, answered at `to` (of `performance.now()`), frames up to `frame` solved. */
-  looked(from: number, to: number, frame: number): void {
+  looked(from: number, to: number, frame: number) {
     const solvedBy = (from + to) / 2;
-    if (frame < this.#next) this.#take((to - from) / 2000);
-    else this.#awaited ??= { frame, at: solvedBy };
+    if (frame < this.next) this.take((to - from) / 2000);
+    else this.awaited ??= { frame, at: solvedBy };
   }
 
-  get seconds(): number | null {
-    return this.#seconds;
-  }
-
-  #take(seconds: number): void {
-    this.#seconds = this.#seconds === null ? seconds : 0.7 * this.#seconds + 0.3 * seconds;
+  private take(seconds: number) {
+    this.seconds = this.seconds === null ? seconds : 0.7 * this.seconds + 0.3 * seconds;
   }
 }

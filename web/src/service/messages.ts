@@ -53,22 +53,9 @@ export interface FrameResult {
   readonly linf: number | null;
 }
 
-/** What the events of a session say. */
-export interface Progress {
-  readonly state: SessionState;
-  readonly received: number;
-  readonly solved: number;
-  readonly coded?: number;
-}
-
 /** A cage that is designed from the motion of a capture. */
 export interface CageDesign {
   readonly id: string;
-  readonly problem?: ProblemDetails | null;
-}
-
-/** What the events of a design say. */
-export interface DesignProgress {
   readonly state: 'queued' | 'running' | 'completed' | 'failed';
   /** What is being done, in a few words. */
   readonly stage?: string | null;
@@ -77,7 +64,8 @@ export interface DesignProgress {
   /** Vertices of the best cage so far; null before there is one. */
   readonly vertices?: number | null;
   /** Its mean L2 error on frames that the design does not see, as a fraction of the diagonal. */
-  readonly error?: number | null;
+  readonly error?: { readonly held_back?: number | null } | null;
+  readonly problem?: ProblemDetails | null;
 }
 
 /** What a cage is to be; what is left out has the service's default. */

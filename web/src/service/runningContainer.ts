@@ -37,7 +37,7 @@ export function connect(service: Service, id: string): ContainerConnection {
 export async function openRunning(service: Service, id: string, signal: AbortSignal): Promise<RunningContainer> {
   const connection = connect(service, id);
   const { stream, pieces, stop } = connection;
-  const abort = (): void => stop.abort(signal.reason);
+  const abort = () => stop.abort(signal.reason);
   signal.addEventListener('abort', abort);
   const codec = createCodec();
   try {

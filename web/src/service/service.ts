@@ -22,13 +22,13 @@ const COORDINATES_ATTEMPTS = 6;
 
 /** A service below an address. All its requests carry the token, in a header. */
 export class Service {
-  readonly #base: URL;
-  readonly #token: TokenStore;
+  private readonly base: URL;
+  private readonly token: TokenStore;
 
   /** @param base address that ends with `/v1/`; beside the page, whatever prefix that has, where it is left out */
   constructor(base = new URL('v1/', document.baseURI), token = pageToken) {
-    this.#base = base;
-    this.#token = token;
+    this.base = base;
+    this.token = token;
   }
 
   /**
@@ -38,24 +38,24 @@ export class Service {
    * @throws ServiceProblem for any status that is no success, and where there is no answer
    */
   async request(path: string, init: RequestInit = {}): Promise<Response> {
-    const sent = this.#token.token;
+    const sent = this.token.token;
     const headers = new Headers(init.headers);
     new Headers(this.authorization()).forEach((value, name) => headers.set(name, value));
     const response = await fetched(this.address(path), { ...init, headers });
     if (response.ok) return response;
     const problem = await problemOf(response);
     // An answer to a token that was replaced meanwhile says nothing about the present one.
-    if (problem.status === 401 && sent === this.#token.token) this.#token.refused();
+    if (problem.status === 401 && sent === this.token.token) this.token.refused();
     throw problem;
   }
 
   address(path: string): string {
-    return new URL(path, this.#base).href;
+    return new URL(path, this.base).href;
   }
 
   /** The headers that requests made elsewhere need. */
   authorization(): HeadersInit {
-    return this.#token.token === null ? {} : { Authorization: `Bearer ${this.#token.token}` };
+    return this.token.token === null ? {} : { Authorization: `Bearer ${this.token.token}` };
   }
 
   /** The container at `path`, to be read at random; `signal` ends opening it. */
@@ -84,7 +84,7 @@ export class Service {
   }
 
   /** Deletes a session; one that is gone already is no error. */
-  async remove(id: string): Promise<void> {
+  async remove(id: string) {
     try {
       await this.request(sessionPath(id), { method: 'DELETE' });
     } catch (error) {
@@ -127,7 +127,7 @@ export class Service {
   async coordinates(id: string, onProgress?: (fraction: number) => void, signal?: AbortSignal): Promise<Coordinates> {
     let [rows, columns, filled, tag] = [0, 0, 0, ''];
     let bytes = new Uint8Array(0);
-    const receive = async (): Promise<void> => {
+    const receive = async () => {
       const headers = new Headers({ Accept: 'application/octet-stream' });
       if (filled > 0) {
         headers.set('Range', `bytes=${filled}-`);
@@ -154,7 +154,7 @@ export class Service {
 }
 
 /** Checks what an answer says of its length, before there is memory for it. */
-async function checkLength(response: Response, expected: number): Promise<void> {
+async function checkLength(response: Response, expected: number) {
   const length = Number(response.headers.get('content-length') ?? expected);
   if (Number.isSafeInteger(expected) && expected > 0 && length === expected) return;
   await response.body?.cancel();

@@ -4,33 +4,33 @@ const KEY = 'cager-token';
 
 /** Holds the token. Fires `change` when it changes, and `wanted` when the service refused the present one or asked for one. */
 export class TokenStore extends EventTarget {
-  #token: string | null;
+  private held: string | null;
 
   /** @param storage where the token outlives a reload; null where the browser has none for this page */
   constructor(private readonly storage: Storage | null) {
     super();
-    this.#token = guarded(() => storage?.getItem(KEY) ?? null);
+    this.held = guarded(() => storage?.getItem(KEY) ?? null);
   }
 
   get token(): string | null {
-    return this.#token;
+    return this.held;
   }
 
   /** Takes a token; `keep` keeps it until the tab is closed, otherwise until the page is. */
-  set(token: string, keep: boolean): void {
-    this.#token = token;
+  set(token: string, keep: boolean) {
+    this.held = token;
     guarded(() => (keep ? this.storage?.setItem(KEY, token) : this.storage?.removeItem(KEY)));
     this.dispatchEvent(new Event('change'));
   }
 
-  clear(): void {
-    this.#token = null;
+  clear() {
+    this.held = null;
     guarded(() => this.storage?.removeItem(KEY));
     this.dispatchEvent(new Event('change'));
   }
 
   /** Says that the service refused the present token, or wants one. */
-  refused(): void {
+  refused() {
     this.dispatchEvent(new Event('wanted'));
   }
 }

@@ -17,13 +17,11 @@ import { filterBar } from './filterBar';
 import { listHeader, listNotices } from './listHeader';
 import './recoveries';
 import { nameOf, row, tableHead } from './row';
-import { SessionList, isUnfinished } from './sessionList';
+import { SessionList } from './sessionList';
 import { sessionsStyle } from './sessionsStyle';
 import './signIn';
 
 const PAGE_ROWS = 25;
-/** Sessions that are followed by streams: HTTP/1.1 has six connections to a host, for all tabs together. The others are polled. */
-const STREAMS = 2;
 
 /**
  * The sessions of the service beside the page: newest first, kept up to date while the page is seen, to be searched, opened, downloaded and
@@ -33,9 +31,9 @@ const STREAMS = 2;
 export class Sessions extends LitElement {
   static override styles = [tokens, controls, pageLayout, sessionsStyle, cardsStyle];
 
-  readonly #service = new Service();
-  readonly #list = new SessionList(this.#service);
-  readonly #figures = new FigureLoader(this.#service);
+  private readonly service = new Service();
+  private readonly list = new SessionList(this.service);
+  private readonly figures = new FigureLoader(this.service);
 
   @state() private text = '';
   @state() private states: StateFilter = 'all';
@@ -50,74 +48,69 @@ export class Sessions extends LitElement {
   @state() private downloads: ReadonlyMap<string, number> = new Map();
   @query('dialog') private dialog!: HTMLDialogElement;
 
-  #clock: ReturnType<typeof setInterval> | undefined;
-  #fetchingOlder = false;
+  private clock: ReturnType<typeof setInterval> | undefined;
+  private fetchingOlder = false;
 
-  override connectedCallback(): void {
+  override connectedCallback() {
     super.connectedCallback();
-    this.#list.addEventListener('change', this.#changed);
-    this.#figures.addEventListener('change', this.#changed);
-    pageToken.addEventListener('wanted', this.#tokenWanted);
-    pageToken.addEventListener('change', this.#tokenChanged);
-    document.addEventListener('visibilitychange', this.#visibilityChanged);
+    this.list.addEventListener('change', this.changed);
+    this.figures.addEventListener('change', this.changed);
+    pageToken.addEventListener('wanted', this.tokenWanted);
+    pageToken.addEventListener('change', this.tokenChanged);
+    document.addEventListener('visibilitychange', this.visibilityChanged);
     // Ages and rates go on without news from the service.
-    this.#clock = setInterval(() => this.requestUpdate(), 5000);
-    this.#visibilityChanged();
+    this.clock = setInterval(() => this.requestUpdate(), 5000);
+    this.visibilityChanged();
   }
 
-  override disconnectedCallback(): void {
+  override disconnectedCallback() {
     super.disconnectedCallback();
-    this.#list.removeEventListener('change', this.#changed);
-    this.#figures.removeEventListener('change', this.#changed);
-    pageToken.removeEventListener('wanted', this.#tokenWanted);
-    pageToken.removeEventListener('change', this.#tokenChanged);
-    document.removeEventListener('visibilitychange', this.#visibilityChanged);
-    clearInterval(this.#clock);
-    this.#list.stop();
+    this.list.removeEventListener('change', this.changed);
+    this.figures.removeEventListener('change', this.changed);
+    pageToken.removeEventListener('wanted', this.tokenWanted);
+    pageToken.removeEventListener('change', this.tokenChanged);
+    document.removeEventListener('visibilitychange', this.visibilityChanged);
+    clearInterval(this.clock);
+    this.list.stop();
   }
 
   override render() {
     if (this.wantsToken) return html`<div class="page"><cager-sign-in></cager-sign-in></div>`;
-    const sessions = this.#list.sessions;
-    const isEmpty = this.#list.loaded && sessions.length === 0;
+    const sessions = this.list.sessions;
+    const isEmpty = this.list.loaded && sessions.length === 0;
     return html`
       <main class="page">
-        ${listHeader(sessions, this.#list.hasOlder)}
-        ${listNotices(this.#list.trouble, this.failure, {
-          onRetry: () => this.#list.refresh(),
+        ${listHeader(sessions, this.list.hasOlder)}
+        ${listNotices(this.list.trouble, this.failure, {
+          onRetry: () => this.list.refresh(),
           onClose: () => (this.failure = ''),
         })}
-        ${isEmpty ? emptyList() : html`${this.#filters()}${this.#table(sessions)}`}
-        <cager-recoveries></cager-recoveries> ${this.#confirmation()}
+        ${isEmpty ? emptyList() : html`${this.filters()}${this.table(sessions)}`}
+        <cager-recoveries></cager-recoveries> ${this.confirmation()}
         <p class="visually-hidden" role="status">${this.said}</p>
       </main>
     `;
   }
 
-  protected override updated(): void {
-    const shown = this.#shown(this.#list.sessions).rows;
+  protected override updated() {
+    const shown = this.shown(this.list.sessions).rows;
     const isOn = !document.hidden && this.isConnected && !this.wantsToken;
-    this.#figures.want(isOn ? shown : []);
-    this.#list.shown = new Set(shown.map(({ id }) => id));
-    // Those that move first: some wait for ever.
-    const unfinished = shown.filter(isUnfinished).map(({ id }) => id);
-    const moves = (id: string): number => Math.sign(this.#list.rates.of(id) ?? 0);
-    const ids = unfinished.sort((a, b) => moves(b) - moves(a)).slice(0, STREAMS);
-    this.#list.follow(isOn ? ids : []);
+    this.figures.want(isOn ? shown : []);
+    this.list.shown = new Set(shown.map(({ id }) => id));
   }
 
-  #filters() {
+  private filters() {
     const filter = { text: this.text, state: this.states };
-    return filterBar(filter, ({ text, state }) => this.#filter(text, state));
+    return filterBar(filter, ({ text, state }) => this.filter(text, state));
   }
 
-  #table(sessions: readonly Session[]) {
-    if (!this.#list.loaded) {
+  private table(sessions: readonly Session[]) {
+    if (!this.list.loaded) {
       return html`<div class="list card" aria-busy="true">
         ${[1, 2, 3].map(() => html`<div class="placeholder"></div>`)}
       </div>`;
     }
-    const { rows, first, matching, isWhole } = this.#shown(sessions);
+    const { rows, first, matching, isWhole } = this.shown(sessions);
     const now = Date.now() / 1000;
     return html`
       <div class="list card">
@@ -129,12 +122,12 @@ export class Sessions extends LitElement {
             (session) =>
               row({
                 session,
-                figures: this.#figures.of(session.id),
-                rate: this.#list.rates.of(session.id),
+                figures: this.figures.of(session.id),
+                rate: this.list.rateOf(session.id),
                 now,
                 downloaded: this.downloads.get(session.id) ?? null,
-                onDownload: (format) => void this.#download(session, format),
-                onRemove: () => void this.#askRemoval(session),
+                onDownload: (format) => void this.download(session, format),
+                onRemove: () => void this.askRemoval(session),
               }),
           )}
         </table>
@@ -144,11 +137,11 @@ export class Sessions extends LitElement {
         matching > rows.length || !isWhole
           ? html`<nav class="pager row muted" aria-label="Pages">
               <span class="figures">${first + 1}–${first + rows.length} of ${matching}${isWhole ? '' : '+'}</span>
-              <button type="button" ?disabled=${first === 0} @click=${() => this.#turn(-1)}>Newer</button>
+              <button type="button" ?disabled=${first === 0} @click=${() => this.turn(-1)}>Newer</button>
               <button
                 type="button"
                 ?disabled=${isWhole && first + rows.length >= matching}
-                @click=${() => this.#turn(1)}
+                @click=${() => this.turn(1)}
               >
                 Older
               </button>
@@ -158,7 +151,7 @@ export class Sessions extends LitElement {
     `;
   }
 
-  #confirmation() {
+  private confirmation() {
     const { removing } = this;
     if (!removing) return nothing;
     return deleteDialog(removing, {
@@ -169,51 +162,51 @@ export class Sessions extends LitElement {
         if (event.target === this.dialog && !this.dialog.open) this.removing = null;
       },
       onKeep: () => this.dialog.close(),
-      onDelete: () => void this.#remove(removing),
+      onDelete: () => void this.removeSession(removing),
     });
   }
 
   /** The rows of the present page; `matching` of the sessions here are those asked for, and `isWhole` says that there are no older ones. */
-  #shown(sessions: readonly Session[]) {
+  private shown(sessions: readonly Session[]) {
     const filter = { text: this.text, state: this.states };
     const matching = sessions.filter((session) => matches(session, filter));
     const last = Math.max(0, Math.ceil(matching.length / PAGE_ROWS) - 1);
     const first = PAGE_ROWS * Math.min(this.page, last);
-    const isWhole = !this.#list.hasOlder;
+    const isWhole = !this.list.hasOlder;
     // Older pages may have more of what is asked for.
-    if (!isWhole && matching.length < first + PAGE_ROWS && isFiltering(filter)) void this.#fetchOlder();
+    if (!isWhole && matching.length < first + PAGE_ROWS && isFiltering(filter)) void this.fetchOlder();
     return { rows: matching.slice(first, first + PAGE_ROWS), first, matching: matching.length, isWhole };
   }
 
-  #filter(text: string, states: StateFilter): void {
+  private filter(text: string, states: StateFilter) {
     this.text = text;
     this.states = states;
     this.page = 0;
   }
 
-  async #turn(pages: number): Promise<void> {
-    const { first, rows, matching, isWhole } = this.#shown(this.#list.sessions);
-    if (pages > 0 && !isWhole && first + rows.length >= matching) await this.#fetchOlder();
+  private async turn(pages: number) {
+    const { first, rows, matching, isWhole } = this.shown(this.list.sessions);
+    if (pages > 0 && !isWhole && first + rows.length >= matching) await this.fetchOlder();
     this.page = Math.max(0, first / PAGE_ROWS + pages);
     this.scrollTo({ top: 0 });
   }
 
-  async #fetchOlder(): Promise<void> {
-    if (this.#fetchingOlder) return;
-    this.#fetchingOlder = true;
+  private async fetchOlder() {
+    if (this.fetchingOlder) return;
+    this.fetchingOlder = true;
     try {
-      await this.#list.older();
+      await this.list.older();
     } catch (error) {
       this.failure = sentenceOf(error);
     } finally {
-      this.#fetchingOlder = false;
+      this.fetchingOlder = false;
       // What was rendered meanwhile may want still older ones.
       this.requestUpdate();
     }
   }
 
-  async #download(session: Session, format: Format): Promise<void> {
-    const note = (part: number | null): void => {
+  private async download(session: Session, format: Format) {
+    const note = (part: number | null) => {
       const downloads = new Map(this.downloads);
       if (part === null) downloads.delete(session.id);
       else downloads.set(session.id, part);
@@ -221,7 +214,7 @@ export class Sessions extends LitElement {
     };
     try {
       note(0);
-      await download(this.#service, session.id, nameOf(session), format, note);
+      await download(this.service, session.id, nameOf(session), format, note);
       this.said = `Downloaded ${nameOf(session)}`;
     } catch (error) {
       this.failure = sentenceOf(error);
@@ -230,18 +223,18 @@ export class Sessions extends LitElement {
     }
   }
 
-  async #askRemoval(session: Session): Promise<void> {
+  private async askRemoval(session: Session) {
     this.removalFailure = '';
     this.removing = session;
     await this.updateComplete;
     this.dialog.showModal();
   }
 
-  async #remove(session: Session): Promise<void> {
+  private async removeSession(session: Session) {
     this.isRemoving = true;
     try {
-      const ids = this.#shown(this.#list.sessions).rows.map(({ id }) => id);
-      await this.#list.remove(session.id);
+      const ids = this.shown(this.list.sessions).rows.map(({ id }) => id);
+      await this.list.remove(session.id);
       this.said = `Deleted ${nameOf(session)}`;
       this.removing = null;
       // The button that had the focus is gone; the row after it, or the last one, takes it.
@@ -257,26 +250,26 @@ export class Sessions extends LitElement {
     }
   }
 
-  #changed = (): void => {
-    const { trouble } = this.#list;
+  private readonly changed = () => {
+    const { trouble } = this.list;
     this.wantsToken = trouble?.problem instanceof ServiceProblem && trouble.problem.status === 401;
     this.requestUpdate();
   };
 
-  #tokenWanted = (): void => {
+  private readonly tokenWanted = () => {
     this.wantsToken = true;
   };
 
-  #tokenChanged = (): void => {
+  private readonly tokenChanged = () => {
     this.wantsToken = false;
     this.page = 0;
-    this.#figures.reset();
-    this.#list.reset();
+    this.figures.reset();
+    this.list.reset();
   };
 
-  #visibilityChanged = (): void => {
-    if (document.hidden) this.#list.stop();
-    else this.#list.start();
+  private readonly visibilityChanged = () => {
+    if (document.hidden) this.list.stop();
+    else this.list.start();
     this.requestUpdate();
   };
 }

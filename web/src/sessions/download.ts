@@ -20,7 +20,7 @@ export async function download(
   name: string,
   format: Format,
   onProgress: (part: number) => void,
-): Promise<void> {
+) {
   const path = format === 'cager' ? sessionPath(id, 'capture.cager') : `${sessionPath(id, 'export')}?format=${format}`;
   const response = await service.request(path);
   const total = Number(response.headers.get('content-length'));

@@ -5,7 +5,7 @@ import { glyphs } from '../style/glyphs';
 export function emptyList() {
   const server = new URL('.', document.baseURI).href.replace(/\/$/, '');
   const command = `cager encode --server ${server} --rest rest.obj --frames frames.npy -o capture.cager`;
-  const copy = (event: Event): void => {
+  const copy = (event: Event) => {
     const button = event.currentTarget as HTMLElement;
     void navigator.clipboard.writeText(command).then(() => button.setAttribute('aria-label', 'Copied'));
   };

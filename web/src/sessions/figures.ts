@@ -26,62 +26,62 @@ const RETRY_MS = 30_000;
 
 /** Fetches figures and keeps them. Fires `change`. */
 export class FigureLoader extends EventTarget {
-  readonly #figures = new Map<string, Figures>();
+  private readonly figures = new Map<string, Figures>();
   /** Of how many frames the figures of a session are, whether these are the last, and when to look again at the earliest. */
-  readonly #fetched = new Map<string, { solved: number; isFinal: boolean; next: number }>();
-  readonly #wanted = new Map<string, Session>();
-  #atWork = 0;
+  private readonly fetched = new Map<string, { solved: number; isFinal: boolean; next: number }>();
+  private readonly wanted = new Map<string, Session>();
+  private atWork = 0;
 
   constructor(private readonly service: Service) {
     super();
   }
 
   of(id: string): Figures | null {
-    return this.#figures.get(id) ?? null;
+    return this.figures.get(id) ?? null;
   }
 
   /** Fetches what is not known of these sessions, or not known anew. */
-  want(sessions: readonly Session[]): void {
-    this.#wanted.clear();
+  want(sessions: readonly Session[]) {
+    this.wanted.clear();
     for (const session of sessions) {
-      if (this.#isDue(session)) this.#wanted.set(session.id, session);
+      if (this.isDue(session)) this.wanted.set(session.id, session);
     }
-    while (this.#atWork < AT_ONCE && this.#wanted.size > 0) void this.#work();
+    while (this.atWork < AT_ONCE && this.wanted.size > 0) void this.work();
   }
 
   /** Forgets everything, for another token. */
-  reset(): void {
-    this.#figures.clear();
-    this.#fetched.clear();
-    this.#wanted.clear();
+  reset() {
+    this.figures.clear();
+    this.fetched.clear();
+    this.wanted.clear();
   }
 
-  #isDue(session: Session): boolean {
+  private isDue(session: Session): boolean {
     if (session.state === 'preparing' || session.frames.solved === 0) return false;
-    const fetched = this.#fetched.get(session.id);
+    const fetched = this.fetched.get(session.id);
     if (!fetched) return true;
     if (fetched.isFinal || performance.now() < fetched.next) return false;
     return fetched.solved !== session.frames.solved || isOver(session);
   }
 
-  async #work(): Promise<void> {
-    this.#atWork += 1;
-    for (const [id, session] of this.#wanted) {
-      this.#wanted.delete(id);
+  private async work() {
+    this.atWork += 1;
+    for (const [id, session] of this.wanted) {
+      this.wanted.delete(id);
       const { solved } = session.frames;
       const note = (wait: number, known: number, isFinal: boolean) =>
-        this.#fetched.set(id, { solved: known, isFinal, next: performance.now() + wait });
+        this.fetched.set(id, { solved: known, isFinal, next: performance.now() + wait });
       note(Math.max(MIN_MS, MS_PER_FRAME * solved), solved, isOver(session));
       try {
         const fetch = session.state === 'completed' ? containerFigures : frameFigures;
-        this.#figures.set(id, await fetch(this.service, session));
+        this.figures.set(id, await fetch(this.service, session));
       } catch {
         // Figures are an addition: what is wrong with the service, the list itself says.
         note(RETRY_MS, -1, false);
       }
       this.dispatchEvent(new Event('change'));
     }
-    this.#atWork -= 1;
+    this.atWork -= 1;
   }
 }
 

@@ -5,7 +5,7 @@ import { isFiltering, matches } from './filter';
 const session = { name: 'Shot 042 hero', id: '01a2', state: 'ready', coordinates: 'harmonic' } as Session;
 
 test('every_word_must_be_somewhere', () => {
-  const found = (text: string): boolean => matches(session, { text, state: 'all' });
+  const found = (text: string) => matches(session, { text, state: 'all' });
   expect(['', 'shot', 'HERO 042', '01A2', 'harmonic ready'].map(found)).toEqual([true, true, true, true, true]);
   expect(['villain', 'shot 043'].map(found)).toEqual([false, false]);
   expect(matches({ ...session, name: null }, { text: 'shot', state: 'all' })).toBe(false);

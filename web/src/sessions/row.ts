@@ -9,8 +9,8 @@ import * as text from '../text';
 export interface Row {
   readonly session: Session;
   readonly figures: Figures | null;
-  /** Frames per second; null where it is not known. */
-  readonly rate: number | null;
+  /** Frames per second. */
+  readonly rate: number;
   /** Seconds since 1970. */
   readonly now: number;
   /** Part of the container that has been downloaded; null while none is. */
@@ -96,12 +96,12 @@ function facts(session: Session): string {
   return parts.filter((part) => part !== null).join(' · ');
 }
 
-function state(session: Session, rate: number | null): TemplateResult {
+function state(session: Session, rate: number): TemplateResult {
   const [look, word] = stateOf(session, rate);
   return html`<span class="state"><span class="dot ${look}"></span>${word}</span>`;
 }
 
-function stateOf(session: Session, rate: number | null): [string, string] {
+function stateOf(session: Session, rate: number): [string, string] {
   switch (session.state) {
     case 'preparing':
       return ['preparing', 'Preparing'];
@@ -110,7 +110,7 @@ function stateOf(session: Session, rate: number | null): [string, string] {
     case 'failed':
       return ['failed', 'Failed'];
     case 'ready':
-      return rate !== null && rate > 0 ? ['running', `Running, ${text.perSecond(rate)}`] : ['waiting', 'Waiting'];
+      return rate > 0 ? ['running', `Running, ${text.perSecond(rate)}`] : ['waiting', 'Waiting'];
   }
 }
 

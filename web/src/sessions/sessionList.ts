@@ -1,18 +1,18 @@
-/** The sessions that are shown, kept up to date: the newest page by polling, running ones that are seen by their events as well. */
+/** The sessions that are shown, kept up to date by polling. */
 
 import { Backoff } from '../service/backoff';
-import { followProgress } from '../service/events';
-import type { Progress, Session } from '../service/messages';
+import { RateMeter } from '../service/measures';
+import type { Session } from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind } from '../service/problem';
-import { type Service, sessionPath } from '../service/service';
-import { Rates } from './rates';
+import type { Service } from '../service/service';
 
-const POLL_RUNNING_SECONDS = 3;
+const POLL_RUNNING_SECONDS = 2;
 const POLL_IDLE_SECONDS = 5;
+/** Seconds over which rates are taken. */
+const RATE_SECONDS = 15;
 
 /** The sessions of a token, newest first. Fires `change`. */
 export class SessionList extends EventTarget {
-  readonly rates = new Rates();
   /** Why the list is not up to date, and when it is asked for again, as of `Date.now()`. */
   trouble: { problem: Error; retryAt: number | null } | null = null;
   /** Sessions that are seen: unfinished ones among them are kept up to date although they are older than the newest page. */
@@ -20,13 +20,13 @@ export class SessionList extends EventTarget {
   /** Whether the service was asked at least once and answered. */
   loaded = false;
 
-  readonly #sessions = new Map<string, Session>();
-  readonly #followed = new Map<string, AbortController>();
-  readonly #backoff = new Backoff();
+  private readonly known = new Map<string, Session>();
+  private readonly rates = new Map<string, RateMeter>();
+  private readonly backoff = new Backoff();
   /** Where older sessions begin; undefined before the first page, null after the last. */
-  #next: string | null | undefined;
-  #timer: ReturnType<typeof setTimeout> | undefined;
-  #running: AbortController | null = null;
+  private next: string | null | undefined;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+  private running: AbortController | null = null;
 
   constructor(private readonly service: Service) {
     super();
@@ -34,166 +34,126 @@ export class SessionList extends EventTarget {
 
   /** Newest first. */
   get sessions(): Session[] {
-    return [...this.#sessions.values()].sort((a, b) => b.created - a.created || (a.id < b.id ? 1 : -1));
+    return [...this.known.values()].sort((a, b) => b.created - a.created || (a.id < b.id ? 1 : -1));
+  }
+
+  /** Frames per second of a session that runs. */
+  rateOf(id: string): number {
+    return this.rates.get(id)?.perSecond() ?? 0;
   }
 
   get hasOlder(): boolean {
-    return typeof this.#next === 'string';
+    return typeof this.next === 'string';
   }
 
-  start(): void {
-    if (this.#running) return;
-    this.#running = new AbortController();
-    void this.#poll(this.#running.signal);
+  start() {
+    if (this.running) return;
+    this.running = new AbortController();
+    void this.poll(this.running.signal);
   }
 
   /** Stops all requests, as while the page is hidden. */
-  stop(): void {
-    this.#running?.abort();
-    this.#running = null;
-    clearTimeout(this.#timer);
-    this.follow([]);
+  stop() {
+    this.running?.abort();
+    this.running = null;
+    clearTimeout(this.timer);
   }
 
   /** Asks at once. */
-  refresh(): void {
-    const wasRunning = this.#running !== null;
+  refresh() {
+    const wasRunning = this.running !== null;
     this.stop();
     if (wasRunning) this.start();
   }
 
   /** Forgets everything, for another token. */
-  reset(): void {
-    this.#sessions.clear();
-    this.#next = undefined;
+  reset() {
+    this.known.clear();
+    this.rates.clear();
+    this.next = undefined;
     this.loaded = false;
     this.trouble = null;
-    this.#changed();
+    this.changed();
     this.refresh();
   }
 
-  async older(): Promise<void> {
-    if (typeof this.#next !== 'string') return;
-    const asked = this.#next;
-    const page = await this.service.sessions(asked, this.#running?.signal);
+  async older() {
+    if (typeof this.next !== 'string') return;
+    const asked = this.next;
+    const page = await this.service.sessions(asked, this.running?.signal);
     // Two callers may have asked for the same page.
-    if (this.#next === asked) this.#next = page.next;
-    page.sessions.forEach((session) => this.#take(session));
-    this.#changed();
+    if (this.next === asked) this.next = page.next;
+    page.sessions.forEach((session) => this.take(session));
+    this.changed();
   }
 
-  async remove(id: string): Promise<void> {
+  async remove(id: string) {
     await this.service.remove(id);
-    this.#forget(id);
-    this.#changed();
+    this.forget(id);
+    this.changed();
   }
 
-  /** Follows the events of these sessions, and of no others. */
-  follow(ids: readonly string[]): void {
-    for (const [id, following] of this.#followed) {
-      if (ids.includes(id)) continue;
-      following.abort();
-      this.#followed.delete(id);
-    }
-    for (const id of ids) {
-      if (this.#followed.has(id)) continue;
-      const following = new AbortController();
-      this.#followed.set(id, following);
-      void this.#followOne(id, following);
-    }
-  }
-
-  async #followOne(id: string, following: AbortController): Promise<void> {
-    try {
-      await followProgress(
-        this.service,
-        sessionPath(id),
-        (progress) => this.#progressed(id, progress),
-        following.signal,
-      );
-      if (!following.signal.aborted) this.#take(await this.service.session(id, following.signal));
-    } catch (error) {
-      const problem = problemBehind(error);
-      // The next poll says whatever else is wrong.
-      if (problem instanceof ServiceProblem && problem.isGone) this.#forget(id);
-    } finally {
-      // Where another one follows meanwhile, this one was replaced.
-      if (this.#followed.get(id) === following) this.#followed.delete(id);
-    }
-    this.#changed();
-  }
-
-  #progressed(id: string, progress: Progress): void {
-    const session = this.#sessions.get(id);
-    if (!session) return;
-    const frames = { ...session.frames, received: progress.received, solved: progress.solved };
-    const coding =
-      session.coding && progress.coded !== undefined ? { ...session.coding, frames: progress.coded } : undefined;
-    // The end is taken over with all figures, once they are fetched.
-    const state = progress.state === 'ready' && session.state === 'preparing' ? 'ready' : session.state;
-    this.#take({ ...session, state, frames, ...(coding && { coding }) });
-    this.#changed();
-  }
-
-  async #poll(signal: AbortSignal): Promise<void> {
+  private async poll(signal: AbortSignal) {
     let seconds: number;
     try {
-      await this.#fetchNewest(signal);
-      this.#backoff.reset();
+      await this.fetchNewest(signal);
+      this.backoff.reset();
       this.trouble = null;
       this.loaded = true;
-      const isRunning = [...this.#sessions.values()].some(isUnfinished);
+      const isRunning = [...this.known.values()].some(isUnfinished);
       seconds = isRunning ? POLL_RUNNING_SECONDS : POLL_IDLE_SECONDS;
     } catch (error) {
       if (isAbort(error) || signal.aborted) return;
       const problem = problemBehind(error);
       const passes = problem instanceof ServiceProblem && problem.passes;
-      seconds = this.#backoff.next(problem instanceof ServiceProblem ? problem.retryAfter : null);
+      seconds = this.backoff.next(problem instanceof ServiceProblem ? problem.retryAfter : null);
       this.trouble = { problem, retryAt: passes ? Date.now() + 1000 * seconds : null };
       if (!passes) {
-        this.#changed();
+        this.changed();
         return;
       }
     }
-    this.#changed();
-    this.#timer = setTimeout(() => void this.#poll(signal), 1000 * seconds);
+    this.changed();
+    this.timer = setTimeout(() => void this.poll(signal), 1000 * seconds);
   }
 
-  async #fetchNewest(signal: AbortSignal): Promise<void> {
+  private async fetchNewest(signal: AbortSignal) {
     const page = await this.service.sessions(null, signal);
     const listed = new Set(page.sessions.map((session) => session.id));
     const oldest = page.next === null ? -Infinity : (page.sessions.at(-1)?.created ?? -Infinity);
-    for (const session of this.#sessions.values()) {
+    for (const session of this.known.values()) {
       if (listed.has(session.id)) continue;
-      if (session.created > oldest) this.#forget(session.id);
-      else if (isUnfinished(session) && this.shown.has(session.id)) await this.#fetchOne(session.id, signal);
+      if (session.created > oldest) this.forget(session.id);
+      else if (isUnfinished(session) && this.shown.has(session.id)) await this.fetchOne(session.id, signal);
     }
-    page.sessions.forEach((session) => this.#take(session));
-    if (this.#next === undefined) this.#next = page.next;
+    page.sessions.forEach((session) => this.take(session));
+    if (this.next === undefined) this.next = page.next;
   }
 
-  async #fetchOne(id: string, signal: AbortSignal): Promise<void> {
+  private async fetchOne(id: string, signal: AbortSignal) {
     try {
-      this.#take(await this.service.session(id, signal));
+      this.take(await this.service.session(id, signal));
     } catch (error) {
       if (!(error instanceof ServiceProblem && error.isGone)) throw error;
-      this.#forget(id);
+      this.forget(id);
     }
   }
 
-  #take(session: Session): void {
-    this.#sessions.set(session.id, session);
-    if (session.state === 'ready') this.rates.look(session.id, session.frames.solved, performance.now());
+  private take(session: Session) {
+    const before = this.known.get(session.id)?.frames.solved ?? session.frames.solved;
+    this.known.set(session.id, session);
+    if (session.state !== 'ready') return;
+    const rate = this.rates.get(session.id) ?? new RateMeter(RATE_SECONDS);
+    this.rates.set(session.id, rate);
+    rate.add(session.frames.solved - before);
   }
 
-  #forget(id: string): void {
-    this.#sessions.delete(id);
-    this.rates.forget(id);
-    this.#followed.get(id)?.abort();
-    this.#followed.delete(id);
+  private forget(id: string) {
+    this.known.delete(id);
+    this.rates.delete(id);
   }
 
-  #changed(): void {
+  private changed() {
     this.dispatchEvent(new Event('change'));
   }
 }

@@ -36,7 +36,7 @@ export class SignIn extends LitElement {
     const refused = pageToken.token !== null ? 'The token was not accepted. Check it, or ask for a new one.' : '';
     const error = this.wrong || refused;
     return html`
-      <form class="card" @submit=${this.#submit}>
+      <form class="card" @submit=${this.submit}>
         <h2>Sign in</h2>
         <p class="muted">This service needs an access token. Ask your administrator for one.</p>
         <div class="field">
@@ -59,11 +59,11 @@ export class SignIn extends LitElement {
     `;
   }
 
-  override firstUpdated(): void {
+  override firstUpdated() {
     this.input.focus();
   }
 
-  #submit = (event: SubmitEvent): void => {
+  private readonly submit = (event: SubmitEvent) => {
     event.preventDefault();
     const token = this.input.value.trim().replace(/^Bearer\s+/i, '');
     if (!/^[\x21-\x7e]+$/.test(token)) {

@@ -39,7 +39,7 @@ import { uploadStyle } from './uploadStyle';
 export class Upload extends LitElement {
   static override styles = [tokens, controls, pageLayout, plotStyle, uploadStyle];
 
-  readonly #service = new Service();
+  private readonly service = new Service();
 
   @state() private dropped: readonly Dropped[] = [];
   @state() private items: readonly Item[] = [];
@@ -54,68 +54,68 @@ export class Upload extends LitElement {
   /** The one whose files were dropped; else one whose files these seem to be, and why they are not. */
   @state() private fitting: Interrupted | null = null;
   @state() private misfit: Misfit | null = null;
-  #furthest: Stage = 'creating';
-  #planning = 0;
-  #wasNamed = false;
+  private furthest: Stage = 'creating';
+  private planning = 0;
+  private wasNamed = false;
 
-  override connectedCallback(): void {
+  override connectedCallback() {
     super.connectedCallback();
-    pageToken.addEventListener('wanted', this.#tokenWanted);
-    pageToken.addEventListener('change', this.#tokenChanged);
-    currentJob()?.addEventListener('change', this.#jobChanged);
+    pageToken.addEventListener('wanted', this.tokenWanted);
+    pageToken.addEventListener('change', this.tokenChanged);
+    currentJob()?.addEventListener('change', this.jobChanged);
     // Asks for a token before somebody has chosen files in vain.
-    void this.#service.sessions().catch(() => undefined);
-    void this.#lookForInterrupted();
+    void this.service.sessions().catch(() => undefined);
+    void this.lookForInterrupted();
   }
 
-  override disconnectedCallback(): void {
+  override disconnectedCallback() {
     super.disconnectedCallback();
-    pageToken.removeEventListener('wanted', this.#tokenWanted);
-    pageToken.removeEventListener('change', this.#tokenChanged);
-    currentJob()?.removeEventListener('change', this.#jobChanged);
+    pageToken.removeEventListener('wanted', this.tokenWanted);
+    pageToken.removeEventListener('change', this.tokenChanged);
+    currentJob()?.removeEventListener('change', this.jobChanged);
   }
 
   override render() {
     if (this.wantsToken) return html`<div class="page"><cager-sign-in></cager-sign-in></div>`;
     const job = currentJob();
     return html`
-      <main class="page" @dragover=${this.#dragOver} @dragleave=${() => (this.isOver = false)} @drop=${this.#drop}>
+      <main class="page" @dragover=${this.dragOver} @dragleave=${() => (this.isOver = false)} @drop=${this.drop}>
         <header>
           <a class="button back" href="#/" aria-label="All sessions" title="All sessions">${glyphs.back}</a>
           <h1>Upload a capture</h1>
         </header>
-        ${job ? jobView(job, this.#furthest, this.#actions) : html`${this.#interrupted()}${dropZone(this.isOver, this.items.length === 0, this.#choosing)}${this.#chosen()}`}
+        ${job ? jobView(job, this.furthest, this.actions) : html`${this.interruptedCards()}${dropZone(this.isOver, this.items.length === 0, this.choosing)}${this.chosen()}`}
       </main>
     `;
   }
 
-  #interrupted() {
+  private interruptedCards() {
     if (this.fitting) return nothing;
     const { misfit } = this;
     return this.interrupted.map((one) =>
-      interruptedCard(one, misfit?.of === one ? misfit.why : '', () => void this.#deleteInterrupted(one)),
+      interruptedCard(one, misfit?.of === one ? misfit.why : '', () => void this.deleteInterrupted(one)),
     );
   }
 
-  #chosen() {
-    if (this.items.length === 0) return this.#note();
+  private chosen() {
+    if (this.items.length === 0) return this.note();
     const { fitting } = this;
     if (fitting) {
       return goOnCard(
         fitting,
-        () => this.plan && this.#run(this.plan, fitting.kept),
+        () => this.plan && this.run(this.plan, fitting.kept),
         () => (this.fitting = null),
       );
     }
     return html`
-      <form class="card" @submit=${this.#submit}>
+      <form class="card" @submit=${this.submit}>
         <h2>Files</h2>
         <ul class="items">
-          ${this.items.map((item) => itemRow(item, (role) => this.#reassign(item, role)))}
+          ${this.items.map((item) => itemRow(item, (role) => this.reassign(item, role)))}
         </ul>
-        ${this.#note()} ${this.plan ? planSummary(this.plan, this.choices) : nothing}
+        ${this.note()} ${this.plan ? planSummary(this.plan, this.choices) : nothing}
         ${optionsForm(this.choices, Boolean(this.plan?.cage), (choices) => {
-          this.#wasNamed ||= choices.name !== this.choices.name;
+          this.wasNamed ||= choices.name !== this.choices.name;
           this.choices = choices;
         })}
         <div class="buttons">
@@ -125,103 +125,103 @@ export class Upload extends LitElement {
     `;
   }
 
-  #note() {
+  private note() {
     return this.finding
       ? html`<p class="note bad" role="alert">${glyphs.alert}<span>${this.finding}</span></p>`
       : nothing;
   }
 
-  readonly #choosing: ChoosingFiles = {
-    onFiles: () => pickFiles((files) => void this.#take(files)),
-    onFolder: () => pickFiles((files) => void this.#take(files), { isFolder: true }),
-    onStartOver: () => this.#startOver(),
+  private readonly choosing: ChoosingFiles = {
+    onFiles: () => pickFiles((files) => void this.take(files)),
+    onFolder: () => pickFiles((files) => void this.take(files), { isFolder: true }),
+    onStartOver: () => this.startOver(),
   };
 
-  readonly #actions: JobActions = {
+  private readonly actions: JobActions = {
     stop: () => currentJob()?.stop(),
     takeBest: () => currentJob()?.takeBest(),
     goOn: () => void currentJob()?.run(),
-    discard: () => void this.#discard(),
-    another: () => this.#startOver(),
+    discard: () => void this.discard(),
+    another: () => this.startOver(),
   };
 
-  async #discard(): Promise<void> {
+  private async discard() {
     const job = currentJob();
     try {
       await job?.discard();
-      this.#putAway();
+      this.putAway();
     } catch (error) {
       if (job) job.trouble = sentenceOf(error);
       this.requestUpdate();
     }
   }
 
-  #submit = (event: SubmitEvent): void => {
+  private readonly submit = (event: SubmitEvent) => {
     event.preventDefault();
     const { plan, choices, items } = this;
-    if (plan) this.#run(plan, newUpload(this.#service, plan, choices, items));
+    if (plan) this.run(plan, newUpload(this.service, plan, choices, items));
   };
 
-  #run(plan: Plan, kept: KeptUpload): void {
+  private run(plan: Plan, kept: KeptUpload) {
     // Somebody may press twice.
     if (currentJob()) return;
-    const job = jobOf(this.#service, plan, kept);
-    job.addEventListener('change', this.#jobChanged);
+    const job = jobOf(this.service, plan, kept);
+    job.addEventListener('change', this.jobChanged);
     setCurrentJob(job);
     void job.run();
   }
 
-  async #lookForInterrupted(): Promise<void> {
-    this.interrupted = await interruptedUploads(this.#service, () => {
-      if (this.isConnected) void this.#lookForInterrupted();
+  private async lookForInterrupted() {
+    this.interrupted = await interruptedUploads(this.service, () => {
+      if (this.isConnected) void this.lookForInterrupted();
     });
   }
 
-  async #deleteInterrupted(interrupted: Interrupted): Promise<void> {
+  private async deleteInterrupted(interrupted: Interrupted) {
     try {
-      await deleteInterrupted(this.#service, interrupted);
+      await deleteInterrupted(this.service, interrupted);
       this.misfit = null;
-      await this.#lookForInterrupted();
+      await this.lookForInterrupted();
     } catch (error) {
       this.misfit = { of: interrupted, why: sentenceOf(error) };
     }
   }
 
-  #startOver = (): void => {
+  private readonly startOver = () => {
     this.dropped = [];
     this.items = [];
     this.plan = null;
     this.finding = '';
     this.fitting = this.misfit = null;
     this.choices = DEFAULT_CHOICES;
-    this.#wasNamed = false;
-    this.#putAway();
+    this.wasNamed = false;
+    this.putAway();
   };
 
-  #putAway(): void {
-    currentJob()?.removeEventListener('change', this.#jobChanged);
+  private putAway() {
+    currentJob()?.removeEventListener('change', this.jobChanged);
     setCurrentJob(null);
     this.requestUpdate();
-    void this.#lookForInterrupted();
+    void this.lookForInterrupted();
   }
 
-  #dragOver = (event: DragEvent): void => {
+  private readonly dragOver = (event: DragEvent) => {
     if (currentJob() || !event.dataTransfer?.types.includes('Files')) return;
     event.preventDefault();
     event.dataTransfer.dropEffect = 'copy';
     this.isOver = true;
   };
 
-  #drop = (event: DragEvent): void => {
+  private readonly drop = (event: DragEvent) => {
     this.isOver = false;
     if (currentJob() || !event.dataTransfer) return;
     // An encoded capture is for the page around this one, which plays it.
     if (event.dataTransfer.files.length === 1 && extensionOf(event.dataTransfer.files[0].name) === 'cager') return;
     event.preventDefault();
-    void this.#take(droppedFiles(event.dataTransfer));
+    void this.take(droppedFiles(event.dataTransfer));
   };
 
-  async #take(files: Dropped[] | Promise<Dropped[]>): Promise<void> {
+  private async take(files: Dropped[] | Promise<Dropped[]>) {
     try {
       const taken = await files;
       const paths = new Set(taken.map(({ path }) => path));
@@ -229,20 +229,20 @@ export class Upload extends LitElement {
       this.dropped = [...this.dropped.filter(({ path }) => !paths.has(path)), ...taken];
       this.items = classify(this.dropped);
       for (const { kept } of this.interrupted) this.items = withEarlierRoles(this.items, kept.present.marks);
-      await this.#makePlan();
+      await this.makePlan();
     } catch (error) {
       this.finding = sentenceOf(error);
     }
   }
 
-  #reassign(item: Item, role: Role): void {
+  private reassign(item: Item, role: Role) {
     this.items = reassigned(this.items, item, role);
-    void this.#makePlan();
+    void this.makePlan();
   }
 
-  async #makePlan(): Promise<void> {
-    this.#planning += 1;
-    const planning = this.#planning;
+  private async makePlan() {
+    this.planning += 1;
+    const planning = this.planning;
     let [plan, finding]: [Plan | null, string] = [null, ''];
     let [fitting, misfit]: [Interrupted | null, Misfit | null] = [null, null];
     try {
@@ -252,34 +252,34 @@ export class Upload extends LitElement {
       finding = sentenceOf(error);
     }
     // Reading large files takes a while; only the last plan counts.
-    if (planning !== this.#planning) return;
+    if (planning !== this.planning) return;
     this.plan = plan;
     this.finding = finding;
     this.fitting = fitting;
     this.misfit = misfit;
-    if (plan && !this.#wasNamed) this.choices = { ...this.choices, name: captureName(plan, this.dropped, this.items) };
+    if (plan && !this.wasNamed) this.choices = { ...this.choices, name: captureName(plan, this.dropped, this.items) };
   }
 
-  #jobChanged = (): void => {
+  private readonly jobChanged = () => {
     const job = currentJob();
-    if (job?.isActive) this.#furthest = job.stage;
+    if (job?.isActive) this.furthest = job.stage;
     this.requestUpdate();
   };
 
-  #tokenWanted = (): void => {
+  private readonly tokenWanted = () => {
     this.wantsToken = true;
   };
 
-  #tokenChanged = (): void => {
+  private readonly tokenChanged = () => {
     this.wantsToken = false;
     const job = currentJob();
     // An upload that stopped for want of a token goes on with the new one.
-    void this.#lookForInterrupted();
+    void this.lookForInterrupted();
     if (pageToken.token !== null && job?.stage === 'failed') void job.run();
-    else void this.#service.sessions().catch((error: unknown) => this.#note401(error));
+    else void this.service.sessions().catch((error: unknown) => this.note401(error));
   };
 
-  #note401(error: unknown): void {
+  private note401(error: unknown) {
     const problem = problemBehind(error);
     if (!(problem instanceof ServiceProblem && problem.status === 401)) this.finding = sentenceOf(problem);
   }

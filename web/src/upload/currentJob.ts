@@ -10,18 +10,18 @@ export function currentJob(): UploadJob | null {
 }
 
 /** Makes it the upload of the page, and has the browser ask before the page is left while it is at work. */
-export function setCurrentJob(next: UploadJob | null): void {
+export function setCurrentJob(next: UploadJob | null) {
   job?.removeEventListener('change', guardPage);
   job = next;
   job?.addEventListener('change', guardPage);
   guardPage();
 }
 
-function guardPage(): void {
+function guardPage() {
   if (job?.isActive) addEventListener('beforeunload', ask);
   else removeEventListener('beforeunload', ask);
 }
 
-function ask(event: BeforeUnloadEvent): void {
+function ask(event: BeforeUnloadEvent) {
   event.preventDefault();
 }

@@ -19,7 +19,7 @@ export interface Heard {
 }
 
 export class FrameSender {
-  #batchBytes = FIRST_BYTES;
+  private batchBytes = FIRST_BYTES;
 
   /** @param path of the session's frames */
   constructor(
@@ -30,15 +30,15 @@ export class FrameSender {
   ) {}
 
   /** Posts the frames of these ranges `[a, b)`. After a failure some of them may have arrived: the service knows which. */
-  async send(ranges: readonly (readonly [number, number])[], signal: AbortSignal): Promise<void> {
+  async send(ranges: readonly (readonly [number, number])[], signal: AbortSignal) {
     const failed = new AbortController();
     const either = AbortSignal.any([signal, failed.signal]);
-    const batches = this.#batches(ranges);
-    const work = async (): Promise<void> => {
-      for (const [first, count] of batches) await this.#post(first, count, either);
+    const batches = this.batches(ranges);
+    const work = async () => {
+      for (const [first, count] of batches) await this.post(first, count, either);
     };
     const failures: Error[] = [];
-    const note = (error: unknown): void => {
+    const note = (error: unknown) => {
       failures.push(problemBehind(error));
       failed.abort();
     };
@@ -48,21 +48,21 @@ export class FrameSender {
   }
 
   /** The next batch is as large as the connection suggests at the time it is taken. A generator may be shared by those who take from it. */
-  *#batches(ranges: readonly (readonly [number, number])[]): Generator<[number, number], void, undefined> {
+  private *batches(ranges: readonly (readonly [number, number])[]): Generator<[number, number], void, undefined> {
     for (const [begin, end] of ranges) {
       for (let first = begin; first < end;) {
-        const count = Math.min(end - first, Math.max(1, Math.floor(this.#batchBytes / this.#frameBytes)));
+        const count = Math.min(end - first, Math.max(1, Math.floor(this.batchBytes / this.frameBytes)));
         yield [first, count];
         first += count;
       }
     }
   }
 
-  get #frameBytes(): number {
+  private get frameBytes(): number {
     return 12 * this.source.points;
   }
 
-  async #post(first: number, count: number, signal: AbortSignal): Promise<void> {
+  private async post(first: number, count: number, signal: AbortSignal) {
     const body = await this.source.read(first, count);
     const began = performance.now();
     const response = await this.service.request(`${this.path}?first=${first}`, {
@@ -79,13 +79,13 @@ export class FrameSender {
       this.heard.solved(result as FrameResult);
     }
     this.heard.sent(count, body.byteLength);
-    this.#adapt(body.byteLength, (performance.now() - began) / 1000);
+    this.adapt(body.byteLength, (performance.now() - began) / 1000);
   }
 
-  #adapt(bytes: number, seconds: number): void {
+  private adapt(bytes: number, seconds: number) {
     const wanted = (bytes / Math.max(seconds, 0.01)) * BATCH_SECONDS;
     // Half of the way, so that one slow answer does not change much.
-    const next = (this.#batchBytes + Math.min(MAX_BYTES, wanted)) / 2;
-    this.#batchBytes = Math.max(this.#frameBytes, Math.min(2 * this.#batchBytes, next));
+    const next = (this.batchBytes + Math.min(MAX_BYTES, wanted)) / 2;
+    this.batchBytes = Math.max(this.frameBytes, Math.min(2 * this.batchBytes, next));
   }
 }

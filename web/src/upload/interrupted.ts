@@ -49,7 +49,7 @@ export async function interruptedUploads(service: Service, onFreed: () => void):
 }
 
 /** Forgets an upload, and deletes what the service has of it. */
-export async function deleteInterrupted(service: Service, { kept }: Interrupted): Promise<void> {
+export async function deleteInterrupted(service: Service, { kept }: Interrupted) {
   const { session, design } = kept.present;
   if (session !== null) await service.remove(session);
   if (design !== null) await removeDesign(service, design);

@@ -106,7 +106,8 @@ function designFacts({ design, plan }: UploadJob) {
     const sent = sampledFrames(plan.frames.frames, plan.frames.points).length;
     return html`<span>Uploading ${counted(sent, 'sample frame')}</span>`;
   }
-  const { vertices, error, stage, state } = design;
+  const { vertices, stage, state } = design;
+  const error = design.error?.held_back;
   return html`
     ${state === 'queued' ? html`<span>Queued</span>` : nothing}
     ${vertices ? html`<span>cage of <b>${count(vertices)} vertices</b> so far</span>` : nothing}

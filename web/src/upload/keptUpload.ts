@@ -26,7 +26,7 @@ export interface UploadRecord {
 
 /** The record of one upload, in the storage of the page; in memory alone where the browser keeps nothing. */
 export class KeptUpload {
-  #sending = new AbortController();
+  private sending = new AbortController();
 
   constructor(private record: UploadRecord) {}
 
@@ -34,26 +34,26 @@ export class KeptUpload {
     return this.record;
   }
 
-  set(part: Partial<Pick<UploadRecord, 'session' | 'design' | 'key'>>): void {
+  set(part: Partial<Pick<UploadRecord, 'session' | 'design' | 'key'>>) {
     const isOther = part.key !== undefined && part.key !== this.record.key;
     if (isOther) this.forget();
     this.record = { ...this.record, ...part };
     guarded(() => localStorage.setItem(PREFIX + this.record.key, JSON.stringify(this.record)));
   }
 
-  forget(): void {
+  forget() {
     guarded(() => localStorage.removeItem(PREFIX + this.record.key));
   }
 
   /** Says to the other tabs that this one sends it, until {@link release}. */
-  hold(): void {
-    this.#sending = new AbortController();
+  hold() {
+    this.sending = new AbortController();
     // Where browsers have no locks, or give none, every tab offers to go on.
-    holdName(PREFIX + this.record.key, this.#sending.signal).catch(() => undefined);
+    holdName(PREFIX + this.record.key, this.sending.signal).catch(() => undefined);
   }
 
-  release(): void {
-    this.#sending.abort();
+  release() {
+    this.sending.abort();
   }
 }
 

@@ -1,7 +1,7 @@
 /** Cages that the service designs from the motion of a capture. */
 
-import { followProgress } from '../service/events';
-import type { CageDesign, DesignOptions, DesignProgress } from '../service/messages';
+import { pause } from '../service/backoff';
+import type { CageDesign, DesignOptions } from '../service/messages';
 import { ServiceProblem, problemBehind, problemFrom } from '../service/problem';
 import { type Service, patiently } from '../service/service';
 import type { FrameSource } from '../files/frameSource';
@@ -14,6 +14,10 @@ const MAX_BYTES = 192 << 20;
 const MIN_FRAMES = 24;
 /** How long a request that begins a design may still be answered after nobody wants it, in milliseconds. */
 const ANSWER_MS = 2000;
+const LOOK_SECONDS = 1;
+
+/** Repeats what fails and may be repeated. */
+type Retrying = <T>(work: () => Promise<T>) => Promise<T>;
 
 /** Numbers of the frames that a design sees: evenly spaced, the first and the last among them. */
 export function sampledFrames(frames: number, points: number): number[] {
@@ -29,10 +33,10 @@ interface Motion {
 
 export class MotionCage {
   /** How far it is; null while none is at work. */
-  progress: DesignProgress | null = null;
+  progress: CageDesign | null = null;
   /** The best cage so far, where somebody did not want to wait for the end. */
   file: File | null = null;
-  #enough = new AbortController();
+  private enough = new AbortController();
 
   /** @param kept says which design is at work, also after the page was closed */
   constructor(
@@ -45,11 +49,10 @@ export class MotionCage {
   /**
    * Waits until the cage is designed; a design that is at work is gone on with.
    *
-   * @param retry repeats what fails and may be repeated
    * @throws ServiceProblem where there can be no cage
    */
-  async design(options: DesignOptions, retry: <T>(work: () => Promise<T>) => Promise<T>, signal: AbortSignal) {
-    this.#enough = new AbortController();
+  async design(options: DesignOptions, retry: Retrying, signal: AbortSignal) {
+    this.enough = new AbortController();
     const { key, design } = this.kept.present;
     const begin = async (): Promise<string> => {
       const id = await retry(() => beginDesign(this.service, this.motion, options, `${key}-cage`, signal));
@@ -58,14 +61,14 @@ export class MotionCage {
     };
     let id = design ?? (await begin());
     try {
-      await this.#follow(id, signal).catch(async (error: unknown) => {
+      await this.follow(id, retry, signal).catch(async (error: unknown) => {
         const problem = problemBehind(error);
         if (design === null || !(problem instanceof ServiceProblem && problem.isGone)) throw problem;
         id = await begin();
-        await this.#follow(id, signal);
+        await this.follow(id, retry, signal);
       });
     } catch (error) {
-      if (signal.aborted || !this.#enough.signal.aborted) throw error;
+      if (signal.aborted || !this.enough.signal.aborted) throw error;
       this.file = await retry(() => bestCage(this.service, id, signal));
       await this.putAway();
     }
@@ -73,12 +76,12 @@ export class MotionCage {
   }
 
   /** Goes on with the best cage so far. */
-  takeBest(): void {
-    this.#enough.abort();
+  takeBest() {
+    this.enough.abort();
   }
 
   /** Deletes the design, which stops it and makes room; a session that took its cage keeps that. */
-  async putAway(): Promise<void> {
+  async putAway() {
     const { design } = this.kept.present;
     if (design === null) return;
     await removeDesign(this.service, design);
@@ -86,12 +89,18 @@ export class MotionCage {
     this.progress = null;
   }
 
-  #follow(id: string, signal: AbortSignal): Promise<void> {
-    const hear = (progress: DesignProgress): void => {
-      this.progress = progress;
+  /** Looks at a design until it is completed; throws where it failed, is gone or was enough. */
+  private async follow(id: string, retry: Retrying, signal: AbortSignal) {
+    const either = AbortSignal.any([signal, this.enough.signal]);
+    for (;;) {
+      const found = await retry(() => readDesign(this.service, id, either));
+      either.throwIfAborted();
+      if (found.problem) throw problemFrom(found.problem);
+      if (found.state === 'completed') return;
+      this.progress = found;
       this.onProgress();
-    };
-    return followDesign(this.service, id, hear, AbortSignal.any([signal, this.#enough.signal]));
+      await pause(LOOK_SECONDS, either);
+    }
   }
 }
 
@@ -120,25 +129,9 @@ async function beginDesign(
 /** Aborted a little after another one, so that what the service has just begun is known, and can be deleted. */
 function answered(signal: AbortSignal): AbortSignal {
   const late = new AbortController();
-  const abort = (): unknown => setTimeout(() => late.abort(signal.reason), ANSWER_MS);
+  const abort = () => setTimeout(() => late.abort(signal.reason), ANSWER_MS);
   signal.addEventListener('abort', abort, { once: true });
   return late.signal;
-}
-
-/**
- * Tells of a design until it is over.
- *
- * @throws ServiceProblem where it failed, or is gone
- */
-async function followDesign(
-  service: Service,
-  id: string,
-  onProgress: (progress: DesignProgress) => void,
-  signal: AbortSignal,
-): Promise<void> {
-  await followProgress<DesignProgress>(service, pathOf(id), onProgress, signal);
-  const { problem } = await service.json<CageDesign>(pathOf(id), { cache: 'no-store', signal });
-  if (problem) throw problemFrom(problem);
 }
 
 /** The best cage so far, as a file to send. */
@@ -147,12 +140,12 @@ async function bestCage(service: Service, id: string, signal: AbortSignal): Prom
   return new File([await response.blob()], 'cage.obj');
 }
 
-export function readDesign(service: Service, id: string): Promise<CageDesign> {
-  return service.json(pathOf(id), { cache: 'no-store', signal: patiently() });
+export function readDesign(service: Service, id: string, signal?: AbortSignal): Promise<CageDesign> {
+  return service.json(pathOf(id), { cache: 'no-store', signal: patiently(signal) });
 }
 
 /** Deletes a design; that it could not be is no failure. */
-export async function removeDesign(service: Service, id: string): Promise<void> {
+export async function removeDesign(service: Service, id: string) {
   await service.request(pathOf(id), { method: 'DELETE' }).catch(() => undefined);
 }
 

@@ -1,13 +1,7 @@
 /** Sends a capture to the service: a cage's design, a session, its frames, its completion. Goes on over broken connections, and after being stopped. */
 
 import { Backoff, type Retry, pause, persistently } from '../service/backoff';
-import {
-  type DesignOptions,
-  type DesignProgress,
-  type Session,
-  type SessionOptions,
-  unsolved,
-} from '../service/messages';
+import { type DesignOptions, type CageDesign, type Session, type SessionOptions, unsolved } from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind, problemFrom, sentenceOf } from '../service/problem';
 import { type Service, sessionPath } from '../service/service';
 import { RateMeter } from '../service/measures';
@@ -46,10 +40,10 @@ export class UploadJob extends EventTarget {
   /** Frames that the service has acknowledged. */
   done = 0;
   readonly measured: Measured;
-  readonly #frames = new RateMeter();
-  readonly #bytes = new RateMeter();
-  readonly #cage: MotionCage;
-  #stopping = new AbortController();
+  private readonly frames = new RateMeter();
+  private readonly bytes = new RateMeter();
+  private readonly cage: MotionCage;
+  private stopping = new AbortController();
 
   /** @param kept what goes on after the page was closed; with a session or a design, this upload goes on with it */
   constructor(
@@ -60,7 +54,7 @@ export class UploadJob extends EventTarget {
   ) {
     super();
     this.stage = request.design ? 'designing' : 'creating';
-    this.#cage = new MotionCage(service, plan, kept, () => this.#changed());
+    this.cage = new MotionCage(service, plan, kept, () => this.changed());
     const unknown = (): Float32Array => new Float32Array(plan.frames.frames).fill(Number.NaN);
     this.measured = { l2: unknown(), linf: unknown() };
   }
@@ -70,11 +64,11 @@ export class UploadJob extends EventTarget {
   }
 
   get framesPerSecond(): number {
-    return this.#frames.perSecond();
+    return this.frames.perSecond();
   }
 
   get bytesPerSecond(): number {
-    return this.#bytes.perSecond();
+    return this.bytes.perSecond();
   }
 
   /** Seconds until the last frame is there, at the present rate; null while the rate is unknown. */
@@ -84,69 +78,69 @@ export class UploadJob extends EventTarget {
   }
 
   /** Stops; what the service has stays there, and {@link run} goes on with the rest. */
-  stop(): void {
-    this.#stopping.abort();
+  stop() {
+    this.stopping.abort();
   }
 
-  takeBest(): void {
-    this.#cage.takeBest();
+  takeBest() {
+    this.cage.takeBest();
   }
 
-  get design(): DesignProgress | null {
-    return this.#cage.progress;
+  get design(): CageDesign | null {
+    return this.cage.progress;
   }
 
   /** Stops, and deletes what the service has. */
-  async discard(): Promise<void> {
+  async discard() {
     this.stop();
     const { session } = this.kept.present;
     if (session !== null) await this.service.remove(session);
-    await this.#cage.putAway();
+    await this.cage.putAway();
     this.kept.forget();
   }
 
   /** Begins, or goes on. Ends with the stage `completed`, `stopped` or `failed`; never throws. */
-  async run(): Promise<void> {
-    this.#stopping = new AbortController();
-    const { signal } = this.#stopping;
+  async run() {
+    this.stopping = new AbortController();
+    const { signal } = this.stopping;
     this.kept.set({});
     this.kept.hold();
     try {
-      if (this.request.design && this.kept.present.session === null && !this.#cage.file) {
-        this.#enter('designing');
-        const retry = <T>(work: () => Promise<T>): Promise<T> => this.#retry(work, signal);
-        await this.#cage.design(this.request.design, retry, signal);
+      if (this.request.design && this.kept.present.session === null && !this.cage.file) {
+        this.enter('designing');
+        const retry = <T>(work: () => Promise<T>): Promise<T> => this.retry(work, signal);
+        await this.cage.design(this.request.design, retry, signal);
       }
-      this.#enter('creating');
+      this.enter('creating');
       const { session } = this.kept.present;
-      this.session = await this.#retry(
-        () => (session === null ? this.#create(signal) : this.service.session(session, signal)),
+      this.session = await this.retry(
+        () => (session === null ? this.create(signal) : this.service.session(session, signal)),
         signal,
       );
       this.kept.set({ session: this.session.id });
-      this.#enter('preparing');
-      await this.#prepared(this.session.id, signal);
-      await this.#cage.putAway();
-      this.#enter('sending');
-      await this.#send(this.session.id, signal);
-      this.#enter('completing');
+      this.enter('preparing');
+      await this.prepared(this.session.id, signal);
+      await this.cage.putAway();
+      this.enter('sending');
+      await this.send(this.session.id, signal);
+      this.enter('completing');
       const { id } = this.session;
-      this.session = await this.#retry(() => this.service.complete(id, this.plan.frames.frames, signal), signal);
+      this.session = await this.retry(() => this.service.complete(id, this.plan.frames.frames, signal), signal);
       this.kept.forget();
       this.figures = await containerFigures(this.service, this.session).catch(() => null);
-      this.#enter('completed');
+      this.enter('completed');
     } catch (error) {
       const isSignedOut = error instanceof ServiceProblem && error.status === 401;
-      if (this.stage === 'designing' && !isSignedOut) await this.#cage.putAway();
-      this.trouble = isAbort(error) ? '' : this.#sentence(error);
-      this.#enter(isAbort(error) ? 'stopped' : 'failed');
+      if (this.stage === 'designing' && !isSignedOut) await this.cage.putAway();
+      this.trouble = isAbort(error) ? '' : this.sentence(error);
+      this.enter(isAbort(error) ? 'stopped' : 'failed');
     } finally {
       this.kept.release();
     }
   }
 
   /** What went wrong; of a session that is gone, what is to be done with its frames. */
-  #sentence(error: unknown): string {
+  private sentence(error: unknown): string {
     const problem = problemBehind(error);
     if (!(problem instanceof ServiceProblem && problem.isGone)) return sentenceOf(problem);
     const { session } = this.kept.present;
@@ -165,10 +159,10 @@ export class UploadJob extends EventTarget {
     return this.kept.present.session === null;
   }
 
-  async #create(signal: AbortSignal): Promise<Session> {
+  private async create(signal: AbortSignal): Promise<Session> {
     const body = new FormData();
     const { key, design } = this.kept.present;
-    const cage = this.#cage.file ?? this.plan.cage;
+    const cage = this.cage.file ?? this.plan.cage;
     const designed = cage === null && design !== null ? { cage: { id: design } } : {};
     body.append('options', JSON.stringify({ ...this.request.options, ...designed }));
     body.append('rest', this.plan.rest);
@@ -177,12 +171,12 @@ export class UploadJob extends EventTarget {
     return this.service.json<Session>('sessions', { method: 'POST', headers, body, signal });
   }
 
-  async #prepared(id: string, signal: AbortSignal): Promise<void> {
+  private async prepared(id: string, signal: AbortSignal) {
     for (;;) {
-      this.session = await this.#retry(() => this.service.session(id, signal), signal);
+      this.session = await this.retry(() => this.service.session(id, signal), signal);
       if (this.session.problem) throw problemFrom(this.session.problem);
       if (this.session.state !== 'preparing') break;
-      this.#changed();
+      this.changed();
       await pause(PREPARING_POLL_SECONDS, signal);
     }
     const { points } = this.session;
@@ -193,20 +187,20 @@ export class UploadJob extends EventTarget {
     }
   }
 
-  async #send(id: string, signal: AbortSignal): Promise<void> {
+  private async send(id: string, signal: AbortSignal) {
     const { frames } = this.plan;
-    const sender = this.#sender(id);
+    const sender = this.sender(id);
     const backoff = new Backoff();
-    await this.#recall(id, signal);
+    await this.recall(id, signal);
     // Whatever broke off, what is missing then is what the service says.
     for (;;) {
-      const session = await this.#retry(() => this.service.session(id, signal), signal);
+      const session = await this.retry(() => this.service.session(id, signal), signal);
       if (session.problem) throw problemFrom(session.problem);
       if (session.coding?.problem) throw problemFrom(session.coding.problem);
       this.session = session;
       const ranges = unsolved(session.frames, frames.frames);
       this.done = frames.frames - ranges.reduce((sum, [first, end]) => sum + end - first, 0);
-      this.#changed();
+      this.changed();
       if (session.state === 'completed' || ranges.length === 0) return;
       try {
         await sender.send(ranges, signal);
@@ -214,22 +208,22 @@ export class UploadJob extends EventTarget {
       } catch (error) {
         const problem = problemBehind(error);
         if (!(problem instanceof ServiceProblem) || !problem.passes) throw problem;
-        await this.#wait({ problem, seconds: backoff.next(problem.retryAfter) }, signal);
+        await this.wait({ problem, seconds: backoff.next(problem.retryAfter) }, signal);
       }
     }
   }
 
   /** Errors of the frames that were sent before, where they are not known here. */
-  async #recall(id: string, signal: AbortSignal): Promise<void> {
+  private async recall(id: string, signal: AbortSignal) {
     if (!this.session || this.session.frames.solved === 0 || this.done > 0) return;
-    for (const { frame, l2, linf } of await this.#retry(() => this.service.errors(id, signal), signal)) {
+    for (const { frame, l2, linf } of await this.retry(() => this.service.errors(id, signal), signal)) {
       if (frame >= this.plan.frames.frames) continue;
       this.measured.l2[frame] = l2 ?? Number.NaN;
       this.measured.linf[frame] = linf ?? Number.NaN;
     }
   }
 
-  #sender(id: string): FrameSender {
+  private sender(id: string): FrameSender {
     return new FrameSender(this.service, sessionPath(id, 'frames'), this.plan.frames, {
       solved: (result) => {
         this.measured.l2[result.frame] = result.l2 ?? Number.NaN;
@@ -237,36 +231,36 @@ export class UploadJob extends EventTarget {
       },
       sent: (count, bytes) => {
         this.done += count;
-        this.#frames.add(count);
-        this.#bytes.add(bytes);
+        this.frames.add(count);
+        this.bytes.add(bytes);
         this.trouble = '';
-        this.#changed();
+        this.changed();
       },
     });
   }
 
-  async #retry<T>(work: () => Promise<T>, signal: AbortSignal): Promise<T> {
-    const result = await persistently(work, { signal, onRetry: (retry) => this.#say(retry) });
+  private async retry<T>(work: () => Promise<T>, signal: AbortSignal): Promise<T> {
+    const result = await persistently(work, { signal, onRetry: (retry) => this.say(retry) });
     this.trouble = '';
     return result;
   }
 
-  #wait(retry: Retry, signal: AbortSignal): Promise<void> {
-    this.#say(retry);
+  private wait(retry: Retry, signal: AbortSignal): Promise<void> {
+    this.say(retry);
     return pause(retry.seconds, signal);
   }
 
-  #say({ problem, seconds }: Retry): void {
+  private say({ problem, seconds }: Retry) {
     this.trouble = `${problem.message} Retrying in ${Math.ceil(seconds)} s.`;
-    this.#changed();
+    this.changed();
   }
 
-  #enter(stage: Stage): void {
+  private enter(stage: Stage) {
     this.stage = stage;
-    this.#changed();
+    this.changed();
   }
 
-  #changed(): void {
+  private changed() {
     this.dispatchEvent(new Event('change'));
   }
 }

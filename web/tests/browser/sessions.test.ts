@@ -173,7 +173,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
   });
 
   test('a_page_that_nobody_sees_asks_for_nothing', async () => {
-    // With one that is not finished the page asks every three seconds.
+    // With one that is not finished the page asks every two seconds.
     await site.client().create(capture, { name: 'waiting' });
     const { page, close } = await openPage(site.browser, `${site.page}#/`);
     await row(page, 'waiting').waitFor();
@@ -185,7 +185,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     await setHidden(true);
     let asked = 0;
     page.on('request', () => (asked += 1));
-    await page.waitForTimeout(3500);
+    await page.waitForTimeout(2500);
     expect(asked).toBe(0);
     await site.client().encode(capture, { name: 'meanwhile' }, 2);
     await setHidden(false);
