@@ -9,7 +9,8 @@ use axum::response::Response;
 use cager_store::Membership;
 use futures_util::stream;
 use http::header::{
-    CONNECTION, CONTENT_LENGTH, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER, TRANSFER_ENCODING, UPGRADE,
+    CONNECTION, CONTENT_LENGTH, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER,
+    TRANSFER_ENCODING, UPGRADE,
 };
 use http::{HeaderMap, HeaderValue};
 use http_body_util::BodyExt;
@@ -81,10 +82,13 @@ impl Forwarder {
     /// What the library says.
     pub(super) fn new(is_tls: bool, idle: Duration) -> Result<Self, reqwest::Error> {
         let _ = rustls::crypto::ring::default_provider().install_default();
-        let builder =
-            reqwest::Client::builder().no_proxy().http1_only().connect_timeout(CONNECT).pool_idle_timeout(idle / 2);
-        let builder = if is_tls { builder } else { builder.tls_certs_only([]) };
-        Ok(Self { client: builder.redirect(reqwest::redirect::Policy::none()).build()? })
+        let builder = || {
+            let builder = reqwest::Client::builder().no_proxy().http1_only().connect_timeout(CONNECT);
+            let builder = if is_tls { builder } else { builder.tls_certs_only([]) };
+            builder.redirect(reqwest::redirect::Policy::none())
+        };
+        let client = builder().pool_idle_timeout(idle / 2).build()?;
+        Ok(Self { client, fresh: builder().pool_max_idle_per_host(0).build()? })
     }
 
     /// Sends a request to the process at `address`.
