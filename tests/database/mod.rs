@@ -89,6 +89,11 @@ impl Database {
         lock(self.bucket.as_ref().expect("a bucket")).run();
     }
 
+    /// Has the bucket refuse what is written, or take it again.
+    pub(crate) fn set_bucket_read_only(&self, is_read_only: bool) {
+        lock(self.bucket.as_ref().expect("a bucket")).set_read_only(is_read_only);
+    }
+
     /// Kills the server, as if it had crashed.
     pub(crate) fn kill(&self) {
         self.server().kill();

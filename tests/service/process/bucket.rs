@@ -113,3 +113,30 @@ async fn while_the_bucket_is_away_the_service_says_so_and_it_goes_on_afterwards(
     assert!(app.container(&plain.id).await == capture.encoded(40));
     assert!(app.container(&coded).await == capture.encoded_with(40, &["--max-error", "0.001"]));
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_bucket_that_refuses_writes_is_told_and_nothing_is_half_written() {
+    let Some(database) = Database::with_bucket() else { return };
+    let app = TestApp::on(&database, &[]);
+    let capture = Capture::small();
+    let (plain, coded) = (app.ready(capture).await, coded_session(&app, capture).await);
+    app.upload(&coded, 0, capture.raw(0..5)).await;
+    let before = database.files("sessions").len();
+    database.set_bucket_read_only(true);
+    app.upload(&plain.id, 0, capture.raw(0..40)).await;
+    let path = format!("/v1/sessions/{coded}/frames?first=5");
+    let refused = app.post(&path, OCTETS, capture.raw(5..10)).await.text();
+    assert!(refused.contains("storage-failed"), "{refused}");
+    app.complete(&plain.id, 40).await.problem(503, "storage-failed");
+    assert_eq!(app.get("/readyz").await.status, 503);
+    assert_eq!(database.files("sessions").len(), before);
+    // What is there can be read.
+    assert_eq!(app.session(&coded).await.frames.solved, 5);
+    database.set_bucket_read_only(false);
+    eventually("it is ready", async || (app.get("/readyz").await.status == 200).then_some(())).await;
+    app.upload(&coded, 5, capture.raw(5..40)).await;
+    for (id, more) in [(&plain.id, &[][..]), (&coded, &["--max-error", "0.001"])] {
+        app.complete(id, 40).await.expect(200);
+        assert!(app.container(id).await == capture.encoded_with(40, more));
+    }
+}

@@ -91,6 +91,17 @@ impl Server {
     }
 
     fn make_bucket(&self) -> Result<(), String> {
+        self.shell(&format!("s3.bucket.create -name {BUCKET}"))
+    }
+
+    /// Has the bucket refuse what is written, or take it again.
+    pub(crate) fn set_read_only(&self, is_read_only: bool) {
+        let line = format!("fs.configure -locationPrefix=/buckets/{BUCKET} -readOnly={is_read_only} -apply");
+        self.shell(&line).expect("the shell");
+    }
+
+    /// Gives its shell a line.
+    fn shell(&self, line: &str) -> Result<(), String> {
         let [master, master_own, .., filer, filer_own, _, _] = self.ports;
         let mut command = Command::new(&self.program);
         command.arg("shell").arg(format!("-master=127.0.0.1:{master}.{master_own}"));
@@ -98,7 +109,7 @@ impl Server {
         let shell = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
         let mut shell = shell.map_err(|error| error.to_string())?;
         let mut said = shell.stdin.take().expect("piped");
-        writeln!(said, "s3.bucket.create -name {BUCKET}").map_err(|error| error.to_string())?;
+        writeln!(said, "{line}").map_err(|error| error.to_string())?;
         drop(said);
         // It would wait for ever for a server that has just ended.
         let began = Instant::now();
