@@ -113,6 +113,7 @@ export class SessionList extends EventTarget {
         return;
       }
     }
+    if (signal.aborted) return;
     this.changed();
     this.timer = setTimeout(() => void this.poll(signal), 1000 * seconds);
   }

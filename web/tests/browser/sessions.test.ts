@@ -174,15 +174,18 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
 
   test('a_page_that_nobody_sees_asks_for_nothing', async () => {
     // With one that is not finished the page asks every two seconds.
-    await site.client().create(capture, { name: 'waiting' });
+    const name = `waiting ${Date.now()}`;
+    await site.client().create(capture, { name });
     const { page, close } = await openPage(site.browser, `${site.page}#/`);
-    await row(page, 'waiting').waitFor();
+    await row(page, name).waitFor();
     const setHidden = (hidden: boolean) =>
       page.evaluate((value) => {
         Object.defineProperty(document, 'hidden', { value, configurable: true });
         document.dispatchEvent(new Event('visibilitychange'));
       }, hidden);
     await setHidden(true);
+    // What has begun may end.
+    await page.waitForTimeout(500);
     let asked = 0;
     page.on('request', () => (asked += 1));
     await page.waitForTimeout(2500);
