@@ -16,8 +16,9 @@ use tokio::time::{sleep, timeout};
 
 const PROCESSES: usize = 3;
 const TENANTS: [&str; 4] = ["east", "north", "south", "west"];
-/// Longest time until the tenants of a process that was killed are answered by others.
-const TAKEN_OVER: Duration = Duration::from_secs(2);
+/// Longest time until the tenants of a process that was killed are answered by others. Half a second is usual; the bucket may just have been killed too, and
+/// the machine be busy.
+const TAKEN_OVER: Duration = Duration::from_secs(5);
 /// Sessions of each tenant that are checked after each kill; after the last one, all are.
 const CHECKED: usize = 8;
 
