@@ -247,10 +247,12 @@ impl ServeConfig {
     /// Refuses what several processes cannot share.
     fn check_shards(&self) -> Result<(), ConfigError> {
         if self.catalog.is_none() {
-            return Err(ConfigError::Half { given: "shards", missing: "catalog" });
+            let why = "shards is set but catalog is not: name the database that the processes share by --catalog";
+            return Err(ConfigError::Shards { why: why.to_owned() });
         }
         if !self.is_guarded() {
-            return Err(ConfigError::Half { given: "shards", missing: "tokens" });
+            let why = "shards is set but tokens is not: without tokens there is one tenant, and nothing to divide";
+            return Err(ConfigError::Shards { why: why.to_owned() });
         }
         let path = |url: &String| url.trim_end_matches('/').splitn(4, '/').nth(3).is_some_and(|path| !path.is_empty());
         if let Some(url) = self.blobs.as_ref().filter(|url| !path(url)) {

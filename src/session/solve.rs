@@ -31,7 +31,6 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
     let mut whole = Vec::new();
     let mut handles = Vec::new();
     let mut measured = Vec::new();
-    let mut positions = Vec::new();
     for mut job in jobs {
         if job.upload.is_abandoned() || session.is_deleted() {
             continue;
@@ -50,8 +49,7 @@ pub(crate) fn solve(session: &Arc<Session>, prepared: &Prepared, jobs: Vec<Frame
             continue;
         }
         let is_first = job.frame == 0 || session.frames().is_empty();
-        le::read_f32(&job.bytes, &mut positions);
-        if let Some(detail) = prepared.reach.refusal_of_f32(job.frame.into(), is_first, what, &positions) {
+        if let Some(detail) = prepared.reach.refusal_of_bytes(job.frame.into(), is_first, what, &job.bytes) {
             job.refuse(problem::INVALID_FRAME, detail);
             continue;
         }

@@ -1,4 +1,4 @@
-//! Frames that are none, by where they lie: in other units or another order of bytes than the rest pose, or shifted.
+//! Frames that are refused for where they lie: in other units or another order of bytes than the rest pose, or shifted.
 
 use cager_geometry::mesh::{Point, bounds};
 
@@ -22,14 +22,17 @@ impl Reach {
         Self { centre: std::array::from_fn(|k| (low[k] + high[k]) / 2.0), diagonal }
     }
 
-    /// Why a frame is none, if it is: `frame` is its number, `what` its rows are, such as `point`, and `positions` three numbers for each.
+    /// Why a frame is refused, if it lies too far away. `frame` is its number, `what` names its rows (`point` or `handle`), and `positions` has three
+    /// coordinates for each row.
     pub fn refusal(&self, frame: u64, is_first: bool, what: &str, positions: &[f64]) -> Option<String> {
         self.refusal_of(frame, is_first, what, positions.as_chunks().0.iter().copied())
     }
 
-    /// As [`Self::refusal`].
-    pub fn refusal_of_f32(&self, frame: u64, is_first: bool, what: &str, positions: &[f32]) -> Option<String> {
-        self.refusal_of(frame, is_first, what, positions.as_chunks::<3>().0.iter().map(|point| point.map(f64::from)))
+    /// As [`Self::refusal`], of little-endian `f32`.
+    pub fn refusal_of_bytes(&self, frame: u64, is_first: bool, what: &str, bytes: &[u8]) -> Option<String> {
+        let points = bytes.as_chunks::<4>().0.as_chunks::<3>().0;
+        let points = points.iter().map(|point| point.map(|number| f64::from(f32::from_le_bytes(number))));
+        self.refusal_of(frame, is_first, what, points)
     }
 
     fn refusal_of(
