@@ -277,7 +277,13 @@ impl Store {
     /// Opens a file of the store for reading.
     pub fn open_file(&self, path: &Path) -> Result<File, StoreError> {
         self.bring(path)?;
-        File::open(path).map_err(|e| StoreError::of(path, "open", e))
+        let file = File::open(path).map_err(|e| StoreError::of(path, "open", e))?;
+        // A folder opens like a file, and cannot be read.
+        match file.metadata() {
+            Ok(metadata) if metadata.is_dir() => Err(StoreError::of(path, "open", io::ErrorKind::IsADirectory.into())),
+            Ok(_) => Ok(file),
+            Err(e) => Err(StoreError::of(path, "open", e)),
+        }
     }
 
     /// Sees that a file of the store can be opened at its path.

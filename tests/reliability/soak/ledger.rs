@@ -234,6 +234,10 @@ impl Ledger {
                 503 => return Ok(()),
                 status => return Err(format!("it was completed, and completing it again answers {status}")),
             }
+            // The client asks again for long where a container cannot be read.
+            if server.get(&format!("{path}/capture.cager")).await == Some(503) {
+                return Ok(());
+            }
             match self.check_container(server, id, known).await {
                 Err(error) if clock.elapsed() > HANG => return Err(error),
                 Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,

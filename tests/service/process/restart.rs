@@ -243,6 +243,7 @@ async fn a_container_that_cannot_be_read_is_served_when_it_can() {
     std::fs::create_dir(&file).expect("a folder");
     app = app.again();
     assert_eq!(app.session(&session.id).await.state, SessionState::Completed);
+    app.get(&format!("/v1/sessions/{}/capture.cager", session.id)).await.expect(503);
     std::fs::remove_dir(&file).expect("a folder");
     std::fs::rename(&aside, &file).expect("a file");
     assert!(app.container(&session.id).await == container);
