@@ -17,6 +17,7 @@ use http_body_util::BodyExt;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::watch;
+use tokio::time::sleep;
 use tokio_util::sync::CancellationToken;
 
 /// How often a request has been sent on.
@@ -25,6 +26,8 @@ const HOPS: HeaderName = HeaderName::from_static("cager-hops");
 const MOST_HOPS: u32 = 3;
 /// How long connecting may take.
 const CONNECT: Duration = Duration::from_secs(2);
+/// How long a request may go on elsewhere, once this process has given up its shards.
+const AFTER_END: Duration = Duration::from_secs(2);
 /// Headers of one connection.
 const OF_CONNECTION: [HeaderName; 8] = [
     CONNECTION,
@@ -56,13 +59,16 @@ pub(super) struct Going {
 }
 
 impl Going {
-    /// Ends when the process at `address` has ended, or this one.
+    /// Ends when the process at `address` has ended, or a moment after this one has given up all it had: what is asked in between is still answered.
     async fn over(mut self, address: String) {
         let is_gone = |seen: &Membership| !seen.processes.values().any(|known| *known == address);
         tokio::select! {
             // An error means that this process ends.
             _ = self.seen.wait_for(is_gone) => {}
-            () = self.ended.cancelled() => {}
+            () = async {
+                self.ended.cancelled().await;
+                sleep(AFTER_END).await;
+            } => {}
         }
     }
 }
