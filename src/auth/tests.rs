@@ -137,7 +137,7 @@ fn mistakes_name_file_and_line_and_show_no_hash() {
         assert!(!error.contains(&secret[..16]) && !error.contains(&hex(FIRST)[..16]), "{error}");
     }
     let error = Access::open(Some(Path::new("no/tokens.toml")), DEFAULTS).unwrap_err().to_string();
-    assert!(error.starts_with("no/tokens.toml: cannot be read: "), "{error}");
+    assert!(error.starts_with("no/tokens.toml: cannot be read ("), "{error}");
 }
 
 #[test]

@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum EntriesError {
     /// It cannot be read.
-    #[error("{}: cannot be read: {source}", file.display())]
+    #[error("{}: cannot be read ({why}); check its name and permissions", file.display())]
     Read {
         /// The file.
         file: PathBuf,
         /// Why.
-        source: std::io::Error,
+        why: std::io::Error,
     },
     /// An entry is wrong.
     #[error("{}: line {line}: {why}", file.display())]
@@ -37,7 +37,7 @@ pub(crate) type Wrong = (usize, String);
 /// # Errors
 /// See [`EntriesError`].
 pub(crate) fn read<T>(file: &Path, parse: impl FnOnce(&str) -> Result<T, Wrong>) -> Result<T, EntriesError> {
-    let text = std::fs::read_to_string(file).map_err(|source| EntriesError::Read { file: file.to_owned(), source })?;
+    let text = std::fs::read_to_string(file).map_err(|why| EntriesError::Read { file: file.to_owned(), why })?;
     parse(&text).map_err(|(offset, why)| EntriesError::Entry {
         file: file.to_owned(),
         line: line_of(&text, offset),

@@ -23,6 +23,7 @@ use http::{StatusCode, header};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
 /// What operators see and do something to: this process.
@@ -164,11 +165,15 @@ async fn drain(State(operated): State<Operated>) -> StatusCode {
 
 #[derive(Serialize)]
 struct Evicted {
+    /// Of solvers.
     bytes: u64,
+    /// Whose frames were forgotten.
+    sessions: usize,
 }
 
-/// Drops cached solvers from memory; solvers in use stay until they are released, and all can be loaded from disk again.
+/// Drops cached solvers from memory, and frames of sessions that nobody uses at the moment. What is in use stays, and all can be loaded again.
 async fn evict(State(operated): State<Operated>) -> Json<Evicted> {
     let services = (operated.services)();
-    Json(Evicted { bytes: services.iter().map(|service| service.solvers.evict()).sum() })
+    let bytes = services.iter().map(|service| service.solvers.evict()).sum();
+    Json(Evicted { bytes, sessions: services.iter().map(|service| service.registry.unload(Duration::ZERO)).sum() })
 }

@@ -253,6 +253,11 @@ impl Frames {
         self.solved.is_empty() && self.pending.is_empty()
     }
 
+    /// Whether any are being solved or written.
+    pub(crate) fn is_pending(&self) -> bool {
+        !self.pending.is_empty()
+    }
+
     /// The highest solved frame.
     pub(crate) fn highest(&self) -> Option<u32> {
         self.solved.last_key_value().map(|(frame, _)| *frame)

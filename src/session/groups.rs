@@ -84,6 +84,11 @@ impl Groups {
         self.coded.get(at).copied()
     }
 
+    /// Whether all that is here can be read from the store again.
+    pub(super) fn are_stored(&self) -> bool {
+        self.last.is_empty() && self.failed.is_none()
+    }
+
     fn add(&mut self, first: u32, group: &StoredGroup, bytes: u64) {
         self.coded.push(CodedGroup { first, frames: group.errors.len() as u32, bytes });
         self.carried = group.carried;
@@ -357,7 +362,7 @@ impl Service {
         }
     }
 
-    async fn code_as_they_come(self: Arc<Self>, session: Arc<Session>) {
+    async fn code_as_they_come(self: Arc<Self>, mut session: Arc<Session>) {
         let mut changes = session.changes();
         loop {
             changes.mark_unchanged();
@@ -377,13 +382,18 @@ impl Service {
                 }
                 Phase::Preparing => {}
             }
+            // While nothing happens it can be unloaded.
+            let (deleted, waiting) = (session.deleted().clone(), Arc::downgrade(&session));
+            drop(session);
             tokio::select! {
                 changed = changes.changed() => if changed.is_err() { return },
                 // A disk may have space again.
                 () = tokio::time::sleep(RETRY), if failed => {}
-                () = session.deleted().cancelled() => return,
+                () = deleted.cancelled() => return,
                 () = self.stopping().cancelled() => return,
             }
+            let Some(again) = waiting.upgrade() else { return };
+            session = again;
         }
     }
 

@@ -8,6 +8,7 @@ pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
 pub(crate) mod groups;
+mod idle;
 mod last_groups;
 pub(crate) mod registry;
 mod resume;
@@ -33,6 +34,7 @@ use frames::Frames;
 use groups::Groups;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
+use std::time::Instant;
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use upload::FrameJob;
@@ -47,6 +49,8 @@ pub(crate) struct Session {
     frames: Mutex<Frames>,
     /// Whether the stored frames have been added to `frames`.
     loaded: AtomicBool,
+    /// When somebody asked for its frames.
+    last_used: Mutex<Instant>,
     /// Taken while frames are stored or loaded; whether they have to be loaded again, after a write of which it is not known how it ended.
     appending: Mutex<bool>,
     queued: Arc<AtomicU64>,
@@ -131,6 +135,7 @@ impl Session {
             status: Mutex::new(status),
             frames: Mutex::new(frames),
             loaded: AtomicBool::new(is_new),
+            last_used: Mutex::new(Instant::now()),
             appending: Mutex::new(false),
             queued: Arc::default(),
             bytes: AtomicU64::new(0),
@@ -218,6 +223,7 @@ impl Session {
     /// # Errors
     /// Damaged frames, after which the session has failed; I/O errors.
     pub(crate) fn load(&self) -> Result<(), ApiError> {
+        self.used();
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
         }
@@ -236,6 +242,7 @@ impl Session {
 
     /// As [`Self::load`], on the blocking pool.
     pub(crate) async fn ensure_loaded(self: &Arc<Self>) -> Result<(), ApiError> {
+        self.used();
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
         }
@@ -356,13 +363,6 @@ impl Session {
             && let Err(error) = self.resolve_completion()
         {
             tracing::warn!(session = %self.meta.id, detail = %error.problem.detail, "whether the session is complete cannot be determined yet");
-        }
-    }
-
-    /// Forgets what coding keeps in memory of a session that nobody uses.
-    pub(crate) fn forget_if_idle(&self) {
-        if lock(&self.lane).strong_count() == 0 && !lock(&self.waiting).busy {
-            self.forget_coder();
         }
     }
 

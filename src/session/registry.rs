@@ -128,6 +128,14 @@ impl Registry {
         lock(&self.inner).sessions.values().cloned().collect()
     }
 
+    /// Does something while no session is found, made or removed.
+    pub(crate) fn with_sessions<T>(
+        &self,
+        work: impl FnOnce(std::collections::btree_map::Values<'_, String, Arc<Session>>) -> T,
+    ) -> T {
+        work(lock(&self.inner).sessions.values())
+    }
+
     /// Number of a tenant's sessions and their bytes, including those being created.
     pub(crate) fn usage_of(&self, tenant: &str) -> (u64, u64) {
         lock(&self.inner).usage_of(tenant)

@@ -1,5 +1,6 @@
 //! Storage quotas of tenants and deletion of expired sessions and jobs.
 
+use super::idle;
 use super::registry::Reserved;
 use crate::audit::Change;
 use crate::auth::Tenant;
@@ -142,6 +143,7 @@ impl Service {
                 session.forget_if_idle();
             }
         }
+        self.registry.unload(idle::IDLE);
     }
 
     /// Deletes the jobs of a kind that have expired.

@@ -10,8 +10,11 @@ const TENANTS: [&str; 4] =
     ["east-token-of-16-bytes", "north-token-of-16-bytes", "south-token-of-16-bytes", "west-token-of-16-bytes"];
 
 fn first(database: &Database, settings: &[&str]) -> TestApp {
-    let tokens = TENANTS.map(|token| (token.split('-').next().expect("a name"), token, ""));
-    TestApp::guarded_on(Some(database.clone()), &tokens, settings)
+    TestApp::guarded_on(Some(database.clone()), &tokens(), settings)
+}
+
+fn tokens() -> [(&'static str, &'static str, &'static str); 4] {
+    TENANTS.map(|token| (token.split('-').next().expect("a name"), token, ""))
 }
 
 /// Waits until so many processes have these numbers of shards.
@@ -102,7 +105,8 @@ async fn what_a_killed_process_had_others_go_on_with() {
 #[tokio::test(flavor = "multi_thread")]
 async fn processes_are_replaced_one_after_the_other_without_a_failed_request() {
     let Some(database) = Database::with_bucket() else { return };
-    let old = first(&database, &["shards=4"]);
+    // With `CAGER_TEST_OLDER` both are of an earlier version, and one of them is replaced by this one.
+    let old = TestApp::older_on(&database, &tokens(), &["shards=4"]);
     let kept = old.elsewhere().ready();
     shared_out(&database, "2,2").await;
     let capture = Capture::small();
@@ -131,7 +135,7 @@ async fn processes_are_replaced_one_after_the_other_without_a_failed_request() {
     let mut replaced = vec![old];
     let replacing = async {
         for k in 0..2 {
-            replaced.push(replaced[k].elsewhere().ready());
+            replaced.push(replaced[k].upgraded().ready());
             shared_out(&database, "1,1,2").await;
             replaced[k].terminate();
             assert!(replaced[k].ended().await.0.success());

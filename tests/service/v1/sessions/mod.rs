@@ -4,5 +4,6 @@ mod create;
 mod geometry;
 mod id;
 mod idempotency;
+mod idle;
 mod list;
 mod without_cage;
