@@ -138,6 +138,7 @@ buckets: $(SEAWEEDFS) ## the service with its files in S3; installs SeaweedFS, a
 	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test blobs
 	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- process::bucket process::shards
 	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test reliability -- soak::several
+	tests/database/stories.sh $(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- --test-threads 4 --skip process::bucket --skip process::shards --skip process::database
 
 $(SEAWEEDFS): Makefile
 	$(PYTHON) -m venv $(S3)

@@ -13,6 +13,8 @@ mod bucket;
 
 /// Tells all tests to keep what is known of sessions in a database (`postgres`), and files in a bucket (`postgres+s3`).
 const ALL: &str = "CAGER_TEST_CATALOG";
+/// Address of a service of S3 that all of them share; else each starts its own.
+const SHARED: &str = "CAGER_TEST_S3";
 
 /// A database, and a bucket where there is one; their servers end with the last of its clones.
 #[derive(Clone)]
@@ -21,7 +23,12 @@ pub(crate) struct Database {
     bucket: Option<Bucket>,
 }
 
-type Bucket = Arc<Mutex<bucket::Server>>;
+/// One of the test's own, or a place in one that all tests share.
+#[derive(Clone)]
+enum Bucket {
+    Own(Arc<Mutex<bucket::Server>>),
+    Shared { address: String, place: String },
+}
 
 impl std::fmt::Debug for Database {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -39,16 +46,28 @@ impl Database {
     /// As [`Self::start`], with a bucket.
     pub(crate) fn with_bucket() -> Option<Self> {
         let (bucket, database) = (bucket::Server::start()?, Self::start()?);
-        Some(Self { bucket: Some(Arc::new(Mutex::new(bucket))), ..database })
+        Some(Self { bucket: Some(Bucket::Own(Arc::new(Mutex::new(bucket)))), ..database })
     }
 
     /// For a test that says nothing of a database: one where `CAGER_TEST_CATALOG=postgres` is set.
     pub(crate) fn of_all() -> Option<Self> {
         match std::env::var(ALL).as_deref() {
-            Ok("postgres+s3") => Some(Self::with_bucket().expect("PostgreSQL and SeaweedFS")),
+            Ok("postgres+s3") => match std::env::var(SHARED) {
+                Ok(address) => {
+                    let place = format!("{}-{}", std::process::id(), fastrand::u64(..));
+                    let database = Self::start().expect("PostgreSQL");
+                    Some(Self { bucket: Some(Bucket::Shared { address, place }), ..database })
+                }
+                Err(_) => Some(Self::with_bucket().expect("PostgreSQL and SeaweedFS")),
+            },
             Ok("postgres") => Some(Self::start().expect("PostgreSQL")),
             _ => None,
         }
+    }
+
+    /// As [`Self::of_all`], for a test that changes files: they are in the service's folder.
+    pub(crate) fn of_all_alone() -> Option<Self> {
+        Self::is_for_all().then(|| Self::start().expect("PostgreSQL"))
     }
 
     pub(crate) fn is_for_all() -> bool {
@@ -57,18 +76,26 @@ impl Database {
 
     /// What tells a service to use it.
     pub(crate) fn flags(&self) -> Vec<String> {
-        let blobs = self.bucket.iter().flat_map(|bucket| ["--blobs".to_owned(), lock(bucket).url("files")]);
+        let place = |bucket: &Bucket| match bucket {
+            Bucket::Own(server) => lock(server).url("files"),
+            Bucket::Shared { place, .. } => bucket::url(place),
+        };
+        let blobs = self.bucket.iter().flat_map(|bucket| ["--blobs".to_owned(), place(bucket)]);
         ["--catalog".to_owned(), self.url()].into_iter().chain(blobs).collect()
     }
 
     /// The environment that goes with them.
     pub(crate) fn environment(&self) -> Vec<(&'static str, String)> {
-        self.bucket.iter().flat_map(|bucket| lock(bucket).environment()).collect()
+        let of = |bucket: &Bucket| match bucket {
+            Bucket::Own(server) => lock(server).environment(),
+            Bucket::Shared { address, .. } => bucket::environment(address),
+        };
+        self.bucket.iter().flat_map(of).collect()
     }
 
     /// Names of files in the bucket.
     pub(crate) fn files(&self, folder: &str) -> Vec<String> {
-        let blobs = lock(self.bucket.as_ref().expect("a bucket")).open("files", 0).expect("the bucket");
+        let blobs = self.own_bucket().open("files", 0).expect("the bucket");
         blobs.list(folder).into_iter().map(|listed| listed.name).collect()
     }
 
@@ -82,16 +109,16 @@ impl Database {
 
     /// Kills the service of S3, as if it had crashed.
     pub(crate) fn kill_bucket(&self) {
-        lock(self.bucket.as_ref().expect("a bucket")).kill();
+        self.own_bucket().kill();
     }
 
     pub(crate) fn run_bucket(&self) {
-        lock(self.bucket.as_ref().expect("a bucket")).run();
+        self.own_bucket().run();
     }
 
     /// Has the bucket refuse what is written, or take it again.
     pub(crate) fn set_bucket_read_only(&self, is_read_only: bool) {
-        lock(self.bucket.as_ref().expect("a bucket")).set_read_only(is_read_only);
+        self.own_bucket().set_read_only(is_read_only);
     }
 
     /// Kills the server, as if it had crashed.
@@ -101,6 +128,13 @@ impl Database {
 
     pub(crate) fn run(&self) {
         self.server().run();
+    }
+
+    fn own_bucket(&self) -> MutexGuard<'_, bucket::Server> {
+        match &self.bucket {
+            Some(Bucket::Own(server)) => lock(server),
+            _ => panic!("it has no bucket of its own"),
+        }
     }
 
     fn server(&self) -> MutexGuard<'_, Server> {

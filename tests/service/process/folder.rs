@@ -41,7 +41,7 @@ async fn what_is_stored_is_for_the_services_user_alone() {
 
 #[tokio::test]
 async fn a_folder_that_is_open_to_all_is_pointed_out() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let said = "every user of this machine may look into the data folder";
     assert!(!app.log().contains(said), "{}", app.log());
     app.kill();

@@ -84,7 +84,7 @@ async fn what_was_being_prepared_is_prepared_after_a_restart() {
 
 #[tokio::test]
 async fn a_rest_pose_that_a_crash_left_without_a_session_is_removed() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let kept = app.ready(Capture::tiny()).await;
     let lost = app.ready(Capture::small()).await;
     app.kill();
@@ -100,7 +100,7 @@ async fn a_rest_pose_that_a_crash_left_without_a_session_is_removed() {
 
 #[tokio::test]
 async fn a_damaged_container_is_found_written_again_and_counted_once() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let capture = Capture::small();
     let session = app.completed(capture, 40).await;
     let expected = app.container(&session.id).await;
@@ -210,7 +210,7 @@ async fn a_session_whose_mark_of_completion_is_damaged_is_completed_again_and_hi
 
 #[tokio::test]
 async fn a_session_whose_rest_pose_is_missing_says_so_until_it_is_back() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let capture = Capture::tiny();
     let session = app.ready(capture).await;
     app.upload(&session.id, 0, capture.raw(0..20)).await;
@@ -233,7 +233,7 @@ async fn a_session_whose_rest_pose_is_missing_says_so_until_it_is_back() {
 
 #[tokio::test]
 async fn a_container_that_cannot_be_read_is_served_when_it_can() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let session = app.completed(Capture::tiny(), 15).await;
     let container = app.container(&session.id).await;
     app.kill();

@@ -18,7 +18,7 @@ fn telling(receiver: &Elsewhere, more: &str) -> (tempfile::TempDir, TestApp) {
     let text =
         format!("[[webhook]]\nurl = \"{}/hook?of=farm\"\nsecret = \"whsec_{secret}\"\n{more}\n", receiver.address);
     std::fs::write(&file, text).expect("a file");
-    let app = TestApp::with(&[&format!("webhooks={}", file.display())]);
+    let app = TestApp::with_its_files(&[&format!("webhooks={}", file.display())]);
     (place, app)
 }
 

@@ -101,6 +101,12 @@ impl TestApp {
         Waiting::spawn(Arc::new(folder()), flags, Vec::new(), Some(database.clone()), None).ready()
     }
 
+    /// Starts a service with its files in its folder, wherever those of others are.
+    pub(crate) fn with_its_files(settings: &[&str]) -> Self {
+        let flags = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]).collect();
+        Waiting::spawn(Arc::new(folder()), flags, Vec::new(), Database::of_all_alone(), None).ready()
+    }
+
     /// Starts a service with its catalogue in its folder, wherever that of others is.
     pub(crate) fn in_folder() -> Self {
         Waiting::spawn(Arc::new(folder()), Vec::new(), Vec::new(), None, None).ready()

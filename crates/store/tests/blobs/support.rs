@@ -144,18 +144,28 @@ impl Server {
 
     /// The address of a place in it.
     pub(crate) fn url(&self, place: &str) -> String {
-        format!("s3://{BUCKET}/{place}")
+        url(place)
     }
 
     /// The environment of programs that use it.
     pub(crate) fn environment(&self) -> [(&'static str, String); 4] {
-        [
-            ("AWS_ENDPOINT_URL", format!("http://127.0.0.1:{}", self.ports[6])),
-            ("AWS_ACCESS_KEY_ID", KEY.to_owned()),
-            ("AWS_SECRET_ACCESS_KEY", SECRET.to_owned()),
-            ("AWS_REGION", "us-east-1".to_owned()),
-        ]
+        environment(&format!("http://127.0.0.1:{}", self.ports[6]))
     }
+}
+
+/// The address of a place in the bucket.
+pub(crate) fn url(place: &str) -> String {
+    format!("s3://{BUCKET}/{place}")
+}
+
+/// The environment of programs that use the service of S3 at this address.
+pub(crate) fn environment(address: &str) -> [(&'static str, String); 4] {
+    [
+        ("AWS_ENDPOINT_URL", address.to_owned()),
+        ("AWS_ACCESS_KEY_ID", KEY.to_owned()),
+        ("AWS_SECRET_ACCESS_KEY", SECRET.to_owned()),
+        ("AWS_REGION", "us-east-1".to_owned()),
+    ]
 }
 
 impl Drop for Server {
