@@ -98,8 +98,18 @@ impl Write for Spool {
 impl Drop for Spool {
     fn drop(&mut self) {
         if !self.taken {
-            self.store.files().discard(&self.path);
+            discard(&self.store, &self.path);
         }
+    }
+}
+
+/// Removes a temporary file or folder. That may ask the database, for which no asynchronous task may wait.
+pub(super) fn discard(store: &Store, path: &Path) {
+    let (store, path) = (store.clone(), path.to_owned());
+    let discard = move || store.files().discard(&path);
+    match tokio::runtime::Handle::try_current() {
+        Ok(runtime) => drop(runtime.spawn_blocking(discard)),
+        Err(_) => discard(),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Results of a job while they are made: in a folder of their own in `tmp/`, then moved into the job's.
 
-use super::{Kind, Store, StoreError, StoredPart};
+use super::{Kind, Store, StoreError, StoredPart, spool};
 use serde::Serialize;
 use std::fs::File;
 use std::io;
@@ -39,7 +39,7 @@ impl Workshop {
 
 impl Drop for Workshop {
     fn drop(&mut self) {
-        self.store.files().discard(&self.path);
+        spool::discard(&self.store, &self.path);
     }
 }
 

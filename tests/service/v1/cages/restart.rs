@@ -45,7 +45,7 @@ async fn a_killed_service_designs_what_it_was_asked_and_keeps_what_it_had() {
 
 #[tokio::test]
 async fn a_damaged_cage_is_found_and_its_design_has_failed_from_then_on() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let job = app.design(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 1.0})).await;
     app.designed(&job.id).await;
     let file = app.cage_file(&job.id, "cage.obj");

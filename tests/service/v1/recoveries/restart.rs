@@ -83,7 +83,7 @@ async fn a_recovery_that_ends_the_service_again_and_again_is_given_up_and_keeps_
 
 #[tokio::test]
 async fn a_damaged_frame_fails_the_recovery() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let job = created(&app, &json!({"points": 800})).await;
     post(&app, &job.id, 0, scans().parts(0..1)).await.expect(200);
     app.kill();

@@ -105,7 +105,7 @@ async fn a_request_repeated_after_its_design_was_deleted_still_gets_its_session(
 
 #[tokio::test]
 async fn a_key_of_a_version_with_other_fingerprints_still_answers() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let capture = Capture::tiny();
     let first: Session = app.create_with(form(capture, &json!({})), Some("k")).await.is(201);
     app.kill();

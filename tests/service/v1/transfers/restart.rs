@@ -28,7 +28,7 @@ async fn a_killed_service_goes_on_with_those_that_ran_and_waited() {
 
 #[tokio::test]
 async fn one_that_ends_the_service_again_and_again_is_given_up() {
-    let mut app = TestApp::start();
+    let mut app = TestApp::with_its_files(&[]);
     let [_, waiting] = [created(&app, &json!({})).await, created(&app, &json!({})).await];
     app.kill();
     let folder = app.data().join("transfers").join(&waiting.id);
