@@ -109,17 +109,17 @@ async fn a_key_of_a_version_with_other_fingerprints_still_answers() {
     let capture = Capture::tiny();
     let first: Session = app.create_with(form(capture, &json!({})), Some("k")).await.is(201);
     app.kill();
-    {
-        let data = app.data();
-        let database = app.catalog();
-        let opened =
-            Store::open(&data, Arc::new(LocalDisk), Shared { catalog: database.as_deref(), ..Shared::default() })
-                .expect("a store");
+    let (data, database) = (app.data(), app.catalog());
+    // Calls of a store block.
+    let rewritten = tokio::task::spawn_blocking(move || {
+        let shared = Shared { catalog: database.as_deref(), ..Shared::default() };
+        let opened = Store::open(&data, Arc::new(LocalDisk), shared).expect("a store");
         let mut meta = opened.sessions.first().expect("a session").clone();
         meta.idempotency = Some(Idempotency { key: "k".to_owned(), fingerprint: "0".repeat(64) });
         opened.store.delete(Kind::Session, &meta.id).expect("a deletion");
         opened.store.create_session(&meta).expect("a session");
-    }
+    });
+    rewritten.await.expect("a key of another version");
     let app = app.again();
     assert_eq!(app.create_with(form(capture, &json!({})), Some("k")).await.is::<Session>(201).id, first.id);
     let other = form(capture, &json!({"lambda": 2.0}));
