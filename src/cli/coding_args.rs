@@ -1,9 +1,9 @@
 //! What `cager encode` is asked of errors and sizes.
 
 use super::args::CodingArgs;
-use crate::coding::Goal;
-use crate::config::bytes;
 use anyhow::{Result, bail};
+use cager_capture::coding::Goal;
+use cager_capture::sizes::bytes;
 use cager_geometry::mesh::{Model, diagonal};
 use clap::ValueEnum;
 use std::str::FromStr;

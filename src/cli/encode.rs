@@ -10,14 +10,14 @@ use super::solver_options::{
     check_inversion, designed_spectrum, inversion_choices, matrix, read_cage, spectrum_bound, with_input_name,
 };
 use super::{design, encode_remote, grouped, human_bytes, progress, read_prim, tell, warn};
-use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
-use crate::design::{read_frames, report as design_report};
-use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
-use crate::frames::CaptureFiles;
-use crate::memory::{Memory, free_bytes};
-use crate::speed::seconds_to_prepare;
 use anyhow::{Context, Result, bail};
 use cager_cages::{DesignOptions, Style};
+use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
+use cager_capture::design::{read_frames, report as design_report};
+use cager_capture::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
+use cager_capture::frames::CaptureFiles;
+use cager_capture::memory::{Memory, free_bytes};
+use cager_capture::speed::seconds_to_prepare;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
