@@ -11,7 +11,7 @@ use cager_cages::{BoundingShape, DesignOptions, EncloseError, EncloseOptions, St
 use cager_capture::design::default_vertices;
 use cager_capture::design::{read_frames, report as design_report};
 use cager_capture::frames::CaptureFiles;
-use cager_compare::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};
+use cager_compare::report_page::{Contents, NO_PAGE, ReportKind, ReportPage, ShownCage, ShownMesh};
 use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::report::DesignReport;
@@ -139,7 +139,7 @@ impl Targets {
                 name: self.output.as_ref().map(Target::path).or(args.check.as_deref()).map(Path::to_string_lossy),
             };
             let program = env!("CARGO_PKG_VERSION");
-            let contents = Contents { kind: Kind::Cage, program, figures: report, geometry: &geometry };
+            let contents = Contents { kind: ReportKind::Cage, program, figures: report, geometry: &geometry };
             let page = ReportPage::built_in().map(|page| page.with(&contents)).transpose()?;
             files.push(complete_file(target, &page.unwrap_or_default())?);
         }

@@ -14,11 +14,11 @@ impl Exhausted {
     /// The response to a refused request for `what`: 429 if the tenant has its share, 503 if others hold the rest.
     pub(crate) fn refusal(self, what: &str) -> ApiError {
         match self {
-            Self::Tenant => {
+            Self::OverShare => {
                 let detail = format!("you hold your share of the {what}; wait for what you have begun, then try again");
                 ApiError::new(problem::SHARE_TAKEN, detail).retry_after(2)
             }
-            Self::Service => {
+            Self::Full => {
                 let detail = format!("all of the {what} is taken at the moment; try again later");
                 ApiError::new(problem::BUSY, detail).retry_after(2)
             }
@@ -45,11 +45,11 @@ struct Ledger {
 struct Account {
     holds: u64,
     served: u64,
-    waiting: VecDeque<(u64, oneshot::Sender<Held>)>,
+    waiting: VecDeque<(u64, oneshot::Sender<Permit>)>,
 }
 
 /// An amount of a budget, released on drop.
-pub(crate) struct Held {
+pub(crate) struct Permit {
     budget: Arc<Budget>,
     tenant: String,
     amount: u64,
@@ -59,9 +59,9 @@ pub(crate) struct Held {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exhausted {
     /// The tenant has its share.
-    Tenant,
-    /// The budget is exhausted.
-    Service,
+    OverShare,
+    /// Nothing is left of the budget.
+    Full,
 }
 
 impl Budget {
@@ -76,7 +76,7 @@ impl Budget {
     }
 
     /// Takes `amount` without waiting. An amount above [`Self::most`] is reduced to it.
-    pub(crate) fn try_take(self: &Arc<Self>, tenant: &str, amount: u64) -> Result<Held, Exhausted> {
+    pub(crate) fn try_take(self: &Arc<Self>, tenant: &str, amount: u64) -> Result<Permit, Exhausted> {
         let amount = amount.min(self.most());
         let mut ledger = lock(&self.ledger);
         let holds = ledger.tenants.get(tenant).map_or(0, |account| account.holds);
@@ -85,17 +85,12 @@ impl Budget {
         }
         // Would it fit if no other tenant held anything?
         let is_own_share = self.shared && !self.admits(holds, holds, amount);
-        Err(if is_own_share { Exhausted::Tenant } else { Exhausted::Service })
-    }
-
-    /// A permit of amount 0, to be grown later.
-    pub(crate) fn nothing(self: &Arc<Self>, tenant: &str) -> Held {
-        lock(&self.ledger).hold(self, tenant, 0)
+        Err(if is_own_share { Exhausted::OverShare } else { Exhausted::Full })
     }
 
     /// Waits for `amount`, reduced as by [`Self::try_take`]. Among waiting tenants the one with the smallest amount is served first, then the one served longest ago;
     /// requests of one tenant are served in order. Dropping the future leaves the queue.
-    pub(crate) async fn take(self: &Arc<Self>, tenant: &str, amount: u64) -> Held {
+    pub(crate) async fn take(self: &Arc<Self>, tenant: &str, amount: u64) -> Permit {
         loop {
             let (give, turn) = oneshot::channel();
             let request = (amount.min(self.most()), give);
@@ -147,7 +142,7 @@ impl Budget {
     }
 }
 
-impl Held {
+impl Permit {
     /// Whose it is.
     pub(crate) fn tenant(&self) -> &str {
         &self.tenant
@@ -169,24 +164,30 @@ impl Held {
         }
     }
 
-    /// A permit of amount 0 of the same budget and tenant.
-    pub(crate) fn nothing(&self) -> Self {
-        self.budget.nothing(&self.tenant)
+    /// A permit of amount 0, to be grown later.
+    pub(crate) fn empty(budget: &Arc<Budget>, tenant: &str) -> Self {
+        lock(&budget.ledger).hold(budget, tenant, 0)
+    }
+
+    /// All of it; what is left is empty.
+    pub(crate) fn take(&mut self) -> Self {
+        let empty = Self::empty(&self.budget, &self.tenant);
+        std::mem::replace(self, empty)
     }
 }
 
 impl Ledger {
-    fn hold(&mut self, budget: &Arc<Budget>, tenant: &str, amount: u64) -> Held {
+    fn hold(&mut self, budget: &Arc<Budget>, tenant: &str, amount: u64) -> Permit {
         self.clock += 1;
         self.used += amount;
         let account = self.tenants.entry(tenant.to_owned()).or_default();
         account.holds += amount;
         account.served = self.clock;
-        Held { budget: Arc::clone(budget), tenant: tenant.to_owned(), amount }
+        Permit { budget: Arc::clone(budget), tenant: tenant.to_owned(), amount }
     }
 
     /// The next request that can be served.
-    fn next(&mut self, budget: &Budget) -> Option<(String, u64, oneshot::Sender<Held>)> {
+    fn next(&mut self, budget: &Budget) -> Option<(String, u64, oneshot::Sender<Permit>)> {
         for account in self.tenants.values_mut() {
             account.waiting.retain(|(_, give)| !give.is_closed());
         }
@@ -203,7 +204,7 @@ impl Ledger {
     }
 }
 
-impl Drop for Held {
+impl Drop for Permit {
     fn drop(&mut self) {
         {
             let mut ledger = lock(&self.budget.ledger);
@@ -232,14 +233,14 @@ mod tests {
     #[tokio::test]
     async fn one_tenant_of_several_never_gets_everything() {
         let budget = Budget::new(900, true);
-        let loud: Vec<Held> = std::iter::from_fn(|| budget.try_take("loud", 1).ok()).collect();
+        let loud: Vec<Permit> = std::iter::from_fn(|| budget.try_take("loud", 1).ok()).collect();
         assert_eq!(loud.len(), 600);
-        assert_eq!(budget.try_take("loud", 1).err(), Some(Exhausted::Tenant));
+        assert_eq!(budget.try_take("loud", 1).err(), Some(Exhausted::OverShare));
         assert!(waits(&budget, "loud", 1).await);
-        let quiet: Vec<Held> = std::iter::from_fn(|| budget.try_take("quiet", 1).ok()).collect();
+        let quiet: Vec<Permit> = std::iter::from_fn(|| budget.try_take("quiet", 1).ok()).collect();
         assert_eq!(quiet.len(), 200);
         let all = budget.try_take("other", 300).err();
-        assert_eq!((all, budget.used()), (Some(Exhausted::Service), 800));
+        assert_eq!((all, budget.used()), (Some(Exhausted::Full), 800));
         drop((loud, quiet));
         assert_eq!(budget.used(), 0);
         assert!(lock(&budget.ledger).tenants.is_empty());
@@ -249,7 +250,7 @@ mod tests {
     async fn a_tenant_alone_gets_everything_and_what_is_larger_takes_everything() {
         let budget = Budget::new(10, false);
         let held = budget.try_take("a", 7).expect("room");
-        assert_eq!(budget.try_take("a", 4).err(), Some(Exhausted::Service));
+        assert_eq!(budget.try_take("a", 4).err(), Some(Exhausted::Full));
         let rest = budget.try_take("a", 3).expect("room");
         assert!(waits(&budget, "b", 1).await);
         drop((held, rest));

@@ -13,7 +13,7 @@ pub use entries::EntriesError;
 pub use error::{ConfigError, Origin};
 pub use flags::ServeFlags;
 pub(crate) use layers::line_of;
-use settings::Kind;
+use settings::SettingKind;
 
 use crate::admission::Budget;
 use crate::auth::{OidcSettings, TenantLimits};
@@ -56,131 +56,131 @@ macro_rules! settings {
         }
 
         /// What each setting may be, in the order in which they are shown.
-        const SETTINGS: &[(&str, Kind)] = &[$((stringify!($name), $kind),)*];
+        const SETTINGS: &[(&str, SettingKind)] = &[$((stringify!($name), $kind),)*];
     };
 }
 
 settings! {
     /// Address and port to listen on. Other than loopback addresses need tokens.
-    listen: SocketAddr = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)), Kind::Address;
+    listen: SocketAddr = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)), SettingKind::Address;
     /// Address and port for operators: on a loopback address what they see and do, elsewhere health and metrics.
-    admin_listen: Option<SocketAddr> = None, Kind::Address;
+    admin_listen: Option<SocketAddr> = None, SettingKind::Address;
     /// Folder of sessions and prepared solvers; made if it is not there.
-    data: PathBuf = PathBuf::from("cager-data"), Kind::File;
+    data: PathBuf = PathBuf::from("cager-data"), SettingKind::File;
     /// Address of a PostgreSQL database for what is known of sessions, `postgres://USER:PASSWORD@HOST:5432/DATABASE`; without one it is in a file in the data
     /// folder.
-    catalog: Option<String> = None, Kind::Secret;
+    catalog: Option<String> = None, SettingKind::Secret;
     /// Address of an S3 bucket for files, `s3://BUCKET/PATH`, with keys and endpoint in the variables `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
     /// `AWS_ENDPOINT_URL` and `AWS_REGION`; the data folder is a cache of it then. Needs `catalog`.
-    blobs: Option<String> = None, Kind::Text;
+    blobs: Option<String> = None, SettingKind::Text;
     /// Bytes of the bucket's files kept in the data folder.
-    blobs_kept_bytes: u64 = 64 * GIB, Kind::Bytes { least: 0, most: 1 << 50 };
+    blobs_kept_bytes: u64 = 64 * GIB, SettingKind::Bytes { least: 0, most: 1 << 50 };
     /// Parts into which the tenants of a database are divided, so that several processes serve them at once; 1 for one process at a time. Needs `catalog`.
-    shards: u32 = 1, Kind::Number { least: 1, most: cager_store::MAX_SHARDS as u64 };
+    shards: u32 = 1, SettingKind::Number { least: 1, most: cager_store::MAX_SHARDS as u64 };
     /// Address at which the other processes reach this one, `http://10.0.0.5:8080`; by default the one it listens on.
-    advertise: Option<String> = None, Kind::Text;
+    advertise: Option<String> = None, SettingKind::Text;
     /// File of access tokens; without one everyone on this machine is tenant `local`.
-    tokens: Option<PathBuf> = None, Kind::File;
+    tokens: Option<PathBuf> = None, SettingKind::File;
     /// Address of an OpenID Connect provider whose tokens are taken as well.
-    oidc_issuer: Option<String> = None, Kind::Text;
+    oidc_issuer: Option<String> = None, SettingKind::Text;
     /// What the provider's tokens for this service have in `aud`.
-    oidc_audience: Option<String> = None, Kind::Text;
+    oidc_audience: Option<String> = None, SettingKind::Text;
     /// Address of the provider's key set, where its description does not say it.
-    oidc_keys: Option<String> = None, Kind::Text;
+    oidc_keys: Option<String> = None, SettingKind::Text;
     /// The claim of the provider's tokens that names the tenant.
-    oidc_tenant: String = "tenant".to_owned(), Kind::Text;
+    oidc_tenant: String = "tenant".to_owned(), SettingKind::Text;
     /// File of addresses that are told when sessions are completed or fail.
-    webhooks: Option<PathBuf> = None, Kind::File;
+    webhooks: Option<PathBuf> = None, SettingKind::File;
     /// File that says who changed what, a line of JSON for each change; without it nothing does.
-    audit: Option<PathBuf> = None, Kind::File;
+    audit: Option<PathBuf> = None, SettingKind::File;
     /// PEM file of the certificate, for TLS.
-    tls_certificate: Option<PathBuf> = None, Kind::File;
+    tls_certificate: Option<PathBuf> = None, SettingKind::File;
     /// PEM file of the certificate's private key.
-    tls_key: Option<PathBuf> = None, Kind::File;
+    tls_key: Option<PathBuf> = None, SettingKind::File;
     /// Names by which a service without tokens may be asked, beside `localhost` and addresses.
-    allowed_hosts: Vec<String> = Vec::new(), Kind::List;
+    allowed_hosts: Vec<String> = Vec::new(), SettingKind::List;
     /// Origins of pages that may ask, beside the service's own.
-    allowed_origins: Vec<String> = Vec::new(), Kind::List;
+    allowed_origins: Vec<String> = Vec::new(), SettingKind::List;
     /// Form of log lines: `human` or `json`.
-    log: LogFormat = LogFormat::Human, Kind::Format;
+    log: LogFormat = LogFormat::Human, SettingKind::Format;
     /// Which log lines appear: a level, or levels by module such as `info,cager_service::http=debug`.
-    log_filter: String = "info".to_owned(), Kind::Filter;
+    log_filter: String = "info".to_owned(), SettingKind::Filter;
     /// Threads that solve; 0 for one per processor.
-    workers: usize = 0, Kind::Number { least: 0, most: 4096 };
+    workers: usize = 0, SettingKind::Number { least: 0, most: 4096 };
     /// Bytes of prepared solvers kept in memory.
-    cache_bytes: u64 = 2 * GIB, Kind::Bytes { least: 0, most: 1 << 50 };
+    cache_bytes: u64 = 2 * GIB, SettingKind::Bytes { least: 0, most: 1 << 50 };
     /// Bytes of prepared solvers kept on disk.
-    prepared_disk_bytes: u64 = 20 * GIB, Kind::Bytes { least: 0, most: 1 << 50 };
+    prepared_disk_bytes: u64 = 20 * GIB, SettingKind::Bytes { least: 0, most: 1 << 50 };
     /// Bytes of frames held in memory between arrival and disk, all streams together.
-    frame_bytes: u64 = 256 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    frame_bytes: u64 = 256 * MIB, SettingKind::Bytes { least: MIB, most: 1 << 50 };
     /// Bytes of rest poses and cages held in memory while sessions are created, all together.
-    upload_bytes: u64 = GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    upload_bytes: u64 = GIB, SettingKind::Bytes { least: MIB, most: 1 << 50 };
     /// Memory for downloads on their way to slow clients, in bytes.
-    download_bytes: u64 = 128 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    download_bytes: u64 = 128 * MIB, SettingKind::Bytes { least: MIB, most: 1 << 50 };
     /// Disk space for cages that wait to be decoded, in bytes.
-    spool_bytes: u64 = 2 * GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    spool_bytes: u64 = 2 * GIB, SettingKind::Bytes { least: MIB, most: 1 << 50 };
     /// Bytes of one rest pose or cage.
-    max_rest_bytes: u64 = 512 * MIB, Kind::Bytes { least: KIB, most: 16 * GIB };
+    max_rest_bytes: u64 = 512 * MIB, SettingKind::Bytes { least: KIB, most: 16 * GIB };
     /// Connections that are served; a few more get health and otherwise 503.
-    max_connections: usize = 1024, Kind::Number { least: 1, most: 1_000_000 };
+    max_connections: usize = 1024, SettingKind::Number { least: 1, most: 1_000_000 };
     /// Connections of one address that have shown no token; 0 for a quarter of `max_connections`. Without tokens they are not counted.
-    max_connections_per_address: usize = 0, Kind::Number { least: 0, most: 1_000_000 };
+    max_connections_per_address: usize = 0, SettingKind::Number { least: 0, most: 1_000_000 };
     /// Requests at work.
-    max_requests: usize = 512, Kind::Number { least: 1, most: 1_000_000 };
+    max_requests: usize = 512, SettingKind::Number { least: 1, most: 1_000_000 };
     /// Frame, cage, event and decode streams at work.
-    max_streams: usize = 256, Kind::Number { least: 1, most: 1_000_000 };
+    max_streams: usize = 256, SettingKind::Number { least: 1, most: 1_000_000 };
     /// Sessions prepared at the same time.
-    max_preparing: usize = 2, Kind::Number { least: 1, most: 4096 };
+    max_preparing: usize = 2, SettingKind::Number { least: 1, most: 4096 };
     /// Memory that preparing one session may take, in bytes; larger ones are refused.
-    max_prepare_bytes: u64 = 8 * GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    max_prepare_bytes: u64 = 8 * GIB, SettingKind::Bytes { least: MIB, most: 1 << 50 };
     /// Sessions waiting to be prepared.
-    max_prepare_queue: usize = 64, Kind::Number { least: 0, most: 1_000_000 };
+    max_prepare_queue: usize = 64, SettingKind::Number { least: 0, most: 1_000_000 };
     /// Cages designed at the same time.
-    max_designs: usize = 1, Kind::Number { least: 1, most: 4096 };
+    max_designs: usize = 1, SettingKind::Number { least: 1, most: 4096 };
     /// Cage designs of a tenant waiting for their turn.
-    max_design_queue: usize = 16, Kind::Number { least: 0, most: 1_000_000 };
+    max_design_queue: usize = 16, SettingKind::Number { least: 0, most: 1_000_000 };
     /// Seconds that a design may take; then the best cage so far is the result.
-    max_design_seconds: u64 = 120, Kind::Number { least: 1, most: DAY };
+    max_design_seconds: u64 = 120, SettingKind::Number { least: 1, most: DAY };
     /// Recoveries that follow frames at the same time.
-    max_recoveries: usize = 1, Kind::Number { least: 1, most: 4096 };
+    max_recoveries: usize = 1, SettingKind::Number { least: 1, most: 4096 };
     /// Recoveries of a tenant whose frames wait for their turn; then no new one is taken.
-    max_recovery_queue: usize = 64, Kind::Number { least: 0, most: 1_000_000 };
+    max_recovery_queue: usize = 64, SettingKind::Number { least: 0, most: 1_000_000 };
     /// Transfers that run at the same time.
-    max_transfers: usize = 1, Kind::Number { least: 1, most: 4096 };
+    max_transfers: usize = 1, SettingKind::Number { least: 1, most: 4096 };
     /// Transfers of a tenant waiting for their turn.
-    max_transfer_queue: usize = 16, Kind::Number { least: 0, most: 1_000_000 };
+    max_transfer_queue: usize = 16, SettingKind::Number { least: 0, most: 1_000_000 };
     /// Memory of shape spaces, in bytes.
-    shape_bytes: u64 = GIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    shape_bytes: u64 = GIB, SettingKind::Bytes { least: MIB, most: 1 << 50 };
     /// Seconds without a request after which a shape space is forgotten.
-    shape_idle_s: u64 = 900, Kind::Number { least: 1, most: DAY };
+    shape_idle_s: u64 = 900, SettingKind::Number { least: 1, most: DAY };
     /// Memory that the frames of one design may take, in bytes: so many of those that were sent are looked at.
-    max_design_bytes: u64 = 512 * MIB, Kind::Bytes { least: MIB, most: 1 << 50 };
+    max_design_bytes: u64 = 512 * MIB, SettingKind::Bytes { least: MIB, most: 1 << 50 };
     /// Bytes of the frames that a cage is designed from.
-    max_frames_bytes: u64 = 4 * GIB, Kind::Bytes { least: KIB, most: 1 << 50 };
+    max_frames_bytes: u64 = 4 * GIB, SettingKind::Bytes { least: KIB, most: 1 << 50 };
     /// Frames waiting to be solved.
-    max_queue_frames: usize = 4096, Kind::Number { least: 16, most: 1 << 30 };
+    max_queue_frames: usize = 4096, SettingKind::Number { least: 16, most: 1 << 30 };
     /// Seconds for a request's header to arrive.
-    header_timeout_s: u64 = 10, Kind::Number { least: 1, most: DAY };
+    header_timeout_s: u64 = 10, SettingKind::Number { least: 1, most: DAY };
     /// Seconds that a request body may pause.
-    body_timeout_s: u64 = 30, Kind::Number { least: 1, most: DAY };
+    body_timeout_s: u64 = 30, SettingKind::Number { least: 1, most: DAY };
     /// Seconds that a connection without requests stays open.
-    idle_timeout_s: u64 = 75, Kind::Number { least: 1, most: DAY };
+    idle_timeout_s: u64 = 75, SettingKind::Number { least: 1, most: DAY };
     /// Seconds in which a response's reader may take nothing.
-    write_timeout_s: u64 = 300, Kind::Number { least: 1, most: DAY };
+    write_timeout_s: u64 = 300, SettingKind::Number { least: 1, most: DAY };
     /// Seconds for a request that is not a stream.
-    request_timeout_s: u64 = 60, Kind::Number { least: 1, most: DAY };
+    request_timeout_s: u64 = 60, SettingKind::Number { least: 1, most: DAY };
     /// Seconds for open requests after a stop signal.
-    drain_timeout_s: u64 = 20, Kind::Number { least: 0, most: DAY };
+    drain_timeout_s: u64 = 20, SettingKind::Number { least: 0, most: DAY };
     /// Bytes of a request's header.
-    max_header_bytes: usize = 32 << 10, Kind::Bytes { least: KIB, most: MIB };
+    max_header_bytes: usize = 32 << 10, SettingKind::Bytes { least: KIB, most: MIB };
     /// Sessions of a tenant, where its token says nothing else.
-    tenant_max_sessions: u64 = 1000, Kind::Number { least: 1, most: 1 << 40 };
+    tenant_max_sessions: u64 = 1000, SettingKind::Number { least: 1, most: 1 << 40 };
     /// Bytes of a tenant's sessions on disk, where its token says nothing else.
-    tenant_max_bytes: u64 = 100 * GIB, Kind::Bytes { least: MIB, most: 1 << 60 };
+    tenant_max_bytes: u64 = 100 * GIB, SettingKind::Bytes { least: MIB, most: 1 << 60 };
     /// Seconds after which a tenant's sessions are deleted, where its token says nothing else; 0 for never.
-    tenant_max_age_s: u64 = 0, Kind::Number { least: 0, most: 1 << 40 };
+    tenant_max_age_s: u64 = 0, SettingKind::Number { least: 0, most: 1 << 40 };
     /// Streams of a tenant at work, where its token says nothing else.
-    tenant_max_streams: u64 = 64, Kind::Number { least: 1, most: 1_000_000 };
+    tenant_max_streams: u64 = 64, SettingKind::Number { least: 1, most: 1_000_000 };
 }
 
 impl ServeConfig {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// Known keys with their requests and results.
 #[derive(Default)]
-pub(crate) struct Requests {
+pub(crate) struct KnownKeys {
     known: HashMap<(String, String), Request>,
 }
 
@@ -31,7 +31,7 @@ pub(crate) enum KeyLookup {
 /// A registry of objects that are created by requests with idempotency keys.
 pub(crate) trait Keyed<T> {
     /// Accesses the keys under the registry's lock.
-    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R;
+    fn requests<R>(&self, work: impl FnOnce(&mut KnownKeys) -> R) -> R;
     /// The object with this id.
     fn made(&self, id: &str) -> Option<Arc<T>>;
 }
@@ -42,7 +42,7 @@ const SENT: &str = "sent-";
 
 /// A request with a key for these parts and options. Its fingerprint is made of what the client sent and nothing else, so that it is the
 /// same after an upgrade.
-pub(crate) fn request<'a>(
+pub(crate) fn fingerprint<'a>(
     key: Option<String>,
     parts: impl IntoIterator<Item = &'a [u8]>,
     options: &impl Serialize,
@@ -55,8 +55,8 @@ pub(crate) fn request<'a>(
     Some(Idempotency { key, fingerprint: format!("{SENT}{sent}") })
 }
 
-/// A request with a key for files, by their parts, names and digests, and options, as [`request`].
-pub(crate) fn request_of_files<'a>(
+/// A request with a key for files, by their parts, names and digests, and options, as [`fingerprint`].
+pub(crate) fn fingerprint_of_files<'a>(
     key: Option<String>,
     files: impl IntoIterator<Item = (&'a str, &'a str, blake3::Hash)>,
     options: &impl Serialize,
@@ -64,7 +64,7 @@ pub(crate) fn request_of_files<'a>(
     let key = key?;
     let files: Vec<_> = files.into_iter().map(|(part, name, digest)| (part, extension(name), digest)).collect();
     let sent = files.iter().flat_map(|(part, name, digest)| [part.as_bytes(), name.as_bytes(), digest.as_bytes()]);
-    request(Some(key), sent, options)
+    fingerprint(Some(key), sent, options)
 }
 
 /// The part of a file's name that says something about its content, in lower case.
@@ -76,7 +76,7 @@ pub(crate) fn extension(name: &str) -> String {
 /// fingerprints created for its key.
 ///
 /// # Errors
-/// Those of [`Requests::look`]; `NOT_FOUND` if the object was deleted.
+/// Those of [`KnownKeys::look`]; `NOT_FOUND` if the object was deleted.
 pub(crate) fn made_before<T>(
     registry: &impl Keyed<T>,
     tenant: &str,
@@ -97,8 +97,8 @@ pub(crate) fn made_before<T>(
 /// Creates an object, at most once per key, after [`made_before`] found none.
 ///
 /// # Errors
-/// Those of `make` and of [`Requests::begin`]; `NOT_FOUND` if the object of an earlier request was deleted.
-pub(crate) async fn once<T, Making: Future<Output = Result<Arc<T>, ApiError>>>(
+/// Those of `make` and of [`KnownKeys::begin`]; `NOT_FOUND` if the object of an earlier request was deleted.
+pub(crate) async fn create_once<T, Making: Future<Output = Result<Arc<T>, ApiError>>>(
     registry: &impl Keyed<T>,
     tenant: &str,
     request: Option<Idempotency>,
@@ -134,7 +134,7 @@ impl<F: FnMut()> Drop for ReleaseOnDrop<F> {
     }
 }
 
-impl Requests {
+impl KnownKeys {
     /// Looks a request up.
     ///
     /// # Errors

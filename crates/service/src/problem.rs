@@ -15,7 +15,7 @@ pub struct ApiError {
 
 /// A kind of error. Its word is part of the API.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kind {
+pub struct ProblemKind {
     /// Last part of the problem's type.
     pub word: &'static str,
     /// What went wrong, the same for every error of the kind.
@@ -26,9 +26,9 @@ pub struct Kind {
 
 macro_rules! kinds {
     ($($name:ident $status:ident $word:literal $title:literal;)*) => {
-        $(#[doc = $title] pub const $name: Kind = Kind { word: $word, title: $title, status: StatusCode::$status };)*
+        $(#[doc = $title] pub const $name: ProblemKind = ProblemKind { word: $word, title: $title, status: StatusCode::$status };)*
         /// Every kind, for documents.
-        pub const ALL: &[Kind] = &[$($name),*];
+        pub const ALL: &[ProblemKind] = &[$($name),*];
     };
 }
 
@@ -80,7 +80,7 @@ impl From<ApiError> for std::io::Error {
 
 impl ApiError {
     /// An error of this kind; `detail` says what went wrong here and what to do.
-    pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
+    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         let problem = Problem {
             kind: format!("{}{}", Problem::TYPE_PREFIX, kind.word),
             title: kind.title.to_owned(),

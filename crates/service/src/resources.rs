@@ -1,6 +1,6 @@
 //! What the services of one process share: who may ask, threads, memory, and the places of tenants.
 
-use crate::admission::{Budget, Held};
+use crate::admission::{Budget, Permit};
 use crate::audit::Audit;
 use crate::auth::{Access, Tenant};
 use crate::cage_job::{DesignPool, Designer};
@@ -60,7 +60,7 @@ pub struct Resources {
     /// Threads that do that.
     pub(crate) preparers: Arc<rayon::ThreadPool>,
     /// Uploaded files being parsed, which keeps a processor busy.
-    pub(crate) reading: Arc<Budget>,
+    pub(crate) parse_slots: Arc<Budget>,
     /// Requests in progress, without streams.
     pub(crate) requests: Arc<Budget>,
     streams: Arc<Budget>,
@@ -158,7 +158,7 @@ impl Resources {
             preparing: config.budget(config.max_preparing as u64),
             making_cages: config.budget(config.max_preparing as u64),
             preparers: Arc::new(pool("prepare", config.workers, threads::NICE_PREPARE)?),
-            reading: config.budget(MAX_CONCURRENT_PARSING),
+            parse_slots: config.budget(MAX_CONCURRENT_PARSING),
             requests: config.budget(config.max_requests as u64),
             streams: config.budget(config.max_streams as u64),
             completing: config.budget(MAX_CONCURRENT_COMPLETIONS),
@@ -185,7 +185,7 @@ impl Resources {
     ///
     /// # Errors
     /// All places are taken: 429 where the tenant has its share, 503 where the service has.
-    pub(crate) fn stream(&self, tenant: &Tenant) -> Result<Held, ApiError> {
+    pub(crate) fn stream(&self, tenant: &Tenant) -> Result<Permit, ApiError> {
         let most = tenant.limits.max_streams;
         let too_many = || {
             self.rejected("tenant_streams");
@@ -218,7 +218,7 @@ impl Resources {
     ///
     /// # Errors
     /// 429 if the tenant has its share, 503 if the memory is exhausted.
-    pub(crate) fn make_room(&self, room: &mut Held, bytes: u64) -> Result<(), ApiError> {
+    pub(crate) fn make_room(&self, room: &mut Permit, bytes: u64) -> Result<(), ApiError> {
         room.grow_to(bytes, UPLOAD_PIECE).map_err(|full| {
             self.rejected("upload_memory");
             full.refusal("memory for models").retry_after(5)
@@ -228,7 +228,7 @@ impl Resources {
     /// Tenants that use shared resources.
     pub(crate) fn tenants_in_use(&self) -> BTreeSet<String> {
         let budgets = [&self.requests, &self.streams, &self.completing, &self.frame_memory, &self.upload_memory];
-        let more = [&self.reading, &self.queued_frames, &self.coding, &self.download_memory, &self.spool_space];
+        let more = [&self.parse_slots, &self.queued_frames, &self.coding, &self.download_memory, &self.spool_space];
         budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).collect()
     }
 

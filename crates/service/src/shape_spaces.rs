@@ -1,7 +1,7 @@
 //! Poses of models and the shapes between them, in memory: bounded for all tenants together, forgotten after a while without a request.
 
-use crate::admission::{Budget, Held};
-use crate::idempotency::{Keyed, Requests};
+use crate::admission::{Budget, Permit};
+use crate::idempotency::{Keyed, KnownKeys};
 use crate::jobs::new_job;
 use crate::preparation::{cage_of, check_extent, check_told, read_part};
 use crate::problem::{self, ApiError};
@@ -38,7 +38,7 @@ pub(crate) struct ShapeSpaces {
 #[derive(Default)]
 struct Kept {
     spaces: BTreeMap<String, Arc<KeptSpace>>,
-    requests: Requests,
+    requests: KnownKeys,
 }
 
 impl Kept {
@@ -62,7 +62,7 @@ pub(crate) struct KeptSpace {
     pub(crate) view: View,
     shapes: Shapes,
     used: Mutex<Instant>,
-    _memory: Held,
+    _memory: Permit,
 }
 
 enum Shapes {
@@ -89,7 +89,7 @@ pub(crate) struct Poses {
     poses: Vec<Vec<Point>>,
     /// What was subtracted from all of these.
     origin: Option<Point>,
-    memory: Held,
+    memory: Permit,
 }
 
 impl ShapeSpaces {
@@ -153,7 +153,7 @@ impl ShapeSpaces {
     ///
     /// # Errors
     /// More than one tenant can have, and no memory at the moment.
-    fn reserve(&self, tenant: &str, points: u64, poses: usize, cage_vertices: Option<u64>) -> Result<Held, ApiError> {
+    fn reserve(&self, tenant: &str, points: u64, poses: usize, cage_vertices: Option<u64>) -> Result<Permit, ApiError> {
         let (needed, most) = (bytes(points, poses as u64, cage_vertices), self.memory.most());
         if needed > most {
             let detail = format!(
@@ -202,7 +202,7 @@ impl ShapeSpaces {
 }
 
 impl Keyed<KeptSpace> for ShapeSpaces {
-    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R {
+    fn requests<R>(&self, work: impl FnOnce(&mut KnownKeys) -> R) -> R {
         self.forget_idle();
         work(&mut lock(&self.all).requests)
     }

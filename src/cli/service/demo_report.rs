@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use cager_capture::decode;
-use cager_compare::report_page::{Box3, Contents, Kind, Quantised, ReportPage, ShownCage, ShownMesh};
+use cager_compare::report_page::{Box3, Contents, Quantised, ReportKind, ReportPage, ShownCage, ShownMesh};
 use cager_demo::Capture;
 use cager_formats::open_frames;
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
@@ -55,7 +55,7 @@ pub(super) fn page(
     let figures = Figures { rows, l2, linf, singular_values: &report.singular_values };
     let geometry = geometry(capture, container, decoded)?;
     let program = env!("CARGO_PKG_VERSION");
-    Ok(page.with(&Contents { kind: Kind::Demo, program, figures: &figures, geometry: &geometry })?)
+    Ok(page.with(&Contents { kind: ReportKind::Demo, program, figures: &figures, geometry: &geometry })?)
 }
 
 fn geometry(capture: &Capture, container: &Path, decoded: &Path) -> Result<Geometry> {

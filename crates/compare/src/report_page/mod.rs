@@ -24,7 +24,7 @@ pub const NO_PAGE: &str = "this program was built without the page of its report
 #[derive(Serialize)]
 pub struct Contents<'a, F: Serialize, G: Serialize> {
     /// Which report it is.
-    pub kind: Kind,
+    pub kind: ReportKind,
     /// Version of the program.
     pub program: &'static str,
     /// The figures.
@@ -36,7 +36,7 @@ pub struct Contents<'a, F: Serialize, G: Serialize> {
 /// The reports there are.
 #[derive(Clone, Copy, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum ReportKind {
     /// Of `cager compare`.
     Comparison,
     /// Of `cager demo`.
@@ -101,7 +101,7 @@ mod tests {
     fn filled(figures: &Value) -> String {
         let html = format!("<!doctype html>\n{BEFORE}</script>\n<p>end</p>\n");
         let page = ReportPage { html: html.into_bytes().leak() };
-        let contents = Contents { kind: Kind::Comparison, program: "0", figures, geometry: &() };
+        let contents = Contents { kind: ReportKind::Comparison, program: "0", figures, geometry: &() };
         String::from_utf8(page.with(&contents).expect("a page")).expect("UTF-8")
     }
 

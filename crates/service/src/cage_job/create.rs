@@ -1,10 +1,10 @@
 //! Creating, resuming and deleting cage jobs.
 
 use super::{CageJob, Finished, options, samples};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
-use crate::idempotency::{extension, request};
+use crate::idempotency::{extension, fingerprint};
 use crate::jobs::{Outcome, Phase, new_job};
 use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
@@ -26,7 +26,7 @@ pub(crate) struct NewCageJob {
     pub(crate) options: CageOptions,
     pub(crate) idempotency_key: Option<String>,
     /// Permit for the memory of the rest pose.
-    pub(crate) room: Held,
+    pub(crate) room: Permit,
     /// Quota reserved for rest pose and frames.
     pub(crate) reserved: Reserved,
 }
@@ -154,7 +154,7 @@ fn request_of(new: &NewCageJob) -> Option<Idempotency> {
     let (rest, frames) = (extension(&new.rest_name), extension(&new.frames_name));
     let digest = new.frames.digest();
     let parts: [&[u8]; 4] = [rest.as_bytes(), &new.rest, frames.as_bytes(), digest.as_bytes()];
-    request(new.idempotency_key.clone(), parts, &new.options)
+    fingerprint(new.idempotency_key.clone(), parts, &new.options)
 }
 
 /// Checks options alone.

@@ -37,7 +37,7 @@ impl Work for CageDesign {
     const NAME: &'static str = "cage design";
     const LIST: &'static str = "/v1/cages";
     const ENDED: &'static str = "cager_designs_total";
-    const FAILED: problem::Kind = problem::CAGE_FAILED;
+    const FAILED: problem::ProblemKind = problem::CAGE_FAILED;
     const UNFINISHED: &'static str = "wait until the cage is designed";
     const QUEUE: &'static str = "design_queue";
 

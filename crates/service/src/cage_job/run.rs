@@ -1,7 +1,7 @@
 //! Running designs: a limited number at a time, tenants in turn, on threads of the lowest priority.
 
 use super::{Best, CageJob, Finished, options, samples};
-use crate::admission::{Budget, Held};
+use crate::admission::{Budget, Permit};
 use crate::config::ServeConfig;
 use crate::engine::threads;
 use crate::jobs::{MAX_ATTEMPTS, Outcome, Phase};
@@ -122,7 +122,7 @@ impl Service {
     }
 
     /// A permit to run; `None` if a job of the same input has to be looked at again, or the job has ended.
-    async fn wait_for_turn(&self, job: &Arc<CageJob>) -> Option<Held> {
+    async fn wait_for_turn(&self, job: &Arc<CageJob>) -> Option<Permit> {
         let (tenant, id) = (&job.meta.tenant, Some(job.meta.id.as_str()));
         let duplicate =
             || self.cage_jobs.duplicate(tenant, &job.meta.key, id).filter(|duplicate| !Arc::ptr_eq(duplicate, job));
@@ -155,7 +155,7 @@ impl Service {
     }
 
     /// Runs the design of a job. Blocks.
-    fn design(&self, job: &Arc<CageJob>, _place: Held) -> RunOutcome {
+    fn design(&self, job: &Arc<CageJob>, _place: Permit) -> RunOutcome {
         let clock = Instant::now();
         let ended = match self.design_with(job, clock) {
             Ok(_) | Err(_) if job.deleted().is_cancelled() || self.stopping().is_cancelled() => RunOutcome::Stopped,

@@ -6,7 +6,7 @@ use toml::Value;
 
 /// What a setting may be.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Kind {
+pub(super) enum SettingKind {
     Address,
     File,
     Text,
@@ -37,20 +37,20 @@ pub(super) fn read(name: &str, value: &Value) -> Option<Result<Value, String>> {
 
 /// Whether it names a file or folder.
 pub(super) fn is_file(name: &str) -> bool {
-    SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, Kind::File))
+    SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, SettingKind::File))
 }
 
 /// Whether a password may be in it.
 pub(super) fn is_secret(name: &str) -> bool {
-    SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, Kind::Secret))
+    SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, SettingKind::Secret))
 }
 
 /// Whether sizes may be given in units.
 pub(super) fn is_bytes(name: &str) -> bool {
-    SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, Kind::Bytes { .. }))
+    SETTINGS.iter().any(|(known, kind)| *known == name && matches!(kind, SettingKind::Bytes { .. }))
 }
 
-impl Kind {
+impl SettingKind {
     /// The value as the configuration wants it, or what would be possible.
     fn read(self, value: &Value) -> Result<Value, String> {
         let text = value.as_str();

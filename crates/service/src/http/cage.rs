@@ -30,7 +30,7 @@ pub(crate) async fn get(
     prepared(&service, &session).await?;
     let reading = Arc::clone(&session);
     let cage = {
-        let place = service.reading.take(&session.meta.tenant, 1).await;
+        let place = service.parse_slots.take(&session.meta.tenant, 1).await;
         blocking(move || {
             let _place = place;
             reading.rest_cage()

@@ -131,7 +131,7 @@ pub(crate) async fn get(
         etag: format!("{}-{kind}{first}-{count}", digest.as_deref().unwrap_or("live")),
         media_type: form.media_type(),
         public: !service.access.is_guarded(),
-        room: service.download_memory.nothing(&tenant.name),
+        room: Permit::empty(&service.download_memory, &tenant.name),
         read: Arc::new(read),
     };
     if digest.is_some() {
@@ -164,7 +164,7 @@ fn follow(
     form: Form,
     first: u64,
     last: u64,
-    place: crate::admission::Held,
+    place: crate::admission::Permit,
 ) -> impl futures_util::Stream<Item = io::Result<Bytes>> {
     let changes = session.changes();
     futures_util::stream::unfold((first, changes, place), move |(next, mut changes, place)| {

@@ -4,7 +4,7 @@ use super::extract::{Query, RequestedSession};
 use super::frames::prepared;
 use super::openapi;
 use super::ranged::Immutable;
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -78,7 +78,7 @@ async fn whole(
     let opened = blocking(move || store.open_file(&path)).await?;
     let file = opened.map_err(|error| session.storage_error(error))?;
     let Completion { container_bytes, container_digest, .. } = completion;
-    let room = service.download_memory.nothing(&tenant.name);
+    let room = Permit::empty(&service.download_memory, &tenant.name);
     let public = !service.access.is_guarded();
     let container = Immutable::of_file(file, 0..container_bytes, container_digest, MEDIA_TYPE, room, public);
     Ok(container.respond(headers))
@@ -151,7 +151,7 @@ struct Writing {
     unsent: Unsent,
     service: Arc<Service>,
     session: Arc<Session>,
-    _place: Held,
+    _place: Permit,
 }
 
 impl Writing {

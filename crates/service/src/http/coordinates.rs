@@ -4,6 +4,7 @@ use super::extract::{Accept, RequestedSession};
 use super::frames::{not_acceptable, prepared};
 use super::openapi;
 use super::ranged::Immutable;
+use crate::admission::Permit;
 use crate::problem::ApiError;
 use crate::service::Service;
 use axum::Json;
@@ -82,7 +83,7 @@ pub(crate) async fn get(
         etag: format!("{}-phi", session.meta.key),
         media_type: "application/octet-stream",
         public: !service.access.is_guarded(),
-        room: service.download_memory.nothing(&tenant.name),
+        room: Permit::empty(&service.download_memory, &tenant.name),
         read: Arc::new(read),
     };
     let mut response = coordinates.respond(&headers);

@@ -4,7 +4,7 @@ use super::decode_layer::{self, LayerQuery};
 use super::extract::{Query, RequestedSession, content_type};
 use super::frames::{body_error, prepared, stopping};
 use super::{openapi, other_model};
-use crate::admission::{Budget, Held};
+use crate::admission::{Budget, Permit};
 use crate::engine::Lane;
 use crate::file_bodies::{TELLING_BYTES, refuse_file};
 use crate::problem::{self, ApiError};
@@ -73,8 +73,8 @@ pub(crate) async fn post(
         (None, cages.boxed())
     };
     // The body is spooled before the model is bound, so that the client can keep sending meanwhile.
-    let space = service.spool_space.nothing(&tenant.name);
-    let spool = Arc::new(Spool::new(&service.config.data, space).map_err(|error| spool_error(&error))?);
+    let space = Permit::empty(&service.spool_space, &tenant.name);
+    let spool = Arc::new(PositionSpool::new(&service.config.data, space).map_err(|error| spool_error(&error))?);
     let arrived = spool.arrived.subscribe();
     let limit = service.config.max_rest_bytes;
     tokio::spawn(spool_cages(Arc::clone(&spool), cages, limit, Arc::clone(&service), Arc::clone(&session)));
@@ -99,7 +99,7 @@ pub(crate) async fn post(
     });
     let frame_bytes = 12 * u64::from(facts.unknowns);
     let queued = Arc::clone(&service.queued_frames);
-    let mut decoding = Decoding { spool, arrived, lane, session, queued, frame_bytes, next: 0, _place: place };
+    let mut decoding = CageDecoding { spool, arrived, lane, session, queued, frame_bytes, next: 0, _place: place };
     // Wait for the first result, so that its error can have an HTTP status.
     let first = decoding.next().await?;
     let rest = futures_util::stream::unfold(decoding, |mut decoding| async {
@@ -124,10 +124,10 @@ struct Job {
 }
 
 /// The request body on disk: a client that reads the response only after sending the whole body must not block.
-struct Spool {
+struct PositionSpool {
     file: Mutex<File>,
     /// Permit for its disk space.
-    space: Mutex<Held>,
+    space: Mutex<Permit>,
     arrived: watch::Sender<Arrived>,
 }
 
@@ -137,9 +137,9 @@ struct Arrived {
     end: Option<Result<(), ApiError>>,
 }
 
-impl Spool {
+impl PositionSpool {
     /// In the data folder, the only place that the service may write to.
-    fn new(data: &Path, space: Held) -> io::Result<Self> {
+    fn new(data: &Path, space: Permit) -> io::Result<Self> {
         let file = Mutex::new(tempfile::tempfile_in(data.join("tmp"))?);
         Ok(Self { file, space: Mutex::new(space), arrived: watch::Sender::default() })
     }
@@ -160,7 +160,7 @@ impl Spool {
 }
 
 async fn spool_cages(
-    spool: Arc<Spool>,
+    spool: Arc<PositionSpool>,
     mut cages: BoxStream<'static, Result<Bytes, ApiError>>,
     limit: u64,
     service: Arc<Service>,
@@ -209,8 +209,8 @@ fn spool_error(error: &io::Error) -> ApiError {
 }
 
 /// Produces the response body.
-struct Decoding {
-    spool: Arc<Spool>,
+struct CageDecoding {
+    spool: Arc<PositionSpool>,
     arrived: watch::Receiver<Arrived>,
     lane: Lane<Job>,
     session: Arc<Session>,
@@ -218,16 +218,16 @@ struct Decoding {
     queued: Arc<Budget>,
     frame_bytes: u64,
     next: u64,
-    _place: Held,
+    _place: Permit,
 }
 
 /// Bytes of the body that have arrived.
-async fn read(spool: Arc<Spool>, at: u64, length: u64) -> Result<Vec<u8>, ApiError> {
+async fn read(spool: Arc<PositionSpool>, at: u64, length: u64) -> Result<Vec<u8>, ApiError> {
     let read = crate::tasks::blocking(move || spool.read(at, length as usize)).await?;
     read.map_err(|error| ApiError::internal(&error))
 }
 
-impl Decoding {
+impl CageDecoding {
     /// Positions of the next few cages; `None` at the end of the body.
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
         const AT_A_TIME: u64 = 4;

@@ -1,7 +1,7 @@
 //! `POST /v1/sessions/{id}/decode?layer=…`: positions of a session's own frames.
 
 use super::frames::{prepared, stopping};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::preparation::Prepared;
 use crate::problem::{self, ApiError};
@@ -84,7 +84,7 @@ pub(super) async fn respond(
     };
     let (ready, source) = (VecDeque::new(), Arc::new(source));
     let frame_bytes = 12 * u64::from(facts.points);
-    let decoding = Decoding {
+    let decoding = LayerDecoding {
         batch: (service.download_memory.most() / PARTS / frame_bytes.max(1)).clamp(1, BATCH as u64),
         service,
         session,
@@ -114,7 +114,7 @@ enum Source {
     Groups(Arc<GroupDecoder>),
 }
 
-struct Decoding {
+struct LayerDecoding {
     service: Arc<Service>,
     session: Arc<Session>,
     source: Arc<Source>,
@@ -127,13 +127,13 @@ struct Decoding {
     batch: u64,
     /// Decoded and not sent.
     ready: VecDeque<Bytes>,
-    _place: Held,
+    _place: Permit,
 }
 
 /// Positions of a frame on their way to the client, with the memory permit of those that were decoded with them.
 struct OwnedFrame {
     bytes: Vec<u8>,
-    _memory: Arc<Held>,
+    _memory: Arc<Permit>,
 }
 
 impl AsRef<[u8]> for OwnedFrame {
@@ -142,7 +142,7 @@ impl AsRef<[u8]> for OwnedFrame {
     }
 }
 
-impl Decoding {
+impl LayerDecoding {
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
         if self.ready.is_empty() && self.next < self.end {
             let wanted = match self.session.goal() {

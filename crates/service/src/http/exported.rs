@@ -3,7 +3,7 @@
 use super::extract::{Query, RequestedSession};
 use super::openapi;
 use super::ranged::{Immutable, is_known};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::{Phase, Session};
@@ -116,7 +116,7 @@ pub(crate) async fn get(
         etag,
         media_type: format.media_type(),
         public: !service.access.is_guarded(),
-        room: service.download_memory.nothing(&tenant.name),
+        room: Permit::empty(&service.download_memory, &tenant.name),
         read: Arc::new(read),
     }
     .respond(&headers);
@@ -132,7 +132,7 @@ async fn made(
     tenant: &str,
     completion: &Completion,
     (format, name): (Format, &str),
-) -> Result<(File, u64, Held), ApiError> {
+) -> Result<(File, u64, Permit), ApiError> {
     let facts = session.facts().ok_or_else(|| ApiError::internal(&"a completed session without facts"))?;
     let (points, frames) = (u64::from(facts.points), u64::from(completion.frames));
     let positions = 12 * points * frames;
@@ -147,7 +147,7 @@ async fn made(
         );
         return Err(ApiError::new(problem::TOO_LARGE, detail));
     }
-    let mut space = service.spool_space.nothing(tenant);
+    let mut space = Permit::empty(&service.spool_space, tenant);
     space.grow(bytes).map_err(|full| {
         service.rejected("spool_space");
         full.refusal("disk space for files on their way")

@@ -17,7 +17,7 @@ pub(crate) struct ReceivedFrame {
 
 /// How frames are laid out in a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Layout {
+pub(crate) enum BodyLayout {
     /// Back to back, numbered from `first`.
     Raw { first: u32, rows: Rows },
     /// As frame records, which contain their numbers.
@@ -26,7 +26,7 @@ pub(crate) enum Layout {
 
 /// Incremental parser of a request body.
 pub(crate) struct FrameReader {
-    layout: Layout,
+    layout: BodyLayout,
     points: u32,
     handles: u32,
     /// Number of the next raw frame; an error beyond `u32::MAX`.
@@ -40,10 +40,10 @@ pub(crate) struct FrameReader {
 }
 
 impl FrameReader {
-    pub(crate) fn new(layout: Layout, facts: &Facts) -> Self {
+    pub(crate) fn new(layout: BodyLayout, facts: &Facts) -> Self {
         let next = match layout {
-            Layout::Raw { first, .. } => u64::from(first),
-            Layout::Records => 0,
+            BodyLayout::Raw { first, .. } => u64::from(first),
+            BodyLayout::Records => 0,
         };
         Self {
             layout,
@@ -54,16 +54,16 @@ impl FrameReader {
             record: None,
             bytes: Vec::new(),
             begun: false,
-            may_be_file: matches!(layout, Layout::Raw { .. }),
+            may_be_file: matches!(layout, BodyLayout::Raw { .. }),
         }
     }
 
     /// Size of the largest possible next frame, in bytes; the caller reserves this much memory before it calls [`Self::push`].
     pub(crate) fn frame_bytes(&self) -> usize {
         let rows = match self.layout {
-            Layout::Raw { rows: Rows::Handles, .. } => self.handles,
-            Layout::Raw { rows: Rows::All, .. } => self.points,
-            Layout::Records => self.points.max(self.handles),
+            BodyLayout::Raw { rows: Rows::Handles, .. } => self.handles,
+            BodyLayout::Raw { rows: Rows::All, .. } => self.points,
+            BodyLayout::Records => self.points.max(self.handles),
         };
         12 * rows as usize
     }
@@ -83,13 +83,13 @@ impl FrameReader {
         }
         self.begun = true;
         let (frame, rows, needed) = match self.layout {
-            Layout::Raw { rows, .. } => {
+            BodyLayout::Raw { rows, .. } => {
                 let frame = u32::try_from(self.next).map_err(|_| {
                     ApiError::new(problem::INVALID_FRAME, "the frame numbers pass 4294967295, the highest there is")
                 })?;
                 (frame, rows, self.frame_bytes())
             }
-            Layout::Records => {
+            BodyLayout::Records => {
                 let Some(header) = self.header(input)? else { return Ok(None) };
                 let rows = if header.kind == Kind::HandleRows { Rows::Handles } else { Rows::All };
                 (header.frame, rows, header.row_bytes() as usize)
@@ -133,11 +133,11 @@ impl FrameReader {
             self.refuse_file(self.bytes.len())?;
         }
         let (which, have, needed) = match (self.layout, self.record) {
-            (Layout::Raw { .. }, _) => (format!("frame {}", self.next), self.bytes.len(), self.frame_bytes()),
-            (Layout::Records, Some(header)) => {
+            (BodyLayout::Raw { .. }, _) => (format!("frame {}", self.next), self.bytes.len(), self.frame_bytes()),
+            (BodyLayout::Records, Some(header)) => {
                 (format!("frame {}", header.frame), self.bytes.len(), header.row_bytes() as usize)
             }
-            (Layout::Records, None) => {
+            (BodyLayout::Records, None) => {
                 ("the header of a frame record".to_owned(), self.head.len(), record::HEADER_BYTES)
             }
         };
@@ -203,7 +203,7 @@ mod tests {
         }
     }
 
-    fn read(layout: Layout, body: &[u8], chunk: usize) -> Result<Vec<ReceivedFrame>, ApiError> {
+    fn read(layout: BodyLayout, body: &[u8], chunk: usize) -> Result<Vec<ReceivedFrame>, ApiError> {
         let mut reader = FrameReader::new(layout, &facts());
         let mut frames = Vec::new();
         for mut piece in body.chunks(chunk) {
@@ -217,21 +217,21 @@ mod tests {
     #[test]
     fn frames_are_the_same_however_the_body_is_cut() {
         let body: Vec<u8> = (0..180u8).collect();
-        let layout = Layout::Raw { first: 7, rows: Rows::All };
+        let layout = BodyLayout::Raw { first: 7, rows: Rows::All };
         let whole = read(layout, &body, 1000).unwrap();
         assert_eq!(whole.iter().map(|f| f.frame).collect::<Vec<_>>(), [7, 8, 9]);
         assert_eq!(whole.iter().flat_map(|f| f.bytes.clone()).collect::<Vec<_>>(), body);
         for chunk in 1..100 {
             assert_eq!(read(layout, &body, chunk).unwrap(), whole, "chunks of {chunk}");
         }
-        let handles = read(Layout::Raw { first: 0, rows: Rows::Handles }, &body[..96], 5).unwrap();
+        let handles = read(BodyLayout::Raw { first: 0, rows: Rows::Handles }, &body[..96], 5).unwrap();
         assert_eq!((handles.len(), handles[0].bytes.len()), (2, 48));
     }
 
     #[test]
     fn whole_frames_have_a_row_for_each_point_whatever_the_handles() {
         let facts = Facts { points: 1, handle_count: 3, ..facts() };
-        let mut reader = FrameReader::new(Layout::Raw { first: 0, rows: Rows::All }, &facts);
+        let mut reader = FrameReader::new(BodyLayout::Raw { first: 0, rows: Rows::All }, &facts);
         let frame = reader.push(&mut &[0; 12][..]).unwrap().expect("a whole frame");
         assert_eq!(frame.bytes.len(), 12);
         reader.finish().unwrap();
@@ -243,24 +243,24 @@ mod tests {
         record::encode(Kind::Positions, 3, f32::NAN, f32::NAN, &[1.0; 15], &mut body).unwrap();
         record::encode(Kind::HandleRows, 9, f32::NAN, f32::NAN, &[2.0; 12], &mut body).unwrap();
         for chunk in 1..body.len() + 1 {
-            let frames = read(Layout::Records, &body, chunk).unwrap();
+            let frames = read(BodyLayout::Records, &body, chunk).unwrap();
             assert_eq!(
                 frames.iter().map(|f| (f.frame, f.rows)).collect::<Vec<_>>(),
                 [(3, Rows::All), (9, Rows::Handles)]
             );
         }
         for cut in 1..88 {
-            assert!(read(Layout::Records, &body[..cut], 1000).is_err(), "cut at {cut}");
+            assert!(read(BodyLayout::Records, &body[..cut], 1000).is_err(), "cut at {cut}");
         }
         body[40] ^= 1;
-        assert!(read(Layout::Records, &body, 7).unwrap_err().problem.detail.contains("damaged"));
+        assert!(read(BodyLayout::Records, &body, 7).unwrap_err().problem.detail.contains("damaged"));
     }
 
     #[test]
     fn a_body_that_ends_within_a_frame_says_where() {
-        let error = read(Layout::Raw { first: 4, rows: Rows::All }, &[0; 70], 64).unwrap_err();
+        let error = read(BodyLayout::Raw { first: 4, rows: Rows::All }, &[0; 70], 64).unwrap_err();
         assert!(error.problem.detail.contains("frame 5, after 10 of 60 bytes"), "{}", error.problem.detail);
-        let error = read(Layout::Raw { first: u32::MAX, rows: Rows::All }, &[0; 120], 64).unwrap_err();
+        let error = read(BodyLayout::Raw { first: u32::MAX, rows: Rows::All }, &[0; 120], 64).unwrap_err();
         assert!(error.problem.detail.contains("4294967295"));
     }
 }

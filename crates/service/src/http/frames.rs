@@ -1,9 +1,9 @@
 //! `POST /v1/sessions/{id}/frames`: receives frames and responds with one record per frame, optionally while the upload runs.
 
 use super::extract::{Accept, Query, RequestedSession, content_type};
-use super::frame_parser::{FrameReader, Layout};
+use super::frame_parser::{BodyLayout, FrameReader};
 use super::openapi;
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -11,7 +11,7 @@ use crate::session::commit::frame_bytes as stored_bytes;
 use crate::session::facts::Facts;
 use crate::session::registry::Reserved;
 use crate::session::upload::{FrameJob, Permits, Upload, UploadEvent};
-use crate::session::{LiveLane, Phase, Session, gone};
+use crate::session::{Phase, Session, SessionQueue, gone};
 use crate::store::FrameEntry;
 use crate::telemetry::RequestId;
 use axum::Extension;
@@ -107,8 +107,8 @@ pub(crate) async fn post(
         _ => Rows::All,
     };
     let layout = match content_type(&headers).as_deref() {
-        Some("application/octet-stream") => Layout::Raw { first: query.first, rows },
-        Some(record::MEDIA_TYPE) => Layout::Records,
+        Some("application/octet-stream") => BodyLayout::Raw { first: query.first, rows },
+        Some(record::MEDIA_TYPE) => BodyLayout::Records,
         _ => {
             let detail = "send frames as application/octet-stream or application/vnd.cager.frames";
             return Err(ApiError::new(problem::MEDIA_TYPE, detail));
@@ -234,7 +234,7 @@ struct UploadReader {
     service: Arc<Service>,
     tenant: Arc<Tenant>,
     session: Arc<Session>,
-    live: Arc<LiveLane>,
+    live: Arc<SessionQueue>,
     upload: Arc<Upload>,
     /// Bytes on disk of a frame.
     stored_bytes: u64,
@@ -347,8 +347,8 @@ impl UploadReader {
 struct UploadResponder {
     upload: Arc<Upload>,
     /// Keeps the lane open: frames may still be queued after the whole body has arrived.
-    _live: Arc<LiveLane>,
-    _place: Held,
+    _live: Arc<SessionQueue>,
+    _place: Permit,
 }
 
 impl Drop for UploadResponder {

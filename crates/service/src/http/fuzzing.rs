@@ -1,10 +1,10 @@
 //! Entry points for fuzz targets into request parsing. They panic if an invariant is violated.
 
 use super::cage_jobs;
-use super::frame_parser::{FrameReader, Layout};
+use super::frame_parser::{BodyLayout, FrameReader};
 use super::multipart;
 use super::ranged::Immutable;
-use crate::preparation::Choices;
+use crate::preparation::ValidOptions;
 use crate::problem::ApiError;
 use crate::service::Service;
 use crate::session::facts::Facts;
@@ -38,7 +38,7 @@ impl Frames {
     /// All frames of a body given in pieces, and the error that would end the response.
     pub fn read<'a>(self, pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<Frame>, Result<(), ApiError>) {
         let rows = if self.handle_rows { Rows::Handles } else { Rows::All };
-        let layout = self.first.map_or(Layout::Records, |first| Layout::Raw { first, rows });
+        let layout = self.first.map_or(BodyLayout::Records, |first| BodyLayout::Raw { first, rows });
         let mut reader = FrameReader::new(layout, &facts(self.points, self.handles));
         let mut frames = Vec::new();
         for mut piece in pieces {
@@ -89,7 +89,7 @@ pub async fn new_session(
     request.headers_mut().insert(header::CONTENT_TYPE, content_type);
     let tenant = service.access.tenant("local");
     let parts = multipart::read(service, &tenant, request).await?;
-    Choices::of(&parts.options)?;
+    ValidOptions::of(&parts.options)?;
     let uploaded = parts.uploaded;
     Ok((uploaded.rest.bytes.len(), uploaded.cage.map_or(0, |cage| cage.bytes.len())))
 }

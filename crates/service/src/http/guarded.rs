@@ -1,6 +1,6 @@
 //! Bodies that end when their token is revoked or expires, and response bodies that keep a request's permit until they are sent.
 
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Grant;
 use axum::body::Body;
 use bytes::Bytes;
@@ -41,7 +41,7 @@ pub(super) fn revocable(body: Body, grant: &Grant) -> Body {
 }
 
 /// Keeps a request's permit until the body is sent, if the body is large and in memory; streams have permits of their own.
-pub(super) fn with_permit(body: Body, place: Held) -> Body {
+pub(super) fn with_permit(body: Body, place: Permit) -> Body {
     match http_body::Body::size_hint(&body).exact() {
         Some(bytes) if bytes > SMALL => Body::new(GuardedBody { body, over: None, _kept: Some(Box::new(place)) }),
         _ => body,

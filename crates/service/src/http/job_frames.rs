@@ -1,6 +1,6 @@
 //! Frames of a job on their way to a client: those that are there, or all as they are made.
 
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::jobs::{Frames, Job, Phase, Piece, Work};
 use crate::problem::{self, ApiError};
@@ -65,7 +65,7 @@ pub(super) fn stream<W: Work>(
     read: Box<dyn Frames<W>>,
 ) -> Result<Response, ApiError> {
     let place = service.stream(tenant)?;
-    let mut room = service.download_memory.nothing(&tenant.name);
+    let mut room = Permit::empty(&service.download_memory, &tenant.name);
     if piece_bytes > 0 {
         room.grow(piece_bytes).map_err(|full| {
             service.rejected("download_memory");
@@ -102,9 +102,9 @@ struct Following<W: Work> {
     end: Option<u32>,
     piece: u32,
     /// The memory of what decodes, once that is there.
-    decoding: Option<Arc<Held>>,
+    decoding: Option<Arc<Permit>>,
     /// The place among streams, and memory for a piece.
-    held: [Held; 2],
+    held: [Permit; 2],
 }
 
 impl<W: Work> Following<W> {
@@ -149,7 +149,7 @@ impl<W: Work> Following<W> {
 
     /// A place among those that decode, and the memory that this reader keeps from its first one on. Both are waited for here and not on a thread that may
     /// block: of those there are few, and a client that hangs up leaves the queue.
-    async fn place(&mut self, bytes: u64) -> io::Result<(Held, Arc<Held>)> {
+    async fn place(&mut self, bytes: u64) -> io::Result<(Permit, Arc<Permit>)> {
         let Self { service, job, decoding, held: [_, room], .. } = self;
         let tenant = room.tenant();
         let taken = async {

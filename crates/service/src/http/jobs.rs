@@ -4,6 +4,7 @@ use super::extract::Query;
 use super::progress::{self, ProgressEvent, ProgressSource};
 use super::ranged::Immutable;
 use super::sessions::PageQuery;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::jobs::{Job, Work};
 use crate::problem::{self, ApiError};
@@ -78,7 +79,7 @@ pub(super) async fn result<W: Work>(
     let (store, path) = (service.store.clone(), service.store.job_file(crate::jobs::kind_of::<W>(), job.id(), name)?);
     let opened = blocking(move || store.open_file(&path)).await?;
     let opened = opened.map_err(|error| job.fail_if_damaged(&service.store, error))?;
-    let room = service.download_memory.nothing(&tenant.name);
+    let room = Permit::empty(&service.download_memory, &tenant.name);
     let etag =
         bytes.as_ref().map_or(part.blake3.clone(), |range| format!("{}-{}-{}", part.blake3, range.start, range.end));
     let bytes = bytes.unwrap_or(0..part.bytes);

@@ -1,7 +1,7 @@
 //! Request bodies whose bytes are counted and admitted to the memory budget as they arrive, before the multipart parser buffers them.
 
 use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 pub(super) struct Metered(Arc<Mutex<MeterState>>);
 
 struct MeterState {
-    room: Held,
+    room: Permit,
     received: u64,
     began: Instant,
     /// Subject of the error message for a body that is too large.
@@ -36,7 +36,7 @@ impl Metered {
         what: impl Into<String>,
     ) -> (Self, Request) {
         let counted = MeterState {
-            room: service.upload_memory.nothing(&tenant.name),
+            room: Permit::empty(&service.upload_memory, &tenant.name),
             received: 0,
             began: Instant::now(),
             what: what.into(),
@@ -59,12 +59,11 @@ impl Metered {
     }
 
     /// Ends counting; returns `read` with its memory permit, or the error that ended the body.
-    pub(super) fn finish<T>(&self, read: Result<T, ApiError>) -> Result<(T, Held), ApiError> {
+    pub(super) fn finish<T>(&self, read: Result<T, ApiError>) -> Result<(T, Permit), ApiError> {
         let mut counted = lock(&self.0);
         counted.done = true;
         let read = counted.refused.take().map_or(read, Err)?;
-        let nothing = counted.room.nothing();
-        Ok((read, std::mem::replace(&mut counted.room, nothing)))
+        Ok((read, counted.room.take()))
     }
 }
 

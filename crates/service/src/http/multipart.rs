@@ -3,12 +3,12 @@
 use super::extract::{content_type, idempotency_key};
 use super::frames::{SLOWEST_BYTES_PER_SECOND, body_error};
 use super::metered::Metered;
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::cage_source::Uploaded;
+use crate::session::cage_source::UploadedFiles;
 use crate::store::NamedFile;
 use axum::body::{Body, BodyDataStream};
 use axum::extract::multipart::{Field, MultipartError};
@@ -27,9 +27,9 @@ const MATRIX: &str = "regularizer_matrix";
 
 /// Parsed parts, with the permit for their memory.
 pub(crate) struct Parts {
-    pub(crate) uploaded: Uploaded,
+    pub(crate) uploaded: UploadedFiles,
     pub(crate) options: SessionOptions,
-    pub(crate) room: Held,
+    pub(crate) room: Permit,
 }
 
 /// What the headers of a form say.
@@ -69,7 +69,7 @@ pub(super) struct Files<T> {
     pub(super) files: HashMap<&'static str, NamedFile>,
     pub(super) options: T,
     /// Permit for their memory.
-    pub(super) room: Held,
+    pub(super) room: Permit,
 }
 
 impl<T> Files<T> {
@@ -90,7 +90,7 @@ impl<T> Files<T> {
 pub(crate) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Request) -> Result<Parts, ApiError> {
     let mut form = read_files(service, tenant, request, &["rest", "cage", MATRIX], "rest pose and cage").await?;
     let rest = form.take("rest", "the rest pose")?;
-    let uploaded = Uploaded { rest, cage: form.files.remove("cage"), matrix: form.files.remove(MATRIX) };
+    let uploaded = UploadedFiles { rest, cage: form.files.remove("cage"), matrix: form.files.remove(MATRIX) };
     Ok(Parts { uploaded, options: form.options, room: form.room })
 }
 

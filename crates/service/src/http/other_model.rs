@@ -2,9 +2,9 @@
 
 use super::metered::Metered;
 use super::multipart::{bad, broken, file_name, form};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
-use crate::preparation::{Choices, check_model, read_part};
+use crate::preparation::{ValidOptions, check_model, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Session;
@@ -19,10 +19,10 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 
 /// The file of a model, and the room that it takes until it is dropped.
-pub(super) struct Uploaded {
+pub(super) struct UploadedModel {
     name: String,
     bytes: Vec<u8>,
-    _room: Held,
+    _room: Permit,
 }
 
 /// What turns cages into positions of another model.
@@ -40,12 +40,12 @@ pub(super) async fn read(
     service: &Arc<Service>,
     tenant: &Tenant,
     request: Request,
-) -> Result<(Uploaded, BoxStream<'static, Result<Bytes, ApiError>>), ApiError> {
+) -> Result<(UploadedModel, BoxStream<'static, Result<Bytes, ApiError>>), ApiError> {
     let (metered, request) = Metered::new(service, tenant, request, "the model has");
     let mut body = form(request).await?;
     // The cages that follow wait on the disk, under a limit of their own.
     let ((name, bytes), room) = metered.finish(read_model(&mut body).await)?;
-    let model = Uploaded { name, bytes, _room: room };
+    let model = UploadedModel { name, bytes, _room: room };
     let (send, mut receive) = mpsc::channel(1);
     tokio::spawn(async move {
         if let Err(error) = pass_on(&mut body, &send).await {
@@ -91,7 +91,7 @@ pub(super) async fn bind(
     service: &Arc<Service>,
     session: &Arc<Session>,
     tenant: &str,
-    uploaded: Uploaded,
+    uploaded: UploadedModel,
 ) -> Result<Bound, ApiError> {
     let prepared = service.solver(session).await?;
     let place = service.solvers.place(tenant).await;
@@ -99,7 +99,7 @@ pub(super) async fn bind(
     blocking(move || {
         let _place = place;
         let model = read_part("model", &uploaded.name, &uploaded.bytes)?;
-        let (cage, system) = (session.rest_cage()?, Choices::of(&session.meta.options)?.system);
+        let (cage, system) = (session.rest_cage()?, ValidOptions::of(&session.meta.options)?.system);
         reject_far_points(&cage, &model.points)
             .map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
         check_model(model.points.len(), system, &cage, service.config.max_prepare_bytes)?;

@@ -1,6 +1,6 @@
 //! Server-sent events that report progress.
 
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::service::Service;
 use axum::body::Body;
 use axum::response::{IntoResponse, Response};
@@ -48,7 +48,7 @@ impl ProgressEvent {
 }
 
 /// Streams an event `progress` after each change, until the state is final, the object is deleted, or the service stops.
-pub(super) fn stream(service: Arc<Service>, place: Held, headers: &HeaderMap, followed: ProgressSource) -> Response {
+pub(super) fn stream(service: Arc<Service>, place: Permit, headers: &HeaderMap, followed: ProgressSource) -> Response {
     let heard = headers.get("last-event-id").and_then(|id| id.to_str().ok()).map(str::to_owned);
     let stream = futures_util::stream::unfold(Some((heard, followed, place)), move |state| {
         let service = Arc::clone(&service);

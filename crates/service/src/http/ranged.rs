@@ -1,6 +1,6 @@
 //! Responses with immutable content: `ETag`, `Range` and conditional requests (RFC 9110, §13 and §14).
 
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
 use axum::body::Body;
@@ -25,7 +25,7 @@ pub(crate) struct Immutable {
     /// Whether shared caches may store it; not if tokens are required.
     pub(crate) public: bool,
     /// Memory permit for the chunks being sent, empty at first.
-    pub(crate) room: Held,
+    pub(crate) room: Permit,
     /// Reads a range; blocks.
     pub(crate) read: Arc<dyn Fn(Range<u64>) -> io::Result<Bytes> + Send + Sync>,
 }
@@ -37,7 +37,7 @@ impl Immutable {
         bytes: Range<u64>,
         etag: String,
         media_type: &'static str,
-        room: Held,
+        room: Permit,
         public: bool,
     ) -> Self {
         let (file, begin, length) = (Mutex::new(file), bytes.start, bytes.end - bytes.start);
@@ -121,8 +121,7 @@ impl Immutable {
     /// The memory permit is released when the body is dropped.
     fn body(&mut self, range: Range<u64>) -> Body {
         let read = Arc::clone(&self.read);
-        let nothing = self.room.nothing();
-        let room = std::mem::replace(&mut self.room, nothing);
+        let room = self.room.take();
         let pieces = futures_util::stream::unfold((range, room), move |(left, room)| {
             let read = Arc::clone(&read);
             async move {

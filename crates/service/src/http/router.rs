@@ -9,7 +9,7 @@ use super::{
     cage, cage_jobs, cages, container, coordinates, decode, errors, events, exported, extract, frames, health, openapi,
     origin, page, recoveries, sent, sessions, shape_spaces, transfers,
 };
-use crate::problem::{self, ApiError, Kind};
+use crate::problem::{self, ApiError, ProblemKind};
 use crate::service::Service;
 use crate::telemetry::{RequestId, request_id, traces};
 use axum::error_handling::HandleErrorLayer;
@@ -276,7 +276,7 @@ fn is_problem(response: &Response) -> bool {
 }
 
 /// The problem kind of an error response that did not come from a handler.
-fn kind_of(status: StatusCode) -> Kind {
+fn kind_of(status: StatusCode) -> ProblemKind {
     match status {
         StatusCode::METHOD_NOT_ALLOWED => problem::METHOD_NOT_ALLOWED,
         StatusCode::NOT_FOUND => problem::NOT_FOUND,

@@ -7,7 +7,7 @@ use super::multipart::{self, FormHeader};
 use super::openapi;
 use super::spooled::{self, FormParts, SpooledForm};
 use crate::auth::Tenant;
-use crate::idempotency::{once, request_of_files};
+use crate::idempotency::{create_once, fingerprint_of_files};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::shape_spaces::{KeptSpace, Wanted, check_options};
@@ -72,7 +72,7 @@ pub(crate) async fn create(
     .await?;
     let kept = to_the_end(async move {
         let (making, owner) = (Arc::clone(&service), Arc::clone(&tenant));
-        once(&service.shape_spaces, &tenant.name, request, |request| make(making, owner, form, request)).await
+        create_once(&service.shape_spaces, &tenant.name, request, |request| make(making, owner, form, request)).await
     });
     let view = kept.await?.view.clone();
     let location = format!("/v1/shapespaces/{}", view.id);
@@ -84,7 +84,7 @@ fn request_of(key: Option<String>, form: &SpooledForm<ShapeSpaceOptions>) -> Opt
     let files = form.many.iter().map(|file| ("pose", file)).chain(form.files.iter().map(|(part, file)| (*part, file)));
     let files = files.map(|(part, file)| (part, &file.name[..], blake3::hash(&file.bytes)));
     let large = form.large.iter().map(|large| (large.part, &large.name[..], large.spool.digest()));
-    request_of_files(key, files.chain(large), &form.options)
+    fingerprint_of_files(key, files.chain(large), &form.options)
 }
 
 async fn make(
@@ -97,7 +97,7 @@ async fn make(
         Some(id) => Some(service.completed_container(&tenant.name, &id).await?),
         None => None,
     };
-    let place = service.reading.take(&tenant.name, 1).await;
+    let place = service.parse_slots.take(&tenant.name, 1).await;
     blocking(move || {
         let (_place, threads) = (place, service.solvers.pool());
         threads.install(|| {

@@ -2,7 +2,7 @@
 
 use super::multipart::{NAME_CHARACTERS, bad, broken, file_name, form, read_options};
 use super::paced::Paced;
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -36,7 +36,7 @@ pub(crate) struct SpooledForm<T> {
     pub(crate) large: Option<LargePart>,
     pub(crate) options: T,
     /// Permit for the memory of the files.
-    pub(crate) room: Held,
+    pub(crate) room: Permit,
     /// Quota reserved for the large part.
     pub(crate) reserved: Reserved,
 }
@@ -68,7 +68,7 @@ pub(super) async fn read<T: DeserializeOwned + Default>(
 ) -> Result<SpooledForm<T>, ApiError> {
     let (pace, request) = Paced::new(request);
     let body = form(request).await?;
-    let room = service.upload_memory.nothing(&tenant.name);
+    let room = Permit::empty(&service.upload_memory, &tenant.name);
     let reserved = service.reserve(tenant, 0)?;
     let mut receiver = Receiver { service, tenant, pace: pace.clone(), taken: 0, room, reserved };
     let read = receiver.read(body, parts).await;
@@ -82,7 +82,7 @@ struct Receiver<'a> {
     pace: Paced,
     /// Bytes in memory.
     taken: u64,
-    room: Held,
+    room: Permit,
     reserved: Reserved,
 }
 

@@ -3,7 +3,7 @@
 use super::registry::Place;
 use super::{Job, Phase, Work};
 use crate::auth::Tenant;
-use crate::idempotency::{made_before, once};
+use crate::idempotency::{create_once, made_before};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::Idempotency;
@@ -39,7 +39,7 @@ impl Service {
         if let Some(made) = made_before(W::jobs(self), &tenant.name, request.as_ref(), may_be)? {
             return Ok(made);
         }
-        let place = self.reading.take(&tenant.name, 1).await;
+        let place = self.parse_slots.take(&tenant.name, 1).await;
         let checked = blocking(move || {
             let _place = place;
             check()
@@ -48,7 +48,7 @@ impl Service {
         let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
         to_the_end(async move {
             let make = |request| make(Arc::clone(&service), Arc::clone(&tenant), checked, request);
-            once(W::jobs(&service), &tenant.name, request, make).await
+            create_once(W::jobs(&service), &tenant.name, request, make).await
         })
         .await
     }

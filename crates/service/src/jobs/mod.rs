@@ -42,7 +42,7 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
     /// Counts those that ended, by result.
     const ENDED: &'static str;
     /// The problem of one that failed.
-    const FAILED: problem::Kind;
+    const FAILED: problem::ProblemKind;
     /// What has to happen before there are results.
     const UNFINISHED: &'static str;
     /// Why a completed one may not have a result.

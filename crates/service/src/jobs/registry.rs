@@ -1,7 +1,7 @@
 //! All jobs of a kind by id and tenant, and the idempotency keys that created them.
 
 use super::{Job, Work};
-use crate::idempotency::{Keyed, Requests};
+use crate::idempotency::{Keyed, KnownKeys};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::JobMeta as _;
@@ -18,7 +18,7 @@ pub(crate) struct Jobs<W: Work> {
 
 struct Inner<W: Work> {
     jobs: BTreeMap<String, Arc<Job<W>>>,
-    requests: Requests,
+    requests: KnownKeys,
     /// The tenants of jobs that are being stored.
     coming: Vec<String>,
 }
@@ -57,7 +57,7 @@ impl<W: Work> Inner<W> {
 
 impl<W: Work> Default for Jobs<W> {
     fn default() -> Self {
-        Self { inner: Mutex::new(Inner { jobs: BTreeMap::new(), requests: Requests::default(), coming: Vec::new() }) }
+        Self { inner: Mutex::new(Inner { jobs: BTreeMap::new(), requests: KnownKeys::default(), coming: Vec::new() }) }
     }
 }
 
@@ -139,7 +139,7 @@ impl<W: Work> Jobs<W> {
 }
 
 impl<W: Work> Keyed<Job<W>> for Jobs<W> {
-    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R {
+    fn requests<R>(&self, work: impl FnOnce(&mut KnownKeys) -> R) -> R {
         work(&mut lock(&self.inner).requests)
     }
 

@@ -1,7 +1,7 @@
 //! Cages made around rest poses, where none was sent.
 
 use super::read_part;
-use crate::admission::{Budget, Held};
+use crate::admission::{Budget, Permit};
 use crate::problem::{self, ApiError};
 use crate::store::{ContentKey, NamedFile};
 use crate::sync::lock;
@@ -56,7 +56,7 @@ impl CageMaker {
         tenant: &str,
         rest: NamedFile,
         vertices: Option<u32>,
-        room: &Arc<Held>,
+        room: &Arc<Permit>,
         stored: impl AsyncFnOnce(ContentKey) -> Option<NamedFile>,
     ) -> Result<Enclosed, ApiError> {
         if let Some(vertices) = vertices.filter(|vertices| !VERTICES.contains(vertices)) {
@@ -99,7 +99,7 @@ impl CageMaker {
     /// waits for it any more.
     async fn make(
         &self,
-        held: (Held, Arc<Held>),
+        held: (Permit, Arc<Permit>),
         rest: NamedFile,
         vertices: Option<u32>,
     ) -> Result<(NamedFile, Result<TriMesh, ApiError>), ApiError> {

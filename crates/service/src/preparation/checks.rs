@@ -1,7 +1,7 @@
 //! What is refused before anything expensive is computed. All functions block.
 
 use super::geometry::geometry;
-use super::{Choices, Geometry};
+use super::{Geometry, ValidOptions};
 use crate::problem::{self, ApiError};
 use cager_capture::coding::{CodingError, Goal, slack};
 use cager_capture::origin::{LOST, own_origin};
@@ -17,18 +17,18 @@ use cager_proto::container::colors_bytes;
 ///
 /// # Errors
 /// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
-pub(crate) fn check(geometry: &Geometry, choices: &Choices, max_bytes: u64) -> Result<(), ApiError> {
-    let unknowns = choices.system.values(&geometry.cage).unknowns();
-    let options = choices.inversion.options(unknowns);
+pub(crate) fn check(geometry: &Geometry, valid: &ValidOptions, max_bytes: u64) -> Result<(), ApiError> {
+    let unknowns = valid.system.values(&geometry.cage).unknowns();
+    let options = valid.inversion.options(unknowns);
     // Report a handle count beyond the points before one beyond the memory. With too few points the options are not at fault.
     if geometry.rest.points.len() >= unknowns {
         check_options(geometry.rest.points.len(), unknowns, options, u64::MAX).map_err(|error| refused(&error))?;
     }
-    check_memory(geometry, choices, options, max_bytes)?;
+    check_memory(geometry, valid, options, max_bytes)?;
     check_place(&geometry.rest.points)?;
-    Solver::check(choices.system, &geometry.cage, &geometry.rest.points, options, u64::MAX)
+    Solver::check(valid.system, &geometry.cage, &geometry.rest.points, options, u64::MAX)
         .map_err(|error| refused(&error))?;
-    choices.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns, choices.frames))?;
+    valid.goal.map_or(Ok(()), |goal| check_goal(goal, geometry, unknowns, valid.frames))?;
     let Some(matrix) = &geometry.matrix else { return Ok(()) };
     Regularizer::Matrix.delta(Some(matrix), &geometry.cage, unknowns).map_err(|error| refused(&error.into()))?;
     Ok(())
@@ -92,12 +92,12 @@ pub(super) fn refused(error: &PrepareError) -> ApiError {
 
 pub(super) fn check_memory(
     geometry: &Geometry,
-    choices: &Choices,
+    valid: &ValidOptions,
     options: SolverOptions,
     max_bytes: u64,
 ) -> Result<(), ApiError> {
     let points = geometry.rest.points.len();
-    let values = choices.system.values(&geometry.cage);
+    let values = valid.system.values(&geometry.cage);
     let unknowns = values.unknowns();
     let handles = match options.handles {
         // Covariance of the handles, its Cholesky factor, and the solution.
@@ -110,7 +110,7 @@ pub(super) fn check_memory(
     let columns = values.columns() as u64;
     // The Gram matrix of the iteration, in double and in single precision.
     let iterated = if columns > unknowns as u64 { 12 * columns * columns } else { 0 };
-    let elements = choices.system.working_bytes(&geometry.cage, None);
+    let elements = valid.system.working_bytes(&geometry.cage, None);
     // Peak memory: two matrices of points × columns in double precision and one in single.
     let needed =
         (20 * points as u64 * columns).saturating_add(handles).saturating_add(iterated).saturating_add(elements);
@@ -166,10 +166,10 @@ mod tests {
         let geometry = Geometry { rest, cage, matrix: None, coded: None, unit: 1.0 };
         let checked = |system: &str, max_bytes: u64| {
             let options = SessionOptions { coordinates: Some(system.to_owned()), ..SessionOptions::default() };
-            let choices = Choices::of(&options).expect("options");
-            let columns = choices.inversion.options(choices.system.values(&geometry.cage).unknowns());
-            let other = check_model(2000, choices.system, &geometry.cage, max_bytes);
-            (check_memory(&geometry, &choices, columns, max_bytes), other)
+            let valid = ValidOptions::of(&options).expect("options");
+            let columns = valid.inversion.options(valid.system.values(&geometry.cage).unknowns());
+            let other = check_model(2000, valid.system, &geometry.cage, max_bytes);
+            (check_memory(&geometry, &valid, columns, max_bytes), other)
         };
         let (own, other) = checked("harmonic", 512 << 20);
         for refused in [own.expect_err("too little"), other.expect_err("too little")] {

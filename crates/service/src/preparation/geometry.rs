@@ -1,6 +1,6 @@
 //! Uploaded files as rest pose, cage and matrix. All functions block.
 
-use super::Choices;
+use super::ValidOptions;
 use crate::problem::{self, ApiError};
 use crate::store::{Content, NamedFile};
 use cager_cages::diagnosis::weld;
@@ -26,9 +26,9 @@ pub(crate) struct Geometry {
     pub(crate) unit: f64,
 }
 
-fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatrix>, ApiError> {
+fn read_matrix(content: &Content, valid: &ValidOptions) -> Result<Option<SparseMatrix>, ApiError> {
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_OPTIONS, format!("regularizer_matrix: {detail}")));
-    match (&content.matrix, choices.inversion.regularizer) {
+    match (&content.matrix, valid.inversion.regularizer) {
         (Some(file), Regularizer::Matrix) => {
             read_matrix_bytes(Path::new(&file.name), &file.bytes).map(Some).or_else(|error| refuse(error.to_string()))
         }
@@ -42,13 +42,13 @@ fn read_matrix(content: &Content, choices: &Choices) -> Result<Option<SparseMatr
 ///
 /// # Errors
 /// Bytes that cannot be read; a cage that cannot be used.
-pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, ApiError> {
+pub(crate) fn read(content: &Content, valid: &ValidOptions) -> Result<Geometry, ApiError> {
     let rest = read_part("rest", &content.rest.name, &content.rest.bytes)?;
-    let cage = read_cage(&content.cage, choices)?;
-    let matrix = read_matrix(content, choices)?;
+    let cage = read_cage(&content.cage, valid)?;
+    let matrix = read_matrix(content, valid)?;
     let given = diagonal(&rest.points);
-    let goal = choices.goal.filter(|_| !choices.exact_rest);
-    Ok(match goal.and_then(|goal| RestMeshes::new(goal, &rest, &cage, choices.system)) {
+    let goal = valid.goal.filter(|_| !valid.exact_rest);
+    Ok(match goal.and_then(|goal| RestMeshes::new(goal, &rest, &cage, valid.system)) {
         Some(RestMeshes { rest, cage, checked }) => Geometry {
             unit: given.min(diagonal(&rest.mesh.points)),
             rest: rest.mesh.clone(),
@@ -64,7 +64,7 @@ pub(crate) fn read(content: &Content, choices: &Choices) -> Result<Geometry, Api
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_cage(file: &NamedFile, choices: &Choices) -> Result<Cage, ApiError> {
+pub(crate) fn read_cage(file: &NamedFile, valid: &ValidOptions) -> Result<Cage, ApiError> {
     let NamedFile { name, bytes } = file;
     let model = read_part("cage", name, bytes)?;
     if model.faces.is_empty() {
@@ -75,9 +75,8 @@ pub(crate) fn read_cage(file: &NamedFile, choices: &Choices) -> Result<Cage, Api
     let model = weld(&model).map(|welded| welded.model).unwrap_or(model);
     let mesh = TriMesh::from(&model);
     let polygon_of = model.faces.polygon_of_triangle();
-    Cage::new(if choices.flip_cage { mesh.flipped() } else { mesh }).map_err(|error| {
-        let or =
-            if matches!(error, CageError::Inward { .. }) && !choices.flip_cage { ", or send flip_cage" } else { "" };
+    Cage::new(if valid.flip_cage { mesh.flipped() } else { mesh }).map_err(|error| {
+        let or = if matches!(error, CageError::Inward { .. }) && !valid.flip_cage { ", or send flip_cage" } else { "" };
         let error = error.renumbered(|triangle| polygon_of[triangle] as usize);
         geometry(format!("{name}: {error}{or}"))
     })

@@ -2,18 +2,18 @@
 
 mod cage_maker;
 mod checks;
-mod choices;
 mod geometry;
 mod shared_cache;
 mod solvers;
+mod valid_options;
 
 pub(crate) use cage_maker::{
     CAGE_NAME, CageMaker, Enclosed, VERTICES, check_extent, obj_of, refuse_cage, vertices_detail,
 };
 pub(crate) use checks::{cannot_be_coded, check, check_model};
-pub(crate) use choices::{Choices, check_told, content_key, goal};
 pub(crate) use geometry::{Geometry, cage_of, read, read_cage, read_part};
 pub(crate) use solvers::{KeptSolvers, SolverRequest, SolverResponse, Solvers, kept_solvers};
+pub(crate) use valid_options::{ValidOptions, check_told, content_key, goal};
 
 use crate::problem::ApiError;
 use cager_capture::preparation_warnings::preparation_warnings;
@@ -42,13 +42,13 @@ pub(crate) struct Prepared {
 /// `INVALID_GEOMETRY`, `INVALID_OPTIONS`.
 pub(crate) fn prepare(
     geometry: &Geometry,
-    choices: &Choices,
+    valid: &ValidOptions,
     max_bytes: u64,
     wanted: &dyn Fn() -> bool,
 ) -> Result<Option<(Prepared, [f64; 3])>, ApiError> {
-    let unknowns = choices.system.values(&geometry.cage).unknowns();
-    let options = choices.inversion.options(unknowns);
-    check_memory(geometry, choices, options, max_bytes)?;
+    let unknowns = valid.system.values(&geometry.cage).unknowns();
+    let options = valid.inversion.options(unknowns);
+    check_memory(geometry, valid, options, max_bytes)?;
     let clock = StepClock::default();
     let before_step = |step| {
         clock.begin(step);
@@ -60,7 +60,7 @@ pub(crate) fn prepare(
         before_step: &before_step,
         ..PrepareContext::default()
     };
-    match Solver::prepare_with(choices.system, &geometry.cage, &geometry.rest.points, options, &context) {
+    match Solver::prepare_with(valid.system, &geometry.cage, &geometry.rest.points, options, &context) {
         Ok(solver) => {
             let seconds = clock.seconds();
             Ok(Some((with_solver(solver, &geometry.cage, options), seconds)))

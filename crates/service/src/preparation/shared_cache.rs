@@ -1,6 +1,6 @@
 //! A cache of limited size that tenants share: what one of them keeps counts against its share, and makes room of its own first.
 
-use crate::admission::{Budget, Exhausted, Held};
+use crate::admission::{Budget, Exhausted, Permit};
 use crate::store::ContentKey;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ pub(crate) struct SharedCache<V> {
 struct Entry<V> {
     value: V,
     used: u64,
-    room: Held,
+    room: Permit,
 }
 
 impl<V> SharedCache<V> {
@@ -48,8 +48,8 @@ impl<V> SharedCache<V> {
                     self.entries.insert(key, Entry { value, used: self.clock, room });
                     return gone;
                 }
-                Err(Exhausted::Tenant) => Some(tenant.to_owned()),
-                Err(Exhausted::Service) => self.budget.largest_holder(),
+                Err(Exhausted::OverShare) => Some(tenant.to_owned()),
+                Err(Exhausted::Full) => self.budget.largest_holder(),
             };
             let Some(oldest) = from.and_then(|from| self.oldest_of(&from)) else { break };
             self.entries.remove(&oldest);

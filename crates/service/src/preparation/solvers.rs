@@ -2,8 +2,8 @@
 //! same key share one preparation.
 
 use super::shared_cache::SharedCache;
-use super::{Choices, Geometry, Prepared};
-use crate::admission::{Budget, Held};
+use super::{Geometry, Prepared, ValidOptions};
+use crate::admission::{Budget, Permit};
 use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
 use crate::resources::Resources;
@@ -32,7 +32,7 @@ type ResultReceiver = watch::Receiver<Option<Result<SolverResponse, ApiError>>>;
 pub(crate) struct SolverRequest {
     pub(crate) key: ContentKey,
     pub(crate) tenant: String,
-    pub(crate) choices: Choices,
+    pub(crate) valid: ValidOptions,
     /// Rest pose and cage, if they have been parsed already.
     pub(crate) geometry: Option<Arc<Geometry>>,
     /// Trace context of the caller.
@@ -52,7 +52,7 @@ pub(crate) fn kept_solvers(budget: Arc<Budget>) -> Arc<KeptSolvers> {
 
 /// The cache of solvers.
 pub(crate) struct Solvers {
-    flights: Mutex<HashMap<ContentKey, InFlight>>,
+    flights: Mutex<HashMap<ContentKey, PendingSolver>>,
     /// Those in memory, of all services of the process.
     kept: Arc<KeptSolvers>,
     store: Store,
@@ -67,7 +67,7 @@ pub(crate) struct Solvers {
     pool: Arc<rayon::ThreadPool>,
 }
 
-struct InFlight {
+struct PendingSolver {
     sender: Arc<ResultSender>,
     tenant: String,
 }
@@ -101,7 +101,7 @@ impl Solvers {
     }
 
     /// A permit to prepare.
-    pub(crate) async fn place(&self, tenant: &str) -> Held {
+    pub(crate) async fn place(&self, tenant: &str) -> Permit {
         self.places.take(tenant, 1).await
     }
 
@@ -162,7 +162,7 @@ impl Solvers {
         }
         let (sender, flight) = watch::channel(None);
         let sender = Arc::new(sender);
-        flights.insert(wanted.key, InFlight { sender: Arc::clone(&sender), tenant: wanted.tenant.clone() });
+        flights.insert(wanted.key, PendingSolver { sender: Arc::clone(&sender), tenant: wanted.tenant.clone() });
         let solvers = Arc::clone(self);
         tokio::spawn(async move { solvers.run_preparation(wanted, &sender).await });
         (flight, true)
@@ -209,13 +209,13 @@ impl Solvers {
         sender: &Arc<ResultSender>,
     ) -> Option<Result<SolverResponse, ApiError>> {
         let clock = Instant::now();
-        let (key, choices) = (wanted.key, wanted.choices);
+        let (key, valid) = (wanted.key, wanted.valid);
         {
             let place = self.loads.take(&wanted.tenant, 1).await;
             let solvers = Arc::clone(&self);
             let load = move || {
                 let _place = place;
-                solvers.load(&key, &choices, clock)
+                solvers.load(&key, &valid, clock)
             };
             let loaded = tokio::task::spawn_blocking(load).await.unwrap_or_else(|e| Err(ApiError::internal(&e)));
             if let Some(done) = loaded.transpose() {
@@ -230,12 +230,12 @@ impl Solvers {
         let _step = TraceSpan::begin("prepare", &wanted.trace);
         let geometry = wanted.geometry.clone();
         let waited_for = Arc::clone(sender);
-        let work = move || self.prepare(&key, &choices, geometry, queued, place, &|| !waited_for.is_closed());
+        let work = move || self.prepare(&key, &valid, geometry, queued, place, &|| !waited_for.is_closed());
         tokio::task::spawn_blocking(work).await.unwrap_or_else(|e| Err(ApiError::internal(&e))).transpose()
     }
 
     /// The stored solver of a content, if there is one. Blocks.
-    fn load(&self, key: &ContentKey, choices: &Choices, clock: Instant) -> Result<Option<SolverResponse>, ApiError> {
+    fn load(&self, key: &ContentKey, valid: &ValidOptions, clock: Instant) -> Result<Option<SolverResponse>, ApiError> {
         let queued = clock.elapsed().as_secs_f64();
         let solver = match self.store.prepared(key) {
             Ok(Some(solver)) => solver,
@@ -251,8 +251,8 @@ impl Solvers {
         };
         lock(&self.files).get(key);
         let file = self.store.content_cage(key)?;
-        let cage = super::read_cage(&file.ok_or_else(deleted)?, choices)?;
-        let options = choices.inversion.options(choices.system.values(&cage).unknowns());
+        let cage = super::read_cage(&file.ok_or_else(deleted)?, valid)?;
+        let options = valid.inversion.options(valid.system.values(&cage).unknowns());
         metrics::counter!("cager_cache_total", "result" => "disk").increment(1);
         let total = clock.elapsed().as_secs_f64();
         let seconds = PreparationSeconds { queued, read: total - queued, total, ..PreparationSeconds::default() };
@@ -264,20 +264,20 @@ impl Solvers {
     fn prepare(
         &self,
         key: &ContentKey,
-        choices: &Choices,
+        valid: &ValidOptions,
         geometry: Option<Arc<Geometry>>,
         queued: f64,
-        _place: Held,
+        _place: Permit,
         wanted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<SolverResponse>, ApiError> {
         let clock = Instant::now();
         metrics::counter!("cager_cache_total", "result" => "miss").increment(1);
         let geometry = match geometry {
             Some(geometry) => geometry,
-            None => Arc::new(super::read(&self.content(key)?, choices)?),
+            None => Arc::new(super::read(&self.content(key)?, valid)?),
         };
         let read = clock.elapsed().as_secs_f64();
-        let prepared = self.pool.install(|| super::prepare(&geometry, choices, self.max_bytes, wanted))?;
+        let prepared = self.pool.install(|| super::prepare(&geometry, valid, self.max_bytes, wanted))?;
         let Some((prepared, [coordinates, maxvol, svd])) = prepared else { return Ok(None) };
         let total = queued + clock.elapsed().as_secs_f64();
         let seconds = PreparationSeconds { queued, read, coordinates, maxvol, svd, total };

@@ -1,10 +1,10 @@
 //! Creating a recovery.
 
-use super::choices::Choices;
+use super::valid_options::ValidOptions;
 use super::{Recovery, RecoveryJob};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
-use crate::idempotency::{extension, request};
+use crate::idempotency::{extension, fingerprint};
 use crate::jobs::new_job;
 use crate::preparation::{cage_of, check_extent, read_part};
 use crate::problem::{self, ApiError};
@@ -25,7 +25,7 @@ pub(crate) struct NewRecovery {
     pub(crate) options: RecoveryOptions,
     pub(crate) idempotency_key: Option<String>,
     /// Permit for the memory of the files.
-    pub(crate) room: Held,
+    pub(crate) room: Permit,
 }
 
 /// Results of validating the input.
@@ -85,14 +85,14 @@ impl Service {
 fn request_of(new: &NewRecovery) -> Option<Idempotency> {
     let parts: Vec<_> = new.parts.named().map(|(name, part)| (name, extension(&part.name), &part.bytes)).collect();
     let sent = parts.iter().flat_map(|(name, extension, bytes)| [name.as_bytes(), extension.as_bytes(), bytes]);
-    request(new.idempotency_key.clone(), sent, &new.options)
+    fingerprint(new.idempotency_key.clone(), sent, &new.options)
 }
 
 /// Validates options and files, so that errors are reported in the response. Blocks.
 fn check(new: &NewRecovery) -> Result<Checked, ApiError> {
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_GEOMETRY, detail));
     let RecoveryParts { template: file, cage, rig, manifold } = &new.parts;
-    Choices::of(&new.options, rig.is_some())?;
+    ValidOptions::of(&new.options, rig.is_some())?;
     let template = read_part("template", &file.name, &file.bytes)?;
     if template.faces.is_empty() {
         return refuse(format!("template: {}: has no faces, and a template is a mesh; give one with faces", file.name));

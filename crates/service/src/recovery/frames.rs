@@ -1,9 +1,9 @@
 //! Frames of a recovery as they are sent, and the end of them.
 
-use super::choices::Choices;
+use super::valid_options::ValidOptions;
 use super::view::missing;
 use super::{RecoveryJob, closed};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
@@ -32,7 +32,7 @@ impl Service {
         job: &Arc<RecoveryJob>,
         frame: u32,
         file: NamedFile,
-        room: Held,
+        room: Permit,
     ) -> Result<PostedFrame, ApiError> {
         if let Some(error) = closed(job) {
             return Err(error);
@@ -47,7 +47,7 @@ impl Service {
         if is_known(job, frame, &part)? {
             return Ok(posted);
         }
-        let place = self.reading.take(&tenant.name, 1).await;
+        let place = self.parse_slots.take(&tenant.name, 1).await;
         let checking = Arc::clone(job);
         let file = blocking(move || {
             let _place = place;
@@ -196,7 +196,7 @@ fn check(job: &RecoveryJob, frame: u32, file: &NamedFile) -> Result<(), ApiError
     let format = MeshFormat::from_path(path).map_err(|error| refuse(error.to_string()))?;
     let mut model = read_model_bytes(format, path, &file.bytes).map_err(|error| refuse(error.to_string()))?;
     cager_capture::origin::move_to(job.meta.origin, &mut model.points);
-    let points = Choices::of(options, job.meta.parts.rig.is_some())?.recover.points;
+    let points = ValidOptions::of(options, job.meta.parts.rig.is_some())?.recover.points;
     match observed(&model, frame as usize, points) {
         Err(error) if !options.force => Err(refuse(format!(
             "{}: {error}; or make the recovery with force (--force on the command line) to go on without such frames",

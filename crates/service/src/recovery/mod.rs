@@ -2,12 +2,12 @@
 //! before they are acknowledged; what follows them is `cager recover` itself, which reads them again whenever it needs them. So a restart begins
 //! with the first frame and comes to the same results.
 
-mod choices;
 mod create;
 mod finish;
 mod frames;
 mod run;
 mod source;
+mod valid_options;
 mod view;
 
 pub(crate) use create::NewRecovery;
@@ -36,7 +36,7 @@ impl Work for Recovery {
     const NAME: &'static str = "recovery";
     const LIST: &'static str = "/v1/recoveries";
     const ENDED: &'static str = "cager_recoveries_total";
-    const FAILED: problem::Kind = problem::RECOVERY_FAILED;
+    const FAILED: problem::ProblemKind = problem::RECOVERY_FAILED;
     const UNFINISHED: &'static str = "results are written when the recovery is completed; post {\"frames\": F} to complete, and wait until its state is completed";
     const MISSING: &'static str =
         "there are joints where a rig and a manifold were sent; make the recovery anew with them";

@@ -1,10 +1,10 @@
 //! Following frames: a limited number of recoveries at a time, tenants in turn, on the threads of the lowest priority.
 
-use super::choices::Choices;
 use super::finish::{refused, results};
 use super::source::StoredSurfaces;
+use super::valid_options::ValidOptions;
 use super::{Finished, FollowedCage, RecoveryJob};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::jobs::{Ended, MAX_ATTEMPTS, Phase};
 use crate::preparation::{cage_of, read_part};
 use crate::problem::{self, ApiError};
@@ -47,7 +47,7 @@ impl Service {
     }
 
     /// Follows frames until there are none for a while, or to the end. Blocks.
-    fn recover(self: Arc<Self>, job: &Arc<RecoveryJob>, place: Held) -> Ended<Finished> {
+    fn recover(self: Arc<Self>, job: &Arc<RecoveryJob>, place: Permit) -> Ended<Finished> {
         let source = StoredSurfaces::new(Arc::clone(&self), Arc::clone(job), place);
         match source.begin() {
             Ok(true) => {}
@@ -79,7 +79,8 @@ impl Service {
     ) -> Result<Option<(Finished, Workshop)>, ApiError> {
         let (meta, pool) = (&job.meta, self.designs.threads());
         let damaged = |error: StoreError| job.fail_if_damaged(&self.store, error);
-        let Choices { recover: options, person, goal } = Choices::of(&meta.options, meta.parts.rig.is_some())?;
+        let ValidOptions { recover: options, person, goal } =
+            ValidOptions::of(&meta.options, meta.parts.rig.is_some())?;
         let RecoveryParts { template, cage, rig, manifold } = self.store.recovery_parts(meta).map_err(damaged)?;
         let mut model = read_part("template", &template.name, &template.bytes)?;
         move_to(meta.origin, &mut model.points);

@@ -1,7 +1,7 @@
 //! Frames of a recovery as its surfaces: those that are stored, and then those that come.
 
 use super::RecoveryJob;
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::jobs::MAX_ATTEMPTS;
 use crate::problem::ApiError;
 use crate::service::Service;
@@ -28,7 +28,7 @@ pub(super) struct StoredSurfaces {
     job: Arc<RecoveryJob>,
     runtime: Handle,
     /// The place among those that work, and since when; given back while there is nothing to do.
-    place: Mutex<Option<(Held, Instant)>>,
+    place: Mutex<Option<(Permit, Instant)>>,
     /// Whether this is noted as an attempt, which may end the process.
     is_counted: AtomicBool,
     /// How many frames were ever followed, over restarts.
@@ -39,7 +39,7 @@ pub(super) struct StoredSurfaces {
 
 impl StoredSurfaces {
     /// With a place for the work. Call within a tokio runtime.
-    pub(super) fn new(service: Arc<Service>, job: Arc<RecoveryJob>, place: Held) -> Self {
+    pub(super) fn new(service: Arc<Service>, job: Arc<RecoveryJob>, place: Permit) -> Self {
         let (place, failure) = (Mutex::new(Some((place, Instant::now()))), Mutex::default());
         let (is_counted, reached) = (AtomicBool::new(false), AtomicU32::new(0));
         Self { service, job, runtime: Handle::current(), place, is_counted, reached, failure }
@@ -102,12 +102,12 @@ impl StoredSurfaces {
     }
 
     /// Room to keep what is known while it waits.
-    fn keep(&self) -> Option<Held> {
+    fn keep(&self) -> Option<Permit> {
         self.service.recoveries_kept.try_take(&self.job.meta.tenant, 1).ok()
     }
 
     /// Waits for a place to work at, with what it keeps meanwhile; after a while it is the turn of others who wait, where there is room to wait too.
-    async fn take_place(&self, kept: Option<Held>) -> Arrival {
+    async fn take_place(&self, kept: Option<Permit>) -> Arrival {
         let since = lock(&self.place).as_ref().map(|(_, since)| *since);
         if since.is_some_and(|since| since.elapsed() < TURN) {
             return Arrival::There;
@@ -129,7 +129,7 @@ impl SurfaceSource for StoredSurfaces {
     fn wait_for(&self, frame: usize) -> Arrival {
         self.runtime.block_on(async {
             let mut changes = self.job.changes();
-            let mut kept: Option<(Held, tokio::time::Instant)> = None;
+            let mut kept: Option<(Permit, tokio::time::Instant)> = None;
             loop {
                 changes.mark_unchanged();
                 if self.is_stopped() {

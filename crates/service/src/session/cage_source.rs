@@ -1,6 +1,6 @@
 //! The cage of a new session: as it was sent, designed before, or made around the rest pose.
 
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::preparation::{CAGE_NAME, Enclosed, refuse_cage};
 use crate::problem::ApiError;
 use crate::service::Service;
@@ -10,7 +10,7 @@ use cager_proto::messages::{CageSource, SessionOptions};
 use std::sync::Arc;
 
 /// The files of a request that creates a session.
-pub(crate) struct Uploaded {
+pub(crate) struct UploadedFiles {
     pub(crate) rest: NamedFile,
     pub(crate) cage: Option<NamedFile>,
     pub(crate) matrix: Option<NamedFile>,
@@ -24,11 +24,11 @@ impl Service {
     pub(crate) async fn resolve_cage(
         &self,
         tenant: &str,
-        uploaded: Uploaded,
+        uploaded: UploadedFiles,
         options: &SessionOptions,
-        room: &Arc<Held>,
+        room: &Arc<Permit>,
     ) -> Result<(Content, Option<ContentKey>), ApiError> {
-        let Uploaded { rest, cage, matrix } = uploaded;
+        let UploadedFiles { rest, cage, matrix } = uploaded;
         let (rest, cage, made) = match (cage, options.cage.clone()) {
             (Some(cage), None) => (rest, cage, None),
             (Some(_), Some(_)) => {

@@ -4,7 +4,7 @@ use super::container_frames::ContainerFrames;
 use super::facts::Outcome;
 use super::frames::{Missing, SealError};
 use super::{Phase, Session};
-use crate::preparation::{self, Choices, Geometry, Prepared, cannot_be_coded};
+use crate::preparation::{self, Geometry, Prepared, ValidOptions, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, SessionMeta, StoreError, StoredPart};
@@ -92,7 +92,7 @@ impl Service {
         blocking(move || cleaned.remove_uncoded(frames)).await?;
         session.forget_coder();
         if let Some(due) = due {
-            self.webhooks.tell(session, due);
+            self.webhooks.send(session, due);
         }
         Ok(())
     }
@@ -239,7 +239,7 @@ impl Session {
     pub(crate) fn geometry(&self) -> Result<Geometry, ApiError> {
         let content = self.store.content(&self.meta.key).map_err(|error| self.storage_error(error))?;
         let content = content.ok_or_else(|| self.missing_content_error())?;
-        preparation::read(&content, &Choices::of(&self.meta.options)?)
+        preparation::read(&content, &ValidOptions::of(&self.meta.options)?)
     }
 
     /// What is known of its rest pose, its cage and its matrix without reading them. Blocks.
@@ -269,12 +269,12 @@ impl Session {
     /// # Errors
     /// Storage errors; `SESSION_DELETED`.
     pub(crate) fn rest_cage(&self) -> Result<Cage, ApiError> {
-        let choices = Choices::of(&self.meta.options)?;
-        if choices.goal.is_some() {
+        let valid = ValidOptions::of(&self.meta.options)?;
+        if valid.goal.is_some() {
             return Ok(self.geometry()?.cage);
         }
         let file = self.store.content_cage(&self.meta.key).map_err(|error| self.storage_error(error))?;
-        preparation::read_cage(&file.ok_or_else(|| self.missing_content_error())?, &choices)
+        preparation::read_cage(&file.ok_or_else(|| self.missing_content_error())?, &valid)
     }
 }
 
@@ -306,7 +306,7 @@ fn write(session: &Session, prepared: &Prepared, frames: u32, webhooks: &Webhook
         return Err(cannot_be_coded(Goal::Size(asked), &CodingError::TooSmall { asked, least: written.bytes }));
     }
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
-    let due = webhooks.keep(session, Event::Completed).map_err(stored)?;
+    let due = webhooks.store_pending(session, Event::Completed).map_err(stored)?;
     session.mark(&completion).map_err(stored)?;
     Ok(Written { completion, due })
 }

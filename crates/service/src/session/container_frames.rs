@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::groups::StoredGroup;
-use crate::preparation::{Choices, Geometry, Prepared};
+use crate::preparation::{Geometry, Prepared, ValidOptions};
 use cager_capture::capture::{CaptureWriter, Encoding, StoredError};
 use cager_capture::coding::Carried;
 use cager_proto::container;
@@ -29,11 +29,11 @@ impl<W: Write> ContainerFrames<W> {
     /// # Errors
     /// Options of another version; an output that refuses.
     pub(crate) fn begin(session: &Session, prepared: &Prepared, geometry: &Geometry, out: W) -> io::Result<Self> {
-        let choices = Choices::of(&session.meta.options)?;
+        let valid = ValidOptions::of(&session.meta.options)?;
         let encoding = Encoding {
             rest: &geometry.rest,
             cage: &geometry.cage,
-            system: choices.system,
+            system: valid.system,
             options: prepared.options,
             solver: &prepared.solver,
             frame_rate: session.meta.options.frame_rate,

@@ -1,15 +1,15 @@
 //! Creating, preparing and deleting sessions.
 
-use super::cage_source::Uploaded;
+use super::cage_source::UploadedFiles;
 use super::facts::{Facts, Outcome};
 use super::resume::CompletionState;
 use super::solve;
 use super::upload::FrameJob;
-use super::{LiveLane, Phase, Session, Status};
-use crate::admission::Held;
+use super::{Phase, Session, SessionQueue, Status};
+use crate::admission::Permit;
 use crate::auth::Tenant;
-use crate::idempotency::{extension, made_before, once, request};
-use crate::preparation::{self, Choices, Geometry, Prepared, SolverRequest, SolverResponse, content_key};
+use crate::idempotency::{create_once, extension, fingerprint, made_before};
+use crate::preparation::{self, Geometry, Prepared, SolverRequest, SolverResponse, ValidOptions, content_key};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Content, ContentKey, Idempotency, Kind, NamedFile, SessionMeta, StoredPart};
@@ -25,11 +25,11 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// A request to create a session.
 pub(crate) struct NewSession {
-    pub(crate) uploaded: Uploaded,
+    pub(crate) uploaded: UploadedFiles,
     pub(crate) options: SessionOptions,
     pub(crate) idempotency_key: Option<String>,
     /// Permit for the memory that the uploaded files take.
-    pub(crate) room: Held,
+    pub(crate) room: Permit,
 }
 
 /// A request whose options have been validated.
@@ -38,7 +38,7 @@ struct Checked {
     content: Content,
     made_cage: Option<ContentKey>,
     options: SessionOptions,
-    choices: Choices,
+    valid: ValidOptions,
 }
 
 impl Service {
@@ -52,7 +52,7 @@ impl Service {
     ) -> Result<Arc<Session>, ApiError> {
         let NewSession { uploaded, options, idempotency_key, room } = new;
         let room = Arc::new(room);
-        let choices = Choices::of(&options)?;
+        let valid = ValidOptions::of(&options)?;
         let (uploaded, options, request) = blocking(move || {
             let request = request_of(idempotency_key, &uploaded, &options);
             (uploaded, options, request)
@@ -66,14 +66,14 @@ impl Service {
         let (content, made_cage) = self.resolve_cage(&tenant.name, uploaded, &options, &room).await?;
         let (key, content) = {
             let (tenant, options) = (tenant.name.clone(), options.clone());
-            blocking(move || (content_key(&tenant, &content, &options, &choices), content)).await?
+            blocking(move || (content_key(&tenant, &content, &options, &valid), content)).await?
         };
-        let checked = Checked { key, content, made_cage, options, choices };
+        let checked = Checked { key, content, made_cage, options, valid };
         let (service, tenant) = (Arc::clone(self), Arc::clone(tenant));
         to_the_end(async move {
             let _room = room;
             let make = |request| service.create_new(&tenant, checked, request);
-            once(&service.registry, &tenant.name, request, make).await
+            create_once(&service.registry, &tenant.name, request, make).await
         })
         .await
     }
@@ -84,7 +84,7 @@ impl Service {
         checked: Checked,
         idempotency: Option<Idempotency>,
     ) -> Result<Arc<Session>, ApiError> {
-        let Checked { key, content, made_cage, options, choices } = checked;
+        let Checked { key, content, made_cage, options, valid } = checked;
         let room = self.reserve(tenant, content.size_bytes())?;
         let in_memory = self.solvers.in_memory(&key);
         let most = self.config.max_preparing + self.config.max_prepare_queue;
@@ -95,7 +95,7 @@ impl Service {
         }
         let (content, geometry) = match in_memory {
             Some(_) => (content, None),
-            None => self.read_geometry(&tenant.name, &key, content, choices).await?,
+            None => self.read_geometry(&tenant.name, &key, content, valid).await?,
         };
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let meta = SessionMeta {
@@ -110,7 +110,7 @@ impl Service {
         };
         let status = match &in_memory {
             Some(prepared) => {
-                let facts = Facts::new(prepared, choices.goal.is_some(), CacheUse::Hit, PreparationSeconds::default());
+                let facts = Facts::new(prepared, valid.goal.is_some(), CacheUse::Hit, PreparationSeconds::default());
                 Status { phase: Phase::Ready, facts: Some(facts) }
             }
             None => Status { phase: Phase::Preparing, facts: None },
@@ -134,8 +134,7 @@ impl Service {
             // Not awaited: without a stored outcome a restart prepares the session again, and finds its solver on disk.
             Some(facts) => drop(self.keep_outcome(&session, Outcome::Ready(Box::new(facts)))),
             None => {
-                let preparing =
-                    Arc::clone(self).prepare(Arc::clone(&session), choices, geometry, CompletionState::None);
+                let preparing = Arc::clone(self).prepare(Arc::clone(&session), valid, geometry, CompletionState::None);
                 drop(tokio::spawn(preparing.with_current_context()));
             }
         }
@@ -171,20 +170,20 @@ impl Service {
         tenant: &str,
         key: &ContentKey,
         content: Content,
-        choices: Choices,
+        valid: ValidOptions,
     ) -> Result<(Content, Option<Arc<Geometry>>), ApiError> {
         if self.solvers.is_stored(key) {
             return Ok((content, None));
         }
-        let place = self.reading.take(tenant, 1).await;
+        let place = self.parse_slots.take(tenant, 1).await;
         let (content, geometry) = blocking(move || {
             let _place = place;
-            let geometry = preparation::read(&content, &choices);
+            let geometry = preparation::read(&content, &valid);
             (content, geometry)
         })
         .await?;
         let geometry = Arc::new(geometry?);
-        preparation::check(&geometry, &choices, self.config.max_prepare_bytes)?;
+        preparation::check(&geometry, &valid, self.config.max_prepare_bytes)?;
         let soon = self.solvers.in_flight() <= self.config.max_preparing;
         Ok((content, soon.then_some(geometry)))
     }
@@ -192,7 +191,7 @@ impl Service {
     pub(super) async fn prepare(
         self: Arc<Self>,
         session: Arc<Session>,
-        choices: Choices,
+        valid: ValidOptions,
         mut geometry: Option<Arc<Geometry>>,
         mark: CompletionState,
     ) {
@@ -200,7 +199,7 @@ impl Service {
         let mut again = true;
         let got = loop {
             let got = tokio::select! {
-                got = self.solvers.get(wanted(&session, choices, geometry.take())) => got,
+                got = self.solvers.get(wanted(&session, valid, geometry.take())) => got,
                 () = session.deleted().cancelled() => return,
             };
             // This request may have joined the preparation of a session that was deleted meanwhile together with its content.
@@ -212,7 +211,7 @@ impl Service {
         match got {
             Ok(SolverResponse { prepared, cache, mut seconds }) => {
                 seconds.total = clock.elapsed().as_secs_f64();
-                let facts = Facts::new(&prepared, choices.goal.is_some(), cache, seconds);
+                let facts = Facts::new(&prepared, valid.goal.is_some(), cache, seconds);
                 session.set_status(Status { phase: Phase::Preparing, facts: Some(facts.clone()) });
                 self.keep_outcome(&session, Outcome::Ready(Box::new(facts.clone()))).await;
                 // The previous process may have ended after writing frames but before storing the outcome. They are loaded before clients
@@ -233,11 +232,11 @@ impl Service {
                     self.keep_outcome(&session, Outcome::Failed(error.problem.clone())).await;
                 }
                 let (webhooks, ended) = (Arc::clone(&self.webhooks), Arc::clone(&session));
-                let due = blocking(move || webhooks.keep(&ended, Event::Failed)).await;
+                let due = blocking(move || webhooks.store_pending(&ended, Event::Failed)).await;
                 session.set_phase(Phase::Failed(error.problem));
                 match due {
                     Ok(Ok(None)) => {}
-                    Ok(Ok(Some(due))) => self.webhooks.tell(&session, due),
+                    Ok(Ok(Some(due))) => self.webhooks.send(&session, due),
                     Ok(Err(_)) | Err(_) => self.webhooks.send_unrecorded(&session),
                 }
             }
@@ -256,16 +255,16 @@ impl Service {
 
     /// The solver of a session that is ready.
     pub(crate) async fn solver(self: &Arc<Self>, session: &Session) -> Result<Arc<Prepared>, ApiError> {
-        let choices = Choices::of(&session.meta.options)?;
-        let got = self.solvers.get(wanted(session, choices, None)).await;
+        let valid = ValidOptions::of(&session.meta.options)?;
+        let got = self.solvers.get(wanted(session, valid, None)).await;
         let prepared = got.map_err(|error| session.explain_missing_content(error))?.prepared;
         session.check_handles(&prepared)?;
         Ok(prepared)
     }
 
     /// The engine lane of a session's frames, opened if no upload holds one.
-    pub(crate) fn lane(&self, session: &Arc<Session>, prepared: Arc<Prepared>, tenant: &Tenant) -> Arc<LiveLane> {
-        session.live_lane(|| {
+    pub(crate) fn lane(&self, session: &Arc<Session>, prepared: Arc<Prepared>, tenant: &Tenant) -> Arc<SessionQueue> {
+        session.queue(|| {
             let cost = {
                 let decoder = prepared.solver.decoder();
                 let (points, columns) = (decoder.points() as f64, decoder.columns() as f64);
@@ -281,7 +280,7 @@ impl Service {
                 }
             };
             let (name, weight) = (&tenant.name, tenant.priority.weight());
-            LiveLane::new(match in_order {
+            SessionQueue::new(match in_order {
                 true => self.engine.lane_in_order(name, weight, cost, run),
                 false => self.engine.lane(name, weight, cost, run),
             })
@@ -319,7 +318,7 @@ impl Service {
 
 impl Session {
     /// Whether it was made of these files and options, as far as that can be told. Blocks.
-    fn is_of(&self, uploaded: &Uploaded, options: &SessionOptions) -> bool {
+    fn is_of(&self, uploaded: &UploadedFiles, options: &SessionOptions) -> bool {
         let (Ok(sent), Ok(files)) = (self.sent_options(), self.files()) else { return false };
         let given = [Some(&uploaded.rest), uploaded.cage.as_ref(), uploaded.matrix.as_ref()];
         let is_same = |(there, given): (&Option<StoredPart>, Option<&NamedFile>)| match (there, given) {
@@ -332,21 +331,21 @@ impl Session {
 }
 
 /// The request with an idempotency key that these files and options are. Blocks.
-fn request_of(key: Option<String>, uploaded: &Uploaded, options: &SessionOptions) -> Option<Idempotency> {
+fn request_of(key: Option<String>, uploaded: &UploadedFiles, options: &SessionOptions) -> Option<Idempotency> {
     let files = [Some(&uploaded.rest), uploaded.cage.as_ref(), uploaded.matrix.as_ref()];
     let names = files.map(|file| file.map_or_else(String::new, |file| extension(&file.name)));
     let parts = files
         .iter()
         .zip(&names)
         .flat_map(|(file, name)| [name.as_bytes(), file.map_or(&[][..], |file| file.bytes.as_slice())]);
-    request(key, parts, options)
+    fingerprint(key, parts, options)
 }
 
-fn wanted(session: &Session, choices: Choices, geometry: Option<Arc<Geometry>>) -> SolverRequest {
+fn wanted(session: &Session, valid: ValidOptions, geometry: Option<Arc<Geometry>>) -> SolverRequest {
     SolverRequest {
         key: session.meta.key,
         tenant: session.meta.tenant.clone(),
-        choices,
+        valid,
         geometry,
         trace: Context::current(),
     }

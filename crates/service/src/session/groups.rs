@@ -3,7 +3,7 @@
 use super::container_frames::ContainerFrames;
 use super::facts::Facts;
 use super::{Phase, Session};
-use crate::preparation::{Choices, Geometry, Prepared, cannot_be_coded};
+use crate::preparation::{Geometry, Prepared, ValidOptions, cannot_be_coded};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{FrameEntry, SessionBytes, StoreError};
@@ -27,7 +27,7 @@ const RETRY: Duration = Duration::from_secs(30);
 #[derive(Default)]
 pub(crate) struct Groups {
     /// From frame 0 on, without gaps.
-    pub(super) coded: Vec<CodedGroup>,
+    pub(super) coded: Vec<GroupOnDisk>,
     pub(super) carried: Carried,
     /// What follows these in the completion that is going on: nothing of it stays if that fails.
     pub(super) last: Vec<LastGroup>,
@@ -39,14 +39,14 @@ pub(crate) struct Groups {
 
 /// A group that is coded for a completion: with fewer frames than usual, or for another number of frames than was announced.
 pub(super) struct LastGroup {
-    pub(super) group: CodedGroup,
+    pub(super) group: GroupOnDisk,
     pub(super) errors: Vec<StoredError>,
     pub(super) carried: Carried,
 }
 
 /// A coded group on disk.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct CodedGroup {
+pub(crate) struct GroupOnDisk {
     pub(crate) first: u32,
     pub(crate) frames: u32,
     pub(super) bytes: u64,
@@ -79,13 +79,13 @@ impl Groups {
     }
 
     /// The group that a frame belongs to, if it is coded.
-    pub(crate) fn of(&self, frame: u32) -> Option<CodedGroup> {
+    pub(crate) fn of(&self, frame: u32) -> Option<GroupOnDisk> {
         let at = self.coded.partition_point(|group| group.first + group.frames <= frame);
         self.coded.get(at).copied()
     }
 
     fn add(&mut self, first: u32, group: &StoredGroup, bytes: u64) {
-        self.coded.push(CodedGroup { first, frames: group.errors.len() as u32, bytes });
+        self.coded.push(GroupOnDisk { first, frames: group.errors.len() as u32, bytes });
         self.carried = group.carried;
     }
 }
@@ -114,7 +114,7 @@ impl Session {
     }
 
     /// The coded group that a frame belongs to.
-    pub(crate) fn coded_group(&self, frame: u32) -> Option<CodedGroup> {
+    pub(crate) fn coded_group(&self, frame: u32) -> Option<GroupOnDisk> {
         lock(&self.groups).of(frame)
     }
 
@@ -279,7 +279,7 @@ impl Session {
         self.bytes.fetch_add(put, Relaxed);
         if is_last {
             let StoredGroup { errors, carried, .. } = group;
-            let group = CodedGroup { first, frames: errors.len() as u32, bytes: put };
+            let group = GroupOnDisk { first, frames: errors.len() as u32, bytes: put };
             lock(&self.groups).last.push(LastGroup { group, errors, carried });
             return Ok(());
         }
@@ -326,7 +326,7 @@ impl Session {
         geometry: &Geometry,
         goal: Goal,
     ) -> Result<Arc<GroupDecoder>, ApiError> {
-        let system = Choices::of(&self.meta.options)?.system;
+        let system = ValidOptions::of(&self.meta.options)?.system;
         let mut kept = lock(&self.group_decoder);
         if let Some(decoder) = kept.upgrade() {
             return Ok(decoder);
@@ -353,11 +353,11 @@ impl Service {
     /// Codes the frames of a session, where they are to be, as groups become whole.
     pub(crate) fn code_in_background(self: &Arc<Self>, session: &Arc<Session>) {
         if session.goal().is_some() {
-            tokio::spawn(Arc::clone(self).code_as_they_come(Arc::clone(session)));
+            tokio::spawn(Arc::clone(self).run_group_coder(Arc::clone(session)));
         }
     }
 
-    async fn code_as_they_come(self: Arc<Self>, session: Arc<Session>) {
+    async fn run_group_coder(self: Arc<Self>, session: Arc<Session>) {
         let mut changes = session.changes();
         loop {
             changes.mark_unchanged();

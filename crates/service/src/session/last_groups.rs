@@ -1,13 +1,13 @@
 //! Groups that are coded only because a session is being completed: they stay with its completion, or not at all.
 
 use super::Session;
-use super::groups::{CodedGroup, LastGroup};
+use super::groups::{GroupOnDisk, LastGroup};
 use crate::sync::lock;
 use std::sync::atomic::Ordering::Relaxed;
 
 impl Session {
     /// As [`Self::coded_group`], with the groups of a completion that is going on.
-    pub(crate) fn group_to_write(&self, frame: u32) -> Option<CodedGroup> {
+    pub(crate) fn group_to_write(&self, frame: u32) -> Option<GroupOnDisk> {
         let groups = lock(&self.groups);
         groups.of(frame).or_else(|| {
             let mut last = groups.last.iter().map(|last| last.group);

@@ -18,7 +18,7 @@ pub(crate) mod upload;
 mod view;
 
 use crate::engine::Lane;
-use crate::preparation::Choices;
+use crate::preparation::ValidOptions;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, FrameEntry, Kind, SessionMeta, Store, StoreError};
@@ -57,7 +57,7 @@ pub(crate) struct Session {
     waiting: Mutex<CommitQueue>,
     /// The last solved frame and its cage, in sessions whose frames depend on their predecessors.
     last_solved: Mutex<Option<(u32, Vec<f32>)>>,
-    lane: Mutex<Weak<LiveLane>>,
+    lane: Mutex<Weak<SessionQueue>>,
     /// What the container is to meet; without it frames are stored as they are solved for.
     goal: Option<Goal>,
     groups: Mutex<Groups>,
@@ -92,12 +92,12 @@ pub(crate) enum Phase {
 
 /// A session's queue in the engine, together with the prepared solver. It exists while uploads run, so that the solvers of idle sessions
 /// can be evicted.
-pub(crate) struct LiveLane {
+pub(crate) struct SessionQueue {
     pub(crate) lane: Lane<FrameJob>,
     uploads: AtomicU64,
 }
 
-impl LiveLane {
+impl SessionQueue {
     pub(crate) fn new(lane: Lane<FrameJob>) -> Self {
         Self { lane, uploads: AtomicU64::new(0) }
     }
@@ -122,7 +122,7 @@ impl Session {
         if matches!(status.phase, Phase::Completed(_)) {
             frames.seal();
         }
-        let goal = Choices::of(&meta.options).ok().and_then(|choices| choices.goal);
+        let goal = ValidOptions::of(&meta.options).ok().and_then(|valid| valid.goal);
         Self {
             meta,
             store: service.store.clone(),
@@ -341,7 +341,7 @@ impl Session {
     }
 
     /// The lane shared by running uploads, created if there is none.
-    pub(crate) fn live_lane(&self, make: impl FnOnce() -> LiveLane) -> Arc<LiveLane> {
+    pub(crate) fn queue(&self, make: impl FnOnce() -> SessionQueue) -> Arc<SessionQueue> {
         let mut lane = lock(&self.lane);
         lane.upgrade().unwrap_or_else(|| {
             let live = Arc::new(make());

@@ -1,7 +1,7 @@
 //! All sessions by id and tenant, the idempotency keys that created them, and storage usage.
 
 use super::Session;
-use crate::idempotency::{Keyed, Requests};
+use crate::idempotency::{Keyed, KnownKeys};
 use crate::problem::{self, ApiError};
 use crate::store::ContentKey;
 use crate::sync::lock;
@@ -20,7 +20,7 @@ pub(crate) struct Registry {
 #[derive(Default)]
 struct Inner {
     sessions: BTreeMap<String, Arc<Session>>,
-    requests: Requests,
+    requests: KnownKeys,
     /// Number and bytes of sessions and cage jobs being created, by tenant.
     reserved: HashMap<String, (u64, u64)>,
 }
@@ -181,7 +181,7 @@ impl Registry {
 }
 
 impl Keyed<Session> for Arc<Registry> {
-    fn requests<R>(&self, work: impl FnOnce(&mut Requests) -> R) -> R {
+    fn requests<R>(&self, work: impl FnOnce(&mut KnownKeys) -> R) -> R {
         work(&mut lock(&self.inner).requests)
     }
 

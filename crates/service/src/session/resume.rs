@@ -3,7 +3,7 @@
 use super::facts::Outcome;
 use super::frames::Frames;
 use super::{Phase, Session, Status};
-use crate::preparation::{Choices, Prepared};
+use crate::preparation::{Prepared, ValidOptions};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Completion, Kind, SessionBytes, SessionMeta, Store, StoreError};
@@ -100,8 +100,8 @@ impl Session {
 const USUAL_DEPENDS_ON_CODING: u32 = 5;
 
 /// With what an earlier version meant by options that were left out.
-fn as_it_was_meant(mut meta: SessionMeta) -> SessionMeta {
-    let is_coded = Choices::of(&meta.options).is_ok_and(|choices| choices.goal.is_some());
+fn with_defaults_of_its_version(mut meta: SessionMeta) -> SessionMeta {
+    let is_coded = ValidOptions::of(&meta.options).is_ok_and(|valid| valid.goal.is_some());
     if is_coded && meta.solver_version < USUAL_DEPENDS_ON_CODING {
         let SolverOptions { handles, lambda, .. } = SolverOptions::default();
         meta.options.handles.get_or_insert_with(|| handles.name().to_owned());
@@ -116,7 +116,7 @@ impl Service {
     /// # Errors
     /// Those of the catalogue.
     pub(crate) fn resume(self: &Arc<Self>, meta: SessionMeta) -> Result<(), StoreError> {
-        let meta = as_it_was_meant(meta);
+        let meta = with_defaults_of_its_version(meta);
         let bytes = self.store.bytes_of_session(&meta).unwrap_or_else(|error| {
             tracing::warn!(session = %meta.id, %error, "its files cannot be counted");
             SessionBytes::default()
@@ -150,12 +150,12 @@ impl Service {
             Some(Outcome::Ready(facts)) => Status { phase: Phase::Ready, facts: Some(*facts) },
             // Earlier versions stored missing content as a failure; the content may have been restored.
             Some(Outcome::Failed(problem)) if problem.word() != problem::SESSION_DELETED.word => failed(problem),
-            Some(Outcome::Failed(_)) | None => match Choices::of(&meta.options) {
-                Ok(choices) => {
+            Some(Outcome::Failed(_)) | None => match ValidOptions::of(&meta.options) {
+                Ok(valid) => {
                     let session = self.found(meta, Status { phase: Phase::Preparing, facts: None }, bytes);
                     self.registry.insert(Arc::clone(&session));
                     self.code_in_background(&session);
-                    tokio::spawn(Arc::clone(self).prepare(session, choices, None, mark));
+                    tokio::spawn(Arc::clone(self).prepare(session, valid, None, mark));
                     return;
                 }
                 Err(error) => failed(error.problem),

@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::registry::Reserved;
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
 use cager_core::inversion::Rows;
@@ -140,7 +140,7 @@ pub(crate) struct FrameJob {
 /// Limits that a frame counts against.
 pub(crate) struct Permits {
     /// A slot in the upload's window, a place among the frames that wait and memory, until it is solved, or on disk where it has to be coded.
-    pub(crate) solving: Option<(OwnedSemaphorePermit, [Held; 2])>,
+    pub(crate) solving: Option<(OwnedSemaphorePermit, [Permit; 2])>,
     /// A slot in the upload's window of unwritten frames, until it is on disk.
     pub(crate) _writing: OwnedSemaphorePermit,
     /// Quota, until its session has counted it.
@@ -175,7 +175,7 @@ impl FrameJob {
         self.disarmed = true;
     }
 
-    pub(super) fn refuse(self, kind: problem::Kind, detail: String) {
+    pub(super) fn refuse(self, kind: problem::ProblemKind, detail: String) {
         let error = ApiError::new(kind, detail).frame(self.frame);
         self.fail(error);
     }

@@ -2,7 +2,7 @@
 
 use super::frames::RANGES;
 use super::{Phase, Session};
-use crate::preparation::Choices;
+use crate::preparation::ValidOptions;
 use crate::sync::lock;
 use cager_capture::coding::InversionChoices;
 use cager_core::inversion::SolverOptions;
@@ -43,7 +43,7 @@ impl Session {
             }
         };
         let usual = SolverOptions::default();
-        let inversion = Choices::of(options).ok().map(|choices| choices.inversion);
+        let inversion = ValidOptions::of(options).ok().map(|valid| valid.inversion);
         let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
         let problem = match &status.phase {
             Phase::Failed(problem) => Some((**problem).clone()),

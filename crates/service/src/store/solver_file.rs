@@ -17,18 +17,18 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::io;
 
-/// Version of the format, raised whenever [`Facts`] or what it holds changes; versions up to 4 were not safetensors files and begin with [`OLD_FORMAT`].
+/// Version of the format, raised whenever [`SolverFacts`] or what it holds changes; versions up to 4 were not safetensors files and begin with [`OLD_FORMAT`].
 const VERSION: &str = "8";
 const OLD_FORMAT: &[u8] = b"CGRSOLV";
 const HEADER_BYTES: u64 = 1 << 16;
 const CHECKSUM: &str = "crc32c";
 
-/// Most bytes of [`Facts`].
+/// Most bytes of [`SolverFacts`].
 const MAX_FACTS_BYTES: usize = 1 << 30;
 
 /// What a solver is made of beside matrices.
 #[derive(Deserialize, Serialize)]
-struct Facts {
+struct SolverFacts {
     positions: u64,
     reads_all: bool,
     diagonal: f64,
@@ -77,7 +77,7 @@ pub(super) fn write(file: &dyn DiskFile, key: &ContentKey, solver: &Solver) -> i
         Near { faces: near.faces.clone(), margin: near.margin }
     });
     matrices.push(Array::new("phi", phi));
-    let facts = Facts {
+    let facts = SolverFacts {
         positions: decoder.positions() as u64,
         reads_all: solver.reads_all(),
         diagonal: solver.diagonal(),
@@ -167,7 +167,7 @@ pub(super) fn read(file: &dyn DiskFile, key: &ContentKey) -> io::Result<Option<S
     }
     let no_fit = || damage("its parts do not fit together");
     let facts = wire::decode::<_, MAX_FACTS_BYTES>(&facts).map_err(|_| no_fit())?;
-    let Facts { positions, reads_all, diagonal, handles, first, tied, nearness, preparation } = facts;
+    let SolverFacts { positions, reads_all, diagonal, handles, first, tied, nearness, preparation } = facts;
     let positions = positions as usize;
     let target = match (constant, previous, first) {
         (Some(offset), None, None) => RegularizationTarget::Constant(offset),
@@ -357,7 +357,7 @@ mod tests {
         let (handles, first) = (vec![25], Some(vec![26.0]));
         let nearness = Some(Near { faces: vec![[29, 30, 31]], margin: 32.0 });
         let facts =
-            Facts { positions: 27, reads_all: true, diagonal: 28.0, handles, first, tied, nearness, preparation };
+            SolverFacts { positions: 27, reads_all: true, diagonal: 28.0, handles, first, tied, nearness, preparation };
         let bytes = wire::encode::<_, MAX_FACTS_BYTES>(&facts).expect("bytes");
         assert_eq!(crc32c::crc32c(&bytes), 4_213_871_190, "files of this version read otherwise: raise it");
     }

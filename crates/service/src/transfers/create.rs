@@ -1,11 +1,11 @@
 //! Creating a transfer.
 
-use super::choices::Choices;
+use super::valid_options::ValidOptions;
 use super::{Transfer, TransferJob};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::cage_job::samples;
-use crate::idempotency::request_of_files;
+use crate::idempotency::fingerprint_of_files;
 use crate::jobs::new_job;
 use crate::preparation::{cage_of, check_extent, read_part};
 use crate::problem::{self, ApiError};
@@ -38,7 +38,7 @@ pub(crate) struct NewTransfer {
     pub(crate) options: TransferOptions,
     pub(crate) idempotency_key: Option<String>,
     /// Permit for the memory of the files.
-    pub(crate) room: Held,
+    pub(crate) room: Permit,
     /// Quota reserved for the large part.
     pub(crate) reserved: Reserved,
 }
@@ -114,7 +114,7 @@ impl Service {
 fn request_of(new: &NewTransfer) -> Option<Idempotency> {
     let files = new.files.iter().map(|(part, file)| (*part, &file.name[..], blake3::hash(&file.bytes)));
     let large = new.large.iter().map(|(part, name, spool)| (*part, &name[..], spool.digest()));
-    request_of_files(new.idempotency_key.clone(), files.chain(large), &new.options)
+    fingerprint_of_files(new.idempotency_key.clone(), files.chain(large), &new.options)
 }
 
 fn geometry(detail: String) -> ApiError {
@@ -143,14 +143,14 @@ fn check(
         }
     };
     let cage = new.files.get("cage");
-    let choices = Choices::of(&new.options, cage.is_some())?;
+    let valid = ValidOptions::of(&new.options, cage.is_some())?;
     let Some(file) = new.files.get("target") else {
         return bad("part target is missing; send the model that is to move as a file");
     };
     let target = read_part("target", &file.name, &file.bytes)?;
     check_extent("target", &target)?;
     let origin = own_origin(&target.points);
-    let is_fitted = choices.method == MethodChoice::Fitted;
+    let is_fitted = valid.method == MethodChoice::Fitted;
     let (frames, source_points) = frames_of(&new, &large, is_fitted)?;
     if let Some(pairs) = new.files.get(PAIRS) {
         if !is_fitted {

@@ -1,14 +1,14 @@
 //! Transfers, independent of HTTP: the motion of one model moved onto another in the background, as `cager transfer` does it. What was sent is stored until
 //! the job is over, so that a restart begins it again and comes to the same result.
 
-mod choices;
 mod create;
 mod run;
+mod valid_options;
 mod view;
 
-pub(crate) use choices::check_options;
 pub(crate) use create::NewTransfer;
 use create::pairs_of;
+pub(crate) use valid_options::check_options;
 pub(crate) use view::TransferFrames;
 
 use crate::config::ServeConfig;
@@ -35,7 +35,7 @@ impl Work for Transfer {
     const NAME: &'static str = "transfer";
     const LIST: &'static str = "/v1/transfers";
     const ENDED: &'static str = "cager_transfers_total";
-    const FAILED: problem::Kind = problem::TRANSFER_FAILED;
+    const FAILED: problem::ProblemKind = problem::TRANSFER_FAILED;
     const UNFINISHED: &'static str =
         "results are written when the transfer is completed; wait until its state is completed";
     const QUEUE: &'static str = "transfer_queue";

@@ -1,8 +1,8 @@
 //! Moving motions: a limited number of transfers at a time, tenants in turn, on the threads of the lowest priority.
 
-use super::choices::{Choices, design_of};
+use super::valid_options::{ValidOptions, design_of};
 use super::{Finished, TransferJob, pairs_of};
-use crate::admission::Held;
+use crate::admission::Permit;
 use crate::cage_job::samples;
 use crate::jobs::{Ended, MAX_ATTEMPTS, Phase, ResultsError, Stoppable};
 use crate::preparation::{cage_of, read_part};
@@ -49,7 +49,7 @@ impl Service {
     }
 
     /// Moves the motion of a job. Blocks.
-    fn transfer(&self, job: &TransferJob, _place: Held) -> Ended<Finished> {
+    fn transfer(&self, job: &TransferJob, _place: Permit) -> Ended<Finished> {
         match self.store.count_attempt(Kind::Transfer, job.id()) {
             Ok(attempts) if attempts > MAX_ATTEMPTS => {
                 let detail = format!(
@@ -77,11 +77,11 @@ impl Service {
         let (meta, workshop) = (&job.meta, self.store.workshop()?);
         let damaged = |error: StoreError| job.fail_if_damaged(&self.store, error);
         let part = |name: &str| self.store.transfer_part(meta, name).map_err(damaged);
-        let choices = Choices::of(&meta.options, meta.parts.contains_key("cage"))?;
+        let valid = ValidOptions::of(&meta.options, meta.parts.contains_key("cage"))?;
         let file = part("target")?.ok_or_else(|| ApiError::internal(&"a transfer has no target"))?;
         let mut target = read_part("target", &file.name, &file.bytes)?;
         move_to(meta.origin, &mut target.points);
-        let is_fitted = choices.method == MethodChoice::Fitted;
+        let is_fitted = valid.method == MethodChoice::Fitted;
         let cage = part("cage")?.map(|file| cage_of(&file, meta.origin.filter(|_| !is_fitted))).transpose()?;
         let source = match part("source_rest")? {
             Some(rest) => {
@@ -106,13 +106,13 @@ impl Service {
             cage: cage.or(own_cage.filter(|_| is_fitted)),
             frames: &mut frames,
             target: &target,
-            method: choices.method,
-            pose: choices.pose,
-            align: about_origin(choices.align, meta.origin),
-            up: choices.up,
+            method: valid.method,
+            pose: valid.pose,
+            align: about_origin(valid.align, meta.origin),
+            up: valid.up,
             pairs,
             detail: meta.options.detail,
-            system: choices.system,
+            system: valid.system,
             stopped: &stopped,
             scratch: workshop.path(),
         };
@@ -130,7 +130,7 @@ impl Service {
             });
         });
         let moved = moved.map_err(|error| refused(&error, &job.meta))?;
-        let finished = self.results(job, &choices, (&target, moved), &workshop)?;
+        let finished = self.results(job, &valid, (&target, moved), &workshop)?;
         Ok((finished, workshop))
     }
 
@@ -138,7 +138,7 @@ impl Service {
     fn results(
         &self,
         job: &TransferJob,
-        choices: &Choices,
+        valid: &ValidOptions,
         (target, moved): (&Model, Transferred),
         workshop: &Workshop,
     ) -> Result<Finished, ApiError> {
@@ -166,7 +166,7 @@ impl Service {
         let encoding = Encoding {
             output: &output,
             system: &MeanValue,
-            goal: choices.goal,
+            goal: valid.goal,
             // The cage does not hold all of the motion.
             offsets: true,
             origin: job.meta.origin,

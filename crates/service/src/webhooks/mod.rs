@@ -69,7 +69,7 @@ impl Webhooks {
     }
 
     /// The message about a session that ends now; `None` if no receiver wants it.
-    fn due(&self, session: &Session, event: Event) -> Option<PendingMessage> {
+    fn message_for(&self, session: &Session, event: Event) -> Option<PendingMessage> {
         let wanted = |hook: &&Arc<Hook>| hook.wants(&session.meta.tenant, event);
         let left: Vec<String> = self.hooks.iter().filter(wanted).map(|hook| hook.id.clone()).collect();
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
@@ -81,8 +81,8 @@ impl Webhooks {
     ///
     /// # Errors
     /// Storage errors.
-    pub(crate) fn keep(&self, session: &Session, event: Event) -> Result<Option<PendingMessage>, StoreError> {
-        let due = self.due(session, event);
+    pub(crate) fn store_pending(&self, session: &Session, event: Event) -> Result<Option<PendingMessage>, StoreError> {
+        let due = self.message_for(session, event);
         due.as_ref().map_or(Ok(()), |due| self.store.set_announcement(&session.meta.id, due))?;
         Ok(due)
     }
@@ -103,19 +103,19 @@ impl Webhooks {
         if let Some(due) = due.filter(ended) {
             // The message contains frame counts; if frames cannot be read, that is logged.
             let _ = session.load();
-            self.tell(session, due);
+            self.send(session, due);
         }
     }
 
     /// Reports a failed session whose message cannot be stored, because its files are damaged or the disk refuses writes.
     pub(crate) fn send_unrecorded(&self, session: &Session) {
-        if let Some(due) = self.due(session, Event::Failed) {
-            self.tell(session, due);
+        if let Some(due) = self.message_for(session, Event::Failed) {
+            self.send(session, due);
         }
     }
 
     /// Sends a message to its receivers, in the background.
-    pub(crate) fn tell(&self, session: &Session, due: PendingMessage) {
+    pub(crate) fn send(&self, session: &Session, due: PendingMessage) {
         let at = SystemTime::UNIX_EPOCH + Duration::from_millis(due.at_ms);
         let body = Body {
             kind: due.event,

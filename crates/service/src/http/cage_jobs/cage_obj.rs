@@ -1,5 +1,6 @@
 //! `GET /v1/cages/{id}/cage.obj`: the best cage so far, and in the end the result.
 
+use crate::admission::Permit;
 use crate::cage_job::{Cage, CageDesign};
 use crate::http::extract::RequestedJob;
 use crate::http::openapi;
@@ -37,7 +38,7 @@ pub(crate) async fn get(
         etag: digest,
         media_type: "model/obj",
         public: !service.access.is_guarded(),
-        room: service.download_memory.nothing(&tenant.name),
+        room: Permit::empty(&service.download_memory, &tenant.name),
         read: Arc::new(move |range| Ok(Bytes::slice(&obj, range.start as usize..range.end as usize))),
     };
     let mut response = bytes.respond(&headers);

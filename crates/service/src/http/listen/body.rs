@@ -1,6 +1,6 @@
 //! Request and response bodies that report progress to the connection's state.
 
-use super::state::{InFlight, State};
+use super::state::{RequestInFlight, State};
 use bytes::Bytes;
 use http_body::{Body, Frame, SizeHint};
 use hyper::body::Incoming;
@@ -32,7 +32,7 @@ pub fn is_body_timeout(error: &(dyn Error + 'static)) -> bool {
 pub(super) struct RequestBody {
     inner: Incoming,
     state: Arc<State>,
-    in_flight: Option<Arc<InFlight>>,
+    in_flight: Option<Arc<RequestInFlight>>,
     timeout: Duration,
     /// Runs only while a handler waits for data.
     clock: Option<Pin<Box<Sleep>>>,
@@ -42,7 +42,7 @@ pub(super) struct RequestBody {
 }
 
 impl RequestBody {
-    pub(super) fn new(inner: Incoming, in_flight: &Arc<InFlight>, timeout: Duration) -> Self {
+    pub(super) fn new(inner: Incoming, in_flight: &Arc<RequestInFlight>, timeout: Duration) -> Self {
         let state = Arc::clone(in_flight.state());
         // A request without a body is complete.
         let empty = inner.is_end_stream();
@@ -117,14 +117,14 @@ impl Drop for RequestBody {
 /// A response body that reports whether the client reads it.
 pub(super) struct ResponseBody {
     inner: axum::body::Body,
-    in_flight: Arc<InFlight>,
+    in_flight: Arc<RequestInFlight>,
     /// Rest of a large piece, for HTTP/2.
     rest: Bytes,
     split: bool,
 }
 
 impl ResponseBody {
-    pub(super) fn new(inner: axum::body::Body, in_flight: Arc<InFlight>, split: bool) -> Self {
+    pub(super) fn new(inner: axum::body::Body, in_flight: Arc<RequestInFlight>, split: bool) -> Self {
         Self { inner, in_flight, rest: Bytes::new(), split }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Limits;
 use super::idle::{IdleConnections, IdleEntry};
-use super::service::Requests;
+use super::service::RequestService;
 use super::socket::{ConnectionResources, Socket};
 use super::state::{Reason, State};
 use axum::Router;
@@ -98,7 +98,7 @@ impl Shared {
     {
         let state = State::new(Arc::clone(&entry));
         let begun = Arc::new(Notify::new());
-        let service = Requests {
+        let service = RequestService {
             app: if spare { self.spare.clone() } else { self.app.clone() },
             peer,
             limits: Arc::clone(&self.limits),

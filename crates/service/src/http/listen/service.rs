@@ -21,7 +21,7 @@ use tower::Service as _;
 
 /// The requests of one connection.
 #[derive(Clone)]
-pub(super) struct Requests {
+pub(super) struct RequestService {
     pub(super) app: Router,
     pub(super) peer: SocketAddr,
     pub(super) limits: Arc<Limits>,
@@ -30,7 +30,7 @@ pub(super) struct Requests {
     pub(super) only_one: Option<Arc<Notify>>,
 }
 
-impl hyper::service::Service<Request<Incoming>> for Requests {
+impl hyper::service::Service<Request<Incoming>> for RequestService {
     type Response = Response<ResponseBody>;
     type Error = Infallible;
     type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Infallible>> + Send>>;

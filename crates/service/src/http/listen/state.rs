@@ -57,20 +57,20 @@ impl Reason {
 
 /// State of one connection.
 pub(super) struct State {
-    facts: Mutex<Facts>,
+    facts: Mutex<ConnectionFacts>,
     /// Listed while the connection waits for its client.
     entry: Arc<IdleEntry>,
 }
 
 #[derive(Debug)]
-struct Facts {
+struct ConnectionFacts {
     http2: bool,
     /// Requests begun on this connection.
     requests: u64,
     /// Requests whose body is still coming or whose response is still going.
     in_flight: usize,
     /// Requests in progress.
-    open: Vec<Weak<InFlight>>,
+    open: Vec<Weak<RequestInFlight>>,
     /// Start of the connection, later the end of the last request.
     idle_since: Instant,
     /// First byte of a header that is not complete.
@@ -91,7 +91,7 @@ struct Facts {
 impl State {
     pub(super) fn new(entry: Arc<IdleEntry>) -> Arc<Self> {
         let now = Instant::now();
-        let facts = Mutex::new(Facts {
+        let facts = Mutex::new(ConnectionFacts {
             http2: false,
             requests: 0,
             in_flight: 0,
@@ -173,7 +173,7 @@ impl State {
     }
 
     /// A request begins. Gives its header's scan, if it had one.
-    pub(super) fn begin(self: &Arc<Self>) -> (Option<Head>, Arc<InFlight>) {
+    pub(super) fn begin(self: &Arc<Self>) -> (Option<Head>, Arc<RequestInFlight>) {
         let mut facts = lock(&self.facts);
         self.entry.work();
         facts.requests += 1;
@@ -182,8 +182,11 @@ impl State {
         facts.scanner = None;
         facts.progress = Instant::now();
         facts.known = false;
-        let in_flight =
-            Arc::new(InFlight { state: Arc::clone(self), reading: Mutex::default(), known: AtomicBool::new(false) });
+        let in_flight = Arc::new(RequestInFlight {
+            state: Arc::clone(self),
+            reading: Mutex::default(),
+            known: AtomicBool::new(false),
+        });
         facts.open.retain(|open| open.strong_count() > 0);
         facts.open.push(Arc::downgrade(&in_flight));
         (facts.head.take(), in_flight)
@@ -249,7 +252,7 @@ impl State {
 }
 
 /// Shared by the two halves of a request: its body and its response.
-pub(super) struct InFlight {
+pub(super) struct RequestInFlight {
     state: Arc<State>,
     reading: Mutex<Reading>,
     /// Whether who sent it has shown who they are.
@@ -270,7 +273,7 @@ fn allowance(bytes: usize) -> Duration {
     Duration::from_secs_f64(bytes as f64 / SLOWEST_READER_BYTES_PER_SECOND)
 }
 
-impl InFlight {
+impl RequestInFlight {
     pub(super) fn state(&self) -> &Arc<State> {
         &self.state
     }
@@ -313,10 +316,10 @@ impl InFlight {
 
 /// What a handler can tell the listener about the connection that its request came by.
 #[derive(Clone)]
-pub(crate) struct ConnectionHandle(Weak<InFlight>);
+pub(crate) struct ConnectionHandle(Weak<RequestInFlight>);
 
 impl ConnectionHandle {
-    pub(super) fn of(request: &Arc<InFlight>) -> Self {
+    pub(super) fn of(request: &Arc<RequestInFlight>) -> Self {
         Self(Arc::downgrade(request))
     }
 
@@ -329,7 +332,7 @@ impl ConnectionHandle {
     }
 }
 
-impl Drop for InFlight {
+impl Drop for RequestInFlight {
     fn drop(&mut self) {
         let mut facts = lock(&self.state.facts);
         facts.in_flight -= 1;

@@ -9,7 +9,7 @@ use crate::problem::{self, ApiError};
 use crate::recovery::{Recovery, RecoveryJob};
 use crate::service::Service;
 use crate::store::NamedFile;
-use crate::{admission::Held, auth::Tenant};
+use crate::{admission::Permit, auth::Tenant};
 use axum::Json;
 use axum::extract::multipart::Field;
 use axum::extract::{Request, State};
@@ -93,7 +93,7 @@ impl Receiver {
         mut field: Field<'_>,
         frame: u32,
         left: &mut u64,
-    ) -> Result<(NamedFile, Held), ApiError> {
+    ) -> Result<(NamedFile, Permit), ApiError> {
         let name = file_name(&field);
         if !name.contains('.') || name.chars().count() > NAME_CHARACTERS {
             let detail = format!(
@@ -101,7 +101,7 @@ impl Receiver {
             );
             return Err(ApiError::new(problem::INVALID_FRAME, detail).frame(frame));
         }
-        let mut room = self.service.upload_memory.nothing(&self.tenant.name);
+        let mut room = Permit::empty(&self.service.upload_memory, &self.tenant.name);
         let limit = self.service.config.max_rest_bytes;
         let mut bytes = Vec::new();
         while let Some(chunk) = in_time(&mut self.patience, self.pace.chunk(&mut field)).await?? {

@@ -15,7 +15,7 @@ use cager_proto::transfer_messages::{TransferMethod, TransferOptions};
 
 /// Validated options.
 #[derive(Clone, Copy)]
-pub(super) struct Choices {
+pub(super) struct ValidOptions {
     pub(super) method: MethodChoice,
     pub(super) pose: Pose,
     pub(super) align: AlignBy,
@@ -30,10 +30,10 @@ pub(super) struct Choices {
 /// # Errors
 /// An option that is out of range, not available, or contradicts another.
 pub(crate) fn check_options(options: &TransferOptions) -> Result<(), ApiError> {
-    Choices::of(options, false).map(|_| ())
+    ValidOptions::of(options, false).map(|_| ())
 }
 
-impl Choices {
+impl ValidOptions {
     /// Validates the options.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use cager_proto::messages::SessionOptions;
 
 /// Validated options, except the upper bound of `spectrum`, which depends on the cage.
 #[derive(Clone, Copy)]
-pub(crate) struct Choices {
+pub(crate) struct ValidOptions {
     pub(crate) system: &'static dyn CoordinateSystem,
     pub(crate) inversion: InversionChoices,
     pub(crate) flip_cage: bool,
@@ -44,7 +44,7 @@ pub(crate) fn check_told(name: Option<&str>, frame_rate: Option<f64>, start: Opt
     Ok(())
 }
 
-impl Choices {
+impl ValidOptions {
     /// Validates what does not depend on the cage.
     ///
     /// # Errors
@@ -127,19 +127,24 @@ pub(crate) fn goal(options: &SessionOptions) -> Result<Option<Goal>, ApiError> {
 }
 
 /// BLAKE3 digest of everything a solver depends on. It includes the tenant, so that one tenant's upload is never a cache hit for another.
-pub(crate) fn content_key(tenant: &str, content: &Content, options: &SessionOptions, choices: &Choices) -> ContentKey {
+pub(crate) fn content_key(
+    tenant: &str,
+    content: &Content,
+    options: &SessionOptions,
+    valid: &ValidOptions,
+) -> ContentKey {
     let extension = |file: &NamedFile| file.name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
     // Defaults are written out, so that an omitted option and its default give the same key; not those of `spectrum` and `handle_count`, which depend
     // on the cage, and not where frames are coded, where they depend on what else was given.
-    let is_coded = choices.goal.is_some();
-    let inversion = choices.inversion;
+    let is_coded = valid.goal.is_some();
+    let inversion = valid.inversion;
     let solving = SessionOptions {
         name: None,
         frame_rate: None,
         frames: None,
         // The cage's bytes are hashed below, whatever their source.
         cage: None,
-        coordinates: Some(choices.system.name().to_owned()),
+        coordinates: Some(valid.system.name().to_owned()),
         handles: if is_coded { options.handles.clone() } else { Some(inversion.handles().name().to_owned()) },
         regularizer: Some(inversion.regularizer.name().to_owned()),
         lambda: if is_coded { options.lambda } else { Some(inversion.lambda()) },

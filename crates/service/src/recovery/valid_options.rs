@@ -16,14 +16,14 @@ const DEFAULT_POINTS: u32 = 15_000;
 
 /// Validated options.
 #[derive(Clone, Copy)]
-pub(super) struct Choices {
+pub(super) struct ValidOptions {
     pub(super) recover: RecoverOptions,
     pub(super) person: FitOptions,
     /// What the container is to meet; without it cages alone are stored.
     pub(super) goal: Option<Goal>,
 }
 
-impl Choices {
+impl ValidOptions {
     /// Validates the options.
     ///
     /// # Errors
