@@ -7,6 +7,7 @@ pub(crate) mod container_frames;
 pub(crate) mod create;
 pub(crate) mod facts;
 pub(crate) mod frames;
+mod group_coding;
 pub(crate) mod groups;
 mod last_groups;
 pub(crate) mod registry;
