@@ -197,10 +197,12 @@ impl Drop for FrameJob {
     fn drop(&mut self) {
         self.leave_queue();
         if !self.disarmed {
-            self.upload.fail(ApiError::new(
-                problem::SESSION_DELETED,
-                format!("frame {} was not solved, because its session ended", self.frame),
-            ));
+            self.upload.fail(if std::thread::panicking() {
+                ApiError::internal(&format!("frame {} was not solved, because its batch panicked", self.frame))
+            } else {
+                let detail = format!("frame {} was not solved, because its session ended", self.frame);
+                ApiError::new(problem::SESSION_DELETED, detail)
+            });
         }
     }
 }
@@ -208,6 +210,7 @@ impl Drop for FrameJob {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
 
     #[tokio::test]
     async fn an_upload_ends_when_all_it_submitted_is_answered() {
@@ -230,5 +233,29 @@ mod tests {
         upload.close(Some(ApiError::new(problem::BAD_REQUEST, "second")));
         assert!(matches!(upload.next(8).await, UploadEvent::Frames(_)));
         assert!(matches!(upload.next(8).await, UploadEvent::Failed(e) if e.problem.detail == "first"));
+    }
+
+    #[test]
+    fn a_frame_that_a_panic_loses_is_not_said_to_be_of_a_deleted_session() {
+        for (panics, kind) in [(true, problem::INTERNAL), (false, problem::SESSION_DELETED)] {
+            let upload = Arc::new(Upload::default());
+            let job = FrameJob {
+                upload: Arc::clone(&upload),
+                frame: 3,
+                rows: Rows::All,
+                bytes: Vec::new(),
+                queued: None,
+                arrived: Instant::now(),
+                disarmed: false,
+                permits: None,
+            };
+            let work = AssertUnwindSafe(move || {
+                let _job = job;
+                assert!(!panics, "as a batch does");
+            });
+            assert_eq!(catch_unwind(work).is_err(), panics);
+            let error = lock(&upload.state).error.clone().expect("an error");
+            assert_eq!(error.status(), kind.status);
+        }
     }
 }
