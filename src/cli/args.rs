@@ -2,7 +2,7 @@
 
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
-use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
+use super::coding_args::CodingArgs;
 use super::explore::ExploreArgs;
 use super::morph_args::MorphArgs;
 use super::motion_args::TransferMotionArgs;
@@ -171,37 +171,6 @@ pub(crate) struct DesignArgs {
     /// End the design with the best cage so far after so many seconds.
     #[arg(long, value_name = "S", conflicts_with = "cage", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) time_limit: Option<u32>,
-}
-
-/// How exactly and how small frames are stored. Without any of these, cages are stored as they are solved for.
-#[derive(Args, Debug)]
-pub(crate) struct CodingArgs {
-    /// Guarantee that no point of any frame is farther than E from where it was captured: a fraction of the rest pose's diagonal, such as
-    /// 0.001, or a length such as 0.2mm, with --unit.
-    #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["target_size", "quality", "mean_error"])]
-    pub(crate) max_error: Option<ErrorBound>,
-
-    /// Write at most so many bytes, such as 500KB, or so many bits for each point and frame, such as 0.5bpvf.
-    #[arg(long, value_name = "SIZE", allow_hyphen_values = true, conflicts_with_all = ["quality", "mean_error"])]
-    pub(crate) target_size: Option<TargetSize>,
-
-    /// preview: cages alone; standard: errors that are not seen; master: a guaranteed maximum error of 0.0001 of the rest pose's
-    /// diagonal.
-    #[arg(long, value_enum, value_name = "QUALITY", conflicts_with = "mean_error")]
-    pub(crate) quality: Option<Quality>,
-
-    /// Write the smallest file whose mean L2 error is at most E, a fraction of the rest pose's diagonal; where a cage is designed, the smallest
-    /// cage of which that holds.
-    #[arg(long, value_name = "E", allow_negative_numbers = true)]
-    pub(crate) mean_error: Option<f64>,
-
-    /// What one unit of the capture's positions is, for lengths given to --max-error.
-    #[arg(long, value_enum, value_name = "UNIT", requires = "max_error")]
-    pub(crate) unit: Option<Unit>,
-
-    /// Store the rest pose and the cage as they are, not on a grid finer than the errors asked for.
-    #[arg(long)]
-    pub(crate) exact_rest: bool,
 }
 
 #[derive(Args)]

@@ -2,7 +2,7 @@
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
-use super::encode::{Targets, checked_options, design_options, finish, sized_design};
+use super::encode_shared::{Targets, checked_options, design_options, finish, sized_design};
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
 use super::{interrupt, is_scene, plain, progress, tell, warn};
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely, mesh_file};

@@ -3,6 +3,7 @@
 mod args;
 mod cage;
 mod cage_args;
+mod cage_outputs;
 mod checks;
 mod coding_args;
 mod compare;
@@ -13,6 +14,7 @@ mod dry_run;
 mod edit;
 mod encode;
 mod encode_remote;
+mod encode_shared;
 mod encode_summary;
 mod explore;
 mod formats;

@@ -1,7 +1,7 @@
 //! What can be said to `cager transfer`.
 
-use super::args::CodingArgs;
 use super::checks::{CheckArgs, TimingArgs};
+use super::coding_args::CodingArgs;
 use super::names;
 use super::outputs::OutputArgs;
 use super::service_args::ServiceArgs;

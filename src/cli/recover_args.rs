@@ -1,7 +1,7 @@
 //! Arguments of `cager recover`.
 
-use super::args::CodingArgs;
 use super::checks::TimingArgs;
+use super::coding_args::CodingArgs;
 use super::outputs::OutputArgs;
 use super::service_args::ServiceArgs;
 use super::stretches::KeyTemplate;
