@@ -1,8 +1,8 @@
 //! `GET …/cage`: the rest cage, which decoders need where a cage's normals follow from its vertices.
 
 use super::extract::{Accept, RequestedSession};
-use super::frames::{not_acceptable, prepared};
 use super::openapi;
+use super::waiting::{not_acceptable, prepared};
 use crate::problem::ApiError;
 use crate::service::Service;
 use crate::tasks::blocking;

@@ -1,9 +1,10 @@
 //! `GET /v1/sessions/{id}/cages`: solved cages, as a download or as a live stream.
 
 use super::extract::{Accept, Query, RequestedSession};
-use super::frames::{not_acceptable, prepared, records_of};
 use super::openapi;
 use super::ranged::Immutable;
+use super::solved_frames::records_of;
+use super::waiting::{not_acceptable, prepared};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::frames::RANGES;

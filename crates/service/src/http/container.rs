@@ -1,9 +1,9 @@
 //! `GET /v1/sessions/{id}/capture.cager`: the container, whole or as its frames come.
 
 use super::extract::{Query, RequestedSession};
-use super::frames::prepared;
 use super::openapi;
 use super::ranged::Immutable;
+use super::waiting::prepared;
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};

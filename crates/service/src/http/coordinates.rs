@@ -1,9 +1,9 @@
 //! `GET …/handles` and `GET …/coordinates`: handle indices for uploading handle rows, and `Φ` for decoding on the client.
 
 use super::extract::{Accept, RequestedSession};
-use super::frames::{not_acceptable, prepared};
 use super::openapi;
 use super::ranged::Immutable;
+use super::waiting::{not_acceptable, prepared};
 use crate::admission::Permit;
 use crate::problem::ApiError;
 use crate::service::Service;

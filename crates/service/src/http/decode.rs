@@ -2,7 +2,7 @@
 
 use super::decode_layer::{self, LayerQuery};
 use super::extract::{Query, RequestedSession, content_type};
-use super::frames::{body_error, prepared, stopping};
+use super::waiting::{body_error, prepared, stopping};
 use super::{openapi, other_model};
 use crate::admission::{Budget, Permit};
 use crate::engine::Lane;

@@ -1,6 +1,6 @@
 //! `POST /v1/sessions/{id}/decode?layer=…`: positions of a session's own frames.
 
-use super::frames::{prepared, stopping};
+use super::waiting::{prepared, stopping};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::preparation::Prepared;

@@ -1,8 +1,8 @@
 //! `GET /v1/sessions/{id}/errors`: errors of every solved frame.
 
 use super::extract::RequestedSession;
-use super::frames::result_of;
 use super::openapi;
+use super::solved_frames::result_of;
 use crate::problem::ApiError;
 use crate::tasks::blocking;
 use axum::response::{IntoResponse, Response};

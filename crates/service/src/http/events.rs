@@ -2,7 +2,7 @@
 
 use super::extract::RequestedSession;
 use super::openapi;
-use super::progress::{self, ProgressEvent, ProgressSource};
+use super::progress::{self, Event, ProgressEvent, ProgressSource};
 use crate::problem::ApiError;
 use crate::service::Service;
 use axum::extract::State;
@@ -10,18 +10,6 @@ use axum::response::Response;
 use cager_proto::messages::{Progress, SessionState};
 use http::HeaderMap;
 use std::sync::Arc;
-
-/// A server-sent event.
-#[derive(utoipa::ToSchema)]
-#[allow(dead_code, reason = "it only describes")]
-pub(crate) struct Event {
-    /// `progress`; as the last one also `deleted`, or `stopping` where the service stops.
-    event: Option<String>,
-    /// Identifies its content, for `Last-Event-ID`.
-    id: Option<String>,
-    /// JSON: `{"state": …, "received": …, "solved": …}` with the state and the numbers of frames; `{}` for the other two types.
-    data: Option<String>,
-}
 
 /// Progress of the session: an event `progress` after each change, until the session is completed, failed or deleted, or the service stops.
 /// Equal progress has equal event ids, so a client that reconnects with `Last-Event-ID` does not receive the last event again.

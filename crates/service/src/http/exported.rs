@@ -160,7 +160,7 @@ async fn made(
     let places = tokio::select! {
         places = working => places,
         () = session.deleted().cancelled() => return Err(crate::session::gone()),
-        () = service.stopping().cancelled() => return Err(super::frames::stopping()),
+        () = service.stopping().cancelled() => return Err(super::waiting::stopping()),
     };
     let container = service.store.container_path(&session.meta.id);
     // What it contains is called as it is.

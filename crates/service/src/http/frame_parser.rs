@@ -5,6 +5,7 @@ use crate::problem::{self, ApiError};
 use crate::session::facts::Facts;
 use cager_core::inversion::Rows;
 use cager_proto::record::{self, FrameHeader, Kind, RecordError};
+use serde::Deserialize;
 
 /// A complete frame.
 #[derive(Debug, PartialEq)]
@@ -13,6 +14,14 @@ pub(crate) struct ReceivedFrame {
     pub(crate) rows: Rows,
     /// Little-endian f32, three for each row.
     pub(crate) bytes: Vec<u8>,
+}
+
+/// Which rows of a frame come.
+#[derive(Clone, Copy, Debug, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum RowsQuery {
+    All,
+    Handles,
 }
 
 /// How frames are laid out in a body.

@@ -1,17 +1,18 @@
 //! `POST /v1/sessions/{id}/frames`: receives frames and responds with one record per frame, optionally while the upload runs.
 
 use super::extract::{Accept, Query, RequestedSession, content_type};
-use super::frame_parser::{BodyLayout, FrameReader};
+use super::frame_parser::{BodyLayout, FrameReader, RowsQuery};
 use super::openapi;
+use super::solved_frames::{as_lines, as_records};
+use super::waiting::{SLOWEST_BYTES_PER_SECOND, body_error, not_acceptable, prepared, stopping, too_slow};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::commit::frame_bytes as stored_bytes;
-use crate::session::facts::Facts;
 use crate::session::registry::Reserved;
 use crate::session::upload::{FrameJob, Permits, Upload, UploadEvent};
-use crate::session::{Phase, Session, SessionQueue, gone};
+use crate::session::{Session, SessionQueue, gone};
 use crate::store::FrameEntry;
 use crate::telemetry::RequestId;
 use axum::Extension;
@@ -21,7 +22,7 @@ use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use cager_core::inversion::Rows;
 use cager_proto::messages::FrameResult;
-use cager_proto::record::{self, FrameHeader, Kind};
+use cager_proto::record;
 use http::{HeaderMap, header};
 use http_body_util::BodyExt;
 use serde::Deserialize;
@@ -47,11 +48,6 @@ const MAX_DRAIN_BYTES: usize = 64 << 20;
 const DRAIN_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long a frame waits for memory.
 const MEMORY_TIMEOUT: Duration = Duration::from_secs(30);
-/// Slowest transfer accepted, after an initial pause of `body_timeout_s`: an incomplete frame occupies memory from its first byte on.
-pub(crate) const SLOWEST_BYTES_PER_SECOND: u64 = 16 << 10;
-/// How long a request waits for its session to be prepared.
-const PREPARE_TIMEOUT: Duration = Duration::from_secs(50);
-
 /// The query of an upload.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
@@ -66,13 +62,6 @@ pub(crate) struct UploadQuery {
     /// request whose answer has begun.
     #[serde(default)]
     live: bool,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize, utoipa::ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum RowsQuery {
-    All,
-    Handles,
 }
 
 /// Posts frames. Any number of whole frames, back to back as little-endian f32, or frame records. The answer has one record
@@ -162,46 +151,6 @@ pub(crate) async fn post(
     Ok(([(header::CONTENT_TYPE, media_type)], Body::from_stream(stream)).into_response())
 }
 
-pub(crate) fn not_acceptable(available: &str) -> ApiError {
-    ApiError::new(problem::NOT_ACCEPTABLE, format!("accept {available}"))
-}
-
-/// Waits until the session is ready and returns the results of its preparation.
-pub(crate) async fn prepared(service: &Service, session: &Arc<Session>) -> Result<Facts, ApiError> {
-    let mut changes = session.changes();
-    let deadline = Instant::now() + PREPARE_TIMEOUT;
-    loop {
-        changes.mark_unchanged();
-        let status = session.status();
-        match (status.phase, status.facts) {
-            (Phase::Failed(problem), _) => {
-                let detail = format!("the session failed: {}", problem.detail);
-                return Err(ApiError::new(problem::SESSION_FAILED, detail));
-            }
-            (Phase::Preparing, _) | (_, None) => {}
-            (_, Some(facts)) => {
-                // It may have become ready since the request arrived.
-                session.ensure_loaded().await?;
-                return Ok(facts);
-            }
-        }
-        tokio::select! {
-            _ = changes.changed() => {}
-            () = session.deleted().cancelled() => return Err(gone()),
-            () = service.stopping().cancelled() => return Err(stopping()),
-            () = sleep_until(deadline) => {
-                let detail = "the session is still being prepared; wait until its state is ready";
-                return Err(ApiError::new(problem::NOT_READY, detail).retry_after(2));
-            }
-        }
-    }
-}
-
-pub(crate) fn stopping() -> ApiError {
-    let detail = "the service is stopping; what was answered is kept, so post the rest when it is back";
-    ApiError::new(problem::STOPPING, detail).retry_after(5)
-}
-
 /// Reads and discards a refused body for a while: many clients read the response only after sending the whole body.
 async fn drain(mut body: Body) {
     let take = async {
@@ -215,18 +164,6 @@ async fn drain(mut body: Body) {
     };
     // A timeout is not an error here.
     let _ = tokio::time::timeout(DRAIN_TIMEOUT, take).await;
-}
-
-pub(crate) fn too_slow() -> ApiError {
-    ApiError::new(problem::REQUEST_TIMEOUT, "the body comes too slowly; send the rest again over a faster connection")
-}
-
-/// The response for an error while reading a body.
-pub(crate) fn body_error(error: &(dyn std::error::Error + 'static)) -> ApiError {
-    if super::listen::is_body_timeout(error) {
-        return ApiError::new(problem::REQUEST_TIMEOUT, "the body stopped arriving; send the rest again");
-    }
-    ApiError::new(problem::BAD_REQUEST, format!("the body broke off ({error}); send the rest again"))
 }
 
 /// The half of an upload that reads the body.
@@ -392,39 +329,4 @@ fn answers(
             Some((item, (None, answering)))
         }
     })
-}
-
-pub(crate) fn result_of(entry: &FrameEntry) -> FrameResult {
-    let measured = |x: f32| Some(x).filter(|x| !x.is_nan());
-    FrameResult { frame: entry.frame, l2: measured(entry.l2), linf: measured(entry.linf) }
-}
-
-fn as_lines(entries: &[FrameEntry]) -> Bytes {
-    let mut lines = Vec::with_capacity(64 * entries.len());
-    for entry in entries {
-        if serde_json::to_writer(&mut lines, &result_of(entry)).is_ok() {
-            lines.push(b'\n');
-        }
-    }
-    lines.into()
-}
-
-/// Frame records of solved cages.
-pub(crate) async fn as_records(session: Arc<Session>, entries: Vec<FrameEntry>) -> io::Result<Bytes> {
-    tokio::task::spawn_blocking(move || records_of(&session, &entries)).await.map_err(io::Error::other)?
-}
-
-/// As [`as_records`], blocking.
-pub(crate) fn records_of(session: &Session, entries: &[FrameEntry]) -> io::Result<Bytes> {
-    let rows = session.facts().map_or(0, |facts| facts.unknowns);
-    let mut cages = Vec::with_capacity(entries.len() * 12 * rows as usize);
-    session.read_cages(entries, &mut cages)?;
-    let mut out = Vec::with_capacity(cages.len() + entries.len() * record::HEADER_BYTES);
-    for (entry, cage) in entries.iter().zip(cages.chunks_exact(12 * rows as usize)) {
-        let crc = crc32c::crc32c(cage);
-        let header = FrameHeader { kind: Kind::Cage, frame: entry.frame, rows, l2: entry.l2, linf: entry.linf, crc };
-        out.extend_from_slice(&header.to_bytes());
-        out.extend_from_slice(cage);
-    }
-    Ok(out.into())
 }

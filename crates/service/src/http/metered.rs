@@ -1,6 +1,6 @@
 //! Request bodies whose bytes are counted and admitted to the memory budget as they arrive, before the multipart parser buffers them.
 
-use super::frames::{SLOWEST_BYTES_PER_SECOND, too_slow};
+use super::waiting::{SLOWEST_BYTES_PER_SECOND, too_slow};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::config::MULTIPART_OVERHEAD_BYTES;

@@ -38,8 +38,10 @@ mod router;
 mod sent;
 mod sessions;
 mod shape_spaces;
+mod solved_frames;
 mod spooled;
 mod transfers;
+mod waiting;
 
 pub use admin::{Operated, admin};
 pub(crate) use guarded::until;

@@ -1,8 +1,8 @@
 //! Parses multipart bodies: the files that a session or a recovery is made from.
 
 use super::extract::{content_type, idempotency_key};
-use super::frames::{SLOWEST_BYTES_PER_SECOND, body_error};
 use super::metered::Metered;
+use super::waiting::{SLOWEST_BYTES_PER_SECOND, body_error};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::config::MULTIPART_OVERHEAD_BYTES;

@@ -1,7 +1,7 @@
 //! The OpenAPI document, generated from the routes.
 
-use super::events::Event;
-use super::frames::RowsQuery;
+use super::frame_parser::RowsQuery;
+use super::progress::Event;
 use super::respond::PROBLEM_JSON;
 use crate::problem;
 use axum::response::IntoResponse;

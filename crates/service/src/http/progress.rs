@@ -13,6 +13,18 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
+/// A server-sent event.
+#[derive(utoipa::ToSchema)]
+#[allow(dead_code, reason = "it only describes")]
+pub(crate) struct Event {
+    /// `progress`; as the last one also `deleted`, or `stopping` where the service stops.
+    event: Option<String>,
+    /// Identifies its content, for `Last-Event-ID`.
+    id: Option<String>,
+    /// JSON: `{"state": …, "received": …, "solved": …}` with the state and the numbers of frames; `{}` for the other two types.
+    data: Option<String>,
+}
+
 /// Shortest interval between events.
 const MIN_EVENT_INTERVAL: Duration = Duration::from_millis(100);
 /// Interval of comments that keep proxies from closing an idle connection.

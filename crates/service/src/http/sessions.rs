@@ -1,9 +1,9 @@
 //! `/v1/sessions`: creating, listing, reading, completing and deleting sessions.
 
 use super::extract::{Body, Caller, Query, Requested, RequestedSession};
-use super::frames::too_slow;
 use super::multipart::FormHeader;
 use super::respond::JsonResult;
+use super::waiting::too_slow;
 use super::{multipart, openapi};
 use crate::auth::Tenant;
 use crate::jobs::{Job, Jobs, Work};

@@ -1,11 +1,11 @@
 //! `/v1/shapespaces`: poses of one model, and the shapes between them.
 
 use super::extract::{Caller, Query};
-use super::frames::too_slow;
 use super::job_frames::OCTETS;
 use super::multipart::{self, FormHeader};
 use super::openapi;
 use super::spooled::{self, FormParts, SpooledForm};
+use super::waiting::too_slow;
 use crate::auth::Tenant;
 use crate::idempotency::{create_once, fingerprint_of_files};
 use crate::problem::{self, ApiError};

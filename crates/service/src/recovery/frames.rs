@@ -1,6 +1,6 @@
 //! Frames of a recovery as they are sent, and the end of them.
 
-use super::valid_options::ValidOptions;
+use super::valid_options::{MAX_FRAMES, ValidOptions};
 use super::view::missing;
 use super::{RecoveryJob, closed};
 use crate::admission::Permit;
@@ -16,8 +16,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Most frames of a recovery, an hour and more; each takes memory to its end.
-pub(super) const MAX_FRAMES: u32 = 100_000;
 /// Least bytes that a frame counts.
 const LEAST_BYTES: u64 = 4096;
 

@@ -1,6 +1,5 @@
 //! What the options of a recovery say.
 
-use super::frames::MAX_FRAMES;
 use crate::preparation::{check_told, goal};
 use crate::problem::{self, ApiError};
 use cager_capture::coding::Goal;
@@ -10,6 +9,9 @@ use cager_proto::messages::SessionOptions;
 use cager_proto::recovery_messages::{Placing, RecoveryOptions};
 use cager_recover::people::{FitOptions, Method};
 use std::ops::RangeInclusive;
+
+/// Most frames of a recovery, an hour and more; each takes memory to its end.
+pub(super) const MAX_FRAMES: u32 = 100_000;
 
 const POINTS: RangeInclusive<u32> = 100..=1_000_000;
 const DEFAULT_POINTS: u32 = 15_000;

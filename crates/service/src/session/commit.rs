@@ -180,7 +180,7 @@ impl Session {
         let (written, orphans) = solved.split_at(orphan.unwrap_or(solved.len()));
         if let Some(first) = orphans.first() {
             self.bytes.fetch_sub(stored_bytes(orphans), Relaxed);
-            self.give_up(orphans, &super::solve::predecessor_missing(first.entry.frame));
+            self.give_up(orphans, &predecessor_missing(first.entry.frame));
         }
         written
     }
@@ -192,4 +192,13 @@ impl Session {
             uploads.iter().for_each(|upload| upload.fail(error.clone().frame(s.entry.frame)));
         }
     }
+}
+
+/// The error for a frame whose predecessor is not solved.
+pub(crate) fn predecessor_missing(frame: u32) -> ApiError {
+    let before = frame.saturating_sub(1);
+    let detail = format!(
+        "frame {frame} depends on frame {before} (the regularizer is temporal), which is not solved yet; post frames in order, frame {before} first"
+    );
+    ApiError::new(problem::FRAMES_MISSING, detail).frame(frame).missing(vec![[before, frame]])
 }

@@ -1,7 +1,7 @@
 //! Solving posted frames in batches; the cages and errors are queued for writing.
 
 use super::Session;
-use super::commit::SolvedFrame;
+use super::commit::{SolvedFrame, predecessor_missing};
 use super::frames::{Claim, Digests};
 use super::upload::FrameJob;
 use crate::preparation::Prepared;
@@ -170,15 +170,6 @@ fn predecessor(session: &Session, frame: u32) -> Result<Option<Vec<f32>>, ApiErr
     let mut bytes = Vec::new();
     session.read_cages(&[entry], &mut bytes)?;
     Ok(Some(le::f32s(&bytes)))
-}
-
-/// The error for a frame whose predecessor is not solved.
-pub(crate) fn predecessor_missing(frame: u32) -> ApiError {
-    let before = frame.saturating_sub(1);
-    let detail = format!(
-        "frame {frame} depends on frame {before} (the regularizer is temporal), which is not solved yet; post frames in order, frame {before} first"
-    );
-    ApiError::new(problem::FRAMES_MISSING, detail).frame(frame).missing(vec![[before, frame]])
 }
 
 /// The error for a frame that was posted before with other content.

@@ -3,11 +3,11 @@
 use crate::auth::Tenant;
 use crate::cage_job::create::{NewCageJob, check_options};
 use crate::http::extract::Caller;
-use crate::http::frames::too_slow;
 use crate::http::jobs::accepted;
 use crate::http::multipart::{self, FormHeader, bad};
 use crate::http::openapi;
 use crate::http::spooled::{self, FormParts};
+use crate::http::waiting::too_slow;
 use crate::problem::ApiError;
 use crate::service::Service;
 use axum::extract::{Request, State};

@@ -1,8 +1,8 @@
 //! `GET /v1/cages/{id}/events`: progress of a design as server-sent events.
 
 use crate::cage_job::CageDesign;
-use crate::http::events::Event;
 use crate::http::extract::RequestedJob;
+use crate::http::progress::Event;
 use crate::http::progress::ProgressEvent;
 use crate::http::{jobs, openapi};
 use crate::problem::ApiError;

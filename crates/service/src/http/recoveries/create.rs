@@ -1,10 +1,10 @@
 //! `POST /v1/recoveries`: a template is to be followed.
 
 use crate::http::extract::Caller;
-use crate::http::frames::too_slow;
 use crate::http::jobs::accepted;
 use crate::http::multipart::{self, FormHeader};
 use crate::http::openapi;
+use crate::http::waiting::too_slow;
 use crate::problem::ApiError;
 use crate::recovery::NewRecovery;
 use crate::service::Service;

@@ -1,7 +1,7 @@
 //! `GET /v1/recoveries/{id}/events`: progress of a recovery as server-sent events.
 
-use crate::http::events::Event;
 use crate::http::extract::RequestedJob;
+use crate::http::progress::Event;
 use crate::http::progress::ProgressEvent;
 use crate::http::{jobs, openapi};
 use crate::problem::ApiError;

@@ -1,10 +1,10 @@
 //! `POST /v1/recoveries/{id}/frames`: surfaces, each a file.
 
 use crate::http::extract::{Query, RequestedJob};
-use crate::http::frames::too_slow;
 use crate::http::multipart::{self, FormHeader, NAME_CHARACTERS, bad, broken, file_name, form};
 use crate::http::openapi;
 use crate::http::paced::Paced;
+use crate::http::waiting::too_slow;
 use crate::problem::{self, ApiError};
 use crate::recovery::{Recovery, RecoveryJob};
 use crate::service::Service;

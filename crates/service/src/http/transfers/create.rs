@@ -1,11 +1,11 @@
 //! `POST /v1/transfers`: a motion is to be moved.
 
 use crate::http::extract::Caller;
-use crate::http::frames::too_slow;
 use crate::http::jobs::accepted;
 use crate::http::multipart::{self, FormHeader};
 use crate::http::openapi;
 use crate::http::spooled::{self, FormParts};
+use crate::http::waiting::too_slow;
 use crate::problem::ApiError;
 use crate::service::Service;
 use crate::store::{PAIRS, SOURCE, SOURCE_FRAMES};

@@ -1,7 +1,7 @@
 //! Listing, looking at, following and deleting transfers.
 
-use crate::http::events::Event;
 use crate::http::extract::{Caller, Query, Requested, RequestedJob};
+use crate::http::progress::Event;
 use crate::http::progress::ProgressEvent;
 use crate::http::sessions::PageQuery;
 use crate::http::{jobs, openapi};
