@@ -4,7 +4,7 @@ use super::args::EncodeArgs;
 use super::coding_args::goal;
 use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
-use super::solver_options::{check_inversion, inversion_choices, matrix, with_input_name};
+use super::solver_options::{check_inversion, inversion_choices, with_input_name};
 use super::{design, progress, tell, warn};
 use anyhow::{Result, bail};
 use cager_cages::{DesignOptions, Style};
@@ -13,7 +13,7 @@ use cager_capture::encode::{self, Encoded, sample_frames};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::memory::{Memory, free_bytes};
 use cager_core::cage::Cage;
-use cager_core::coordinates::MeanValue;
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, Target, commit_together};
@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 /// Where the container goes, and the report.
 pub(super) struct Targets {
     pub(super) output: Target,
-    report: Option<Target>,
+    pub(super) report: Option<Target>,
 }
 
 impl Targets {

@@ -275,7 +275,7 @@ impl ServeConfig {
     }
 
     /// As it is for one of its shards: the first one is where all was before it was divided. What is kept is shared out among them.
-    pub(crate) fn of_shard(&self, shard: Shard) -> Self {
+    pub fn of_shard(&self, shard: Shard) -> Self {
         let of = u64::from(shard.of);
         let mut config = Self {
             prepared_disk_bytes: self.prepared_disk_bytes / of,

@@ -8,8 +8,7 @@ mod vectors;
 
 pub(crate) use random::{DRAW_FRAMES, DRAWS, Draw, draws};
 pub(crate) use spectra::Spectra;
-pub use summary::{Choice, Recommendation};
-pub(crate) use summary::{Claim, claims, recommend};
+pub(crate) use summary::{Claim, Recommendation, claims, recommend};
 pub(crate) use swaps::Swaps;
 pub(crate) use vectors::Vectors;
 

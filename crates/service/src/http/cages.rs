@@ -5,6 +5,7 @@ use super::openapi;
 use super::ranged::Immutable;
 use super::solved_frames::records_of;
 use super::waiting::{not_acceptable, prepared};
+use crate::admission::Permit;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::frames::RANGES;
@@ -165,7 +166,7 @@ fn follow(
     form: Form,
     first: u64,
     last: u64,
-    place: crate::admission::Permit,
+    place: Permit,
 ) -> impl futures_util::Stream<Item = io::Result<Bytes>> {
     let changes = session.changes();
     futures_util::stream::unfold((first, changes, place), move |(next, mut changes, place)| {

@@ -140,7 +140,10 @@ impl SurfaceSource for StoredSurfaces {
                     (status.progress.arrived as usize, status.progress.declared)
                 };
                 if declared.is_some_and(|declared| frame >= declared as usize) {
-                    return self.take_place(kept.map(|(kept, _)| kept)).await.and_end();
+                    return match self.take_place(kept.map(|(kept, _)| kept)).await {
+                        Arrival::There => Arrival::End,
+                        other => other,
+                    };
                 }
                 if frame < arrived {
                     return self.take_place(kept.map(|(kept, _)| kept)).await;
@@ -196,12 +199,5 @@ impl SurfaceSource for StoredSurfaces {
         }
         let files: Vec<PathBuf> = (0..frames).map(|frame| self.file(frame)).collect();
         frame_numbers(&files)
-    }
-}
-
-impl Arrival {
-    /// The end in place of a frame.
-    fn and_end(self) -> Self {
-        if self == Self::There { Self::End } else { self }
     }
 }
