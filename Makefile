@@ -21,7 +21,7 @@ MODULE := target/python/bin/python
 LINT := target/lint-deploy
 
 NPM := $(shell command -v npm 2>/dev/null)
-PAGE := web/dist/index.html
+PAGE := web/dist/viewer/index.html
 
 .PHONY: help demo test web viewer page-test page-lint captures proxies blender blender-extension blender-pictures alembic usd gltf farm buckets python soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 

@@ -1,11 +1,8 @@
-//! The version that `cager --version` tells: that of the package, and the commit where it is known; and the viewer, built anew into the program whenever it changes.
+//! The version that `cager --version` tells: that of the package, and the commit where it is known.
 
 use std::process::Command;
 
 fn main() {
-    // `make web` fills it. A folder that is missing would have every build begin anew.
-    let _ = std::fs::create_dir_all("web/dist");
-    println!("cargo::rerun-if-changed=web/dist");
     println!("cargo::rerun-if-env-changed=CAGER_COMMIT");
     let version = std::env::var("CARGO_PKG_VERSION").unwrap_or_default();
     let known = std::env::var("CAGER_COMMIT").ok().filter(|commit| !commit.is_empty());

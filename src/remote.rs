@@ -1,4 +1,4 @@
-//! Encoding by a service: another machine computes, from frames in single precision, the container that [`crate::encode`]
+//! Encoding by a service: another machine computes, from frames in single precision, the container that [`cager_capture::encode`]
 //! gives of such frames.
 
 mod cage;
@@ -14,7 +14,7 @@ pub use frames::FileFrames;
 pub use recover::{RemoteRecovery, RemoteRecoveryProgress, recover_remotely};
 pub use transfer::{RemoteTransfer, transfer_remotely};
 
-use crate::encode::Encoded;
+use cager_capture::encode::Encoded;
 use cager_client::cage_messages::CageProgress;
 use cager_client::messages::{CageSource, FrameResult, PreparationSeconds, SessionOptions};
 use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewSession, UploadOptions};

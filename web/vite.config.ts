@@ -37,13 +37,13 @@ const oneFile: Plugin = {
   },
 };
 
-/** The page of reports, which `cager compare`, `demo` and `cage` fill with what they found: `vite build --mode report` adds it to the viewer. */
+/** The page of reports, which `cager compare`, `demo` and `cage` fill with what they found: `vite build --mode report` makes it. */
 const report: UserConfig = {
   base: './',
   plugins: [oneFile],
   build: {
     target: 'es2022',
-    emptyOutDir: false,
+    outDir: 'dist/report',
     modulePreload: false,
     chunkSizeWarningLimit: 1000,
     rolldownOptions: { input: 'report.html', output: { codeSplitting: false } },
@@ -56,6 +56,7 @@ const page: UserConfig = {
   plugins: [embeddable],
   build: {
     target: 'es2022',
+    outDir: 'dist/viewer',
     assetsInlineLimit: 0,
     cssCodeSplit: true,
     modulePreload: { polyfill: false },

@@ -1,6 +1,6 @@
 //! A disk in memory, so that what is stored can be any bytes.
 
-use cager::store::disk::{Disk, DiskFile, Entry};
+use cager_service::store::disk::{Disk, DiskFile, Entry};
 use cager_store::{Catalog, CatalogError, Key, SqliteCatalog};
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -2,7 +2,7 @@
 
 use super::cage_args::CageArgs;
 use super::checks::{CaptureArgs, CheckArgs, TimingArgs};
-use super::coding_args::{ErrorBound, Quality, TargetSize, Unit};
+use super::coding_args::CodingArgs;
 use super::explore::ExploreArgs;
 use super::morph_args::MorphArgs;
 use super::motion_args::TransferMotionArgs;
@@ -10,12 +10,13 @@ use super::names;
 use super::outputs::OutputArgs;
 use super::recover_args::RecoverArgs;
 use super::rig::{ManifoldArgs, RigArgs};
+use super::service::ServiceCommand;
 use super::transfer_args::{EditArgs, TransferArgs};
-use crate::config::{ServeFlags, bytes};
-use crate::decode::Layer;
-use crate::memory::Memory;
-use crate::report_page::Up;
 use cager_cages::Style;
+use cager_capture::decode::Layer;
+use cager_capture::memory::Memory;
+use cager_capture::sizes::bytes;
+use cager_compare::report_page::Up;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
@@ -68,67 +69,15 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     Cage(Box<CageArgs>),
     Compare(CompareArgs),
-    Serve(Box<ServeFlags>),
-    Store(StoreArgs),
+    #[command(flatten)]
+    Service(ServiceCommand),
     Health(HealthArgs),
-    Demo(DemoArgs),
     /// List the file formats of meshes and captures: whether they are written as well as read, and what they say of units and times.
     ///
     /// Example: cager formats
     Formats,
     Completions(CompletionsArgs),
     Man(ManArgs),
-}
-
-/// Look after what a service has stored, while it does not run: how much that is, whether it is whole, copies of its containers.
-///
-/// Example: cager store verify --data /srv/cager
-#[derive(Args)]
-pub(crate) struct StoreArgs {
-    #[command(subcommand)]
-    pub(crate) command: StoreCommand,
-
-    /// The service's data folder [default: cager-data].
-    #[arg(long, global = true, value_name = "DIR")]
-    pub(crate) data: Option<PathBuf>,
-
-    /// The service's database, where it has one. A password is safer in the variable CAGER_CATALOG.
-    #[arg(long, global = true, value_name = "URL")]
-    pub(crate) catalog: Option<String>,
-
-    /// The service's bucket, where it has one.
-    #[arg(long, global = true, value_name = "URL")]
-    pub(crate) blobs: Option<String>,
-
-    /// Into how many shards the service's database is divided, where it is.
-    #[arg(long, global = true, value_name = "N")]
-    pub(crate) shards: Option<u32>,
-
-    /// Which of them is meant, from 0.
-    #[arg(long, global = true, value_name = "K", default_value_t = 0)]
-    pub(crate) shard: u32,
-
-    /// The service's file of settings, TOML.
-    #[arg(long, global = true, value_name = "FILE")]
-    pub(crate) config: Option<PathBuf>,
-}
-
-/// What to do with what is stored.
-#[derive(Subcommand)]
-pub(crate) enum StoreCommand {
-    /// Sessions, jobs and bytes of each tenant.
-    Usage,
-    /// Read everything, and name what is damaged; exit status 1 if something is.
-    Verify,
-    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager.
-    Export {
-        /// Where to; it may be there.
-        #[arg(value_name = "DIR")]
-        output: PathBuf,
-        /// Only this session; may be repeated.
-        #[arg(long = "session", value_name = "ID")]
-        sessions: Vec<String>,
-    },
 }
 
 /// Recover the cage of every frame of a capture and write a .cager file.
@@ -222,37 +171,6 @@ pub(crate) struct DesignArgs {
     /// End the design with the best cage so far after so many seconds.
     #[arg(long, value_name = "S", conflicts_with = "cage", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) time_limit: Option<u32>,
-}
-
-/// How exactly and how small frames are stored. Without any of these, cages are stored as they are solved for.
-#[derive(Args, Debug)]
-pub(crate) struct CodingArgs {
-    /// Guarantee that no point of any frame is farther than E from where it was captured: a fraction of the rest pose's diagonal, such as
-    /// 0.001, or a length such as 0.2mm, with --unit.
-    #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["target_size", "quality", "mean_error"])]
-    pub(crate) max_error: Option<ErrorBound>,
-
-    /// Write at most so many bytes, such as 500KB, or so many bits for each point and frame, such as 0.5bpvf.
-    #[arg(long, value_name = "SIZE", allow_hyphen_values = true, conflicts_with_all = ["quality", "mean_error"])]
-    pub(crate) target_size: Option<TargetSize>,
-
-    /// preview: cages alone; standard: errors that are not seen; master: a guaranteed maximum error of 0.0001 of the rest pose's
-    /// diagonal.
-    #[arg(long, value_enum, value_name = "QUALITY", conflicts_with = "mean_error")]
-    pub(crate) quality: Option<Quality>,
-
-    /// Write the smallest file whose mean L2 error is at most E, a fraction of the rest pose's diagonal; where a cage is designed, the smallest
-    /// cage of which that holds.
-    #[arg(long, value_name = "E", allow_negative_numbers = true)]
-    pub(crate) mean_error: Option<f64>,
-
-    /// What one unit of the capture's positions is, for lengths given to --max-error.
-    #[arg(long, value_enum, value_name = "UNIT", requires = "max_error")]
-    pub(crate) unit: Option<Unit>,
-
-    /// Store the rest pose and the cage as they are, not on a grid finer than the errors asked for.
-    #[arg(long)]
-    pub(crate) exact_rest: bool,
 }
 
 #[derive(Args)]
@@ -420,28 +338,6 @@ pub(crate) struct HealthArgs {
     /// Longest time to wait, in seconds.
     #[arg(long, value_name = "S", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub(crate) timeout_s: u64,
-}
-
-/// Encode and decode a built-in capture through a service of its own: needs no files and no network.
-///
-/// Example: cager demo -o my-first-capture
-#[derive(Args, Debug)]
-pub(crate) struct DemoArgs {
-    /// Folder for the results: rest.obj, cage.obj, capture.cager, decoded.npy, report.json and report.html.
-    #[arg(short, long, value_name = "DIR", default_value = "cager-demo")]
-    pub(crate) output: PathBuf,
-
-    /// Points of the capture, about.
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=4_000_000))]
-    pub(crate) points: u32,
-
-    /// Frames of the capture.
-    #[arg(long, value_name = "F", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub(crate) frames: u32,
-
-    /// Vertices of the cage, about.
-    #[arg(long, value_name = "V", default_value_t = 330, value_parser = clap::value_parser!(u32).range(26..=5_000))]
-    pub(crate) cage_vertices: u32,
 }
 
 /// Print a completion script for a shell.

@@ -3,8 +3,8 @@
 use super::checks::CheckArgs;
 use super::names;
 use super::outputs::OutputArgs;
-use crate::report_page::Up;
 use cager_cages::Style;
+use cager_compare::report_page::Up;
 use clap::{ArgGroup, Args, ValueEnum};
 use std::path::PathBuf;
 

@@ -2,13 +2,13 @@
 
 use super::dry_run::read_files;
 use super::warn;
-use crate::belonging::Belonging;
-use crate::encode::{EncodeError, sample_frames};
-use crate::frames::CaptureFiles;
-use crate::mismatch::{self, Mismatch, Up, cage_mismatch, mismatches};
-use crate::timing::Timing;
 use anyhow::{Result, bail};
 use cager_cages::diagnosis::weld;
+use cager_capture::belonging::Belonging;
+use cager_capture::encode::{EncodeError, sample_frames};
+use cager_capture::frames::CaptureFiles;
+use cager_capture::mismatch::{self, Mismatch, Up, cage_mismatch, mismatches};
+use cager_capture::timing::Timing;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
 use clap::Args;
 use std::path::{Path, PathBuf};

@@ -1,12 +1,42 @@
 //! What `cager encode` is asked of errors and sizes.
 
-use super::args::CodingArgs;
-use crate::coding::Goal;
-use crate::config::bytes;
 use anyhow::{Result, bail};
+use cager_capture::coding::Goal;
+use cager_capture::sizes::bytes;
 use cager_geometry::mesh::{Model, diagonal};
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use std::str::FromStr;
+
+/// How exactly and how small frames are stored. Without any of these, cages are stored as they are solved for.
+#[derive(Args, Debug)]
+pub(crate) struct CodingArgs {
+    /// Guarantee that no point of any frame is farther than E from where it was captured: a fraction of the rest pose's diagonal, such as
+    /// 0.001, or a length such as 0.2mm, with --unit.
+    #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["target_size", "quality", "mean_error"])]
+    pub(crate) max_error: Option<ErrorBound>,
+
+    /// Write at most so many bytes, such as 500KB, or so many bits for each point and frame, such as 0.5bpvf.
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true, conflicts_with_all = ["quality", "mean_error"])]
+    pub(crate) target_size: Option<TargetSize>,
+
+    /// preview: cages alone; standard: errors that are not seen; master: a guaranteed maximum error of 0.0001 of the rest pose's
+    /// diagonal.
+    #[arg(long, value_enum, value_name = "QUALITY", conflicts_with = "mean_error")]
+    pub(crate) quality: Option<Quality>,
+
+    /// Write the smallest file whose mean L2 error is at most E, a fraction of the rest pose's diagonal; where a cage is designed, the smallest
+    /// cage of which that holds.
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    pub(crate) mean_error: Option<f64>,
+
+    /// What one unit of the capture's positions is, for lengths given to --max-error.
+    #[arg(long, value_enum, value_name = "UNIT", requires = "max_error")]
+    pub(crate) unit: Option<Unit>,
+
+    /// Store the rest pose and the cage as they are, not on a grid finer than the errors asked for.
+    #[arg(long)]
+    pub(crate) exact_rest: bool,
+}
 
 /// A largest error: a fraction of the diagonal, or a length in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,9 +6,9 @@ use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
 use super::solver_options::{read_cage, with_input_name};
 use super::{human_bytes, plain, progress, read_prim};
-use crate::compare::{CompareError, Figures, Job, Progress, compare, seconds};
-use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage};
 use anyhow::Result;
+use cager_compare::report_page::{Contents, NO_PAGE, ReportKind, ReportPage};
+use cager_compare::{CompareError, Figures, Job, Progress, compare, seconds};
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{AtomicFile, commit_together};
@@ -75,7 +75,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     figures_text.push(b'\n');
     match &page {
         Some(page) => {
-            let (kind, program) = (Kind::Comparison, figures.program);
+            let (kind, program) = (ReportKind::Comparison, figures.program);
             report.write_all(&page.with(&Contents { kind, program, figures: &figures, geometry: &geometry })?)?;
         }
         None => {

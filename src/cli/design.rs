@@ -1,9 +1,9 @@
 //! Cage design with a progress bar, for `cager cage` and `cager encode`.
 
 use super::progress;
-use crate::design::default_vertices;
 use anyhow::{Result, bail};
 use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress};
+use cager_capture::design::default_vertices;
 use cager_core::cage::CageError;
 use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;

@@ -1,7 +1,7 @@
 //! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
 
-use super::cage::{Targets, cage_bytes, complete_file};
 use super::cage_args::CageArgs;
+use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::dry_run::tell_dry_run;
 use super::{print, read_model};
 use anyhow::{Result, bail};

@@ -1,9 +1,9 @@
 //! `--dry-run`: checks and reports without writing anything.
 
 use super::{grouped, human_bytes, progress, tell};
-use crate::encode::EncodeError;
-use crate::frames::CaptureFiles;
 use anyhow::Result;
+use cager_capture::encode::EncodeError;
+use cager_capture::frames::CaptureFiles;
 use cager_formats::{FrameReader, Target};
 
 /// Reads every frame, so that what is wrong with any of them is told.

@@ -4,9 +4,9 @@ use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
 use super::transfer_args::EditArgs;
 use super::{grouped, progress, tell};
-use crate::edited::EditedCages;
-use crate::{decode, edit};
 use anyhow::Result;
+use cager_capture::edited::EditedCages;
+use cager_capture::{decode, edit};
 use cager_formats::commit_together;
 
 pub(super) fn run(args: &EditArgs) -> Result<()> {

@@ -1,32 +1,28 @@
-//! `cager encode`: here, and what is the same where a service encodes.
+//! `cager encode`.
 
 use super::args::{EncodeArgs, SpectrumArg};
 use super::checks::{capture_files, check_cage, check_capture, warn_of_departures};
 use super::coding_args::goal;
 use super::dry_run::{read_files, size, tell_dry_run};
-use super::encode_summary::{summary, write_report};
-use super::outputs::Outputs;
-use super::solver_options::{
-    check_inversion, designed_spectrum, inversion_choices, matrix, read_cage, spectrum_bound, with_input_name,
+use super::encode_shared::{
+    Targets, checked_options, design_options, finish, name_file, name_files, sized_design, solver_options,
 };
-use super::{design, encode_remote, grouped, human_bytes, progress, read_prim, tell, warn};
-use crate::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
-use crate::design::{read_frames, report as design_report};
-use crate::encode::{self, ChooseSpectrum, EncodeProgress, Encoded, Job, sample_frames};
-use crate::frames::CaptureFiles;
-use crate::memory::{Memory, free_bytes};
-use crate::speed::seconds_to_prepare;
-use anyhow::{Context, Result, bail};
-use cager_cages::{DesignOptions, Style};
+use super::solver_options::{check_inversion, designed_spectrum, matrix, read_cage, spectrum_bound};
+use super::{design, encode_remote, grouped, human_bytes, progress, read_prim, warn};
+use anyhow::{Context, Result};
+use cager_capture::coding::Goal;
+use cager_capture::design::{read_frames, report as design_report};
+use cager_capture::encode::{self, ChooseSpectrum, EncodeProgress, Job, sample_frames};
+use cager_capture::frames::CaptureFiles;
+use cager_capture::memory::{Memory, free_bytes};
+use cager_capture::speed::seconds_to_prepare;
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::inversion::{PrepareError, Solver, SolverOptions, check_options};
+use cager_core::inversion::check_options;
 use cager_core::regularize::Regularizer;
-use cager_formats::{AtomicFile, FrameReader, Target, commit_together};
-use cager_geometry::linalg::SparseMatrix;
+use cager_formats::FrameReader;
 use cager_geometry::mesh::Model;
 use cager_proto::report::DesignReport;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     let clock = Instant::now();
@@ -63,25 +59,6 @@ pub(super) fn run(args: &EncodeArgs) -> Result<()> {
     };
     warn_of_departures(&files);
     done
-}
-
-/// Where the container goes, and the report.
-pub(super) struct Targets {
-    pub(super) output: Target,
-    report: Option<Target>,
-}
-
-impl Targets {
-    fn new(args: &EncodeArgs) -> Result<Self> {
-        let inputs = [&args.rest, &args.frames].into_iter().chain(&args.cage).chain(&args.solver.regularizer_matrix);
-        let mut outputs = Outputs::new(args.outputs, inputs)?;
-        let output = outputs.binary(&args.output, "walk.cager")?;
-        Ok(Self { output, report: args.report.as_ref().map(|path| outputs.text(path)).transpose()? })
-    }
-
-    pub(super) fn begin_report(&self) -> Result<Option<AtomicFile>> {
-        Ok(self.report.as_ref().map(AtomicFile::create).transpose()?)
-    }
 }
 
 /// What can be known without designing a cage and solving, and without a service.
@@ -124,23 +101,6 @@ fn dry_run(
     tell_dry_run(&targets.output, &what, std::slice::from_ref(&targets.report))
 }
 
-/// How a cage is designed. Mean value coordinates do without a tidy one; the others want all points inside.
-pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignOptions> {
-    let mean_value = args.solver.coordinates.name() == MeanValue.name();
-    if args.coding.mean_error.is_some() && !mean_value {
-        bail!(
-            "--mean-error: is measured with mean value coordinates; give --cage-vertices, or leave --coordinates out"
-        );
-    }
-    Ok(DesignOptions {
-        goal: design::goal(args.design.cage_vertices, args.coding.mean_error, points)?,
-        style: args.design.style.unwrap_or(if mean_value { Style::Free } else { Style::Editable }),
-        seed: args.design.seed.unwrap_or(0),
-        time_limit: args.design.time_limit.map(|s| Duration::from_secs(s.into())),
-        ..DesignOptions::default()
-    })
-}
-
 /// A cage from the capture itself.
 fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, DesignReport)> {
     let options = sized_design(args, files, rest)?;
@@ -150,39 +110,6 @@ fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Ca
     let report = design_report(&design, &options, frames.len());
     let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
     Ok((cage, report))
-}
-
-/// How a cage is designed, of as many vertices as suit what the file is to meet.
-pub(super) fn sized_design(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<DesignOptions> {
-    let mut options = design_options(args, rest.points.len())?;
-    if let Some(vertices) = best_cage_size(args, files, rest)? {
-        tell(&format!(
-            "cages of several sizes were tried on the first frames: {vertices} vertices suit what is asked for\n"
-        ))?;
-        options.goal = design::goal(Some(vertices as u32), None, rest.points.len())?;
-    }
-    Ok(options)
-}
-
-/// How many vertices a designed cage should have for a bound or a size, where neither they nor an error of the cage are given.
-fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<Option<usize>> {
-    let mut reader = files.open()?;
-    let total = reader.frames();
-    let goal = goal(&args.coding, args.cage.is_some(), rest, total)?;
-    let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.coding.mean_error) else { return Ok(None) };
-    let frames = sample_frames(reader.as_mut(), CAGE_SIZE_FRAMES, true).map_err(|error| name_files(error, args))?;
-    let memory = args.memory.unwrap_or_else(Memory::half_of_free);
-    let system = args.solver.coordinates;
-    check_inversion(&args.solver)?;
-    let sizes = CageSizes { goal, rest, system, frames: &frames, total, memory };
-    let bar = progress::steps();
-    bar.set_message("trying cages of several sizes");
-    let best = sizes.best(|cage, rest| {
-        let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
-        Solver::prepare(system, cage, &rest.points, options)
-    });
-    bar.finish_and_clear();
-    Ok(best)
 }
 
 fn encode_locally(
@@ -247,62 +174,4 @@ fn encode_locally(
 /// Frames to choose a spectrum threshold by: the first ones where cages follow their predecessors.
 fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, encode::EncodeError> {
     sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones)
-}
-
-/// What the arguments say of the inversion, and what is usual for this rest pose and cage.
-fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<SolverOptions> {
-    let unknowns = args.solver.coordinates.values(cage).unknowns();
-    // The number of frames says how large a file may be, not whether it is coded.
-    let is_coded = goal(&args.coding, args.cage.is_some(), rest, 1)?.is_some();
-    Ok(inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns))
-}
-
-/// [`solver_options`] for this rest pose and cage, with all checked that needs no coordinates.
-pub(super) fn checked_options(
-    args: &EncodeArgs,
-    rest: &Model,
-    cage: &Cage,
-    matrix: Option<&SparseMatrix>,
-) -> Result<SolverOptions> {
-    let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
-    let unknowns = system.values(cage).unknowns();
-    let delta = matrix.map_or(Ok(()), |_| Regularizer::Matrix.delta(matrix, cage, unknowns).map(|_| ()));
-    // A service knows its own memory.
-    let memory = if args.server.is_some() { u64::MAX } else { free_bytes() };
-    delta
-        .map_err(PrepareError::from)
-        .and_then(|()| Solver::check(system, cage, &rest.points, options, memory))
-        .map_err(|error| name_file(&error, args))?;
-    Ok(options)
-}
-
-pub(super) fn finish(
-    targets: &Targets,
-    encoded: Encoded,
-    report_file: Option<AtomicFile>,
-    clock: Instant,
-) -> Result<()> {
-    let Encoded { mut report, container } = encoded;
-    report.seconds.total = clock.elapsed().as_secs_f64();
-    // A full disk shows here, before either file has its name.
-    let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
-    commit_together(report_file.into_iter().chain([container]).collect())?;
-    warn(&report.warnings);
-    tell(&summary(&report, targets.output.path()))
-}
-
-/// Errors of `core` know vertices and points; the user needs the file.
-fn name_files(error: encode::EncodeError, args: &EncodeArgs) -> anyhow::Error {
-    match error {
-        encode::EncodeError::Prepare(inner) => name_file(&inner, args),
-        error @ encode::EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", args.frames.display()),
-        other => other.into(),
-    }
-}
-
-fn name_file(error: &PrepareError, args: &EncodeArgs) -> anyhow::Error {
-    match (error, &args.solver.regularizer_matrix) {
-        (PrepareError::Term(_), Some(matrix)) => anyhow::anyhow!("{}: {error}", matrix.display()),
-        _ => with_input_name(error, &args.rest, args.cage.as_deref().unwrap_or(&args.rest)),
-    }
 }

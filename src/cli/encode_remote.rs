@@ -2,15 +2,15 @@
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
-use super::encode::{Targets, checked_options, design_options, finish, sized_design};
+use super::encode_shared::{Targets, checked_options, design_options, finish, sized_design};
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
 use super::{interrupt, is_scene, plain, progress, tell, warn};
-use crate::coding::Goal;
-use crate::encode::Encoded;
-use crate::frames::CaptureFiles;
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely, mesh_file};
 use anyhow::{Context, Result, anyhow, bail};
 use cager_cages::DesignOptions;
+use cager_capture::coding::Goal;
+use cager_capture::encode::Encoded;
+use cager_capture::frames::CaptureFiles;
 use cager_client::messages::SessionOptions;
 use cager_client::{FrameSource, MeshFile};
 use cager_core::cage::Cage;

@@ -1,15 +1,14 @@
 //! Handling of SIGINT and similar signals while outputs are incomplete.
 
-use crate::sync::lock;
 use anyhow::Result;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// What a signal that ends the process has it say.
 static LAST_WORDS: Mutex<String> = Mutex::new(String::new());
 
 /// Sets what is said if a signal ends the process: what is left elsewhere, and how to go on with it.
 pub(super) fn set_last_words(text: String) {
-    *lock(&LAST_WORDS) = text;
+    *LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner) = text;
 }
 
 /// From here on a signal that asks the process to end removes its temporary files and folders first; a second one ends
@@ -29,7 +28,6 @@ pub(super) fn remove_temporaries_on_signal() -> Result<()> {
 
 #[cfg(unix)]
 mod unix {
-    use crate::sync::lock;
     use anyhow::{Context, Result};
     use cager_formats::remove_temporaries;
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -37,9 +35,9 @@ mod unix {
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
     use std::io::Write;
-    use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
     use std::sync::mpsc::channel;
+    use std::sync::{Arc, PoisonError};
 
     pub(super) fn install() -> Result<()> {
         let what = "signals cannot be watched; free some memory or processes and try again";
@@ -48,7 +46,7 @@ mod unix {
         let thread = move || {
             if let Some(signal) = receive.recv().ok().and_then(|mut signals| signals.forever().next()) {
                 remove_temporaries();
-                let said = lock(&super::LAST_WORDS);
+                let said = super::LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner);
                 if !said.is_empty() {
                     // Nowhere is left to report a closed stderr to.
                     let _ = writeln!(std::io::stderr(), "cager: {said}");

@@ -3,18 +3,18 @@
 mod args;
 mod cage;
 mod cage_args;
+mod cage_outputs;
 mod checks;
 mod coding_args;
 mod compare;
 mod decode;
-mod demo;
-mod demo_report;
 mod design;
 mod diagnosis;
 mod dry_run;
 mod edit;
 mod encode;
 mod encode_remote;
+mod encode_shared;
 mod encode_summary;
 mod explore;
 mod formats;
@@ -22,7 +22,6 @@ mod global_args;
 mod health;
 mod inspect;
 mod interrupt;
-mod local_service;
 mod manual;
 mod morph_args;
 mod motion_args;
@@ -35,10 +34,13 @@ mod recover_args;
 mod recover_remote;
 mod recover_stretch;
 mod rig;
-pub(crate) mod serve;
+#[cfg(feature = "serve")]
+mod service;
+#[cfg(not(feature = "serve"))]
+#[path = "no_service.rs"]
+mod service;
 mod service_args;
 mod solver_options;
-mod store;
 mod stretches;
 mod transfer;
 mod transfer_args;
@@ -76,9 +78,7 @@ pub fn run() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Cage(args) => cage::run(&args),
         Command::Compare(args) => compare::run(&args),
-        Command::Demo(args) => demo::run(&args),
-        Command::Serve(args) => serve::run(&args),
-        Command::Store(args) => store::run(&args),
+        Command::Service(command) => command.run(),
         Command::Health(args) => health::run(&args),
         Command::Formats => formats::run(),
         Command::Completions(args) => {

@@ -1,13 +1,13 @@
 //! What can be said to `cager transfer`.
 
-use super::args::CodingArgs;
 use super::checks::{CheckArgs, TimingArgs};
+use super::coding_args::CodingArgs;
 use super::names;
 use super::outputs::OutputArgs;
 use super::service_args::ServiceArgs;
-use crate::transfer::{MethodChoice, words};
 use anyhow::{Context, Result, bail};
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_motion::transfer::{MethodChoice, words};
 use cager_proto::transfer_messages::{PublicShape, RestPose, SourceAlignment, TransferMethod, UpAxis};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};

@@ -1,7 +1,7 @@
 //! Values of options that are named as the library names them, each with its help.
 
-use crate::design::style_by_name;
 use cager_cages::Style;
+use cager_capture::design::style_by_name;
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
@@ -87,7 +87,7 @@ fn named<T: Clone + Send + Sync + 'static>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::{STYLES as ALL_STYLES, style_name};
+    use cager_capture::design::{STYLES as ALL_STYLES, style_name};
 
     #[test]
     fn every_name_of_the_library_can_be_given_and_no_other() {

@@ -1,13 +1,13 @@
 //! Poses of one model: meshes, and frames of .cager files.
 
 use super::{grouped, read_model};
-use crate::decode::{self, Decoding};
-use crate::origin::move_from;
-use crate::pose_faces::same_faces;
 use anyhow::{Context, Result, bail};
+use cager_capture::decode::{self, Decoding};
+use cager_capture::origin::move_from;
 use cager_core::cage::Cage;
 use cager_formats::{FrameRange, ScratchDir, open_frames};
 use cager_geometry::mesh::{Model, Point};
+use cager_motion::pose_faces::same_faces;
 use std::fmt;
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,11 @@
 //! Arguments of `cager recover`.
 
-use super::args::CodingArgs;
 use super::checks::TimingArgs;
+use super::coding_args::CodingArgs;
 use super::outputs::OutputArgs;
 use super::service_args::ServiceArgs;
 use super::stretches::KeyTemplate;
-use crate::mismatch::Up;
+use cager_capture::mismatch::Up;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;

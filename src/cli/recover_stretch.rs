@@ -5,16 +5,16 @@ use super::outputs::folder_of;
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
 use super::solver_options::read_cage;
 use super::{grouped, human_bytes, progress};
-use crate::encode::{EncodeProgress, Encoded};
-use crate::recover::{
-    Encoding, JOINTS_RATE, Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, cage_around,
-    gait_svg, recover,
-};
 use anyhow::{Context, Result};
+use cager_capture::encode::{EncodeProgress, Encoded};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_formats::{AtomicFile, MeshSequence, ScratchDir, Target};
 use cager_geometry::mesh::{Model, Point};
+use cager_motion::recover::{
+    Encoding, JOINTS_RATE, Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, cage_around,
+    gait_svg, recover,
+};
 use cager_recover::manifold::Manifold;
 use cager_recover::people::{FitOptions, Method};
 use cager_recover::rig::Rig;

@@ -2,10 +2,10 @@
 
 use super::args::{SolverArgs, SpectrumArg};
 use super::{grouped, read_model, warn};
-use crate::coding::InversionChoices;
-use crate::origin::move_to;
 use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
+use cager_capture::coding::InversionChoices;
+use cager_capture::origin::move_to;
 use cager_core::cage::{Cage, CageError};
 use cager_core::inversion::{Handles, PrepareError};
 use cager_core::regularize::Regularizer;

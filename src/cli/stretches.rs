@@ -1,7 +1,7 @@
 //! Stretches of frames that have a template each: how they are told and cut, what their files are called, and the list of them.
 
-use crate::decode::{self, Container, DecodeError};
 use anyhow::{Context, Result, bail};
+use cager_capture::decode::{self, Container, DecodeError};
 use cager_formats::MeshSequence;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;

@@ -9,16 +9,13 @@ use super::outputs::{Outputs, folder_of};
 use super::solver_options::read_cage;
 use super::transfer_source::MotionSource;
 use super::{grouped, human_bytes, progress, read_model, tell, transfer_remote, warn};
-use crate::coding::InversionChoices;
-use crate::design::FRAMES;
-use crate::encode::{self, EncodeProgress, Encoded, Job, sample_frames};
-use crate::memory::Memory;
-use crate::origin::{move_to, own_origin};
-use crate::transfer::{
-    MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer, words,
-};
 use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
+use cager_capture::coding::InversionChoices;
+use cager_capture::design::FRAMES;
+use cager_capture::encode::{self, EncodeProgress, Encoded, Job, sample_frames};
+use cager_capture::memory::Memory;
+use cager_capture::origin::{move_to, own_origin};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::regularize::Regularizer;
@@ -26,6 +23,9 @@ use cager_explore::TransferError;
 use cager_explore::alignment::AlignBy;
 use cager_formats::{AtomicFile, ScratchDir, Target, commit_together};
 use cager_geometry::mesh::{Model, Point};
+use cager_motion::transfer::{
+    MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer, words,
+};
 use std::io::Write;
 use std::path::Path;
 

@@ -4,13 +4,13 @@ use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::dry_run::read_files;
 use super::motion_args::TransferMotionArgs;
 use super::read_prim;
-use crate::frames::CaptureFiles;
-use crate::timing::Timing;
-use crate::transfer::{MotionFile, decoded};
 use anyhow::{Result, bail};
+use cager_capture::frames::CaptureFiles;
+use cager_capture::timing::Timing;
 use cager_core::cage::Cage;
 use cager_formats::{Error, FrameReader};
 use cager_geometry::mesh::Model;
+use cager_motion::transfer::{MotionFile, decoded};
 use std::path::{Path, PathBuf};
 
 /// What is moved.

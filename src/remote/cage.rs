@@ -1,8 +1,8 @@
 //! Has a service design a cage from evenly spaced frames of a local capture.
 
 use super::{RemoteError, RemoteProgress};
-use crate::design::of_stages;
 use cager_cages::{DesignOptions, Goal, Style};
+use cager_capture::design::of_stages;
 use cager_client::cage_messages::{CageJob, CageOptions, CageState, CageStyle};
 use cager_client::{Client, ClientError, FrameSource, MeshFile, NewCage};
 use cager_proto::report::{DesignReport, StageReport};

@@ -92,7 +92,7 @@ impl RemoteError {
     }
 
     /// The error alone, for a service that does not stay.
-    pub(crate) fn without_session(self) -> Self {
+    pub fn without_session(self) -> Self {
         match self {
             Self::Kept { cause, .. } | Self::Ended { cause, .. } | Self::Gone { cause } => *cause,
             error => error,

@@ -1,6 +1,6 @@
 //! Frames of a capture on disk as a source for uploads.
 
-use crate::frames::CaptureFiles;
+use cager_capture::frames::CaptureFiles;
 use cager_client::FrameSource;
 use cager_formats::{Error, FrameReader};
 use std::io;

@@ -1,7 +1,7 @@
 //! Coded files: the bound that was asked for holds for every point of every frame, sizes and mean errors are met, and what cannot be is refused.
 
 use crate::support::{Dir, ENCODE, Small, largest, mean, measure, polygons, read_frames};
-use cager::decode;
+use cager_capture::decode;
 use cager_geometry::mesh::{Model, Polygons};
 
 /// Encodes with more arguments, decodes, and gives the errors and the size.

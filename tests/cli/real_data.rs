@@ -1,9 +1,9 @@
 //! The captures of `CAGER_CAPTURES` (default `../shared/data`), which are not part of the project.
 
 use crate::support::{Dir, Output, TestCommand, close, npy_f64, read_cages};
-use cager::encode::{Job, encode};
-use cager::memory::Memory;
-use cager::mismatch::{FRAMES, Mismatch, Up, mismatches};
+use cager_capture::encode::{Job, encode};
+use cager_capture::memory::Memory;
+use cager_capture::mismatch::{FRAMES, Mismatch, Up, mismatches};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{Handles, SolverOptions};

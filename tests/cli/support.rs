@@ -1,6 +1,6 @@
 //! A folder to work in, the program to run there, and small captures to run it on.
 
-use cager::decode;
+use cager_capture::decode;
 use cager_demo::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, open_frames, write_model};
 use cager_geometry::mesh::{Model, Point, Polygons, TriMesh, diagonal};
@@ -18,7 +18,7 @@ pub(crate) const ENCODE: &str = "encode --rest rest.obj --cage cage.obj --frames
 
 /// Whether the program holds the page of its reports, which is built where Node is.
 pub(crate) fn has_report_page() -> bool {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("web/dist/report.html").exists()
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("web/dist/report/report.html").exists()
 }
 
 /// A folder of its own for one test.

@@ -5,7 +5,7 @@ mod bad_input;
 use crate::refused::refused;
 use crate::support::{Dir, Small, as_model, mean, measure, read_frames};
 use crate::transfer::{centres, remeshed};
-use cager::decode;
+use cager_capture::decode;
 use cager_geometry::mesh::{Model, Point};
 
 // Small cages are soon designed.

@@ -9,7 +9,7 @@ const DOCUMENT: &str = "docs/OPERATIONS.md";
 #[test]
 fn every_kind_of_problem_is_in_the_table_with_its_status_and_title() {
     let document = text(DOCUMENT);
-    for kind in cager::problem::ALL {
+    for kind in cager_service::problem::ALL {
         let row = format!("| `{}` | {} | {} |", kind.word, kind.status.as_u16(), kind.title);
         assert!(document.contains(&row), "{row} is missing in {DOCUMENT}");
     }
@@ -18,7 +18,7 @@ fn every_kind_of_problem_is_in_the_table_with_its_status_and_title() {
 #[test]
 fn every_metric_is_in_the_table_and_described_and_no_other() {
     let (document, metrics) = (text(DOCUMENT), metrics());
-    let described: String = text("src/telemetry/metrics.rs").split_whitespace().collect();
+    let described: String = text("crates/service/src/telemetry/metrics.rs").split_whitespace().collect();
     for metric in &metrics {
         assert!(document.contains(&format!("| `{metric}` |")), "{metric} is missing in {DOCUMENT}");
         assert!(described.contains(&format!("!(\"{metric}\",")), "{metric} is not described");
@@ -58,8 +58,9 @@ fn the_commands_for_tokens_make_a_file_that_is_accepted() {
     // The only part that a machine may lack.
     let commands = commands.replace("$(openssl rand -hex 32)", "0123456789abcdef0123456789abcdef");
     succeeds(std::process::Command::new("sh").args(["-euc", &commands]).current_dir(folder.path()));
-    let limits = cager::config::ServeConfig::default().tenant_limits();
-    let access = cager::auth::Access::open(Some(&folder.path().join("tokens.toml")), limits).expect("a tokens file");
+    let limits = cager_service::config::ServeConfig::default().tenant_limits();
+    let access =
+        cager_service::auth::Access::open(Some(&folder.path().join("tokens.toml")), limits).expect("a tokens file");
     let bearer = http::HeaderValue::from_static("Bearer 0123456789abcdef0123456789abcdef");
     let headers = http::HeaderMap::from_iter([(http::header::AUTHORIZATION, bearer)]);
     assert_eq!(access.authenticate(&headers).expect("a tenant").tenant.name, "studio-a");

@@ -33,7 +33,7 @@ pub(crate) fn blocks(document: &str, language: &str) -> Vec<String> {
 /// Names of metrics that the sources count, set or record.
 pub(crate) fn metrics() -> BTreeSet<String> {
     let mut found = BTreeSet::new();
-    let mut folders = vec![repository().join("src")];
+    let mut folders = vec![repository().join("crates/service/src")];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).expect("a folder") {
             let path = entry.expect("an entry").path();
@@ -80,7 +80,7 @@ pub(crate) fn write_capture(folder: &Path) {
 /// The file is a container of `frames` frames with good checksums.
 #[track_caller]
 pub(crate) fn assert_container(path: &Path, frames: usize) {
-    let mut container = cager::decode::open(path).expect("a container");
+    let mut container = cager_capture::decode::open(path).expect("a container");
     assert_eq!(container.frames(), frames);
     container.verify().expect("its checksums match");
 }

@@ -1,7 +1,7 @@
 //! The OpenAPI document.
 
-use cager::http::document;
-use cager::problem;
+use cager_service::http::document;
+use cager_service::problem;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! Small captures with everything that a service should answer about them, computed in this process.
 
-use cager::capture::{CaptureWriter, Encoding, StoredError};
-use cager::encode::{Job, encode};
-use cager::memory::Memory;
+use cager_capture::capture::{CaptureWriter, Encoding, StoredError};
+use cager_capture::encode::{Job, encode};
+use cager_capture::memory::Memory;
 use cager_client::{MeshFile, NewSession, messages::SessionOptions};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;

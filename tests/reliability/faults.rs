@@ -1,6 +1,6 @@
 //! The disk that fails, which the store's own tests use too.
 
-use cager::store::disk;
+use cager_service::store::disk;
 
 #[path = "../faults/mod.rs"]
 mod shared;

@@ -1,8 +1,8 @@
 //! A disk whose syncs and changes of the catalogue can be held up for as long as a test wants.
 
 use crate::faults::{Hooked, Op};
-use cager::store::Disk;
-use cager::store::disk::{DiskFile, Entry};
+use cager_service::store::Disk;
+use cager_service::store::disk::{DiskFile, Entry};
 use cager_store::{Catalog, CatalogError};
 use std::fs::File;
 use std::io;

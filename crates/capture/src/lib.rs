@@ -17,5 +17,6 @@ pub mod mismatch;
 pub mod origin;
 pub mod preparation_warnings;
 pub mod reach;
+pub mod sizes;
 pub mod speed;
 pub mod timing;

@@ -1,8 +1,8 @@
 //! Files that operators write.
 
 use crate::Target;
-use cager::auth::{Access, TenantLimits};
-use cager::config::{ServeConfig, ServeFlags};
+use cager_service::auth::{Access, TenantLimits};
+use cager_service::config::{ServeConfig, ServeFlags};
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{Seek, Write};
@@ -48,7 +48,7 @@ pub(super) const CONFIG: Target = Target {
     name: "config",
     run: config,
     seeds: || {
-        let some = "listen = \"127.0.0.1:0\"\ndata = \"d\"\ntokens = \"/t\"\nlog = \"json\"\nlog_filter = \"info,cager::http=debug\"\n\
+        let some = "listen = \"127.0.0.1:0\"\ndata = \"d\"\ntokens = \"/t\"\nlog = \"json\"\nlog_filter = \"info,cager_service::http=debug\"\n\
                     workers = 2\nframe_bytes = \"512 MiB\"\nmax_rest_bytes = 1_000_000\nheader_timeout_s = \"7\"\n";
         vec![some.into(), b"max_header_bytes = \"32 KiB\"\ntenant_max_bytes='1 TiB'\n".to_vec()]
     },

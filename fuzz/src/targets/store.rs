@@ -3,12 +3,12 @@
 use super::{byte, mend};
 use crate::Target;
 use crate::disk::MemoryDisk;
-use cager::store::{Content, ContentKey, Kind, NamedFile, SessionMeta, Shared, Store};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{Rows, Solver, SolverOptions};
 use cager_geometry::mesh::TriMesh;
 use cager_proto::messages::SessionOptions;
+use cager_service::store::{Content, ContentKey, Kind, NamedFile, SessionMeta, Shared, Store};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -59,7 +59,7 @@ fn log(mut bytes: &[u8]) {
     let disk = MemoryDisk::default();
     drop(open(&disk));
     let folder = Path::new(LOG_PATH).parent().expect("a folder");
-    cager::store::Disk::create_dir(&disk, folder).expect("a folder");
+    cager_service::store::Disk::create_dir(&disk, folder).expect("a folder");
     disk.put(Path::new(FILES[0].0), &session_file());
     disk.put(Path::new(LOG_PATH), &file);
     let opened =
@@ -84,7 +84,7 @@ fn session_file() -> Vec<u8> {
 
 fn meta() -> SessionMeta {
     let options = SessionOptions { lambda: Some(0.3), name: Some("n".into()), ..SessionOptions::default() };
-    let idempotency = Some(cager::store::Idempotency { key: "k".into(), fingerprint: "f".into() });
+    let idempotency = Some(cager_service::store::Idempotency { key: "k".into(), fingerprint: "f".into() });
     SessionMeta {
         made_cage: None,
         id: ID.into(),
@@ -186,7 +186,8 @@ pub(super) const SMALL_FILES: Target = Target {
             matrix: None,
         };
         store.put_content(&KEY, &content).expect("content");
-        let completion = cager::store::Completion { frames: 6, container_bytes: 7, container_digest: "00".into() };
+        let completion =
+            cager_service::store::Completion { frames: 6, container_bytes: 7, container_digest: "00".into() };
         let described = disk.get(Path::new(FILES[2].0)).expect("a file");
         let content = described[head("content", b"").len()..described.len() - 2].to_vec();
         let json = |value: serde_json::Result<Vec<u8>>| value.expect("JSON");
@@ -232,7 +233,7 @@ fn small_file(mut bytes: &[u8]) {
     let disk = MemoryDisk::default();
     drop(open(&disk));
     let folder = Path::new(path).parent().expect("a folder");
-    cager::store::Disk::create_dir(&disk, folder).expect("a folder");
+    cager_service::store::Disk::create_dir(&disk, folder).expect("a folder");
     disk.put(Path::new(path), &file);
     if kind == "completion" {
         disk.put(Path::new(FILES[0].0), &session_file());

@@ -14,7 +14,7 @@ use axum::body::{Body, Bytes};
 use axum::extract::ConnectInfo;
 use axum::response::IntoResponse;
 use axum::routing::{get, post};
-use cager::http::listen::{Limits, is_body_timeout, serve};
+use cager_service::http::listen::{Limits, is_body_timeout, serve};
 use futures_util::StreamExt as _;
 use http::{StatusCode, header};
 use std::convert::Infallible;

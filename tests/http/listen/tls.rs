@@ -1,7 +1,7 @@
 //! TLS.
 
 use super::*;
-use cager::http::listen::{Tls, tls_config};
+use cager_service::http::listen::{Tls, tls_config};
 use rustls::pki_types::CertificateDer;
 use rustls::{ClientConfig, RootCertStore};
 use std::path::Path;

@@ -1,14 +1,14 @@
 //! The service within this process, on a socket, with designs that take as long as a test wants.
 
 use super::Api;
-use cager::cage_job::Designer;
-use cager::config::ServeConfig;
-use cager::http::listen::serve;
-use cager::http::{router, seen, spare};
-use cager::service::Service;
-use cager::store::LocalDisk;
 use cager_cages::{Design, DesignError, Progress};
 use cager_geometry::mesh::{TriMesh, bounds};
+use cager_service::cage_job::Designer;
+use cager_service::config::ServeConfig;
+use cager_service::http::listen::serve;
+use cager_service::http::{router, seen, spare};
+use cager_service::service::Service;
+use cager_service::store::LocalDisk;
 use std::ops::{ControlFlow, Deref};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::{Arc, Mutex};

@@ -1,9 +1,9 @@
 //! `Idempotency-Key`: a session is made once, however often it is asked for.
 
 use crate::support::{Capture, TestApp, cage_form, file, form, text};
-use cager::store::{Idempotency, Kind, LocalDisk, Shared, Store};
 use cager_proto::cage_messages::CageJob;
 use cager_proto::messages::{Session, SessionList};
+use cager_service::store::{Idempotency, Kind, LocalDisk, Shared, Store};
 use futures_util::future::join_all;
 use serde_json::json;
 use std::sync::Arc;

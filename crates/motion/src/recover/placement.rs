@@ -1,0 +1,121 @@
+//! Where a template begins: turned, moved and scaled to the first surface, where that was asked for; where not, whether it should have been.
+
+use super::{RecoverError, RecoverOptions};
+use cager_capture::mismatch::Up;
+use cager_core::cage::Cage;
+use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::vector::{cross, norm, sub};
+use cager_registration::{
+    AlignOptions, Alignment, FitOptions, Observation, ObservationOptions, RegistrationError, Target, Template, align,
+};
+use std::path::Path;
+
+/// How a template was brought to the first surface.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Placement {
+    /// The angle it was turned by, in degrees.
+    pub degrees: f64,
+    /// The factor it was scaled by.
+    pub scale: f64,
+    /// What it was moved by then.
+    pub translation: Point,
+    /// Root mean square distance of the surfaces after it, of positions and normals together, as a share of the surface's size.
+    pub score: f64,
+    /// The same of the best other turn, over this one's: near one, either may be right.
+    pub runner_up: f64,
+}
+
+/// A runner-up below this is as good as the best.
+const AMBIGUOUS: f64 = 1.15;
+/// A first fit that a turn makes better than this share of it was turned wrongly.
+const CLEARLY_BETTER: f64 = 0.8;
+/// Turns below this, in degrees, are left to the fit.
+const MIN_TURN: f64 = 12.0;
+/// Sizes that differ by less are motion.
+const SAME_SIZE: f64 = 0.05;
+
+impl Placement {
+    /// Brings a template and its cage to a surface.
+    pub(super) fn find(
+        template: &mut Model,
+        cage: &mut TriMesh,
+        surface: &Observation,
+        options: &RecoverOptions,
+    ) -> Result<Option<Self>, RecoverError> {
+        if let Some(up) = options.up {
+            let turn = |p: &mut Point| *p = turned(*p, up);
+            template.points.iter_mut().chain(&mut cage.vertices).for_each(turn);
+        }
+        if !options.align && !options.scale {
+            return Ok(None);
+        }
+        let up = options.up.map(|up| if up == Up::Z { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] });
+        let own = seen(template).ok_or(RegistrationError::NoSurface)?;
+        let found = align(&own, surface, &AlignOptions { up, scale: options.scale });
+        template.points.iter_mut().chain(&mut cage.vertices).for_each(|p| *p = found.apply(*p));
+        let Alignment { scale, translation, score, runner_up, .. } = found;
+        Ok(Some(Self { degrees: found.degrees(), scale, translation, score, runner_up }))
+    }
+
+    /// What the user should know.
+    pub(super) fn warning(&self) -> Option<String> {
+        (self.runner_up < AMBIGUOUS).then(|| {
+            format!(
+                "the template may be turned otherwise: another turn lies only {:.0} % worse on the first surface; look at the result, or turn the template yourself",
+                100.0 * (self.runner_up - 1.0)
+            )
+        })
+    }
+}
+
+/// A point whose model stood along the other of the two usual axes.
+fn turned([x, y, z]: Point, up: Up) -> Point {
+    match up {
+        Up::Z => [x, -z, y],
+        Up::Y => [x, z, -y],
+        Up::Other => [x, y, z],
+    }
+}
+
+/// A template as a surface.
+fn seen(template: &Model) -> Option<Observation> {
+    let mesh = TriMesh::from(template);
+    Observation::of_mesh(&mesh.vertices, &mesh.triangles, &ObservationOptions::default()).ok().map(|(seen, _)| seen)
+}
+
+/// Refuses a template that lies on the first surface better when it is turned, and one of another size.
+pub(super) fn check_start(
+    model: &Model,
+    cage: &Cage,
+    template: &Template,
+    area_of: impl Fn(&[Point]) -> f64,
+    first: (&Path, &Observation, &Target),
+) -> Result<(), RecoverError> {
+    let (path, surface, target) = first;
+    let fit = |start: &[Point]| {
+        let fitted = template.fit(target, start, &FitOptions::FAR);
+        let score = template.score(target, &fitted);
+        (fitted, score)
+    };
+    let (fitted, score) = fit(cage.vertices());
+    let path = || path.to_owned();
+    if let Some(found) = seen(model).map(|seen| align(&seen, surface, &AlignOptions::default()))
+        && found.degrees() > MIN_TURN
+    {
+        let turned: Vec<Point> = cage.vertices().iter().map(|&p| found.apply(p)).collect();
+        if fit(&turned).1 < CLEARLY_BETTER * score {
+            return Err(RecoverError::Turned { path: path(), degrees: found.degrees() });
+        }
+    }
+    let scale = (area_of(&fitted) / area_of(cage.vertices())).sqrt();
+    if (scale - 1.0).abs() > SAME_SIZE {
+        return Err(RecoverError::OtherSize { path: path(), scale });
+    }
+    Ok(())
+}
+
+/// The area of triangles.
+pub(super) fn area(vertices: &[Point], triangles: &[[u32; 3]]) -> f64 {
+    let corner = |v: u32| vertices[v as usize];
+    triangles.iter().map(|&[a, b, c]| 0.5 * norm(cross(sub(corner(b), corner(a)), sub(corner(c), corner(a))))).sum()
+}

@@ -1,0 +1,251 @@
+//! Parses multipart bodies: the files that a session or a recovery is made from.
+
+use super::extract::{content_type, idempotency_key};
+use super::metered::Metered;
+use super::waiting::{SLOWEST_BYTES_PER_SECOND, body_error};
+use crate::admission::Permit;
+use crate::auth::Tenant;
+use crate::config::MULTIPART_OVERHEAD_BYTES;
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::cage_source::UploadedFiles;
+use crate::store::NamedFile;
+use axum::body::{Body, BodyDataStream};
+use axum::extract::multipart::{Field, MultipartError};
+use axum::extract::{FromRequest, Multipart, Request};
+use cager_proto::messages::SessionOptions;
+use futures_util::{StreamExt as _, stream};
+use serde::de::DeserializeOwned;
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+const OPTIONS_BYTES: usize = 64 << 10;
+pub(super) const NAME_CHARACTERS: usize = 200;
+/// Name of the part with the matrix of the regularizer `matrix`.
+const MATRIX: &str = "regularizer_matrix";
+
+/// Parsed parts, with the permit for their memory.
+pub(crate) struct Parts {
+    pub(crate) uploaded: UploadedFiles,
+    pub(crate) options: SessionOptions,
+    pub(crate) room: Permit,
+}
+
+/// What the headers of a form say.
+pub(super) struct FormHeader {
+    pub(super) idempotency_key: Option<String>,
+    /// Longest time for the body to arrive.
+    pub(super) patience: Duration,
+}
+
+/// Checks the headers of a form with these parts, whose content may have `limit` bytes.
+///
+/// # Errors
+/// The body is not multipart, it is too large, or its idempotency key is malformed.
+pub(super) fn check_form_header(
+    service: &Service,
+    request: &Request,
+    parts: &str,
+    limit: u64,
+) -> Result<FormHeader, ApiError> {
+    let headers = request.headers();
+    if content_type(headers).as_deref() != Some("multipart/form-data") {
+        return Err(ApiError::new(problem::MEDIA_TYPE, format!("send multipart/form-data with the parts {parts}")));
+    }
+    let declared = http_body::Body::size_hint(request.body()).lower();
+    if declared > limit.saturating_add(MULTIPART_OVERHEAD_BYTES) {
+        service.rejected("body_too_large");
+        let detail = format!("the body has {declared} bytes, but the parts {parts} may have {limit} together");
+        return Err(ApiError::new(problem::TOO_LARGE, detail).limit(limit));
+    }
+    let most = if declared > 0 { declared } else { limit };
+    let patience = Duration::from_secs(service.config.body_timeout_s + most / SLOWEST_BYTES_PER_SECOND);
+    Ok(FormHeader { idempotency_key: idempotency_key(headers)?, patience })
+}
+
+/// Files of a form by the names of their parts, and its options.
+pub(super) struct Files<T> {
+    pub(super) files: HashMap<&'static str, NamedFile>,
+    pub(super) options: T,
+    /// Permit for their memory.
+    pub(super) room: Permit,
+}
+
+impl<T> Files<T> {
+    /// The file of a part that has to be there.
+    ///
+    /// # Errors
+    /// It is not there.
+    pub(super) fn take(&mut self, part: &str, what: &str) -> Result<NamedFile, ApiError> {
+        let missing = || bad(format!("part {part} is missing; send {what} as a file"));
+        self.files.remove(part).ok_or_else(missing)
+    }
+}
+
+/// Reads the parts that make a session.
+///
+/// # Errors
+/// Parts that are missing, twice there, unknown or too large; no room.
+pub(crate) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Request) -> Result<Parts, ApiError> {
+    let mut form = read_files(service, tenant, request, &["rest", "cage", MATRIX], "rest pose and cage").await?;
+    let rest = form.take("rest", "the rest pose")?;
+    let uploaded = UploadedFiles { rest, cage: form.files.remove("cage"), matrix: form.files.remove(MATRIX) };
+    Ok(Parts { uploaded, options: form.options, room: form.room })
+}
+
+/// Reads files into memory, and options; `what` are all the files together.
+///
+/// # Errors
+/// Parts that are twice there, unknown or too large; no room.
+pub(super) async fn read_files<T: DeserializeOwned + Default>(
+    service: &Arc<Service>,
+    tenant: &Tenant,
+    request: Request,
+    parts: &[&'static str],
+    what: &str,
+) -> Result<Files<T>, ApiError> {
+    let (metered, request) = Metered::new(service, tenant, request, format!("{what} have"));
+    let body = form(request).await?;
+    let ((files, options), room) = metered.finish(read_parts(service, body, parts, what).await)?;
+    Ok(Files { files, options, room })
+}
+
+/// The form in a request's body.
+///
+/// # Errors
+/// It is no multipart form.
+pub(super) async fn form(request: Request) -> Result<Multipart, ApiError> {
+    // It gets one piece at a time: the parser (multer 3.1) buffers whatever is there, which must not be a whole capture; and it looks for the first
+    // boundary between two readings of the body, and takes one that comes to its end in the second for incomplete.
+    let pieces = |(mut pieces, is_first): (BodyDataStream, bool)| async move {
+        if !is_first {
+            tokio::task::yield_now().await;
+        }
+        pieces.next().await.map(|piece| (piece, (pieces, false)))
+    };
+    let request = request.map(|body| Body::from_stream(stream::unfold((body.into_data_stream(), true), pieces)));
+    Multipart::from_request(request, &())
+        .await
+        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))
+}
+
+async fn read_parts<T: DeserializeOwned + Default>(
+    service: &Service,
+    mut body: Multipart,
+    parts: &[&'static str],
+    what: &str,
+) -> Result<(HashMap<&'static str, NamedFile>, T), ApiError> {
+    let (mut files, mut options) = (HashMap::new(), None);
+    let mut left = service.config.max_rest_bytes;
+    while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
+        let part = field.name().unwrap_or_default().to_owned();
+        let twice = || bad(format!("part {part:?} is there twice; send it once"));
+        if part == "options" {
+            if options.is_some() {
+                return Err(twice());
+            }
+            options = Some(read_options(field).await?);
+        } else if let Some(known) = parts.iter().find(|known| **known == part) {
+            if files.contains_key(known) {
+                return Err(twice());
+            }
+            files.insert(*known, read_file(service, &part, field, &mut left, what).await?);
+        } else {
+            return Err(bad(format!("part {part:?} is unknown; send {} and options", parts.join(", "))));
+        }
+    }
+    Ok((files, options.unwrap_or_default()))
+}
+
+async fn read_file(
+    service: &Service,
+    part: &str,
+    mut field: Field<'_>,
+    left: &mut u64,
+    what: &str,
+) -> Result<NamedFile, ApiError> {
+    let name = file_name(&field);
+    // There is one format of matrices, so that their names say nothing.
+    let name = if part == MATRIX && name.is_empty() { format!("{MATRIX}.mtx") } else { name };
+    if !(name.contains('.') || part == MATRIX) || name.chars().count() > NAME_CHARACTERS {
+        let detail = format!("part {part:?} needs a file name whose extension says the format, such as rest.obj");
+        return Err(bad(detail));
+    }
+    let mut bytes = Vec::new();
+    while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {
+        *left = left.checked_sub(chunk.len() as u64).ok_or_else(|| {
+            service.rejected("body_too_large");
+            let limit = service.config.max_rest_bytes;
+            let detail = format!("{what} are larger than {limit} bytes together; send a lighter model");
+            ApiError::new(problem::TOO_LARGE, detail).limit(limit)
+        })?;
+        bytes.extend_from_slice(&chunk);
+    }
+    Ok(NamedFile { name, bytes })
+}
+
+/// The file name of a part, without folders and control characters.
+pub(super) fn file_name(field: &Field<'_>) -> String {
+    let name = field.file_name().unwrap_or_default();
+    name.rsplit(['/', '\\']).next().unwrap_or_default().chars().filter(|c| !c.is_control()).collect()
+}
+
+/// Parses a part as JSON.
+///
+/// # Errors
+/// More than 64 KiB; invalid JSON or options.
+pub(super) async fn read_options<T: DeserializeOwned>(mut field: Field<'_>) -> Result<T, ApiError> {
+    let mut bytes = Vec::new();
+    while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {
+        bytes.extend_from_slice(&chunk);
+        if bytes.len() > OPTIONS_BYTES {
+            let detail = format!("part \"options\" is larger than {OPTIONS_BYTES} bytes");
+            return Err(ApiError::new(problem::TOO_LARGE, detail).limit(OPTIONS_BYTES as u64));
+        }
+    }
+    serde_json::from_slice(&bytes)
+        .map_err(|error| ApiError::new(problem::INVALID_OPTIONS, format!("part \"options\": {error}")))
+}
+
+pub(super) fn bad(detail: String) -> ApiError {
+    ApiError::new(problem::BAD_REQUEST, detail)
+}
+
+pub(super) fn broken(error: &MultipartError) -> ApiError {
+    let general = body_error(error);
+    if general.problem.word() == problem::REQUEST_TIMEOUT.word {
+        return general;
+    }
+    bad(format!("the multipart body cannot be read: {}", error.body_text()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytes::Bytes;
+    use std::task::Poll;
+
+    #[tokio::test]
+    async fn a_form_that_comes_while_it_is_looked_at_is_read() {
+        let text = "--b\r\nContent-Disposition: form-data; name=\"x\"\r\n\r\n1\r\n--b--\r\n";
+        let mut polls = 0;
+        let body = stream::poll_fn(move |cx| {
+            polls += 1;
+            match polls {
+                1 => {
+                    cx.waker().wake_by_ref();
+                    Poll::Pending
+                }
+                2 => Poll::Ready(Some(Ok::<_, std::io::Error>(Bytes::from_static(text.as_bytes())))),
+                _ => Poll::Ready(None),
+            }
+        });
+        let request = Request::builder().header("content-type", "multipart/form-data; boundary=b");
+        let request = request.body(Body::from_stream(body)).expect("a request");
+        let mut form = form(request).await.expect("a form");
+        let field = form.next_field().await.expect("a whole form").expect("a part");
+        assert_eq!(field.name(), Some("x"));
+        assert_eq!(field.text().await.expect("its text"), "1");
+    }
+}

@@ -1,0 +1,128 @@
+//! `/v1/sessions`: creating, listing, reading, completing and deleting sessions.
+
+use super::extract::{Body, Caller, Query, Requested, RequestedSession};
+use super::multipart::FormHeader;
+use super::respond::JsonResult;
+use super::waiting::too_slow;
+use super::{multipart, openapi};
+use crate::auth::Tenant;
+use crate::jobs::{Job, Jobs, Work};
+use crate::problem::{self, ApiError};
+use crate::service::Service;
+use crate::session::create::NewSession;
+use axum::Json;
+use axum::extract::{Request, State};
+use axum::response::{IntoResponse, Response};
+use cager_proto::messages::{Complete, Session, SessionList, SessionState};
+use http::{StatusCode, header};
+use serde::Deserialize;
+use std::sync::Arc;
+use tokio::time::timeout;
+
+pub(super) const PAGE: usize = 100;
+/// Most missing ranges per session in a list.
+const LISTED_RANGES: usize = 10;
+
+/// Makes a session: parts `rest` and `cage` are files whose names carry their format, part `options` is JSON. Without a cage one is made
+/// from the rest pose, or taken from a design, as `options.cage` says. It is prepared in the background; frames may be posted at once
+/// and wait for it.
+#[utoipa::path(
+    post, path = "/v1/sessions", operation_id = "create_session", tag = "sessions",
+    params(("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[ -~]+$", description = "A repetition with the same key and content gives the same session")),
+    request_body(content = openapi::NewSessionForm, content_type = "multipart/form-data"),
+    responses((status = 201, description = "The session, or the one that an earlier request with the same key made", body = Session,
+        headers(("Location" = String, description = "Address of the session")))),
+)]
+pub(crate) async fn create(
+    State(service): State<Arc<Service>>,
+    Caller(tenant): Caller,
+    request: Request,
+) -> Result<Response, ApiError> {
+    let limit = service.config.max_rest_bytes;
+    let FormHeader { idempotency_key, patience } =
+        multipart::check_form_header(&service, &request, "rest, cage and options", limit)?;
+    let parts = timeout(patience, multipart::read(&service, &tenant, request)).await.map_err(|_| too_slow())??;
+    let new = NewSession { uploaded: parts.uploaded, options: parts.options, idempotency_key, room: parts.room };
+    let session = service.create(&tenant, new).await?;
+    let location = format!("/v1/sessions/{}", session.meta.id);
+    Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(session.view())).into_response())
+}
+
+/// Where a page begins.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct PageQuery {
+    /// The `next` of the page before.
+    pub(super) after: Option<String>,
+}
+
+impl PageQuery {
+    /// A page of a tenant's jobs, and where the next one begins.
+    pub(super) fn page<W: Work>(&self, jobs: &Jobs<W>, tenant: &Tenant) -> (Vec<Arc<Job<W>>>, Option<String>) {
+        let mut page = jobs.page(&tenant.name, self.after.as_deref(), PAGE + 1);
+        let more = page.len() > PAGE;
+        page.truncate(PAGE);
+        let next = page.last().filter(|_| more).map(|job| job.id().to_owned());
+        (page, next)
+    }
+}
+
+/// Lists the tenant's sessions, newest first, a hundred at a time; of missing frames the first ranges.
+#[utoipa::path(get, path = "/v1/sessions", operation_id = "list_sessions", tag = "sessions", params(PageQuery), responses((status = 200, description = "A page of sessions", body = SessionList)))]
+pub(crate) async fn list(
+    State(service): State<Arc<Service>>,
+    Caller(tenant): Caller,
+    Query(query): Query<PageQuery>,
+) -> JsonResult<SessionList> {
+    let mut page = service.registry.page(Some(&tenant.name), query.after.as_deref(), PAGE + 1);
+    let more = page.len() > PAGE;
+    page.truncate(PAGE);
+    let mut sessions = Vec::with_capacity(page.len());
+    for session in &page {
+        let loaded = session.ensure_loaded().await;
+        let mut view = session.view_with(LISTED_RANGES);
+        match loaded {
+            // It is being deleted.
+            Err(error) if error.problem.word() == problem::SESSION_DELETED.word => continue,
+            // An unreadable session is listed as failed.
+            Err(error) if view.state != SessionState::Failed => {
+                (view.state, view.problem) = (SessionState::Failed, Some(*error.problem));
+            }
+            _ => {}
+        }
+        sessions.push(view);
+    }
+    let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
+    Ok(Json(SessionList { sessions, next }))
+}
+
+/// A session.
+#[utoipa::path(get, path = "/v1/sessions/{id}", operation_id = "get_session", tag = "sessions", params(openapi::Id), responses((status = 200, description = "The session", body = Session)))]
+pub(crate) async fn get(RequestedSession { session, .. }: RequestedSession) -> Json<Session> {
+    Json(session.view())
+}
+
+/// Deletes a session with all that belongs to it; what runs for it stops.
+#[utoipa::path(delete, path = "/v1/sessions/{id}", operation_id = "delete_session", tag = "sessions", params(openapi::Id), responses((status = 204, description = "It is gone")))]
+pub(crate) async fn delete(
+    State(service): State<Arc<Service>>,
+    Requested(session): Requested<crate::session::Session>,
+) -> Result<StatusCode, ApiError> {
+    service.delete(&session).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Says that no more frames are coming, and writes the container. Repeating it changes nothing.
+#[utoipa::path(
+    post, path = "/v1/sessions/{id}/complete", operation_id = "complete_session", tag = "sessions", params(openapi::Id), request_body = Complete,
+    responses((status = 200, description = "The completed session", body = Session)),
+)]
+pub(crate) async fn complete(
+    State(service): State<Arc<Service>>,
+    RequestedSession { session, .. }: RequestedSession,
+    Body(complete): Body<Complete>,
+) -> JsonResult<Session> {
+    service.complete(&session, complete).await?;
+    Ok(Json(session.view()))
+}

@@ -1,0 +1,213 @@
+//! A service from its start to its end: what it listens on, what it takes over, and when it stops.
+
+use crate::cage_job::local_designer;
+use crate::config::ServeConfig;
+use crate::http::listen::{Limits, serve, tls_config};
+use crate::http::{Operated, admin, router, seen, seen_by_operators, spare};
+use crate::resources::Resources;
+use crate::service::{Service, StartError};
+use crate::shards;
+use crate::store::{LocalDisk, Shard, StoreError};
+use crate::telemetry;
+use anyhow::{Context, Result, bail};
+use axum::Router;
+use std::io::Write;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+
+/// Connections of operators and their machines.
+const OPERATORS: usize = 64;
+/// How often it is tried to take over a database that another process has.
+const TAKEOVER_PAUSE: Duration = Duration::from_millis(250);
+
+/// Serves until a signal asks the process to stop. `version` is that of the program, for its metrics.
+///
+/// # Errors
+/// A port, a folder or a file that cannot be used.
+pub fn run(config: ServeConfig, version: &'static str) -> Result<()> {
+    telemetry::init_logging(config.log, &config.log_filter)?;
+    telemetry::metrics::recorder();
+    metrics::gauge!("cager_build_info", "version" => version).set(1.0);
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("serve").build()?;
+    let outcome = runtime.block_on(async {
+        telemetry::traces::begin().map_err(|error| anyhow::anyhow!(error))?;
+        let stop = CancellationToken::new();
+        tokio::spawn(stop_on_signals(stop.clone()));
+        run_until(config, stop, |address| {
+            // For scripts that asked for any free port.
+            let _ = writeln!(std::io::stdout(), "listening on {address}");
+        })
+        .await
+    });
+    telemetry::traces::end();
+    // Blocking work that is left is not waited for: what was answered is on disk.
+    runtime.shutdown_timeout(Duration::from_secs(2));
+    outcome
+}
+
+/// Serves until `stop`; tells `listening` the address when connections are accepted.
+///
+/// # Errors
+/// A port, a folder or a file that cannot be used.
+pub(crate) async fn run_until(
+    config: ServeConfig,
+    stop: CancellationToken,
+    listening: impl FnOnce(SocketAddr),
+) -> Result<()> {
+    telemetry::metrics::recorder();
+    tokio::spawn(telemetry::metrics::keep(stop.clone()));
+    let tls = config.tls().map(|tls| tls_config(&tls)).transpose()?;
+    if config.shards > 1 {
+        return serve_shards(config, tls, stop, listening).await;
+    }
+    // What waits for a database that another process has listens to nobody, so that nobody is sent here.
+    let Some(service) = start(config.clone(), &stop).await? else { return Ok(()) };
+    let listener = listen(&config).await?;
+    let drained = CancellationToken::new();
+    let seen_by_them = seen_by_operators(Arc::clone(&service));
+    listen_for_operators(&config, Operated::one(&service), seen_by_them, drained.clone()).await?;
+    listening(told(&listener, tls.is_some())?);
+    let spare = spare(seen(Arc::clone(&service)));
+    serve(listener, router(Arc::clone(&service)), spare, config.limits(), tls, stop).await?;
+    // The operators' listener closes last.
+    drained.cancel();
+    if service.is_taken_over() {
+        bail!("another process has taken over the database, and goes on with all sessions");
+    }
+    tracing::info!("stopped");
+    Ok(())
+}
+
+/// Serves some of the shards of a database, beside other processes.
+async fn serve_shards(
+    config: ServeConfig,
+    tls: Option<Arc<rustls::ServerConfig>>,
+    stop: CancellationToken,
+    listening: impl FnOnce(SocketAddr),
+) -> Result<()> {
+    let listener = listen(&config).await?;
+    let address = match &config.advertise {
+        Some(address) => address.trim_end_matches('/').to_owned(),
+        None => {
+            let own = listener.local_addr()?;
+            if own.ip().is_unspecified() {
+                bail!(
+                    "{own}: other processes cannot be told to ask there; say by --advertise where they reach this one"
+                );
+            }
+            if own.ip().is_loopback() {
+                tracing::warn!(
+                    "only processes on this machine can ask this one at {own}: --advertise gives another address"
+                );
+            }
+            format!("{}://{own}", if tls.is_some() { "https" } else { "http" })
+        }
+    };
+    // Shards are given up while requests are still taken, which then go to the processes that get them.
+    let closing = CancellationToken::new();
+    let shards = shards::start(config.clone(), address, stop.clone()).await?;
+    let drained = CancellationToken::new();
+    let seen = shards::seen_by_operators(Arc::clone(&shards));
+    listen_for_operators(&config, shards.operated(), seen, drained.clone()).await?;
+    listening(told(&listener, tls.is_some())?);
+    let leaving = tokio::spawn({
+        let (shards, closing) = (Arc::clone(&shards), closing.clone());
+        async move {
+            stop.cancelled().await;
+            shards.leave().await;
+            closing.cancel();
+        }
+    });
+    let spare = spare(shards::seen(Arc::clone(&shards)));
+    serve(listener, shards::answered(shards), spare, config.limits(), tls, closing).await?;
+    drained.cancel();
+    leaving.await?;
+    tracing::info!("stopped");
+    Ok(())
+}
+
+async fn listen(config: &ServeConfig) -> Result<TcpListener> {
+    TcpListener::bind(config.listen)
+        .await
+        .with_context(|| format!("{}: cannot be listened on; is it in use? give another --listen", config.listen))
+}
+
+/// Says where it listens.
+fn told(listener: &TcpListener, is_tls: bool) -> Result<SocketAddr> {
+    let address = listener.local_addr()?;
+    tracing::info!(%address, scheme = if is_tls { "https" } else { "http" }, "listening");
+    Ok(address)
+}
+
+/// Serves operators until `drained`, where the settings say so.
+async fn listen_for_operators(
+    config: &ServeConfig,
+    operated: Operated,
+    seen: Router,
+    drained: CancellationToken,
+) -> Result<()> {
+    let Some(address) = config.admin_listen else { return Ok(()) };
+    let listener = TcpListener::bind(address).await.with_context(|| {
+        format!("{address}: cannot be listened on for operators; is it in use? give another --admin-listen")
+    })?;
+    let address = listener.local_addr()?;
+    tracing::info!(%address, "listening for operators");
+    let limits = Limits { max_connections: OPERATORS, max_per_address: OPERATORS, ..config.limits() };
+    let routes = admin(operated, seen.clone(), address.ip().is_loopback());
+    tokio::spawn(serve(listener, routes, spare(seen), limits, None, drained));
+    Ok(())
+}
+
+/// Opens the data folder. While another process has its database, waits for the end of that one; `None` where this one is stopped meanwhile.
+async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Option<Arc<Service>>> {
+    let resources = Resources::new(&config, local_designer())?;
+    tokio::spawn(resources.access.clone().watch(stop.clone()));
+    let mut is_told = false;
+    loop {
+        let (config, resources, own) = (config.clone(), Arc::clone(&resources), stop.clone());
+        let opening = move || Service::of_shard(resources, config, Arc::new(LocalDisk), Shard::WHOLE, own);
+        let what = match tokio::task::spawn_blocking(opening).await? {
+            Err(StartError::Store(StoreError::InUse { what })) => what,
+            // Who waits does so through restarts of the database too.
+            Err(StartError::Store(StoreError::Catalog { what, action: "reach", .. })) if is_told => what,
+            started => return Ok(Some(started?)),
+        };
+        if !std::mem::replace(&mut is_told, true) {
+            tracing::warn!("waits, to take over when that ends: {what}");
+        }
+        tokio::select! {
+            () = tokio::time::sleep(TAKEOVER_PAUSE) => {}
+            () = stop.cancelled() => return Ok(None),
+        }
+    }
+}
+
+/// Begins to stop at the first signal; the second one ends the process at once.
+async fn stop_on_signals(stop: CancellationToken) {
+    if signal().await.is_ok() {
+        stop.cancel();
+        tracing::info!("stopping; a second signal ends it at once");
+        if signal().await.is_ok() {
+            std::process::exit(130);
+        }
+    }
+}
+
+#[cfg(unix)]
+async fn signal() -> std::io::Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let (mut interrupt, mut terminate) = (signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?);
+    tokio::select! {
+        _ = interrupt.recv() => {}
+        _ = terminate.recv() => {}
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+async fn signal() -> std::io::Result<()> {
+    tokio::signal::ctrl_c().await
+}

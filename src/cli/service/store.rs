@@ -1,0 +1,199 @@
+//! `cager store`: what a service has stored, while it does not run.
+
+use crate::cli::{print, tell};
+use anyhow::{Context as _, Result, bail};
+use cager_formats::{AtomicFile, Target};
+use cager_service::config::{ServeConfig, ServeFlags};
+use cager_service::store::{Kind, LocalDisk, Opened, Shard, Shared, Store, Verified};
+use clap::{Args, Subcommand};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Look after what a service has stored, while it does not run: how much that is, whether it is whole, copies of its containers.
+///
+/// Example: cager store verify --data /srv/cager
+#[derive(Args)]
+pub(crate) struct StoreArgs {
+    #[command(subcommand)]
+    command: StoreCommand,
+
+    /// The service's data folder [default: cager-data].
+    #[arg(long, global = true, value_name = "DIR")]
+    data: Option<PathBuf>,
+
+    /// The service's database, where it has one. A password is safer in the variable CAGER_CATALOG.
+    #[arg(long, global = true, value_name = "URL")]
+    catalog: Option<String>,
+
+    /// The service's bucket, where it has one.
+    #[arg(long, global = true, value_name = "URL")]
+    blobs: Option<String>,
+
+    /// Into how many shards the service's database is divided, where it is.
+    #[arg(long, global = true, value_name = "N")]
+    shards: Option<u32>,
+
+    /// Which of them is meant, from 0.
+    #[arg(long, global = true, value_name = "K", default_value_t = 0)]
+    shard: u32,
+
+    /// The service's file of settings, TOML.
+    #[arg(long, global = true, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+/// What to do with what is stored.
+#[derive(Subcommand)]
+pub(crate) enum StoreCommand {
+    /// Sessions, jobs and bytes of each tenant.
+    Usage,
+    /// Read everything, and name what is damaged; exit status 1 if something is.
+    Verify,
+    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager.
+    Export {
+        /// Where to; it may be there.
+        #[arg(value_name = "DIR")]
+        output: PathBuf,
+        /// Only this session; may be repeated.
+        #[arg(long = "session", value_name = "ID")]
+        sessions: Vec<String>,
+    },
+}
+
+pub(super) fn run(args: &StoreArgs) -> Result<()> {
+    let opened = open(args)?;
+    match &args.command {
+        StoreCommand::Usage => usage(&opened),
+        StoreCommand::Verify => verify(&opened),
+        StoreCommand::Export { output, sessions } => export(&opened, output, sessions),
+    }
+}
+
+fn open(args: &StoreArgs) -> Result<Opened> {
+    let flags = ServeFlags {
+        data: args.data.clone(),
+        catalog: args.catalog.clone(),
+        blobs: args.blobs.clone(),
+        shards: args.shards,
+        config: args.config.clone(),
+        ..ServeFlags::default()
+    };
+    let config = ServeConfig::load(args.config.as_deref(), std::env::vars(), &flags)?;
+    if !config.data.is_dir() && config.blobs.is_none() {
+        bail!("{}: there is no such folder; name the service's by --data", config.data.display());
+    }
+    let shard = Shard { number: args.shard, of: config.shards };
+    if shard.number >= shard.of {
+        bail!("--shard {}: there are {} shards, from 0", shard.number, shard.of);
+    }
+    let config = config.of_shard(shard);
+    let shared = Shared {
+        catalog: config.catalog.as_deref(),
+        blobs: config.blobs.as_deref(),
+        kept_bytes: config.blobs_kept_bytes,
+        shard,
+    };
+    Ok(Store::open(&config.data, Arc::new(LocalDisk), shared)?)
+}
+
+/// Kind, id and tenant of all sessions and jobs, by kind, oldest first.
+fn objects(opened: &Opened) -> Vec<(Kind, &str, &str)> {
+    let mut all: Vec<(Kind, &str, &str)> = Vec::new();
+    all.extend(opened.sessions.iter().map(|meta| (Kind::Session, &meta.id[..], &meta.tenant[..])));
+    all.extend(opened.cage_jobs.iter().map(|meta| (Kind::CageJob, &meta.id[..], &meta.tenant[..])));
+    all.extend(opened.recoveries.iter().map(|meta| (Kind::Recovery, &meta.id[..], &meta.tenant[..])));
+    all.extend(opened.transfers.iter().map(|meta| (Kind::Transfer, &meta.id[..], &meta.tenant[..])));
+    all
+}
+
+#[derive(Default)]
+struct Use {
+    sessions: usize,
+    jobs: usize,
+    bytes: u64,
+}
+
+fn usage(opened: &Opened) -> Result<()> {
+    let store = &opened.store;
+    let mut tenants = BTreeMap::<&str, Use>::new();
+    for (kind, id, tenant) in objects(opened) {
+        let of = tenants.entry(tenant).or_default();
+        match kind {
+            Kind::Session => of.sessions += 1,
+            _ => of.jobs += 1,
+        }
+        of.bytes += store.bytes(kind, id)?;
+    }
+    let mut keys = BTreeSet::new();
+    for session in &opened.sessions {
+        let of = tenants.entry(&session.tenant).or_default();
+        of.bytes += store.frame_bytes(&session.id)?;
+        // Sessions with the same model share it.
+        if keys.insert(session.key) {
+            of.bytes += store.content_bytes(&session.key)?;
+        }
+    }
+    let mut text = format!("{:<24} {:>9} {:>9} {:>16}\n", "tenant", "sessions", "jobs", "bytes");
+    let mut sum = Use::default();
+    for (tenant, Use { sessions, jobs, bytes }) in &tenants {
+        text += &format!("{tenant:<24} {sessions:>9} {jobs:>9} {bytes:>16}\n");
+        sum = Use { sessions: sum.sessions + sessions, jobs: sum.jobs + jobs, bytes: sum.bytes + bytes };
+    }
+    text += &format!("{:<24} {:>9} {:>9} {:>16}\n", "all", sum.sessions, sum.jobs, sum.bytes);
+    print(&text)
+}
+
+fn verify(opened: &Opened) -> Result<()> {
+    let store = &opened.store;
+    let (mut bytes, mut damaged) = (0, 0);
+    let mut note = |what: &str, id: &str, tenant: &str, found: Verified| -> Result<()> {
+        bytes += found.bytes;
+        damaged += usize::from(!found.damage.is_empty());
+        found.damage.iter().try_for_each(|why| print(&format!("{what} {id} of {tenant}: {why}\n")))
+    };
+    let all = objects(opened);
+    for (kind, id, tenant) in &all {
+        note(kind.name(), id, tenant, store.verify(*kind, id)?)?;
+    }
+    let mut keys = BTreeSet::new();
+    for session in opened.sessions.iter().filter(|session| keys.insert(session.key)) {
+        note("model of the session", &session.id, &session.tenant, store.verify_content(&session.key))?;
+    }
+    for aside in &opened.quarantined {
+        damaged += 1;
+        print(&format!("{}: {}; it is in {}\n", aside.name, aside.why, aside.path.display()))?;
+    }
+    tell(&format!("read {bytes} bytes of {} sessions and jobs and {} models\n", all.len(), keys.len()))?;
+    if damaged > 0 {
+        bail!("{damaged} of them are damaged; restore those from a backup, or delete them");
+    }
+    print("nothing is damaged\n")
+}
+
+fn export(opened: &Opened, output: &Path, wanted: &[String]) -> Result<()> {
+    let store = &opened.store;
+    if let Some(unknown) = wanted.iter().find(|id| opened.sessions.iter().all(|session| session.id != **id)) {
+        bail!("there is no session {unknown}");
+    }
+    fs::create_dir_all(output).with_context(|| format!("{}: cannot be made", output.display()))?;
+    let (mut written, mut running) = (0, 0);
+    for session in opened.sessions.iter().filter(|session| wanted.is_empty() || wanted.contains(&session.id)) {
+        if store.completion(&session.id)?.is_none() {
+            running += 1;
+            continue;
+        }
+        let folder = output.join(&session.tenant);
+        fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+        let path = folder.join(format!("{}.cager", session.id));
+        let failed = || format!("{}: the container of session {} cannot be written", path.display(), session.id);
+        let mut container = store.open_file(&store.container_path(&session.id))?;
+        let mut file = AtomicFile::create(Target::New(path.clone())).with_context(failed)?;
+        io::copy(&mut container, &mut file).with_context(failed)?;
+        file.commit().with_context(failed)?;
+        written += 1;
+    }
+    tell(&format!("wrote {written} containers; {running} sessions are not completed and have none\n"))
+}
