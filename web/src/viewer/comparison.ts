@@ -29,6 +29,11 @@ export class Comparison {
     this.apply();
   }
 
+  /** What can be shown: surfaces that something was recovered from have no ghost, as they are dots already. */
+  get sides(): readonly Side[] {
+    return this.surfaces ? ['decoded', 'both', 'original'] : ['decoded', 'both', 'ghost', 'original'];
+  }
+
   /** Where the original ends and the decoded model begins, as a fraction of the picture's width. */
   get split(): number {
     return this.place;
