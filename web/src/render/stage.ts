@@ -297,6 +297,12 @@ export class Stage {
     return cornersOf(boundsOf(this.inScene(rest)));
   }
 
+  /** Where the middle of the model is in the picture that was drawn last, as a fraction of its width. */
+  get middleShare(): number {
+    const { projectionMatrix, matrixWorldInverse } = this.camera;
+    return this.ground.middle.clone().applyMatrix4(matrixWorldInverse).applyMatrix4(projectionMatrix).x / 2 + 0.5;
+  }
+
   /** Has the ground and its shadow go along with the model, whose middle is at this place of the scene. */
   moveGround(middle: ArrayLike<number>) {
     const { x, z } = this.ground.middle;

@@ -23,6 +23,9 @@ export class PageServer {
   readonly #passing = new Set<IncomingMessage>();
   readonly #stopped = new Set<ServerResponse>();
   #isStalled = false;
+  /** How many requests with frames are passed on before others wait. */
+  #frameRequests = Infinity;
+  readonly #waiting: (() => void)[] = [];
 
   private constructor(
     private readonly server: Server,
@@ -40,7 +43,10 @@ export class PageServer {
       // The page of parts lies deeper; both find the service beside themselves.
       const isPassed = ['v1/', 'tests/browser/page/v1/'].some((below) => path.startsWith(PREFIX + below));
       if (isPassed && found.#isStalled) return;
-      if (isPassed) pass(origin(), asked, answer, found.#lengthOf(path, answer), found.#passing);
+      const passOn = () => pass(origin(), asked, answer, found.#lengthOf(path, answer), found.#passing);
+      if (isPassed && asked.method === 'POST' && path.endsWith('/frames') && found.#frameRequests-- <= 0)
+        found.#waiting.push(passOn);
+      else if (isPassed) passOn();
       else send(folder, path, answer);
     });
     await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
@@ -53,6 +59,16 @@ export class PageServer {
   stall(): void {
     this.#isStalled = true;
     this.#passing.forEach((response) => response.unpipe());
+  }
+
+  /** Passes so many requests with frames on and holds the others back until {@link release}: an upload lasts as long as a test needs. */
+  holdFrames(passed = 0): void {
+    this.#frameRequests = passed;
+  }
+
+  release(): void {
+    this.#frameRequests = Infinity;
+    for (const passOn of this.#waiting.splice(0)) passOn();
   }
 
   /** Passes new requests on again. */
