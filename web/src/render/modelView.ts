@@ -15,8 +15,8 @@ import { ink, modelUniforms, numberedGeometry, shaderMaterial } from './material
 import { inkFragmentShader, modelFragmentShader, modelVertexShader } from './sceneShaders';
 import type { Surface } from './surface';
 
-/** How much of the picture the original covers where it is drawn over what is decoded. */
-const GHOST_OPACITY = 0.45;
+/** How much of what is decoded shows through the original that is drawn over it. */
+const GHOST_TRANSPARENCY = 0.55;
 
 /** The model as surface, wireframe, points and handles, all placed by the decoder's textures. */
 export class ModelView {
@@ -116,7 +116,7 @@ export class ModelView {
   /** Draws the surface as a ghost: its depth first, so that only its front is blended with the picture; null draws the model as ever. */
   setPass(pass: 'depth' | 'ghost' | null) {
     this.wireframe.layers.mask = this.handles.layers.mask = pass ? 0 : 1;
-    this.uniforms.opacity.value = pass ? GHOST_OPACITY : 1;
+    this.uniforms.transparency.value = pass ? GHOST_TRANSPARENCY : 0;
     for (const { material } of [this.surface, this.points]) {
       (material as Material).colorWrite = pass !== 'depth';
       (material as Material).transparent = pass === 'ghost';

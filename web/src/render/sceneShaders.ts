@@ -63,7 +63,7 @@ uniform sampler2D heatColors;
 uniform float heatShare;
 uniform bool hasColors;
 uniform bool asPoints;
-uniform float opacity;
+uniform float transparency;
 in vec3 viewPosition;
 in vec3 viewNormal;
 in float heatValue;
@@ -108,7 +108,7 @@ void main() {
   float away = 1.0 - facing;
   float rim = away * away * away * sqrt(max(0.0, away)) * (0.24 + 0.28 * max(0.0, up)) * (heatShare > 0.0 || hasColors ? 0.35 : 1.0);
   vec3 lit = base * light * cavity + gloss + rim * vec3(0.80, 0.90, 1.0);
-  shade = vec4(toned(lit), opacity);
+  shade = vec4(toned(lit), 1.0 - transparency);
 }`;
 
 /** Lines and dots in one colour, at points of the model. */
