@@ -17,8 +17,10 @@ const UNUSED_PARTS: Readonly<Record<string, string>> = {
   'shaders/ShaderChunk.js': 'export const ShaderChunk = {};',
   'shaders/ShaderLib.js': 'export const ShaderLib = {};',
   'shaders/DFGLUTData.js': 'export const getDFGLUT = () => null;',
-  'webgl/WebGLEnvironments.js': 'export const WebGLEnvironments = function () { this.get = (map) => map; this.dispose = () => {}; };',
-  'webgl/WebGLShadowMap.js': 'export const WebGLShadowMap = function () { this.enabled = false; this.render = () => {}; };',
+  'webgl/WebGLEnvironments.js':
+    'export const WebGLEnvironments = function () { this.get = (map) => map; this.dispose = () => {}; };',
+  'webgl/WebGLShadowMap.js':
+    'export const WebGLShadowMap = function () { this.enabled = false; this.render = () => {}; };',
   'webgl/WebGLOutput.js': 'export const WebGLOutput = function () {};',
   'webxr/WebXRManager.js': `const nothing = () => null;
     export const WebXRManager = function () {

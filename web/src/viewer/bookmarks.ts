@@ -8,15 +8,19 @@ const MAX_VIEWS = 20;
 
 /** Views as text, as links have them. */
 export function savedViews(capture: Capture): readonly string[] {
-  const found: unknown = guarded(() => JSON.parse(localStorage.getItem(nameOf(capture)) ?? '[]'));
+  const found = guarded(() => JSON.parse(localStorage.getItem(nameOf(capture)) ?? '[]') as unknown);
   return Array.isArray(found) ? found.filter((view) => typeof view === 'string').slice(0, MAX_VIEWS) : [];
 }
 
 /** Returns whether the browser keeps them. */
 export function saveViews(capture: Capture, views: readonly string[]): boolean {
   const name = nameOf(capture);
-  const keep = () => localStorage.setItem(name, JSON.stringify(views.slice(-MAX_VIEWS)));
-  return guarded(() => (views.length === 0 ? localStorage.removeItem(name) : keep()) ?? true) ?? false;
+  const isKept = guarded(() => {
+    if (views.length === 0) localStorage.removeItem(name);
+    else localStorage.setItem(name, JSON.stringify(views.slice(-MAX_VIEWS)));
+    return true;
+  });
+  return isKept ?? false;
 }
 
 function nameOf({ identity, name }: Capture): string {

@@ -58,12 +58,12 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
     expect([range, repeat]).toEqual([[1, 2], 'ping-pong']);
     await page.keyboard.press('v');
     await page.getByRole('button', { name: 'Top' }).click();
-    await page.waitForFunction(() => /camera=0,89[^&]*,-/.test(location.hash));
+    await page.waitForFunction(() => /camera=0,89[^&]*,-/.test(decodeURIComponent(location.hash)));
     await page.getByRole('button', { name: 'Save this view' }).click();
     await page.keyboard.press('0');
     await page.waitForFunction(() => !location.hash.includes('camera='));
     await page.getByRole('button', { name: '1. Frame 2, orthographic' }).click();
-    await page.waitForFunction(() => /camera=0,89[^&]*,-/.test(location.hash));
+    await page.waitForFunction(() => /camera=0,89[^&]*,-/.test(decodeURIComponent(location.hash)));
     expect(await seriousFindings(page)).toEqual([]);
     expect(pages.errors).toEqual([]);
   });
