@@ -62,7 +62,7 @@ try {
   const perSecond = (played / frames) * FRAME_RATE;
   const whole = pageBytes + staticBytes;
   await write([
-    ['page, all parts of the viewer, gzipped', kilobytes(pageBytes), '350 kB'],
+    ['page, all parts of the viewer, gzipped', kilobytes(pageBytes), '230 kB'],
     ['static part of the container: model, cage', kilobytes(staticBytes), '–'],
     [
       'to the first decoded frame, page and capture',

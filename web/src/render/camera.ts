@@ -1,4 +1,4 @@
-import type { PerspectiveCamera } from 'three';
+import type { OrthographicCamera, PerspectiveCamera } from 'three';
 import { type boundsOf, middleOf } from '../coordinates/topology';
 
 /** A camera that turns around a point. Lengths are in units of the rest pose's diagonal, angles in radians. */
@@ -9,6 +9,8 @@ export interface CameraState {
   /** Angle above the horizon. */
   readonly elevation: number;
   readonly distance: number;
+  /** Whether it looks without perspective; what is at the target is as large as with it. */
+  readonly isParallel?: boolean;
 }
 
 /** Vertical field of view in radians. */
@@ -61,7 +63,8 @@ export function framed(camera: CameraState, points: ArrayLike<number>, aspect: n
   let distance = NEAREST;
   for (let at = 0; at < seen.length; at += 3) {
     const [across, high] = [Math.abs(seen[at] - x), Math.abs(seen[at + 1] - y)];
-    distance = Math.max(distance, Math.max(high, across / aspect) / slope + seen[at + 2] - z);
+    const nearer = camera.isParallel ? 0 : seen[at + 2] - z;
+    distance = Math.max(distance, Math.max(high, across / aspect) / slope + nearer);
   }
   const { right, up, back } = axesOf(camera);
   const along = (k: number) => x * right[k] + y * up[k] + z * back[k];
@@ -84,6 +87,7 @@ export function eyeOf(camera: CameraState): [number, number, number] {
 export function blended(from: CameraState, to: CameraState, share: number): CameraState {
   const mix = (a: number, b: number) => a + (b - a) * share;
   return {
+    ...to,
     target: [0, 1, 2].map((k) => mix(from.target[k], to.target[k])) as [number, number, number],
     azimuth: wrapped(from.azimuth + wrapped(to.azimuth - from.azimuth) * share),
     elevation: mix(from.elevation, to.elevation),
@@ -95,13 +99,19 @@ export function blended(from: CameraState, to: CameraState, share: number): Came
 export function nearlySame(a: CameraState, b: CameraState): boolean {
   const far = Math.max(...a.target.map((value, k) => Math.abs(value - b.target[k]))) / b.distance;
   const turned = Math.max(Math.abs(wrapped(a.azimuth - b.azimuth)), Math.abs(a.elevation - b.elevation));
-  return far < 2e-4 && turned < 2e-4 && Math.abs(Math.log(a.distance / b.distance)) < 2e-4;
+  return (
+    Boolean(a.isParallel) === Boolean(b.isParallel) &&
+    far < 2e-4 &&
+    turned < 2e-4 &&
+    Math.abs(Math.log(a.distance / b.distance)) < 2e-4
+  );
 }
 
-/** The camera as text for links: angles in degrees, distance, target. */
+/** The camera as text for links: angles in degrees, distance, target; without perspective the distance is negative. */
 export function cameraText(camera: CameraState): string {
   const degrees = [camera.azimuth, camera.elevation].map((angle) => rounded((angle * 180) / Math.PI, 1));
-  return [...degrees, ...[camera.distance, ...camera.target].map((value) => rounded(value, 3))].join(',');
+  const distance = camera.isParallel ? -camera.distance : camera.distance;
+  return [...degrees, ...[distance, ...camera.target].map((value) => rounded(value, 3))].join(',');
 }
 
 /** Reads {@link cameraText}; null where it is not one. */
@@ -110,8 +120,8 @@ export function cameraFromText(text: string | null): CameraState | null {
   const values = text.split(',').map((part) => (part.trim() === '' ? NaN : Number(part)));
   if (values.length !== 6 || !values.every((value) => Number.isFinite(value) && Math.abs(value) < 1e6)) return null;
   const [azimuth, elevation, distance, x, y, z] = values;
-  const camera: CameraState = { target: [x, y, z], azimuth: 0, elevation: 0, distance: 1 };
-  return zoomed(orbited(camera, (azimuth * Math.PI) / 180, (elevation * Math.PI) / 180), distance);
+  const camera: CameraState = { target: [x, y, z], azimuth: 0, elevation: 0, distance: 1, isParallel: distance < 0 };
+  return zoomed(orbited(camera, (azimuth * Math.PI) / 180, (elevation * Math.PI) / 180), Math.abs(distance));
 }
 
 /** Unit vectors to the right, upwards and towards the camera. */
@@ -134,6 +144,18 @@ export function aim(camera: PerspectiveCamera, state: CameraState) {
   camera.lookAt(...state.target);
   camera.near = state.distance * 0.02;
   camera.far = state.distance + 40;
+  camera.updateProjectionMatrix();
+  camera.updateMatrixWorld();
+}
+
+/** The same without perspective, for a picture of this aspect. */
+export function aimParallel(camera: OrthographicCamera, state: CameraState, aspect: number) {
+  camera.top = state.distance * Math.tan(FIELD_OF_VIEW / 2);
+  camera.right = camera.top * aspect;
+  [camera.left, camera.bottom] = [-camera.right, -camera.top];
+  camera.position.set(...eyeOf(state));
+  camera.lookAt(...state.target);
+  [camera.near, camera.far] = [-40, state.distance + 40];
   camera.updateProjectionMatrix();
   camera.updateMatrixWorld();
 }

@@ -21,8 +21,8 @@ export interface StageColors {
   readonly shadow: number;
 }
 
-/** What of a capture whose original is there is drawn: what is decoded, the original, or the original to the left of a line. */
-export type Side = 'decoded' | 'original' | 'both';
+/** What of a capture whose original is there is drawn: what is decoded, the original, the original to the left of a line, or the original translucent over what is decoded. */
+export type Side = 'decoded' | 'original' | 'both' | 'ghost';
 
 /** CSS pixels of the canvas that something lies above. */
 export interface Covered {

@@ -49,6 +49,7 @@ export function modelUniforms() {
     color: { value: new Color() },
     colors: { value: null },
     hasColors: { value: false },
+    transparency: { value: 0 },
     skyDirection: { value: new Vector3(0, 1, 0) },
   } satisfies Record<string, IUniform>;
 }

@@ -1,9 +1,22 @@
-import { Group, LineSegments, Mesh, Points, type Color, type DataTexture, type Texture, type Vector3 } from 'three';
+import {
+  Group,
+  LineSegments,
+  Mesh,
+  Points,
+  type Color,
+  type DataTexture,
+  type Material,
+  type Texture,
+  type Vector3,
+} from 'three';
 import { pointColorTexture, pointValueTexture } from './dataTextures';
 import type { Decoder } from './decoder';
 import { ink, modelUniforms, numberedGeometry, shaderMaterial } from './materials';
 import { inkFragmentShader, modelFragmentShader, modelVertexShader } from './sceneShaders';
 import type { Surface } from './surface';
+
+/** How much of what is decoded shows through the original that is drawn over it. */
+const GHOST_TRANSPARENCY = 0.55;
 
 /** The model as surface, wireframe, points and handles, all placed by the decoder's textures. */
 export class ModelView {
@@ -98,6 +111,16 @@ export class ModelView {
     uniforms.positions.value = placed?.positions ?? this.decoder.positions;
     uniforms.normals.value = placed?.normals ?? this.decoder.normals;
     this.uniforms.heatShare.value = this.hasHeat && !placed ? 1 : 0;
+  }
+
+  /** Draws the surface as a ghost: its depth first, so that only its front is blended with the picture; null draws the model as ever. */
+  setPass(pass: 'depth' | 'ghost' | null) {
+    this.wireframe.layers.mask = this.handles.layers.mask = pass ? 0 : 1;
+    this.uniforms.transparency.value = pass ? GHOST_TRANSPARENCY : 0;
+    for (const { material } of [this.surface, this.points]) {
+      (material as Material).colorWrite = pass !== 'depth';
+      (material as Material).transparent = pass === 'ghost';
+    }
   }
 
   setColors(model: Color, wire: Color, wireOpacity: number, handle: Color) {

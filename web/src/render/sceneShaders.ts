@@ -1,3 +1,4 @@
+import { FIELD_OF_VIEW } from './camera';
 import { WIDTH, WIDTH_BITS } from './packing';
 
 const header = `precision highp float;
@@ -7,6 +8,13 @@ precision highp sampler2D;
 
 const lookUp = `
 ivec2 texelOf(int point) { return ivec2(point & ${WIDTH - 1}, point >> ${WIDTH_BITS}); }
+`;
+
+/** How far away a point looks; without perspective all are as far as the camera's target. */
+const away = `
+float awayOf(float z) {
+  return projectionMatrix[3][3] == 1.0 ? ${(1 / Math.tan(FIELD_OF_VIEW / 2)).toFixed(6)} / projectionMatrix[1][1] : max(0.05, -z);
+}
 `;
 
 /** Light to sRGB, with a shoulder that keeps highlights from clipping. */
@@ -35,7 +43,7 @@ out vec3 viewPosition;
 out vec3 viewNormal;
 out float heatValue;
 out vec3 ownColor;
-${lookUp}
+${lookUp}${away}
 void main() {
   ivec2 at = texelOf(gl_VertexID);
   vec4 place = modelViewMatrix * vec4(texelFetch(positions, at, 0).xyz, 1.0);
@@ -45,7 +53,7 @@ void main() {
   ownColor = hasColors ? texelFetch(colors, at, 0).rgb : color;
   place.xyz *= 1.0 - towards;
   gl_Position = projectionMatrix * place;
-  gl_PointSize = pointSize / max(0.05, -place.z);
+  gl_PointSize = pointSize / awayOf(place.z);
 }`;
 
 /** Soft studio light fixed to the camera, and a slight darkening of hollows. */
@@ -55,6 +63,7 @@ uniform sampler2D heatColors;
 uniform float heatShare;
 uniform bool hasColors;
 uniform bool asPoints;
+uniform float transparency;
 in vec3 viewPosition;
 in vec3 viewNormal;
 in float heatValue;
@@ -99,7 +108,7 @@ void main() {
   float away = 1.0 - facing;
   float rim = away * away * away * sqrt(max(0.0, away)) * (0.24 + 0.28 * max(0.0, up)) * (heatShare > 0.0 || hasColors ? 0.35 : 1.0);
   vec3 lit = base * light * cavity + gloss + rim * vec3(0.80, 0.90, 1.0);
-  shade = vec4(toned(lit), 1.0);
+  shade = vec4(toned(lit), 1.0 - transparency);
 }`;
 
 /** Lines and dots in one colour, at points of the model. */
@@ -144,6 +153,7 @@ out vec3 viewPosition;
 out vec3 viewNormal;
 out float heatValue;
 out vec3 ownColor;
+${away}
 void main() {
   vec4 place = modelViewMatrix * vec4(position, 1.0);
   viewPosition = place.xyz;
@@ -151,7 +161,7 @@ void main() {
   heatValue = heat;
   ownColor = color;
   gl_Position = projectionMatrix * place;
-  gl_PointSize = pointSize / max(0.05, -place.z);
+  gl_PointSize = pointSize / awayOf(place.z);
 }`;
 
 /** Squares along a side of the backdrop, whose colours are computed at their corners: at every pixel they would cost more than the model. */

@@ -8,8 +8,10 @@ export function drawSide(
   split: number,
   drawDecoded: () => void,
   drawOriginal: () => void,
+  drawGhost: () => void,
 ) {
-  if (side === 'decoded') drawDecoded();
+  if (side === 'decoded' || side === 'ghost') drawDecoded();
+  if (side === 'ghost') drawGhost();
   if (side === 'original') drawOriginal();
   if (side !== 'both') return;
   const { x: width, y: height } = renderer.getSize(new Vector2());

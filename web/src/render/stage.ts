@@ -1,10 +1,21 @@
-import { Color, Group, Matrix3, Matrix4, PerspectiveCamera, Scene, Vector2, Vector3, type WebGLRenderer } from 'three';
+import {
+  Color,
+  Group,
+  Matrix3,
+  Matrix4,
+  OrthographicCamera,
+  PerspectiveCamera,
+  Scene,
+  Vector2,
+  Vector3,
+  type WebGLRenderer,
+} from 'three';
 import type { StaticPart } from '../capture';
 import type { Surface } from '../observed/surface';
 import { boundsOf } from '../coordinates/topology';
 import { Backdrop } from './backdrop';
 import { CageView } from './cageView';
-import { aim, cornersOf, FIELD_OF_VIEW, type CameraState } from './camera';
+import { aim, aimParallel, cornersOf, FIELD_OF_VIEW, type CameraState } from './camera';
 import { Decoder, type Pose } from './decoder';
 import type { Covered, Layers, Side, StageColors } from './drawn';
 import { Ground } from './ground';
@@ -27,7 +38,10 @@ export class Stage {
   readonly decoder: Decoder;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera((FIELD_OF_VIEW * 180) / Math.PI, 1, 0.01, 100);
+  private readonly perspective = new PerspectiveCamera((FIELD_OF_VIEW * 180) / Math.PI, 1, 0.01, 100);
+  private readonly parallel = new OrthographicCamera();
+  /** The one of both that the last picture was drawn with. */
+  private camera: PerspectiveCamera | OrthographicCamera = this.perspective;
   private readonly upright = new Group();
   private readonly model: ModelView;
   private readonly cage: CageView;
@@ -226,7 +240,8 @@ export class Stage {
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered: the rest shows what the camera looks at. */
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
     this.pictureIsOld = true;
-    this.camera.setViewOffset(width, height, covered.right / 2, (covered.bottom - covered.top) / 2, width, height);
+    for (const camera of [this.perspective, this.parallel])
+      camera.setViewOffset(width, height, covered.right / 2, (covered.bottom - covered.top) / 2, width, height);
     const size = `${width} ${height} ${pixelRatio}`;
     // Even an unchanged size would empty the canvas and make all its buffers anew.
     if (size === this.size) return;
@@ -234,7 +249,7 @@ export class Stage {
     this.wasEmptied = this.shownFrom !== null;
     this.renderer.setPixelRatio(pixelRatio);
     this.renderer.setSize(Math.max(1, width), Math.max(1, height), false);
-    this.camera.aspect = Math.max(1, width) / Math.max(1, height);
+    this.perspective.aspect = Math.max(1, width) / Math.max(1, height);
     const { y: lines } = this.renderer.getDrawingBufferSize(new Vector2());
     this.pixels = { perUnit: lines / (2 * Math.tan(FIELD_OF_VIEW / 2)), ratio: pixelRatio };
     this.model.setSizes(this.pixels.perUnit, pixelRatio);
@@ -248,8 +263,9 @@ export class Stage {
     if (!this.pictureIsOld && state === this.shownFrom) return;
     this.pictureIsOld = this.wasEmptied = false;
     this.shownFrom = state;
-    const { camera } = this;
-    aim(camera, state);
+    if (state.isParallel) aimParallel(this.parallel, state, this.perspective.aspect);
+    else aim(this.perspective, state);
+    const camera = (this.camera = state.isParallel ? this.parallel : this.perspective);
     this.model.setSky(new Vector3(0, 1, 0).transformDirection(camera.matrixWorldInverse));
     const isDue = !hurried || ++this.picturesWithShadow >= SHADOW_EVERY;
     if (isDue && this.shadowIsOld && this.ground.mesh.visible && this.model.surface.visible) {
@@ -261,7 +277,8 @@ export class Stage {
     this.renderer.clear();
     const side = this.decoder.placedTextures && !this.observed ? this.side : 'decoded';
     const drawDecoded = () => this.renderer.render(this.scene, camera);
-    drawSide(this.renderer, side, this.split, drawDecoded, () => this.drawOriginal());
+    const [drawOriginal, drawGhost] = [() => this.drawOriginal(), () => this.drawGhost()];
+    drawSide(this.renderer, side, this.split, drawDecoded, drawOriginal, drawGhost);
   }
 
   /** Points, x y z each, in diagonals and in the model's axes, as they are in the scene. */
@@ -278,6 +295,12 @@ export class Stage {
     const rest = Float32Array.from(this.capture.rest);
     this.decoder.place(rest);
     return cornersOf(boundsOf(this.inScene(rest)));
+  }
+
+  /** Where the middle of the model is in the picture that was drawn last, as a fraction of its width. */
+  get middleShare(): number {
+    const { projectionMatrix, matrixWorldInverse } = this.camera;
+    return this.ground.middle.clone().applyMatrix4(matrixWorldInverse).applyMatrix4(projectionMatrix).x / 2 + 0.5;
   }
 
   /** Has the ground and its shadow go along with the model, whose middle is at this place of the scene. */
@@ -307,6 +330,21 @@ export class Stage {
     this.model.showPlaced(false);
     this.cage.group.visible = cage;
     this.model.handles.visible = handles;
+  }
+
+  /** The original's surface, translucent over all that was drawn. */
+  private drawGhost() {
+    const shown = [this.backdrop.mesh, this.ground.mesh, this.cage.group].filter(({ visible }) => visible);
+    for (const each of shown) each.visible = false;
+    this.model.showPlaced(true);
+    for (const pass of ['depth', 'ghost'] as const) {
+      if (pass === 'depth') this.renderer.clearDepth();
+      this.model.setPass(pass);
+      this.renderer.render(this.scene, this.camera);
+    }
+    this.model.setPass(null);
+    this.model.showPlaced(false);
+    for (const each of shown) each.visible = true;
   }
 
   private showRest() {

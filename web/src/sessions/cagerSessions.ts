@@ -6,6 +6,7 @@ import { ServiceProblem, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import { controls, pageLayout } from '../style/controls';
+import { terms } from '../style/terms';
 import { tokens } from '../style/tokens';
 import { cardsStyle } from './cardsStyle';
 import { download, type Format } from './download';
@@ -20,6 +21,7 @@ import { nameOf, row, tableHead } from './row';
 import { SessionList } from './sessionList';
 import { sessionsStyle } from './sessionsStyle';
 import './signIn';
+import { forgetThumbnails } from './thumbnails';
 
 const PAGE_ROWS = 25;
 
@@ -86,7 +88,12 @@ export class Sessions extends LitElement {
           onClose: () => (this.failure = ''),
         })}
         ${isEmpty ? emptyList() : html`${this.filters()}${this.table(sessions)}`}
-        <cager-recoveries></cager-recoveries> ${this.confirmation()}
+        <cager-recoveries></cager-recoveries>
+        <details class="about">
+          <summary>About CageR: cage, diagonal, L2 and L∞</summary>
+          ${terms}
+        </details>
+        ${this.confirmation()}
         <p class="visually-hidden" role="status">${this.said}</p>
       </main>
     `;
@@ -261,6 +268,7 @@ export class Sessions extends LitElement {
   };
 
   private readonly tokenChanged = () => {
+    if (pageToken.token === null) forgetThumbnails();
     this.wantsToken = false;
     this.page = 0;
     this.figures.reset();

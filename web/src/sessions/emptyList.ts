@@ -1,5 +1,6 @@
 import { html } from 'lit';
 import { glyphs } from '../style/glyphs';
+import walk from './walk.svg';
 
 /** What to do where there are no sessions yet. */
 export function emptyList() {
@@ -11,6 +12,7 @@ export function emptyList() {
   };
   return html`
     <section class="first" aria-labelledby="first-title">
+      <img src=${walk} width="1220" height="400" alt="Five frames of a walk, each inside its cage" />
       <div>
         <h2 id="first-title">No sessions yet</h2>
         <p>A session turns one animated mesh into a small capture that plays here. There are three ways to start.</p>

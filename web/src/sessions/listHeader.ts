@@ -19,6 +19,7 @@ export function listHeader(sessions: readonly Session[], hasOlder: boolean) {
   const isUploading = (currentJob()?.stage ?? 'completed') !== 'completed';
   return html`
     <header>
+      <span class="brand">${glyphs.cage} CageR</span>
       <h1>Sessions</h1>
       <span class="muted">${sessions.length > 0 ? summary.filter(Boolean).join(' · ') : nothing}</span>
       <span class="grow"></span>

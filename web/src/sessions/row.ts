@@ -5,6 +5,7 @@ import type { Figures } from './figures';
 import { glyphs } from '../style/glyphs';
 import { FORMATS, type Format } from './download';
 import * as text from '../text';
+import { thumbnailOf } from './thumbnails';
 
 export interface Row {
   readonly session: Session;
@@ -61,6 +62,7 @@ export function row(row: Row): TemplateResult {
     <tbody role="rowgroup" data-id=${session.id}>
       <tr class="session" role="row">
         <td class="title" role="cell">
+          ${thumbnail(session)}
           <a class="name clip" href="#/session/${encodeURIComponent(session.id)}" title=${name}>${name}</a>
           <div class="facts fine clip">${facts(session)}</div>
         </td>
@@ -85,6 +87,13 @@ export function row(row: Row): TemplateResult {
       ${remarks(session)}
     </tbody>
   `;
+}
+
+function thumbnail({ id }: Session) {
+  const picture = thumbnailOf(id);
+  return picture === null
+    ? html`<span class="thumbnail">${glyphs.cage}</span>`
+    : html`<img class="thumbnail" src=${picture} alt="" />`;
 }
 
 function facts(session: Session): string {

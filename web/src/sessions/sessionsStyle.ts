@@ -72,6 +72,41 @@ export const sessionsStyle = css`
   :is(.name, .facts) {
     max-width: 340px;
   }
+  .thumbnail {
+    float: left;
+    display: grid;
+    place-content: center;
+    width: 56px;
+    height: 42px;
+    margin-right: var(--cager-space-3);
+    border-radius: var(--cager-radius-small);
+    background: var(--cager-raised);
+    color: var(--cager-line-strong);
+    object-fit: cover;
+  }
+  .brand {
+    display: flex;
+    align-items: center;
+    gap: 6px;
+    color: var(--cager-muted);
+    font-weight: 650;
+  }
+  .about {
+    max-width: 62ch;
+    margin-top: var(--cager-space-5);
+  }
+  .about > summary {
+    color: var(--cager-muted);
+  }
+  .about dl {
+    display: grid;
+    grid-template-columns: auto 1fr;
+    gap: 4px var(--cager-space-4);
+    margin-top: var(--cager-space-3);
+  }
+  .about dt {
+    font-weight: 600;
+  }
   .name {
     display: block;
     color: var(--cager-text);
@@ -209,6 +244,10 @@ export const sessionsStyle = css`
     gap: var(--cager-space-5);
     max-width: 680px;
     margin: var(--cager-space-6) auto 0;
+  }
+  .first img {
+    width: 100%;
+    height: auto;
   }
   .first p {
     color: var(--cager-muted);

@@ -8,7 +8,7 @@ import { save } from '../save';
 import { recordTurntable } from './recording';
 import type { Action } from './shortcuts';
 import { sentence } from '../text';
-import { sought, spedUp, started, stepped, worstFrame } from './transport';
+import { ranged, REPEATS, sought, spedUp, started, stepped, worstFrame, type Transport } from './transport';
 
 /** Angle and factor of one press of a key. */
 const [TURN, ZOOM] = [Math.PI / 12, 1.15];
@@ -30,7 +30,9 @@ export function perform(action: Action, viewer: CagerViewer) {
     last: () => (player.transport = sought(transport, transport.frames)),
     slower: () => (player.transport = spedUp(transport, -1)),
     faster: () => (player.transport = spedUp(transport, 1)),
-    loop: () => (player.transport = { ...transport, loop: !transport.loop }),
+    loop: () => (player.transport = { ...transport, repeat: nextRepeat(transport), direction: 1 }),
+    in: () => (player.transport = ranged(transport, 'in')),
+    out: () => (player.transport = ranged(transport, 'out')),
     smooth: () => (player.transport = { ...transport, smooth: !transport.smooth }),
     worst: () => goToWorst(player),
     frame: () => player.frameAll(),
@@ -55,7 +57,9 @@ export function perform(action: Action, viewer: CagerViewer) {
     picture: () => void savePicture(viewer, player),
     turntable: () => void toggleRecording(viewer, player),
     fullscreen: () => void toggleFullscreen(viewer),
-    figures: () => (viewer.figures = !viewer.figures),
+    figures: () => viewer.togglePanel('figures'),
+    views: () => viewer.togglePanel('views'),
+    link: () => void copyLink(viewer),
     edit: () => void viewer.toggleEditing(),
     poses: () => void viewer.togglePoses(),
     beside: () => viewer.toggleBeside(),
@@ -70,6 +74,10 @@ function goToWorst(player: Player) {
   if (worst !== null) player.transport = { ...sought(player.transport, worst), playing: false };
 }
 
+function nextRepeat({ repeat }: Transport) {
+  return REPEATS[(REPEATS.indexOf(repeat) + 1) % REPEATS.length];
+}
+
 function nextHeat({ heatMap: { kind, kinds } }: Player): Heat {
   return kinds[(kinds.indexOf(kind) + 1) % kinds.length];
 }
@@ -77,8 +85,8 @@ function nextHeat({ heatMap: { kind, kinds } }: Player): Heat {
 /** Shows the next side of a comparison; without an original, where one could come from. */
 function compare(player: Player) {
   const { comparison } = player;
-  const next = { decoded: 'both', both: 'original', original: 'decoded' } as const;
-  if (comparison.isOpen) comparison.side = next[comparison.side];
+  const { sides, side } = comparison;
+  if (comparison.isOpen) comparison.side = sides[(sides.indexOf(side) + 1) % sides.length];
   else player.setHeat('error');
 }
 
@@ -127,6 +135,18 @@ async function toggleRecording(viewer: CagerViewer, player: Player) {
   } finally {
     player.progress = null;
     viewer.recording = null;
+  }
+}
+
+/** Copies the address of the page, which follows the view. */
+async function copyLink(viewer: CagerViewer) {
+  if (!viewer.linkable) return;
+  try {
+    viewer.tellView();
+    await navigator.clipboard.writeText(location.href);
+    viewer.say('Link copied');
+  } catch {
+    viewer.report('The link could not be copied. Copy it from the address bar.');
   }
 }
 

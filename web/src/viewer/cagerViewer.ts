@@ -15,7 +15,8 @@ import { Layout } from './layout';
 import { LiveBadge } from './liveBadge';
 import { emptyState, notice, progressBox } from './messages';
 import { overlayStyle } from './overlayStyle';
-import { deck, helpSheet, legend, titleBox, toolbar } from './parts';
+import { helpSheet } from './helpSheet';
+import { deck, legend, titleBox } from './parts';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
 import { PoseMode } from './poseMode';
@@ -25,8 +26,14 @@ import { correspondenceOf, readReport, trackingOf } from './reports';
 import { actionOfKey, type Action } from './shortcuts';
 import { followLooks, stageColors } from './stageColors';
 import { sentence } from '../text';
+import { thumbnail } from './thumbnail';
 import type { Timeline } from './timeline';
+import { toolbar } from './toolbar';
+import { viewsPanel } from './viewsPanel';
 import { viewerStyle } from './viewerStyle';
+
+/** How long what was done is said. */
+const SAID_MILLISECONDS = 2000;
 
 /**
  * Plays a capture: `<cager-viewer src="walk.cager" autoplay></cager-viewer>`, or one that is set as the property `capture`. A `.cager` file that is
@@ -49,10 +56,15 @@ import { viewerStyle } from './viewerStyle';
 export class CagerViewer extends CaptureElement {
   static override styles = [tokens, controls, viewerStyle, overlayStyle];
 
-  @state() figures = false;
+  /** The panel that is open beside the tools. */
+  @state() private panel: 'figures' | 'views' | null = null;
+  /** What was done, for a moment. */
+  @state() private said = '';
   @state() recording: AbortController | null = null;
   @query('cager-timeline') private readonly timeline!: Timeline | null;
   @query('dialog.sheet') private readonly sheet!: HTMLDialogElement;
+  /** Whether the address of the page leads back to what is shown. */
+  @property({ type: Boolean }) linkable = false;
   /** A second capture to show beside the first; whoever sets it closes it. */
   @property({ attribute: false }) beside: Capture | null = null;
   readonly editing = new EditMode(this);
@@ -138,6 +150,27 @@ export class CagerViewer extends CaptureElement {
     await this.poses.toggle();
   }
 
+  togglePanel(panel: 'figures' | 'views') {
+    this.panel = this.panel === panel ? null : panel;
+  }
+
+  /** Says for a moment what was done. */
+  say(sentence: string) {
+    this.said = sentence;
+    setTimeout(() => (this.said = ''), SAID_MILLISECONDS);
+  }
+
+  /** The view as `viewchange` tells it. */
+  get viewText(): string {
+    return this.player ? this.link.textOf(this.player) : '';
+  }
+
+  /** A small picture of what is shown, as an address; null while nothing is. */
+  thumbnail(): string | null {
+    const { player } = this;
+    return player && thumbnail(player.drawn());
+  }
+
   openHelp() {
     this.sheet.showModal();
   }
@@ -190,6 +223,7 @@ export class CagerViewer extends CaptureElement {
     const { capture, progress } = player;
     const act = (action: Action) => perform(action, this);
     const opening = this.opener.name;
+    const close = () => (this.panel = null);
     return html`
       <div class="lead corner">
         <slot name="lead"></slot>
@@ -199,15 +233,18 @@ export class CagerViewer extends CaptureElement {
       ${toolbar(player, act, {
         colors:
           this.pair.isPainted || [player, this.pair.player].some((shown) => shown?.capture.static.colors !== undefined),
-        figures: this.figures,
+        figures: this.panel === 'figures',
+        views: this.panel === 'views',
         editing: this.editing.isOn,
         beside: this.beside !== null,
         poses: this.poses.isOn,
         recording: this.recording !== null,
         recordable: canRecord(),
+        linkable: this.linkable,
       })}
       ${this.editing.panel(stem(this))} ${this.poses.panel()}
-      ${this.figures ? figuresPanel(player, () => (this.figures = false)) : nothing}
+      ${this.panel === 'figures' ? figuresPanel(player, close) : nothing}
+      ${this.panel === 'views' ? viewsPanel(player, this, close) : nothing}
       ${legend(player, this.comparisonActs, this.panelShare > 0)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
       ${
@@ -215,9 +252,11 @@ export class CagerViewer extends CaptureElement {
           ? progressBox(`Opening ${opening}`, null)
           : progress
             ? progressBox(progress.doing, progress.fraction)
-            : player.playback.buffering
-              ? progressBox('Loading', null)
-              : nothing
+            : this.said !== ''
+              ? progressBox(this.said, null)
+              : player.playback.buffering
+                ? progressBox('Loading', null)
+                : nothing
       }
       ${deck(player, act, {
         besideErrors: this.pair.errors,
@@ -265,9 +304,9 @@ export class CagerViewer extends CaptureElement {
     super.tick();
   }
 
-  protected override tellView() {
+  override tellView() {
     super.tellView();
-    if (this.figures) this.requestUpdate();
+    if (this.panel) this.requestUpdate();
   }
 
   private writePlace() {

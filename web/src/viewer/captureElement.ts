@@ -205,8 +205,8 @@ export abstract class CaptureElement extends LitElement {
     this.link.touch();
   }
 
-  /** Called when the view has rested for a while. */
-  protected tellView() {
+  /** Tells the view; called when it has rested for a while. */
+  tellView() {
     if (this.player) this.tell('viewchange', this.link.textOf(this.player));
   }
 

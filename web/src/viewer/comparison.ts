@@ -5,6 +5,9 @@ import type { Side } from '../render/drawn';
 import type { Stage } from '../render/stage';
 import type { Dropped } from '../files/classify';
 
+/** A place of the line that leaves some of both sides. */
+const within = (share: number) => Math.min(0.95, Math.max(0.05, share || 0.5));
+
 /** The capture beside the frames that it was encoded from, or the surfaces that it was recovered from, where somebody has given them to the page. */
 export class Comparison {
   /** Called when something else is to be shown. */
@@ -14,6 +17,8 @@ export class Comparison {
   files: readonly Dropped[] = [];
   private shownSide: Side = 'decoded';
   private place = 0.5;
+  /** Whether somebody has put the line where it is. */
+  private wasMoved = false;
 
   constructor(
     private readonly capture: Capture,
@@ -25,8 +30,15 @@ export class Comparison {
   }
 
   set side(side: Side) {
+    // The line begins where the model is.
+    if (side === 'both' && this.shownSide !== 'both' && !this.wasMoved) this.place = within(this.stage.middleShare);
     this.shownSide = side;
     this.apply();
+  }
+
+  /** What can be shown: surfaces that something was recovered from have no ghost, as they are dots already. */
+  get sides(): readonly Side[] {
+    return this.surfaces ? ['decoded', 'both', 'original'] : ['decoded', 'both', 'ghost', 'original'];
   }
 
   /** Where the original ends and the decoded model begins, as a fraction of the picture's width. */
@@ -35,7 +47,8 @@ export class Comparison {
   }
 
   set split(split: number) {
-    this.place = Math.min(0.95, Math.max(0.05, split));
+    this.wasMoved = true;
+    this.place = within(split);
     this.apply();
   }
 

@@ -13,9 +13,14 @@ export interface ComparisonActs {
   close(): void;
 }
 
-const SIDE_NAMES: Readonly<Record<Side, string>> = { decoded: 'Decoded', both: 'Both', original: 'Original' };
+const SIDE_NAMES: Readonly<Record<Side, string>> = {
+  decoded: 'Decoded',
+  both: 'Both',
+  ghost: 'Ghost',
+  original: 'Original',
+};
 /** The same where the original is no model but surfaces. */
-const SURFACE_NAMES: typeof SIDE_NAMES = { decoded: 'Template', both: 'Both', original: 'Observed' };
+const SURFACE_NAMES: typeof SIDE_NAMES = { ...SIDE_NAMES, decoded: 'Template', original: 'Observed' };
 /** Rounding of the picture that is a larger part of the errors than this is told. */
 const TELLING_PART = 0.05;
 /** A root mean square beyond this, in diagonals, means that the files are of something else. */
@@ -38,7 +43,6 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
   const names = surfaces ? SURFACE_NAMES : SIDE_NAMES;
   const what = surfaces ? 'Distance from the surface' : 'Error against the original';
   const { measured } = heatMap;
-  const sides = Object.keys(SIDE_NAMES) as Side[];
   const showsErrors = heatMap.kind === 'error' && measured !== null;
   return html`
     <div class="source row">
@@ -49,7 +53,7 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
     </div>
     ${showsErrors ? [errorFigures(player, measured), surfaces ? nothing : rangeChoice(player)] : nothing}
     <div class="segments" role="group" aria-label="Show">
-      ${sides.map(
+      ${comparison.sides.map(
         (side) =>
           html`<button aria-pressed=${String(comparison.side === side)} @click=${() => (comparison.side = side)}>
             ${names[side]}

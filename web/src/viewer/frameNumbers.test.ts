@@ -36,5 +36,5 @@ test('frames_that_are_missing_take_their_time', () => {
   expect(advanced(transport, 0.5).position).toBeCloseTo(2, 9);
   // The whole round is numbers 0 to 6.
   expect(advanced(transport, 0.65).position).toBeCloseTo(0.5, 9);
-  expect(advanced({ ...transport, loop: false }, 0.65)).toMatchObject({ position: 2, playing: false });
+  expect(advanced({ ...transport, repeat: 'once' }, 0.65)).toMatchObject({ position: 2, playing: false });
 });

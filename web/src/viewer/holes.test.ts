@@ -18,7 +18,7 @@ test('at the end it begins anew, or stops', () => {
   holes.add({ first: 25, count: 5, problem });
   holes.add({ first: 0, count: 2, problem });
   expect(holes.past({ ...playing, position: 26 })).toMatchObject({ position: 2, playing: true });
-  expect(holes.past({ ...playing, position: 26, loop: false })).toMatchObject({ position: 26, playing: false });
+  expect(holes.past({ ...playing, position: 26, repeat: 'once' })).toMatchObject({ position: 26, playing: false });
 });
 
 test('it stops where no frame is left', () => {

@@ -38,10 +38,10 @@ export class Holes {
     for (let left = this.holes.size + 1; left > 0; left--) {
       const hole = this.at(frame);
       if (!hole) return frame === Math.floor(transport.position) ? transport : { ...transport, position: frame };
-      frame = hole.first + hole.count;
-      if (frame < transport.frames) continue;
-      if (!transport.loop || !transport.complete) break;
-      frame = 0;
+      frame = transport.direction > 0 ? hole.first + hole.count : hole.first - 1;
+      if (frame >= 0 && frame < transport.frames) continue;
+      if (transport.repeat === 'once' || !transport.complete) break;
+      frame = transport.direction > 0 ? 0 : transport.frames - 1;
     }
     return { ...transport, playing: false };
   }

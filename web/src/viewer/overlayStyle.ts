@@ -61,6 +61,22 @@ export const overlayStyle = css`
     pointer-events: none;
     z-index: 5;
   }
+  .terms {
+    display: grid;
+    grid-template-columns: auto 1fr;
+    gap: 4px var(--cager-space-4);
+    margin: var(--cager-space-3) 0;
+  }
+  .terms dt {
+    font-weight: 600;
+  }
+  .sheet > h3 {
+    margin: var(--cager-space-4) 0 4px;
+  }
+  .sheet :is(th, td) {
+    padding: 2px var(--cager-space-4) 2px 0;
+    font-weight: 400;
+  }
   .columns {
     display: grid;
     grid-template-columns: repeat(auto-fit, minmax(225px, 1fr));
@@ -211,6 +227,11 @@ export const overlayStyle = css`
   }
   .mark.probe span {
     top: 8px;
+  }
+  @container (min-width: 900px) and (min-height: 740px) {
+    .panel {
+      right: calc(2 * var(--cager-space-3) + 148px);
+    }
   }
   @container (max-width: 680px) {
     .panel {

@@ -2,78 +2,16 @@ import { html, nothing, type TemplateResult } from 'lit';
 import type { FrameErrors } from '../capture';
 import { HEAT } from '../render/colorMap';
 import type { FrameRange } from '../editing/cageEdit';
-import type { Layers } from '../render/drawn';
 import { comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
 import { numberAt, numberText } from './frameNumbers';
-import { glyphs, type GlyphName } from '../style/glyphs';
-import type { Heat } from './heatMap';
+import { glyphs } from '../style/glyphs';
 import type { Player } from './player';
 import { isLost } from './reports';
-import { keyLabel, labelOf, SHORTCUTS, type Action } from './shortcuts';
-import { count, percent } from '../text';
+import { keyLabel } from './shortcuts';
+import { count, percent, threeDigits } from '../text';
 import './timeline';
-import { sought, SPEEDS } from './transport';
-
-export type Act = (action: Action) => void;
-
-const HEAT_NAMES: Readonly<Record<Heat, string>> = {
-  none: 'Heat map',
-  motion: 'Heat map: motion',
-  error: 'Heat map: error',
-};
-
-/** A button with a drawing; `pressed` makes it a switch. */
-function tool(action: Action, name: GlyphName, act: Act, pressed?: boolean, label = labelOf(action)): TemplateResult {
-  return html`<button
-    class="quiet icon"
-    data-action=${action}
-    title="${label} (${keyLabel(action)})"
-    aria-label=${label}
-    aria-pressed=${pressed === undefined ? nothing : String(pressed)}
-    @click=${() => act(action)}
-  >
-    ${glyphs[name]}
-  </button>`;
-}
-
-/** Switches for what is drawn, and what to do with the picture. */
-export function toolbar(
-  player: Player,
-  act: Act,
-  shown: {
-    colors: boolean;
-    figures: boolean;
-    editing: boolean;
-    beside: boolean;
-    poses: boolean;
-    recording: boolean;
-    recordable: boolean;
-  },
-) {
-  const layers = Object.keys(player.layers) as (keyof Layers)[];
-  const isPossible: Partial<Record<keyof Layers, boolean>> = {
-    handles: player.capture.handles !== undefined,
-    colors: shown.colors,
-  };
-  const possible = layers.filter((layer) => isPossible[layer] ?? true);
-  return html`<div class="tools glass" role="toolbar" aria-label="View" aria-orientation="vertical">
-    ${possible.map((layer) => tool(layer, layer, act, player.layers[layer]))}
-    ${tool('heat', 'heat', act, player.heatMap.kind !== 'none', HEAT_NAMES[player.heatMap.kind])}
-    ${tool('edit', 'edit', act, shown.editing)}
-    ${player.capture.container ? tool('poses', 'poses', act, shown.poses) : nothing}
-    ${tool('beside', 'beside', act, shown.beside)}
-    <hr />
-    ${tool('frame', 'frame', act)} ${tool('follow', 'follow', act, player.isFollowing)}
-    ${tool('picture', 'camera', act)}
-    ${
-      shown.recordable
-        ? tool('turntable', 'turntable', act, shown.recording, shown.recording ? 'Stop recording' : undefined)
-        : nothing
-    }
-    ${tool('fullscreen', 'fullscreen', act)} ${tool('figures', 'figures', act, shown.figures)}
-    ${tool('help', 'keyboard', act)}
-  </div>`;
-}
+import { tool, type Act } from './toolbar';
+import { sought, SPEEDS, type Repeat, type Transport } from './transport';
 
 export function titleBox(heading: string, { capture }: Player, isEdited: boolean) {
   const { static: part, frames, tracking, frameNumbers } = capture;
@@ -109,11 +47,17 @@ export function deck(player: Player, act: Act, { besideErrors, range }: Timeline
       .tracking=${capture.tracking}
       .frameNumbers=${capture.frameNumbers}
       .range=${range}
+      .played=${transport.range}
       .position=${transport.position}
       @seek=${(event: CustomEvent<number>) => (player.transport = sought(player.transport, event.detail))}
     ></cager-timeline>
   </div>`;
 }
+
+const REPEATS: Readonly<Record<Repeat, string>> = { once: 'Loop', loop: 'Loop', 'ping-pong': 'Loop: ping-pong' };
+
+const isBegun = ({ range }: Transport) => range !== null && range[0] > 0;
+const isEnded = ({ range, frames }: Transport) => range !== null && range[1] < frames - 1;
 
 function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void, figures: TemplateResult | null) {
   const { transport } = player;
@@ -126,7 +70,9 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
     >
       ${glyphs[transport.playing ? 'pause' : 'play']}
     </button>
-    ${tool('previous', 'previous', act)} ${tool('next', 'next', act)} ${tool('loop', 'loop', act, transport.loop)}
+    ${tool('previous', 'previous', act)} ${tool('next', 'next', act)}
+    ${tool('loop', transport.repeat === 'ping-pong' ? 'pingPong' : 'loop', act, transport.repeat !== 'once', REPEATS[transport.repeat])}
+    ${tool('in', 'in', act, isBegun(transport))} ${tool('out', 'out', act, isEnded(transport))}
     ${figures ? tool('worst', 'worst', act) : nothing}
     <select
       class="figures"
@@ -134,7 +80,12 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
       title="Speed"
       @change=${(event: Event) => onSpeed(Number((event.target as HTMLSelectElement).value))}
     >
-      ${SPEEDS.map((speed) => html`<option value=${speed} .selected=${speed === transport.speed}>${speed}×</option>`)}
+      ${SPEEDS.map(
+        (speed) =>
+          html`<option value=${speed} .selected=${speed === transport.speed}>
+            ${speed}× · ${threeDigits(speed * transport.rate)} fps
+          </option>`,
+      )}
     </select>
     <div class="place row figures"><span data-place></span><span class="clock muted" data-clock></span></div>
     ${figures ?? nothing}
@@ -181,36 +132,4 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
     }
     ${compares ? comparisonPanel(player, acts) : nothing}
   </div>`;
-}
-
-export function helpSheet(close: () => void) {
-  return html`<dialog
-    class="sheet"
-    aria-labelledby="help-title"
-    @click=${(event: Event) => event.target === event.currentTarget && close()}
-  >
-    <header>
-      <h2 id="help-title">Keyboard shortcuts</h2>
-      <button class="quiet icon" aria-label="Close" @click=${close}>${glyphs.close}</button>
-    </header>
-    <div class="columns">
-      ${SHORTCUTS.map(
-        ({ title, entries }) =>
-          html`<section>
-            <h3 class="fine">${title}</h3>
-            <dl class="keys">
-              ${entries.map(
-                ({ action, label }) =>
-                  html`<dt><kbd>${keyLabel(action)}</kbd></dt>
-                    <dd>${label}</dd>`,
-              )}
-            </dl>
-          </section>`,
-      )}
-    </div>
-    <p class="muted">
-      Drag to orbit; drag with the right button or two fingers to pan; scroll or pinch to zoom; double-click to frame
-      all.
-    </p>
-  </dialog>`;
 }

@@ -168,6 +168,12 @@ export class Player {
     this.controls.go(camera, atOnce);
   }
 
+  /** Looks with perspective or without it from where the camera is. */
+  setParallel(isParallel: boolean) {
+    this.controls.go({ ...this.controls.destination, isParallel }, true);
+    this.onState();
+  }
+
   /** Frames the motion from the usual side. */
   goHome(atOnce = false) {
     this.frameAll(HOME, atOnce);
@@ -227,12 +233,18 @@ export class Player {
     return positions;
   }
 
-  picture(): Promise<Blob> {
-    this.resolution.share = 1;
+  /** The canvas with its picture, which lasts until the browser shows it. */
+  drawn(): HTMLCanvasElement {
     this.stage.renew();
     this.stage.draw(this.camera);
+    return this.stage.canvas;
+  }
+
+  picture(): Promise<Blob> {
+    this.resolution.share = 1;
+    const canvas = this.drawn();
     return new Promise((resolve, reject) => {
-      this.stage.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The image could not be saved.'))));
+      canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The image could not be saved.'))));
     });
   }
 

@@ -34,6 +34,8 @@ export class Timeline extends LitElement {
   @property({ attribute: false }) frameNumbers: FrameNumbers = null;
   /** Frames that an edit is kept over, shown below to be dragged. */
   @property({ attribute: false }) range: FrameRange | null = null;
+  /** First and last frame that are played; null for all. */
+  @property({ attribute: false }) played: readonly [number, number] | null = null;
   @query('.chart') private readonly chartPlace!: HTMLElement | null;
   @query('.slider') private readonly slider!: HTMLElement;
   private place = 0;
@@ -77,6 +79,7 @@ export class Timeline extends LitElement {
         <div class="track">
           <div class="rail"></div>
           ${this.tracking ? lostRuns(this.tracking).map((run) => this.mark(run)) : null}
+          ${this.played ? this.outside(this.played) : null}
           <div class="done"></div>
           <div class="thumb"></div>
         </div>
@@ -111,6 +114,13 @@ export class Timeline extends LitElement {
   private mark([first, last]: [number, number]) {
     const [left, right] = [this.shareOf(first), this.shareOf(last)];
     return html`<i class="lost" .style=${`left: ${100 * left}%; width: ${100 * (right - left)}%`}></i>`;
+  }
+
+  /** What of the rail is not played. */
+  private outside([first, last]: readonly [number, number]) {
+    const [left, right] = [this.shareOf(first), this.shareOf(last)];
+    return html`<i class="outside" .style=${`left: 0; width: ${100 * left}%`}></i
+      ><i class="outside" .style=${`left: ${100 * right}%; right: 0`}></i>`;
   }
 
   private isMeasured(): boolean {

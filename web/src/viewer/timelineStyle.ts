@@ -40,9 +40,16 @@ export const timelineStyle = css`
     border-radius: 2px;
     background: var(--cager-bad);
   }
+  .outside {
+    position: absolute;
+    inset-block: 4px;
+    z-index: 1;
+    background: repeating-linear-gradient(45deg, var(--cager-muted) 0 2px, var(--cager-surface) 2px 6px);
+  }
   .thumb {
     position: absolute;
     top: 2px;
+    z-index: 2;
     left: 0;
     width: 14px;
     height: 14px;

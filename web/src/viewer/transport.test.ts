@@ -3,6 +3,7 @@ import {
   advanced,
   framesAhead,
   framesAround,
+  ranged,
   sought,
   spedUp,
   standing,
@@ -27,7 +28,7 @@ describe('transport', () => {
   });
 
   it('stops at the last frame without a loop, and begins anew from there', () => {
-    const ended = advanced({ ...playing, loop: false }, 60);
+    const ended = advanced({ ...playing, repeat: 'once' }, 60);
     expect(ended).toMatchObject({ position: 9, playing: false });
     expect(started(ended).position).toBe(0);
   });
@@ -41,7 +42,7 @@ describe('transport', () => {
   it('steps whole frames, around the ends of a loop', () => {
     expect(stepped({ ...playing, position: 0.2 }, -1)).toMatchObject({ position: 9, playing: false });
     expect(stepped({ ...playing, position: 9 }, 1).position).toBe(0);
-    expect(stepped({ ...playing, position: 9, loop: false }, 1).position).toBe(9);
+    expect(stepped({ ...playing, position: 9, repeat: 'once' }, 1).position).toBe(9);
   });
 
   it('seeks only what exists', () => {
@@ -63,8 +64,24 @@ describe('transport', () => {
 
   it('looks ahead around the end of a loop, each frame once', () => {
     expect([...framesAhead({ ...playing, position: 8.5 }, 4)]).toEqual([8, 9, 0, 1]);
-    expect([...framesAhead({ ...playing, position: 8.5, loop: false }, 4)]).toEqual([8, 9]);
+    expect([...framesAhead({ ...playing, position: 8.5, repeat: 'once' }, 4)]).toEqual([8, 9]);
     expect([...framesAhead(playing, 99)]).toHaveLength(10);
+  });
+
+  it('plays back and forth, and only the part between in and out', () => {
+    const back = advanced({ ...playing, repeat: 'ping-pong', position: 8.5 }, 0.05);
+    expect(back).toMatchObject({ position: 8, direction: -1 });
+    expect(advanced({ ...back, position: 1 }, 0.1)).toMatchObject({ position: 2, direction: 1 });
+    expect([...framesAhead({ ...back, position: 1.5 }, 4)]).toEqual([1, 0, 1, 2]);
+    const part = ranged(ranged({ ...playing, position: 3 }, 'in'), 'in').range;
+    expect(part).toBeNull();
+    const within = ranged({ ...ranged({ ...playing, position: 3 }, 'in'), position: 5 }, 'out');
+    expect(within.range).toEqual([3, 5]);
+    expect(advanced({ ...within, position: 5.5 }, 0.05).position).toBe(4);
+    expect(framesAround({ ...within, position: 5.5 })).toEqual({ before: 5, after: 5, mix: 0 });
+    expect([...framesAhead({ ...within, position: 4 }, 4)]).toEqual([4, 5, 3, 4]);
+    expect(advanced({ ...within, repeat: 'once' }, 0.1)).toMatchObject({ position: 5, playing: false });
+    expect(started({ ...within, playing: false, position: 9 }).position).toBe(3);
   });
 
   it('finds the worst frame among those that were measured', () => {

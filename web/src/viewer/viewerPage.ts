@@ -5,6 +5,7 @@ import { problemBehind, ServiceProblem } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import '../sessions/signIn';
+import { keepThumbnail } from '../sessions/thumbnails';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
 import type { Dropped } from '../files/classify';
@@ -14,6 +15,9 @@ import './compareDialog';
 import type { CompareChoice, CompareDialog } from './compareDialog';
 import { jobCapture, type JobKind } from './jobCapture';
 import { sessionCapture } from './sessionCapture';
+
+/** When a picture is taken for the list after the model can be seen: frames come then. */
+const THUMBNAIL_MILLISECONDS = 1000;
 
 /** The page of one capture: a session or a recovery of the service, or a file. */
 @customElement('cager-viewer-page')
@@ -119,12 +123,14 @@ export class ViewerPage extends LitElement {
     return html`<main>
       <cager-viewer
         autoplay
+        ?linkable=${this.job !== null}
         ?inert=${this.wantsToken}
         .capture=${this.capture}
         .beside=${this.beside}
         .view=${this.view}
         @signin=${this.tokenWanted}
         @viewchange=${this.tellView}
+        @ready=${this.keepThumbnail}
         @besidewanted=${this.askBeside}
         @besideclosed=${() => this.setBeside(null)}
       >
@@ -167,6 +173,15 @@ export class ViewerPage extends LitElement {
     event.stopPropagation();
     this.shownView = event.detail;
     this.tellLink();
+  };
+
+  /** Keeps a picture of the session for the list, some time after the model can be seen. */
+  private readonly keepThumbnail = () => {
+    const { capture, viewer } = this;
+    setTimeout(() => {
+      const picture = capture && capture === this.capture && capture.session && viewer?.thumbnail();
+      if (picture) keepThumbnail(capture.session!, picture);
+    }, THUMBNAIL_MILLISECONDS);
   };
 
   private tellLink() {

@@ -136,15 +136,39 @@ export const viewerStyle = css`
     overflow: hidden auto;
     scrollbar-width: none;
   }
-  .tools > * {
+  .tools > [role='group'] {
     flex: none;
+    display: grid;
+    gap: 2px;
   }
-  .tools hr {
-    width: 22px;
-    height: 1px;
-    margin: 3px auto;
-    border: 0;
-    background: var(--cager-line);
+  .tools > [role='group'] + [role='group'] {
+    padding-top: 4px;
+    border-top: 1px solid var(--cager-line);
+  }
+  .tools .fine {
+    grid-column: 1 / -1;
+    padding-left: 6px;
+  }
+  :is(.tools .fine, .caption-text) {
+    display: none;
+  }
+  @container (min-width: 900px) and (min-height: 740px) {
+    .tools > [role='group'] {
+      grid-template-columns: 1fr 1fr;
+    }
+    .tools :is(.fine, .caption-text) {
+      display: block;
+    }
+    .tools button {
+      flex-direction: column;
+      gap: 1px;
+      width: 68px;
+      padding: 4px 0 3px;
+    }
+    .tools .caption-text {
+      font-size: 11px;
+      line-height: 1.2;
+    }
   }
   .deck {
     position: absolute;
@@ -213,14 +237,22 @@ export const viewerStyle = css`
       inset: auto var(--cager-space-2) max(var(--cager-space-2), env(safe-area-inset-bottom));
     }
   }
+  @container (max-width: 680px) {
+    .tools button {
+      min-height: 38px;
+    }
+  }
   @container (max-width: 680px) and (max-height: 700px) {
     .tools button {
       min-height: 36px;
     }
   }
-  @container (max-width: 400px) {
-    .clock {
+  @container (max-width: 480px) {
+    :is(.clock, [data-action='in'], [data-action='out']) {
       display: none;
+    }
+    .transport select {
+      width: 4.2em;
     }
   }
   @container (max-width: 320px) or (max-height: 220px) {
@@ -248,7 +280,7 @@ export const viewerStyle = css`
     }
   }
   @media (pointer: coarse) {
-    [data-action='help'] {
+    .keyboard {
       display: none;
     }
   }

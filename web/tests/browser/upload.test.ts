@@ -3,10 +3,10 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
-import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import { solvedFromStart } from '../../src/service/messages';
 import { seriousFindings } from './harness/axe';
-import { openPage, slow } from './harness/browser';
+import { openPage } from './harness/browser';
 import { cager, missing } from './harness/programs';
 import { Site } from './harness/site';
 import { SphereCapture } from './harness/sphere';
@@ -14,12 +14,10 @@ import { SphereCapture } from './harness/sphere';
 const capture = new SphereCapture();
 const small = new SphereCapture(2);
 const FRAMES = 12;
-/** A capture whose bytes take a slow connection long; its frames are repeated behind each other. */
+/** A capture that takes several requests; its frames are repeated behind each other. */
 const large = new SphereCapture(4);
 const LARGE = { 'rest.obj': large.rest, 'cage.obj': large.cage, 'wave.npy': large.npy(4) };
-/** Bytes per second at which {@link dropLarge} takes about thirteen seconds: as long as tests need for what is to happen meanwhile, on a busy machine too. */
-const SLOW = { uploadThroughput: 384 << 10 };
-const LARGE_FRAMES = 160;
+const LARGE_FRAMES = 80;
 
 describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
   let site: Site;
@@ -29,6 +27,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
   }, 120_000);
 
   beforeEach(() => site.service.run());
+  afterEach(() => site.server.release());
 
   afterAll(() => site.close());
 
@@ -87,18 +86,18 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
 
   test('a_service_that_is_killed_during_an_upload_gets_the_rest_when_it_is_back', async () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['502', 'ERR_']);
-    await slow(page, SLOW);
+    site.server.holdFrames(1);
     await dropLarge(page);
     await page.getByText(`${LARGE_FRAMES} frames of 2,562 points`).waitFor();
     await encodeCages(page);
     await page.getByText('You can watch while it uploads').waitFor();
     await site.service.kill();
+    site.server.release();
     await page
       .getByRole('alert')
       .getByText(/Retrying in/)
       .waitFor();
     await site.service.run();
-    await slow(page, {});
     const id = await encoded(page);
     expect((await site.client().session(id)).frames).toMatchObject({ solved: LARGE_FRAMES, missing: [] });
     expect(errors).toEqual([]);
@@ -107,14 +106,14 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
 
   test('an_upload_goes_on_while_the_session_is_watched', async () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
-    await slow(page, SLOW);
+    site.server.holdFrames(1);
     await dropLarge(page);
     await encodeCages(page);
     await page.getByRole('link', { name: 'Watch live' }).click();
     const id = /#\/session\/([0-9a-f]+)/.exec(page.url())![1];
     await page.locator('cager-viewer').waitFor();
     expect((await site.client().session(id)).state).toBe('ready');
-    await slow(page, {});
+    site.server.release();
     await expect.poll(async () => (await site.client().session(id)).state, { timeout: 30_000 }).toBe('completed');
     await page.goto(`${site.page}#/upload`);
     await page.getByRole('heading', { name: 'Encoded: wave' }).waitFor();
@@ -186,7 +185,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
 
   test('a_session_that_is_deleted_during_its_upload_is_told_of_and_started_again', async () => {
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['404', '410', 'ERR_']);
-    await slow(page, SLOW);
+    site.server.holdFrames(1);
     await dropLarge(page);
     await page.getByLabel('Name').fill('to be deleted');
     await encodeCages(page);
@@ -195,12 +194,12 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     const deleted = (await link.getAttribute('href'))!.replace('#/session/', '');
     await expect.poll(async () => (await site.client().session(deleted)).frames.solved).toBeGreaterThan(0);
     await site.client().call(`/${deleted}`, { method: 'DELETE' });
+    site.server.release();
     await page
       .getByRole('alert')
       .getByText(/The session was deleted during the upload/)
       .waitFor();
     expect(await seriousFindings(page)).toEqual([]);
-    await slow(page, {});
     await page.getByRole('button', { name: 'Start again' }).click();
     const id = await encoded(page);
     expect(id).not.toBe(deleted);
@@ -210,7 +209,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
 
   test('an_upload_that_was_stopped_goes_on_or_is_deleted', async () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
-    await slow(page, SLOW);
+    site.server.holdFrames(1);
     await dropLarge(page);
     await encodeCages(page);
     await page.getByText('You can watch while it uploads').waitFor();
@@ -240,13 +239,15 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
     site = await Site.start({ studio: TOKEN, neighbour: OTHER_TOKEN });
   }, 120_000);
 
+  afterEach(() => site.server.release());
+
   afterAll(() => site.close());
 
   test('by_a_reload_goes_on_with_what_is_missing_when_the_same_files_are_dropped', async () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['401']);
     page.on('dialog', (dialog) => void dialog.accept());
     await signIn(page);
-    await slow(page, SLOW);
+    site.server.holdFrames(1);
     await dropLarge(page);
     await page.getByLabel('Name').fill('broken off');
     await encodeCages(page);
@@ -274,7 +275,7 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
       const first = /frames\?first=(\d+)/.exec(request.url());
       if (first) posted.push(Number(first[1]));
     });
-    await slow(page, {});
+    site.server.release();
     await page.getByRole('button', { name: 'Resume' }).click();
     expect(await encoded(page)).toBe(id);
     expect(Math.min(...posted)).toBe(firstMissing);
@@ -326,8 +327,8 @@ describe.skipIf(missing)('an upload that was broken off', { timeout: 120_000 }, 
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['401']);
     page.on('dialog', (dialog) => void dialog.accept());
     await signIn(page);
-    await slow(page, SLOW);
-    await dropLarge(page, 2 * LARGE_FRAMES);
+    site.server.holdFrames(1);
+    await dropLarge(page);
     await encodeCages(page);
     await page.getByText('You can watch while it uploads').waitFor();
     const other = await page.context().newPage();
@@ -446,8 +447,8 @@ async function drop(page: Page, files: Files, repeated?: { name: string; times: 
 }
 
 /** Drops {@link LARGE}; the bytes are made in the page, as they are too many to be carried there. */
-function dropLarge(page: Page, frames = LARGE_FRAMES): Promise<void> {
-  return drop(page, LARGE, { name: 'wave.npy', times: frames / 4 });
+function dropLarge(page: Page): Promise<void> {
+  return drop(page, LARGE, { name: 'wave.npy', times: LARGE_FRAMES / 4 });
 }
 
 /** Waits for the end of the upload; the session's identifier. */

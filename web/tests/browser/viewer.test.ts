@@ -51,6 +51,23 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
     expect(await again.evaluate(() => location.hash)).toBe(fragment);
   });
 
+  it('plays the part between in and out back and forth, looks without perspective, and returns to a saved view', async () => {
+    const page = await opened('definition3-mvc');
+    for (const key of ['ArrowLeft', 'Home', 'ArrowRight', '[', 'ArrowRight', ']', 'l']) await page.keyboard.press(key);
+    const { range, repeat } = await inViewer(page, ({ player }) => player!.transport, null);
+    expect([range, repeat]).toEqual([[1, 2], 'ping-pong']);
+    await page.keyboard.press('v');
+    await page.getByRole('button', { name: 'Top' }).click();
+    await page.waitForFunction(() => /camera=0,89[^&]*,-/.test(decodeURIComponent(location.hash)));
+    await page.getByRole('button', { name: 'Save this view' }).click();
+    await page.keyboard.press('0');
+    await page.waitForFunction(() => !location.hash.includes('camera='));
+    await page.getByRole('button', { name: '1. Frame 2, orthographic' }).click();
+    await page.waitForFunction(() => /camera=0,89[^&]*,-/.test(decodeURIComponent(location.hash)));
+    expect(await seriousFindings(page)).toEqual([]);
+    expect(pages.errors).toEqual([]);
+  });
+
   it('saves a picture and a turntable video', async () => {
     const page = await opened('definition3-mvc');
     const download = async (key: string) => {
@@ -144,7 +161,7 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
     await page.keyboard.press('h');
     await page.getByText('Motion between frames').waitFor();
     await page.keyboard.press('?');
-    await page.getByRole('dialog', { name: 'Keyboard shortcuts' }).waitFor();
+    await page.getByRole('dialog', { name: 'CageR help' }).getByText('Diagonal', { exact: true }).waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     await page.keyboard.press('Escape');
     expect(await seriousFindings(page)).toEqual([]);

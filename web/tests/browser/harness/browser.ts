@@ -75,8 +75,8 @@ export async function openPage(
   return { page, errors, close: () => context.close() };
 }
 
-/** Makes the connection of a page as slow as so many bytes per second in either direction; as fast as it is where nothing is said. */
-export async function slow(page: Page, to: { uploadThroughput?: number; downloadThroughput?: number }): Promise<void> {
+/** Makes the connection of a page as slow as so many bytes per second; as fast as it is where nothing is said. */
+export async function slow(page: Page, to: { downloadThroughput?: number }): Promise<void> {
   const session = await page.context().newCDPSession(page);
   const unlimited = { offline: false, latency: 0, downloadThroughput: -1, uploadThroughput: -1 };
   await session.send('Network.emulateNetworkConditions', { ...unlimited, ...to });

@@ -23,6 +23,9 @@ export class PageServer {
   readonly #passing = new Set<IncomingMessage>();
   readonly #stopped = new Set<ServerResponse>();
   #isStalled = false;
+  /** How many requests with frames are passed on before others wait. */
+  #frameRequests = Infinity;
+  readonly #waiting: (() => void)[] = [];
 
   private constructor(
     private readonly server: Server,
@@ -40,7 +43,11 @@ export class PageServer {
       // The page of parts lies deeper; both find the service beside themselves.
       const isPassed = ['v1/', 'tests/browser/page/v1/'].some((below) => path.startsWith(PREFIX + below));
       if (isPassed && found.#isStalled) return;
-      if (isPassed) pass(origin(), asked, answer, found.#lengthOf(path, answer), found.#passing);
+      const passOn = (begun: readonly Buffer[] = []) =>
+        pass(origin(), asked, answer, found.#lengthOf(path, answer), found.#passing, begun);
+      if (isPassed && asked.method === 'POST' && path.endsWith('/frames') && found.#frameRequests-- <= 0)
+        found.#hold(asked, answer, passOn);
+      else if (isPassed) passOn();
       else send(folder, path, answer);
     });
     await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
@@ -53,6 +60,27 @@ export class PageServer {
   stall(): void {
     this.#isStalled = true;
     this.#passing.forEach((response) => response.unpipe());
+  }
+
+  /** Passes so many requests with frames on and holds the others back until {@link release}: an upload lasts as long as a test needs. */
+  holdFrames(passed = 0): void {
+    this.#frameRequests = passed;
+  }
+
+  release(): void {
+    this.#frameRequests = Infinity;
+    for (const passOn of this.#waiting.splice(0)) passOn();
+  }
+
+  /** Keeps a request until {@link release}. Its body is read meanwhile, as else nothing would tell that the page has given it up. */
+  #hold(asked: IncomingMessage, answer: ServerResponse, passOn: (begun: readonly Buffer[]) => void): void {
+    const begun: Buffer[] = [];
+    const take = (piece: Buffer) => begun.push(piece);
+    asked.on('data', take);
+    this.#waiting.push(() => {
+      asked.off('data', take);
+      if (!answer.destroyed) passOn(begun);
+    });
   }
 
   /** Passes new requests on again. */
@@ -87,6 +115,7 @@ function pass(
   answer: ServerResponse,
   length: number,
   passing: Set<IncomingMessage>,
+  begun: readonly Buffer[],
 ): void {
   const url = (asked.url ?? '').replace(/^.*?\/v1\//, '/v1/');
   const passed = request(`${origin}${url}`, { method: asked.method, headers: asked.headers }, (response) => {
@@ -110,7 +139,9 @@ function pass(
     else answer.writeHead(502).end();
   });
   answer.once('close', () => passed.destroy());
-  asked.pipe(passed);
+  for (const piece of begun) passed.write(piece);
+  if (asked.readableEnded) passed.end();
+  else asked.pipe(passed);
 }
 
 function send(folder: string, path: string, answer: ServerResponse): void {
