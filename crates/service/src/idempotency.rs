@@ -203,10 +203,10 @@ mod tests {
         let some = SessionOptions { lambda: Some(0.5), ..SessionOptions::default() };
         // Keys outlive upgrades: with other values here, a request repeated after one would be refused as another.
         let defaults = "sent-d4852dca7117667e1b9a86586b926fb4a3680ffad2b05cb61e46935835c475a6";
-        assert_eq!(of(&|| request(key(), parts, &SessionOptions::default())), defaults);
-        assert_eq!(of(&|| request(key(), parts, &CageOptions::default())), defaults);
+        assert_eq!(of(&|| fingerprint(key(), parts, &SessionOptions::default())), defaults);
+        assert_eq!(of(&|| fingerprint(key(), parts, &CageOptions::default())), defaults);
         assert_eq!(
-            of(&|| request(key(), parts, &some)),
+            of(&|| fingerprint(key(), parts, &some)),
             "sent-d43d828b855e62a4a92c492ee98d8dcf9a30c108854433965115b45190fe5dff"
         );
     }

@@ -4,6 +4,7 @@ use super::cage_jobs;
 use super::frame_parser::{BodyLayout, FrameReader};
 use super::multipart;
 use super::ranged::Immutable;
+use crate::admission::{Budget, Permit};
 use crate::preparation::ValidOptions;
 use crate::problem::ApiError;
 use crate::service::Service;
@@ -121,7 +122,7 @@ pub fn immutable(content: Bytes, etag: &str, headers: &HeaderMap) -> Result<Resp
         etag: etag.to_owned(),
         media_type: "application/octet-stream",
         public: false,
-        room: crate::admission::Budget::new(u64::MAX, false).nothing(""),
+        room: Permit::empty(&Budget::new(u64::MAX, false), ""),
         read: Arc::new(move |range| Ok(content.slice(range.start as usize..range.end as usize))),
     };
     let mut response = bytes.respond(headers);
