@@ -19,7 +19,7 @@ use cager_cages::Style;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
-use cager_formats::FrameRange;
+use cager_formats::{FrameRange, Units};
 use clap::{Args, Parser, Subcommand};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -246,9 +246,14 @@ pub(crate) struct CodingArgs {
     #[arg(long, value_name = "E", allow_negative_numbers = true)]
     pub(crate) mean_error: Option<f64>,
 
-    /// What one unit of the capture's positions is, for lengths given to --max-error.
-    #[arg(long, value_enum, value_name = "UNIT", requires = "max_error")]
+    /// What one unit of the positions is in files that do not say it: for lengths given to --max-error, and for programs that read
+    /// what is decoded.
+    #[arg(long, value_enum, value_name = "UNIT")]
     pub(crate) unit: Option<Unit>,
+
+    /// What the file of the rest pose says.
+    #[arg(skip)]
+    pub(crate) said: Units,
 
     /// Store the rest pose and the cage as they are, not on a grid finer than the errors asked for.
     #[arg(long)]

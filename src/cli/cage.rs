@@ -5,14 +5,14 @@ use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design;
 use super::dry_run::{read_files, tell_dry_run};
 use super::outputs::Outputs;
-use super::{grouped, progress, read_model, read_prim, tell, warn};
+use super::{grouped, progress, read_model, read_with_units, tell, warn};
 use crate::design::default_vertices;
 use crate::design::{read_frames, report as design_report};
 use crate::frames::CaptureFiles;
 use crate::report_page::{Contents, Kind, NO_PAGE, ReportPage, ShownCage, ShownMesh};
 use anyhow::{Result, bail};
 use cager_cages::{BoundingShape, DesignOptions, EncloseError, EncloseOptions, Style, bounding_shape, enclose};
-use cager_formats::{AtomicFile, Target, commit_together, model_bytes, obj_bytes};
+use cager_formats::{AtomicFile, Target, Units, commit_together, model_bytes, obj_bytes};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::report::DesignReport;
 use serde::Serialize;
@@ -46,7 +46,10 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
     let clock = Instant::now();
     let targets = Targets::new(args)?;
     let prim = args.checks.prim.as_deref();
-    let models: Vec<Model> = args.rest.iter().map(|path| read_prim(path, prim)).collect::<Result<_, _>>()?;
+    let read: Vec<(Model, Units)> =
+        args.rest.iter().map(|path| read_with_units(path, prim)).collect::<Result<_, _>>()?;
+    let units = read[0].1;
+    let models: Vec<Model> = read.into_iter().map(|(model, _)| model).collect();
     if models.len() > 1 && args.general.is_none() {
         bail!("--rest: was given {} times; only --general takes several models", models.len());
     }
@@ -69,14 +72,14 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
     let Some(output) = &targets.output else { bail!("-o: say which file to write") };
     if args.outputs.dry_run {
         if let Some(frames) = &args.frames {
-            read_files(&Motion::new(args, rest, frames)?.files)?;
+            read_files(&Motion::new(args, (rest, units), frames)?.files)?;
         }
         return tell_dry_run(output, "a cage", &[targets.report.clone(), targets.picture.clone()]);
     }
     let vertices = args.vertices.map_or(default_vertices(rest.points.len()), |n| n as usize);
     let mut warnings = Vec::new();
     let (cage, report) = match (&args.frames, args.general) {
-        (Some(frames), None) => designed(args, rest, frames, &mut warnings)?,
+        (Some(frames), None) => designed(args, (rest, units), frames, &mut warnings)?,
         (_, Some(shape)) => {
             let shape = match shape {
                 GeneralArg::Box => BoundingShape::Box,
@@ -179,7 +182,7 @@ struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    fn new(args: &'a CageArgs, rest: &Model, frames: &Path) -> Result<Self> {
+    fn new(args: &'a CageArgs, (rest, units): (&Model, Units), frames: &Path) -> Result<Self> {
         let start = args.improve.as_ref().map(|path| read_model(path).map(|model| (path, model))).transpose()?;
         let options = DesignOptions {
             goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
@@ -191,6 +194,7 @@ impl<'a> Motion<'a> {
         };
         let no_frames = args.rest.iter().chain(&args.improve);
         let mut files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
+        files.rest_units = units;
         check_capture(&mut files, (&args.rest[0], rest), &args.checks, false)?;
         Ok(Self { start, options, files })
     }
@@ -199,11 +203,11 @@ impl<'a> Motion<'a> {
 /// A cage from the motion: a new one, or an artist's with its vertices moved.
 fn designed(
     args: &CageArgs,
-    rest: &Model,
+    (rest, units): (&Model, Units),
     frames_path: &Path,
     warnings: &mut Vec<String>,
 ) -> Result<(Model, Option<DesignReport>)> {
-    let Motion { start, options, files } = Motion::new(args, rest, frames_path)?;
+    let Motion { start, options, files } = Motion::new(args, (rest, units), frames_path)?;
     let frames = read_frames(&files)?;
     warn_of_departures(&files);
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));

@@ -5,11 +5,12 @@ use super::warn;
 use crate::belonging::Belonging;
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
-use crate::mismatch::{self, Mismatch, Up, cage_mismatch, mismatches};
+use crate::mismatch::{self, Mismatch, cage_mismatch, mismatches};
 use crate::timing::Timing;
 use anyhow::{Result, bail};
 use cager_cages::diagnosis::weld;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::units::Up;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -155,9 +156,7 @@ pub(super) fn check_capture(
         return Ok(());
     }
     let advice = match found[0] {
-        Mismatch::Axes(up @ (Up::Y | Up::Z)) if turns => {
-            format!("pass --up {}", if up == Up::Z { "z" } else { "y" })
-        }
+        Mismatch::Axes(Some(up)) if turns => format!("pass --up {}", up.name()),
         Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
         Mismatch::Axes(_) => "export both with the same axes".to_owned(),
         Mismatch::Units(_) => "scale one of them".to_owned(),

@@ -4,6 +4,7 @@ use super::args::CodingArgs;
 use crate::coding::Goal;
 use crate::config::bytes;
 use anyhow::{Result, bail};
+use cager_formats::Units;
 use cager_geometry::mesh::{Model, diagonal};
 use clap::ValueEnum;
 use std::str::FromStr;
@@ -40,7 +41,7 @@ pub(crate) enum Unit {
 }
 
 impl Unit {
-    fn metres(self) -> f64 {
+    pub(super) fn metres(self) -> f64 {
         match self {
             Self::Mm => 1e-3,
             Self::Cm => 1e-2,
@@ -48,6 +49,13 @@ impl Unit {
             Self::In => 0.0254,
             Self::Ft => 0.3048,
         }
+    }
+}
+
+impl CodingArgs {
+    /// What the file of the rest pose says of its positions, or else is told.
+    pub(super) fn units(&self) -> Units {
+        self.said.or(Units { metres_per_unit: self.unit.map(Unit::metres), up: None })
     }
 }
 
@@ -100,13 +108,8 @@ impl FromStr for TargetSize {
 
 /// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked. A mean error is what a cage meets that is designed for it.
 pub(super) fn goal(coding: &CodingArgs, has_cage: bool, rest: &Model, frames: usize) -> Result<Option<Goal>> {
-    let unit = coding.unit.map(Unit::metres);
+    let unit = coding.units().metres_per_unit;
     Ok(match (coding.max_error, coding.target_size, coding.quality) {
-        (Some(ErrorBound::Fraction(_)), ..) if unit.is_some() => {
-            bail!(
-                "--unit: the maximum error is a fraction of the diagonal; give a length such as 0.2mm, or leave --unit out"
-            )
-        }
         (Some(ErrorBound::Fraction(error)), ..) => Some(Goal::MaxError(error)),
         (Some(ErrorBound::Metres(length)), ..) => {
             let Some(unit) = unit else {

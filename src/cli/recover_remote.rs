@@ -4,7 +4,6 @@ use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
 use super::{grouped, human_bytes, plain, progress, tell, warn};
-use crate::mismatch::Up;
 use crate::remote::{RemoteRecovery, RemoteRecoveryProgress, mesh_file, recover_remotely};
 use anyhow::Result;
 use cager_client::NewRecovery;
@@ -12,6 +11,7 @@ use cager_client::messages::SessionOptions;
 use cager_client::recovery_messages::{Placing, RecoveryOptions, RecoveryState};
 use cager_formats::{AtomicFile, MeshSequence, Target, commit_together};
 use cager_geometry::mesh::Model;
+use cager_geometry::units::Up;
 use std::path::PathBuf;
 
 /// Has a service recover what the arguments say.

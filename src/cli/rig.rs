@@ -3,12 +3,12 @@
 use super::outputs::{OutputArgs, Outputs};
 use super::{grouped, human_bytes, progress, read_model, tell, warn};
 use crate::decode::{self, DecodeError, Positions};
-use crate::mismatch::Up;
 use crate::recover::{manifold_of, rig_of};
 use anyhow::{Context, Result, bail};
 use cager_formats::biovision::{Clip, read_bvh};
 use cager_formats::{AtomicFile, Target};
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
+use cager_geometry::units::Up;
 use cager_geometry::vector::{add, distance};
 use cager_recover::manifold::{Examples, Kind, Manifold};
 use cager_recover::poses::{Naming, SkeletonPoses};

@@ -7,7 +7,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
-use cager_formats::{FrameReader, Target};
+use cager_formats::{FrameReader, Target, Units};
 use cager_geometry::mesh::{Model, Point};
 
 /// How a recovered animation is stored.
@@ -19,6 +19,7 @@ pub(crate) struct Encoding<'a> {
     /// Whether points may have left their cages.
     pub(crate) offsets: bool,
     pub(crate) origin: Option<Point>,
+    pub(crate) units: Units,
     pub(crate) exact_rest: bool,
 }
 
@@ -30,7 +31,7 @@ impl Encoding<'_> {
         frames: &mut dyn FrameReader,
         progress: &dyn Fn(EncodeProgress),
     ) -> Result<Encoded, EncodeError> {
-        let Self { output, system, goal, offsets, origin, exact_rest } = self;
+        let Self { output, system, goal, offsets, origin, units, exact_rest } = self;
         // Where points stay in their cages, all of them tell these exactly.
         let exact = goal.is_none() && !offsets;
         let choices = InversionChoices {
@@ -55,6 +56,7 @@ impl Encoding<'_> {
             memory,
             goal,
             origin,
+            units,
             exact_rest,
         };
         encode::encode(job, progress)

@@ -26,12 +26,12 @@ pub use source::{Arrival, SurfaceSource};
 pub(crate) use surfaces::observed;
 
 use crate::design::default_vertices;
-use crate::mismatch::Up;
 use any_subject::Recovering;
 use cager_cages::{EncloseError, enclose_apart};
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, MeanValue};
 use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::units::Up;
 use cager_recover::joints::JointsError;
 use cager_recover::people::ModelError;
 use cager_registration::{ObservationError, RegistrationError, outward};

@@ -2,10 +2,10 @@
 
 use super::frames::MAX_FRAMES;
 use crate::coding::Goal;
-use crate::mismatch::Up;
 use crate::preparation::{check_told, goal};
 use crate::problem::{self, ApiError};
 use crate::recover::RecoverOptions;
+use cager_geometry::units::Up;
 use cager_proto::messages::SessionOptions;
 use cager_proto::recovery_messages::{Placing, RecoveryOptions};
 use cager_recover::people::{FitOptions, Method};

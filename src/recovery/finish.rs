@@ -10,7 +10,7 @@ use crate::problem::{self, ApiError};
 use crate::recover::{Encoding, JOINTS_RATE, RecoverError, Recovered};
 use crate::store::{StoredPart, Workshop};
 use cager_core::coordinates::CoordinateSystem;
-use cager_formats::{Error, Target};
+use cager_formats::{Error, Target, Units};
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 
@@ -32,6 +32,7 @@ pub(super) fn results(
         goal,
         offsets: options.offsets,
         origin: job.meta.origin,
+        units: Units::UNKNOWN,
         exact_rest: options.exact_rest,
     };
     let stopped = || source.is_stopped();

@@ -21,7 +21,7 @@ use cager_cages::{DesignError, Progress as DesignProgress};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_explore::TransferError;
-use cager_formats::{FrameReader, Target};
+use cager_formats::{FrameReader, Target, Units};
 use cager_geometry::mesh::Model;
 use cager_proto::transfer_messages::TransferStage;
 use std::fs::File;
@@ -170,6 +170,7 @@ impl Service {
             // The cage does not hold all of the motion.
             offsets: true,
             origin: job.meta.origin,
+            units: Units::UNKNOWN,
             exact_rest: options.exact_rest,
         };
         let stopped = || self.is_stopped(job);

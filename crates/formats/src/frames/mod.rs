@@ -30,9 +30,9 @@ mod write;
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Units;
 
 use crate::error::Error;
-use crate::units::Units;
 
 pub(crate) use block::read_values;
 pub use numbers::missing_frames;
@@ -75,9 +75,9 @@ pub trait FrameReader: Send {
         Vec::new()
     }
 
-    /// What the coordinates mean, where the source tells; they are given as they are stored.
-    fn units(&self) -> Option<Units> {
-        None
+    /// What the coordinates mean, as far as the source says; they are given as they are stored.
+    fn units(&self) -> Units {
+        Units::UNKNOWN
     }
 
     /// The file that the last frame was read from and the faces in it, where it has any.
