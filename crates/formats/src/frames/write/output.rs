@@ -46,9 +46,9 @@ pub trait FrameWriter: Send {
 /// What some formats store beside the positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
-    /// Frames per second, for the times in `.mdd`, `.abc`, `.usdc` and `.glb`: 24 by default.
+    /// Frames per second, for the times in `.mdd`, `.mcx`, `.abc`, `.usdc` and `.glb`: 24 by default.
     pub fps: f64,
-    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.abc`, `.usdc` and `.glb`; 0, 1, 2, … where the list is empty.
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.mcx`, `.abc`, `.usdc` and `.glb`; 0, 1, 2, … where the list is empty.
     pub numbers: Vec<f64>,
     /// What is added to all positions, which are then written in double precision by the formats that have it.
     pub origin: Option<Point>,
