@@ -69,6 +69,7 @@ short! {
     npy "npy" 240_000;
     pc2 "pc2" 240_000;
     mdd "mdd" 240_000;
+    mcx "mcx" 120_000;
     abc "abc" 60_000;
     usdc "usdc" 60_000;
     usdz "usdz" 30_000;

@@ -7,6 +7,7 @@ use cager_core::coordinates::Refinement;
 use cager_core::inversion::{Convergence, Outcome, Threshold};
 use cager_core::maxvol::Volume;
 use cager_core::numbers::number_or_null;
+use cager_geometry::units::Units;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// The report of one encoding. Keys that are missing read as zero or empty.
@@ -30,6 +31,12 @@ pub struct Report {
     /// What is added to all positions, of a capture that lies far from the origin of its coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<[f64; 3]>,
+    /// The length of 1 in metres, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metres_per_unit: Option<f64>,
+    /// The axis that points up, `y` or `z`, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub up: Option<String>,
     /// The number of each frame where it comes from, as in the names of its files; absent where they are 0, 1, 2, …
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frame_numbers: Vec<f64>,
@@ -103,6 +110,7 @@ impl Report {
         self.points = header.points as usize;
         self.frame_rate = header.frame_rate;
         self.origin = header.origin;
+        self.set_units(header.units);
         self.unknowns = header.rows_per_frame as usize;
         self.cage_vertices = header.cage_vertices as usize;
         self.cage_faces = header.cage_faces as usize;
@@ -111,6 +119,12 @@ impl Report {
         self.regularizer.clone_from(&header.regularizer);
         self.spectrum = header.spectrum as usize;
         self.lambda = header.lambda;
+    }
+
+    /// Says what positions mean.
+    pub fn set_units(&mut self, units: Units) {
+        self.metres_per_unit = units.metres_per_unit;
+        self.up = units.up.map(|up| up.name().to_owned());
     }
 
     /// Says how many bytes the written file has, once the frames are counted and the size of the capture is known.
@@ -123,12 +137,14 @@ impl Report {
 
     /// The JSON that a container stores: without what its other sections say and what differs from run to run.
     pub(crate) fn stored(&self) -> serde_json::Result<Vec<u8>> {
-        const ELSEWHERE: [&str; 16] = [
+        const ELSEWHERE: [&str; 18] = [
             "points",
             "frames",
             "frame_rate",
             "diagonal",
             "origin",
+            "metres_per_unit",
+            "up",
             "frame_numbers",
             "unknowns",
             "cage_vertices",

@@ -2,6 +2,7 @@
 
 mod support;
 
+use cager_geometry::units::Units;
 use cager_proto::container::{ContainerReader, ContainerWriter, Header};
 use std::io::Cursor;
 use support::{Part, header, put_together, small_container, small_model, take_apart, tetrahedron};
@@ -32,7 +33,7 @@ fn an_origin_comes_back_and_moves_no_position_in_the_file() {
 fn an_origin_is_put_into_a_file_that_otherwise_keeps_its_bytes() {
     let bytes = small_container();
     let mut reader = ContainerReader::open(Cursor::new(&bytes)).unwrap();
-    let moved = ContainerWriter::copy_with_origin(&mut reader, ORIGIN, Vec::new()).unwrap();
+    let moved = ContainerWriter::copy_placed(&mut reader, (Some(ORIGIN), Units::UNKNOWN), Vec::new()).unwrap();
     let mut parts = take_apart(&bytes);
     parts.insert(1, part(ORIGIN));
     assert_eq!(moved, put_together(&parts));

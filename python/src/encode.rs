@@ -15,7 +15,7 @@ use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareContext, PrepareError, Solver};
-use cager_formats::{Target, commit_together};
+use cager_formats::{Target, Units, commit_together};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use pyo3::prelude::*;
 use tempfile::TempPath;
@@ -131,6 +131,7 @@ fn encoded(
         memory: Memory::half_of_free(),
         goal,
         origin: frames.origin,
+        units: Units::UNKNOWN,
         exact_rest: false,
     };
     let done = encode_job(job, &|now| {

@@ -98,7 +98,7 @@ pub(crate) struct EncodeArgs {
     pub(crate) design: DesignArgs,
 
     /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of
-    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd,
+    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd, .mcx,
     /// .abc, .usdc, .usda or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
@@ -222,7 +222,7 @@ pub(crate) struct DecodeArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Where to write: .npy, .pc2, .mdd, .abc, .usdc, .glb or .gltf (morph targets), OUT.vat/ (textures for engines), or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
+    /// Where to write: .npy, .pc2, .mdd, .mcx (with its .xml), .abc, .usdc, .glb or .gltf (morph targets), OUT.vat/ (textures for engines), or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
     /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), of one frame (--frame) .obj, .ply, .off or .stl, or - for .npy on
     /// standard output.
     #[arg(short, long, value_name = "OUT")]

@@ -5,13 +5,13 @@ use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design;
 use super::dry_run::{read_files, tell_dry_run};
-use super::{grouped, progress, read_model, read_prim, tell, warn};
+use super::{grouped, progress, read_model, read_with_units, tell, warn};
 use anyhow::{Result, bail};
 use cager_cages::{BoundingShape, DesignOptions, EncloseError, EncloseOptions, Style, bounding_shape, enclose};
 use cager_capture::design::default_vertices;
 use cager_capture::design::{read_frames, report as design_report};
 use cager_capture::frames::CaptureFiles;
-use cager_formats::{Target, commit_together};
+use cager_formats::{Target, Units, commit_together};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
 use cager_proto::report::DesignReport;
 use serde::Serialize;
@@ -41,7 +41,10 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
     let clock = Instant::now();
     let targets = Targets::new(args)?;
     let prim = args.checks.prim.as_deref();
-    let models: Vec<Model> = args.rest.iter().map(|path| read_prim(path, prim)).collect::<Result<_, _>>()?;
+    let read: Vec<(Model, Units)> =
+        args.rest.iter().map(|path| read_with_units(path, prim)).collect::<Result<_, _>>()?;
+    let units = read[0].1;
+    let models: Vec<Model> = read.into_iter().map(|(model, _)| model).collect();
     if models.len() > 1 && args.general.is_none() {
         bail!("--rest: was given {} times; only --general takes several models", models.len());
     }
@@ -64,14 +67,14 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
     let Some(output) = &targets.output else { bail!("-o: say which file to write") };
     if args.outputs.dry_run {
         if let Some(frames) = &args.frames {
-            read_files(&Motion::new(args, rest, frames)?.files)?;
+            read_files(&Motion::new(args, (rest, units), frames)?.files)?;
         }
         return tell_dry_run(output, "a cage", &[targets.report.clone(), targets.picture.clone()]);
     }
     let vertices = args.vertices.map_or(default_vertices(rest.points.len()), |n| n as usize);
     let mut warnings = Vec::new();
     let (cage, report) = match (&args.frames, args.general) {
-        (Some(frames), None) => designed(args, rest, frames, &mut warnings)?,
+        (Some(frames), None) => designed(args, (rest, units), frames, &mut warnings)?,
         (_, Some(shape)) => {
             let shape = match shape {
                 GeneralArg::Box => BoundingShape::Box,
@@ -101,7 +104,7 @@ struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    fn new(args: &'a CageArgs, rest: &Model, frames: &Path) -> Result<Self> {
+    fn new(args: &'a CageArgs, (rest, units): (&Model, Units), frames: &Path) -> Result<Self> {
         let start = args.improve.as_ref().map(|path| read_model(path).map(|model| (path, model))).transpose()?;
         let options = DesignOptions {
             goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
@@ -113,6 +116,7 @@ impl<'a> Motion<'a> {
         };
         let no_frames = args.rest.iter().chain(&args.improve);
         let mut files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
+        files.rest_units = units;
         check_capture(&mut files, (&args.rest[0], rest), &args.checks, false)?;
         Ok(Self { start, options, files })
     }
@@ -121,11 +125,11 @@ impl<'a> Motion<'a> {
 /// A cage from the motion: a new one, or an artist's with its vertices moved.
 fn designed(
     args: &CageArgs,
-    rest: &Model,
+    (rest, units): (&Model, Units),
     frames_path: &Path,
     warnings: &mut Vec<String>,
 ) -> Result<(Model, Option<DesignReport>)> {
-    let Motion { start, options, files } = Motion::new(args, rest, frames_path)?;
+    let Motion { start, options, files } = Motion::new(args, (rest, units), frames_path)?;
     let frames = read_frames(&files)?;
     warn_of_departures(&files);
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));

@@ -7,9 +7,10 @@ use cager_cages::diagnosis::weld;
 use cager_capture::belonging::Belonging;
 use cager_capture::encode::{EncodeError, sample_frames};
 use cager_capture::frames::CaptureFiles;
-use cager_capture::mismatch::{self, Mismatch, Up, cage_mismatch, mismatches};
+use cager_capture::mismatch::{self, Mismatch, cage_mismatch, mismatches};
 use cager_capture::timing::Timing;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::units::Up;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -155,9 +156,7 @@ pub(super) fn check_capture(
         return Ok(());
     }
     let advice = match found[0] {
-        Mismatch::Axes(up @ (Up::Y | Up::Z)) if turns => {
-            format!("pass --up {}", if up == Up::Z { "z" } else { "y" })
-        }
+        Mismatch::Axes(Some(up)) if turns => format!("pass --up {}", up.name()),
         Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
         Mismatch::Axes(_) => "export both with the same axes".to_owned(),
         Mismatch::Units(_) => "scale one of them".to_owned(),

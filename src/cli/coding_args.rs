@@ -3,6 +3,7 @@
 use anyhow::{Result, bail};
 use cager_capture::coding::Goal;
 use cager_capture::sizes::bytes;
+use cager_formats::Units;
 use cager_geometry::mesh::{Model, diagonal};
 use clap::{Args, ValueEnum};
 use std::str::FromStr;
@@ -29,9 +30,14 @@ pub(crate) struct CodingArgs {
     #[arg(long, value_name = "E", allow_negative_numbers = true)]
     pub(crate) mean_error: Option<f64>,
 
-    /// What one unit of the capture's positions is, for lengths given to --max-error.
-    #[arg(long, value_enum, value_name = "UNIT", requires = "max_error")]
+    /// What one unit of the positions is in files that do not say it: for lengths given to --max-error, and for programs that read
+    /// what is decoded.
+    #[arg(long, value_enum, value_name = "UNIT")]
     pub(crate) unit: Option<Unit>,
+
+    /// What the file of the rest pose says.
+    #[arg(skip)]
+    pub(crate) said: Units,
 
     /// Store the rest pose and the cage as they are, not on a grid finer than the errors asked for.
     #[arg(long)]
@@ -70,7 +76,7 @@ pub(crate) enum Unit {
 }
 
 impl Unit {
-    fn metres(self) -> f64 {
+    pub(super) fn metres(self) -> f64 {
         match self {
             Self::Mm => 1e-3,
             Self::Cm => 1e-2,
@@ -78,6 +84,13 @@ impl Unit {
             Self::In => 0.0254,
             Self::Ft => 0.3048,
         }
+    }
+}
+
+impl CodingArgs {
+    /// What the file of the rest pose says of its positions, or else is told.
+    pub(super) fn units(&self) -> Units {
+        self.said.or(Units { metres_per_unit: self.unit.map(Unit::metres), up: None })
     }
 }
 
@@ -130,13 +143,8 @@ impl FromStr for TargetSize {
 
 /// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked. A mean error is what a cage meets that is designed for it.
 pub(super) fn goal(coding: &CodingArgs, has_cage: bool, rest: &Model, frames: usize) -> Result<Option<Goal>> {
-    let unit = coding.unit.map(Unit::metres);
+    let unit = coding.units().metres_per_unit;
     Ok(match (coding.max_error, coding.target_size, coding.quality) {
-        (Some(ErrorBound::Fraction(_)), ..) if unit.is_some() => {
-            bail!(
-                "--unit: the maximum error is a fraction of the diagonal; give a length such as 0.2mm, or leave --unit out"
-            )
-        }
         (Some(ErrorBound::Fraction(error)), ..) => Some(Goal::MaxError(error)),
         (Some(ErrorBound::Metres(length)), ..) => {
             let Some(unit) = unit else {

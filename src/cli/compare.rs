@@ -5,7 +5,7 @@ use super::checks::{check_cage, check_capture, checked_files, warn_of_departures
 use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
 use super::solver_options::{read_cage, with_input_name};
-use super::{human_bytes, plain, progress, read_prim};
+use super::{human_bytes, plain, progress, read_with_units};
 use anyhow::Result;
 use cager_compare::report_page::{Contents, NO_PAGE, ReportKind, ReportPage};
 use cager_compare::{CompareError, Figures, Job, Progress, compare, seconds};
@@ -32,10 +32,11 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         (Some(_), json) => (outputs.text(&args.output)?, json.as_ref().map(|path| outputs.text(path)).transpose()?),
         (None, _) => (outputs.text(&figures)?, None),
     };
-    let mut rest = read_prim(&args.rest, args.checks.prim.as_deref())?;
+    let (mut rest, units) = read_with_units(&args.rest, args.checks.prim.as_deref())?;
     let mut files = checked_files(&args.checks, &args.frames, rest.points.len(), [&args.rest, &args.cage]);
+    files.rest_units = units;
     files.take_origin(&mut rest);
-    let cage = read_cage(&args.cage, args.flip_cage, files.origin)?;
+    let cage = read_cage(&args.cage, args.flip_cage, (files.origin, units))?;
     check_capture(&mut files, (&args.rest, &rest), &args.checks, false)?;
     check_cage((&args.cage, cage.mesh()), &rest, &args.checks)?;
     let open = || files.open();

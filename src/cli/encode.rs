@@ -2,13 +2,13 @@
 
 use super::args::{EncodeArgs, SpectrumArg};
 use super::checks::{capture_files, check_cage, check_capture, warn_of_departures};
-use super::coding_args::goal;
+use super::coding_args::{Unit, goal};
 use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_shared::{
     Targets, checked_options, design_options, finish, name_file, name_files, sized_design, solver_options,
 };
 use super::solver_options::{check_inversion, designed_spectrum, matrix, read_cage, spectrum_bound};
-use super::{design, encode_remote, grouped, human_bytes, progress, read_prim, warn};
+use super::{design, encode_remote, grouped, human_bytes, progress, read_with_units, warn};
 use anyhow::{Context, Result};
 use cager_capture::coding::Goal;
 use cager_capture::design::{read_frames, report as design_report};
@@ -24,17 +24,24 @@ use cager_geometry::mesh::Model;
 use cager_proto::report::DesignReport;
 use std::time::Instant;
 
-pub(super) fn run(args: &EncodeArgs) -> Result<()> {
+pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     let clock = Instant::now();
-    let targets = Targets::new(args)?;
-    let mut rest = read_prim(&args.rest, args.capture.checks.prim.as_deref())?;
+    let targets = Targets::new(&args)?;
+    let (mut rest, said) = read_with_units(&args.rest, args.capture.checks.prim.as_deref())?;
+    args.coding.said = said;
+    let args = &args;
     let no_frames = [&args.rest].into_iter().chain(&args.cage);
     let mut files = capture_files(&args.capture, &args.frames, &mut rest, no_frames);
     files.selection.range = args.frames_range;
+    (files.rest_units, files.metres_per_unit) = (said, args.coding.unit.map(Unit::metres));
     files.take_origin(&mut rest);
     // What is wrong with it is told before anything is computed.
     goal(&args.coding, args.cage.is_some(), &rest, 1)?;
-    let cage = args.cage.as_ref().map(|path| read_cage(path, args.flip_cage, files.origin)).transpose()?;
+    let cage = args
+        .cage
+        .as_ref()
+        .map(|path| read_cage(path, args.flip_cage, (files.origin, args.coding.units())))
+        .transpose()?;
     check_capture(&mut files, (&args.rest, &rest), &args.capture.checks, true)?;
     if let (Some(path), Some(cage)) = (&args.cage, &cage) {
         check_cage((path, cage.mesh()), &rest, &args.capture.checks)?;
@@ -144,7 +151,7 @@ fn encode_locally(
 
     let bar = progress::PreparationBar::new("encoding", frames.frames())
         .expecting(|| seconds_to_prepare(system, cage, rest.points.len()));
-    let announced = frames.frames();
+    let (announced, units) = (frames.frames(), frames.units());
     let job = Job {
         rest,
         cage,
@@ -157,6 +164,7 @@ fn encode_locally(
         memory,
         goal: goal(&args.coding, args.cage.is_some(), rest, announced)?,
         origin: files.origin,
+        units,
         exact_rest: args.coding.exact_rest,
     };
     let result = encode::encode(job, &|told| match told {

@@ -14,15 +14,15 @@ use cager_capture::frames::CaptureFiles;
 use cager_client::messages::SessionOptions;
 use cager_client::{FrameSource, MeshFile};
 use cager_core::cage::Cage;
-use cager_formats::{AtomicFile, Target, obj_bytes};
+use cager_formats::{AtomicFile, Target, Units, obj_bytes};
 use cager_geometry::mesh::{Model, Point, Polygons};
 use cager_proto::container::{ContainerReader, ContainerWriter, counted_from_zero};
 use std::io::{BufReader, BufWriter};
 use std::path::Path;
 use std::time::Instant;
 
-/// Bytes of an origin in a container, rather too many.
-const ORIGIN_BYTES: u64 = 128;
+/// Bytes of an origin and of units in a container, rather too many.
+const PLACEMENT_BYTES: u64 = 256;
 
 /// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
 /// words that name them.
@@ -38,6 +38,8 @@ pub(super) fn run(
     if cage.is_none() {
         design_options(args, rest.points.len())?;
     }
+    let units = files.open()?.units();
+    let is_placed = files.origin.is_some() || units != Units::UNKNOWN;
     let frames = FileFrames::open(files.clone())?;
     if !counted_from_zero(&frames.numbers()) {
         warn(&["a service numbers frames from 0; encode here to keep the numbers of the files".to_owned()]);
@@ -61,8 +63,8 @@ pub(super) fn run(
     let report_file = targets.begin_report()?;
 
     let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
-    // As it was read: welded and turned around.
-    let moved_cage = cage.filter(|_| files.origin.is_some()).map(|cage| MeshFile::new("cage.obj", cage_obj(cage)));
+    // As it was read: welded, turned around and in the units of the rest pose.
+    let moved_cage = cage.filter(|_| is_placed).map(|cage| MeshFile::new("cage.obj", cage_obj(cage)));
     let mut options = SessionOptions {
         name: session_name(&args.output),
         coordinates: Some(args.solver.coordinates.name().to_owned()),
@@ -79,9 +81,9 @@ pub(super) fn run(
             args.coding.exact_rest,
         )
     };
-    // A service does not know of the origin, which is added to what it sends.
-    if files.origin.is_some() {
-        options.target_size = options.target_size.map(|bytes| bytes.saturating_sub(ORIGIN_BYTES));
+    // A service does not know of the origin and of the units, which are added to what it sends.
+    if is_placed {
+        options.target_size = options.target_size.map(|bytes| bytes.saturating_sub(PLACEMENT_BYTES));
     }
     // Here, since a service designs before it sees what the frames cost.
     let clock_size = Instant::now();
@@ -140,10 +142,7 @@ pub(super) fn run(
     let EncodedRemotely { mut encoded, session, .. } = result?;
     encoded.report.seconds.read += read_seconds;
     encoded.report.seconds.design += size_seconds;
-    let placed = match files.origin {
-        Some(origin) => with_origin(encoded, origin, &targets.output),
-        None => Ok(encoded),
-    };
+    let placed = if is_placed { placed(encoded, (files.origin, units), &targets.output) } else { Ok(encoded) };
     placed
         .and_then(|encoded| finish(targets, encoded, report_file, clock))
         .map_err(|error| anyhow!("{error:#}; {}", goes_on(&plain(&session))))?;
@@ -158,15 +157,16 @@ fn cage_obj(cage: &Cage) -> Vec<u8> {
     obj_bytes(&Model { points: cage.vertices().to_vec(), faces, ..Model::default() })
 }
 
-/// The container of a service, which was sent positions about an origin and does not know of it.
-fn with_origin(encoded: Encoded, origin: Point, output: &Target) -> Result<Encoded> {
+/// The container of a service, which was sent positions about an origin and knows neither it nor what they mean.
+fn placed(encoded: Encoded, (origin, units): (Option<Point>, Units), output: &Target) -> Result<Encoded> {
     let Encoded { mut report, container: mut from } = encoded;
     let mut reader = ContainerReader::open(BufReader::new(from.reader()?))?;
     let out = BufWriter::new(AtomicFile::create(output)?);
-    let mut container = ContainerWriter::copy_with_origin(&mut reader, origin, out)?
+    let mut container = ContainerWriter::copy_placed(&mut reader, (origin, units), out)?
         .into_inner()
         .map_err(std::io::IntoInnerError::into_error)?;
-    report.origin = Some(origin);
+    report.origin = origin;
+    report.set_units(units);
     report.set_output(container.complete()?);
     Ok(Encoded { report, container })
 }

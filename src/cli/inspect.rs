@@ -87,6 +87,11 @@ fn as_text(name: &str, report: &Report, sections: &[Section]) -> Result<String> 
     if let Some([x, y, z]) = report.origin {
         writeln!(out, "  origin    {x} {y} {z}, added to all positions")?;
     }
+    let unit = report.metres_per_unit.map(|metres| format!("1 is {metres} m"));
+    let up = report.up.as_ref().map(|up| format!("{} up", plain(up)));
+    if let Some(units) = unit.into_iter().chain(up).reduce(|unit, up| format!("{unit}, {up}")) {
+        writeln!(out, "  units     {units}")?;
+    }
     let (vertices, faces) = (grouped(report.cage_vertices), grouped(report.cage_faces));
     writeln!(out, "  cage      {vertices} vertices, {faces} faces")?;
     // How many are read is known where not every point is.

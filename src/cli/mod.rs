@@ -48,7 +48,7 @@ mod transfer_remote;
 mod transfer_source;
 
 use args::{Cli, Command};
-use cager_formats::CacheFormat;
+use cager_formats::{CacheFormat, Units};
 use cager_geometry::mesh::Model;
 use clap::{CommandFactory, Parser};
 pub(crate) use global_args::{is_quiet, is_verbose, tell};
@@ -67,7 +67,7 @@ pub fn run() -> ExitCode {
         return ExitCode::FAILURE;
     }
     let result = match command {
-        Command::Encode(args) => encode::run(&args),
+        Command::Encode(args) => encode::run(*args),
         Command::Decode(args) => decode::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Transfer(args) => transfer::run(&args),
@@ -140,9 +140,14 @@ fn read_model(path: &Path) -> Result<Model, cager_formats::Error> {
 
 /// As [`read_model`], of a scene the mesh that `prim` names.
 fn read_prim(path: &Path, prim: Option<&str>) -> Result<Model, cager_formats::Error> {
-    let (model, note) = cager_formats::read_prim_with_note(path, prim)?;
+    read_with_units(path, prim).map(|(model, _)| model)
+}
+
+/// As [`read_prim`], with what the file says of its coordinates.
+fn read_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Units), cager_formats::Error> {
+    let (model, note, units) = cager_formats::read_prim_with_units(path, prim)?;
     warn(note.as_slice());
-    Ok(model)
+    Ok((model, units))
 }
 
 /// Whether a file is a scene that may have several meshes, by its name.

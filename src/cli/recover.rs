@@ -7,10 +7,10 @@ use super::recover_args::{Align, JointsKind, RecoverArgs};
 use super::recover_stretch::{Beside, Done, Stretching};
 use super::rig::{read_manifold, read_rig};
 use super::stretches::{Stretch, StretchList, cut, numbered};
-use super::{grouped, read_model, recover_remote, tell, warn};
+use super::{grouped, read_with_units, recover_remote, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::origin::{move_to, own_origin};
-use cager_formats::{AtomicFile, MeshSequence, Target, commit_together, mesh_sequence};
+use cager_formats::{AtomicFile, MeshSequence, Target, Units, commit_together, mesh_sequence};
 use cager_geometry::mesh::{Model, Point};
 use cager_recover::manifold::Manifold;
 use cager_recover::rig::Rig;
@@ -43,7 +43,7 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     let person = person(args)?;
     if args.outputs.dry_run {
         let mut others = vec![list, joints.map(|(target, _)| target), gait];
-        for (((output, report), (template, _)), files) in targets.iter().zip(&templates).zip(&stretches) {
+        for (((output, report), (template, ..)), files) in targets.iter().zip(&templates).zip(&stretches) {
             others.push(report.clone());
             let what = format!("{} frames of {} points", grouped(files.files.len()), grouped(template.points.len()));
             tell_dry_run(output, &what, &std::mem::take(&mut others))?;
@@ -55,12 +55,12 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     let mut beside = Beside { joints, gait: gait.map(AtomicFile::create).transpose()?, report: None };
     let list = list.map(AtomicFile::create).transpose()?;
     let (mut done, mut listed) = (Vec::new(), Vec::new());
-    for (at, (((output, report), (template, origin)), files)) in
+    for (at, (((output, report), (template, origin, units)), files)) in
         targets.iter().zip(templates).zip(&stretches).enumerate()
     {
         let path = &args.template[at].path;
         let stretch =
-            Stretching { args, path, person: person.as_ref(), cage: args.cage.get(at), origin, files, output };
+            Stretching { args, path, person: person.as_ref(), cage: args.cage.get(at), origin, units, files, output };
         beside.report = report.clone().map(AtomicFile::create).transpose()?;
         done.push(stretch.recover(template, std::mem::take(&mut beside))?);
         listed.push(Stretch {
@@ -106,9 +106,13 @@ fn refuse_several(args: &RecoverArgs) -> Result<()> {
     Ok(())
 }
 
-/// A template, checked, and its origin.
-fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>)> {
-    let mut template = read_model(path)?;
+/// A template, checked, its origin, and what its positions mean where it is not brought to those of the frames.
+fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Units)> {
+    let (mut template, mut units) = read_with_units(path, None)?;
+    if args.scale == Align::Auto {
+        units.metres_per_unit = None;
+    }
+    units.up = args.up.or(units.up);
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", path.display());
     }
@@ -121,7 +125,7 @@ fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>)> {
         );
     }
     move_to(origin, &mut template.points);
-    Ok((template, origin))
+    Ok((template, origin, units.or(args.coding.units())))
 }
 
 /// What is known of a person.

@@ -5,7 +5,7 @@ use super::coding_args::CodingArgs;
 use super::outputs::OutputArgs;
 use super::service_args::ServiceArgs;
 use super::stretches::KeyTemplate;
-use cager_capture::mismatch::Up;
+use cager_geometry::units::Up;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;

@@ -6,12 +6,12 @@ use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
 use super::{grouped, human_bytes, plain, progress, tell, warn};
 use crate::remote::{RemoteRecovery, RemoteRecoveryProgress, mesh_file, recover_remotely};
 use anyhow::Result;
-use cager_capture::mismatch::Up;
 use cager_client::NewRecovery;
 use cager_client::messages::SessionOptions;
 use cager_client::recovery_messages::{Placing, RecoveryOptions, RecoveryState};
 use cager_formats::{AtomicFile, MeshSequence, Target, commit_together};
 use cager_geometry::mesh::Model;
+use cager_geometry::units::Up;
 use std::path::PathBuf;
 
 /// Has a service recover what the arguments say.

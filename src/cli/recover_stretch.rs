@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use cager_capture::encode::{EncodeProgress, Encoded};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_formats::{AtomicFile, MeshSequence, ScratchDir, Target};
+use cager_formats::{AtomicFile, MeshSequence, ScratchDir, Target, Units};
 use cager_geometry::mesh::{Model, Point};
 use cager_motion::recover::{
     Encoding, JOINTS_RATE, Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, cage_around,
@@ -37,6 +37,8 @@ pub(super) struct Stretching<'a> {
     pub(super) person: Option<&'a (Rig, Manifold)>,
     pub(super) cage: Option<&'a PathBuf>,
     pub(super) origin: Option<Point>,
+    /// What the recovered positions mean.
+    pub(super) units: Units,
     pub(super) files: &'a MeshSequence,
     pub(super) output: &'a Target,
 }
@@ -73,7 +75,7 @@ impl Stretching<'_> {
     /// The cage that is given, or one around the template.
     fn cage(&self, template: &Model) -> Result<Cage> {
         if let Some(path) = self.cage {
-            return read_cage(path, false, self.origin);
+            return read_cage(path, false, (self.origin, Units::UNKNOWN));
         }
         let bar = progress::ticking("making a cage");
         let made = cage_around(template);
@@ -123,7 +125,7 @@ impl Stretching<'_> {
 
     /// Encodes what was recovered.
     fn encoded(&self, system: &'static dyn CoordinateSystem, recovered: Recovered, beside: Beside) -> Result<Done> {
-        let Self { args, output, origin, .. } = *self;
+        let Self { args, output, origin, units, .. } = *self;
         let Recovered { rest, cage, mut frames, report, joints, mut warnings, .. } = recovered;
         let count = report.frames.len();
         let goal = goal(&args.coding, true, &rest, count)?;
@@ -135,7 +137,7 @@ impl Stretching<'_> {
         }
         let bar = progress::PreparationBar::new("encoding", count);
         let (offsets, exact_rest) = (args.offsets, args.coding.exact_rest);
-        let encoding = Encoding { output, system, goal, offsets, origin, exact_rest };
+        let encoding = Encoding { output, system, goal, offsets, origin, units, exact_rest };
         let result = encoding.write((&rest, &cage), &mut frames, &|told| match told {
             EncodeProgress::Preparing(step) => bar.preparing(step),
             EncodeProgress::Frames(done) => bar.done(done),

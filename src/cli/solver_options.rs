@@ -1,7 +1,7 @@
 //! From arguments and files to a cage and the options of its solver.
 
 use super::args::{SolverArgs, SpectrumArg};
-use super::{grouped, read_model, warn};
+use super::{grouped, read_with_units, warn};
 use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
 use cager_capture::coding::InversionChoices;
@@ -9,14 +9,21 @@ use cager_capture::origin::move_to;
 use cager_core::cage::{Cage, CageError};
 use cager_core::inversion::{Handles, PrepareError};
 use cager_core::regularize::Regularizer;
-use cager_formats::read_matrix;
+use cager_formats::{Units, read_matrix};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Point, TriMesh};
 use std::path::Path;
 
-/// The cage in a file, about the origin of its model.
-pub(super) fn read_cage(path: &Path, flip: bool, origin: Option<Point>) -> Result<Cage> {
-    let mut model = read_model(path)?;
+/// The cage in a file, about the origin and in the units of its model.
+pub(super) fn read_cage(path: &Path, flip: bool, (origin, units): (Option<Point>, Units)) -> Result<Cage> {
+    let (mut model, said) = read_with_units(path, None)?;
+    let change = said.change_to(units);
+    if !change.is_none() {
+        change.apply_to(&mut model.points);
+        let what =
+            format!("{}: the cage is {change}, as its unit and axes are not those of the rest pose", path.display());
+        warn(&[what]);
+    }
     if model.faces.is_empty() {
         bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
     }

@@ -8,7 +8,7 @@ use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
 use super::solver_options::read_cage;
 use super::transfer_source::MotionSource;
-use super::{grouped, human_bytes, progress, read_model, tell, transfer_remote, warn};
+use super::{grouped, human_bytes, progress, read_with_units, tell, transfer_remote, warn};
 use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
 use cager_capture::coding::InversionChoices;
@@ -21,7 +21,7 @@ use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::regularize::Regularizer;
 use cager_explore::TransferError;
 use cager_explore::alignment::AlignBy;
-use cager_formats::{AtomicFile, ScratchDir, Target, commit_together};
+use cager_formats::{AtomicFile, ScratchDir, Target, Units, commit_together};
 use cager_geometry::mesh::{Model, Point};
 use cager_motion::transfer::{
     MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer, words,
@@ -37,7 +37,8 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let method = args.method()?;
     let (align, matrix) = args.alignment()?;
     let align = words::align(align, matrix).unwrap_or(AlignBy::Surfaces);
-    let mut target = read_model(&args.target)?;
+    let (mut target, said) = read_with_units(&args.target, None)?;
+    let units = said.or(args.coding.units());
     let origin = own_origin(&target.points);
     move_to(origin, &mut target.points);
     // What is wrong with them is told before anything is computed.
@@ -90,7 +91,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let moved = transfer(job, &|done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let moved = moved.map_err(|error| named(error, args))?;
-    write(args, &output, (&target, origin), &design, moved, report)?;
+    write(args, &output, (&target, origin, units), &design, moved, report)?;
     source.warn_of_departures();
     Ok(())
 }
@@ -104,7 +105,7 @@ fn cage(
 ) -> Result<Option<Cage>> {
     let Some(path) = &args.cage else { return Ok(None) };
     let (inside, origin) = if method == MethodChoice::Fitted { (source, None) } else { (target, origin) };
-    let cage = read_cage(path, false, origin)?;
+    let cage = read_cage(path, false, (origin, Units::UNKNOWN))?;
     check_cage((path, cage.mesh()), inside, &args.checks)?;
     Ok(Some(cage))
 }
@@ -146,7 +147,7 @@ fn named(error: TransferFailed, args: &TransferMotionArgs) -> Error {
 fn write(
     args: &TransferMotionArgs,
     output: &Target,
-    (target, origin): (&Model, Option<Point>),
+    (target, origin, units): (&Model, Option<Point>, Units),
     options: &DesignOptions,
     moved: Transferred,
     report_file: Option<AtomicFile>,
@@ -180,6 +181,7 @@ fn write(
         memory: Memory::half_of_free(),
         goal,
         origin,
+        units,
         exact_rest: args.coding.exact_rest,
     };
     let result = encode::encode(job, &|told| match told {

@@ -3,7 +3,7 @@
 use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::dry_run::read_files;
 use super::motion_args::TransferMotionArgs;
-use super::read_prim;
+use super::read_with_units;
 use anyhow::{Result, bail};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::timing::Timing;
@@ -37,10 +37,11 @@ impl MotionSource {
         let (Some(rest_path), Some(frames)) = (&args.source_rest, &args.source_frames) else {
             bail!("--source-rest and --source-frames, or --source, say what is moved; give them");
         };
-        let rest = read_prim(rest_path, args.checks.prim.as_deref())?;
+        let (rest, units) = read_with_units(rest_path, args.checks.prim.as_deref())?;
         let no_frames = [rest_path, &args.target].into_iter().chain(&args.cage);
         let mut files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
         files.timing = timing;
+        files.rest_units = units;
         check_capture(&mut files, (rest_path, &rest), &args.checks, false)?;
         Ok(Self { rest, cage: None, frames: Frames::Files(Box::new(files)) })
     }

@@ -115,7 +115,6 @@ fn what_cannot_be_met_is_refused_in_a_sentence_and_nothing_is_written() {
         ("--max-error 1e-12", "ask for at least"),
         ("--target-size 300", "the smallest possible file has about"),
         ("--max-error 0.2mm", "needs --unit"),
-        ("--max-error 0.001 --unit mm", "leave --unit out"),
         ("--max-error 5m --unit mm", "times the rest pose's diagonal"),
         ("--mean-error 1e-12", "single precision"),
         ("--dry-run --max-error 0.2mm", "needs --unit"),

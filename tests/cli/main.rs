@@ -38,4 +38,5 @@ mod support;
 mod times;
 mod transfer;
 mod transfer_motion;
+mod units;
 mod usage;

@@ -3,11 +3,11 @@
 use crate::support::{Dir, Output, TestCommand, close, npy_f64, read_cages};
 use cager_capture::encode::{Job, encode};
 use cager_capture::memory::Memory;
-use cager_capture::mismatch::{FRAMES, Mismatch, Up, mismatches};
+use cager_capture::mismatch::{FRAMES, Mismatch, mismatches};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{Handles, SolverOptions};
-use cager_formats::{Target, commit_together, open_frames, read_model};
+use cager_formats::{Target, Units, Up, commit_together, open_frames, read_model};
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal, winding_number};
 use cager_proto::report::Report;
 use serde_json::Value;
@@ -59,6 +59,7 @@ pub(crate) fn run_with(
         memory: Memory::half_of_free(),
         goal: None,
         origin: None,
+        units: Units::UNKNOWN,
         exact_rest: false,
     };
     let encoded = encode(job, &|_| {}).expect("an encoding");
@@ -415,7 +416,7 @@ fn no_real_capture_is_taken_for_a_mistake_and_every_mixed_up_one_is() {
         let larger = mismatches(&rest, &some(&|frame, i| frame[i].map(|x| 100.0 * x)));
         assert!(matches!(larger[..], [Mismatch::Units(factor)] if (factor - 100.0).abs() < 0.01), "{name}: {larger:?}");
         let z_up = mismatches(&rest, &some(&|frame, i| [frame[i][0], -frame[i][2], frame[i][1]]));
-        assert_eq!(z_up, [Mismatch::Axes(Up::Z)], "{name}");
+        assert_eq!(z_up, [Mismatch::Axes(Some(Up::Z))], "{name}");
         let reversed = mismatches(&rest, &some(&|frame, i| frame[n - 1 - i]));
         assert!(matches!(reversed[..], [Mismatch::Order(_)]), "{name}: {reversed:?}");
     }

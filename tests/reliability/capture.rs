@@ -72,6 +72,7 @@ impl Reference {
             memory: Memory::half_of_free(),
             goal: None,
             origin: None,
+            units: cager_formats::Units::UNKNOWN,
             exact_rest: false,
         };
         let encoded = encode(job, &|_| {}).expect("an encoding");
@@ -87,6 +88,7 @@ impl Reference {
             solver: &solver,
             frame_rate: None,
             origin: None,
+            units: cager_formats::Units::UNKNOWN,
         };
         let mut writer = CaptureWriter::new(Vec::new(), &encoding).expect("a container");
         let (mut cages, mut errors) = (Vec::new(), Vec::new());

@@ -6,6 +6,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_geometry::mesh::{Model, Point};
+use cager_geometry::units::Units;
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
 use cager_proto::report::{Coding, ConditionNumber, FrameError, Report};
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,8 @@ pub struct Encoding<'a> {
     pub frame_rate: Option<f64>,
     /// What is added to all positions when they are decoded.
     pub origin: Option<Point>,
+    /// What positions mean, as far as it is known.
+    pub units: Units,
 }
 
 /// Errors of a frame as they are stored, with the sums that the error of the whole capture needs.
@@ -237,6 +240,7 @@ fn header(encoding: &Encoding<'_>) -> Header {
         rows_per_frame: encoding.solver.decoder().unknowns() as u32,
         frame_rate: encoding.frame_rate,
         origin: encoding.origin,
+        units: encoding.units,
         ..Header::default()
     }
 }

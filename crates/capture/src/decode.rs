@@ -240,7 +240,8 @@ pub(crate) fn frame_options(
     let numbers = (0..range.count()).filter_map(|place| numbers.get(range.frame(place)).copied()).collect();
     let origin = container.header().origin;
     let rounding = if origin.is_some() { LOST * diagonal(&container.rest()?.points) } else { 0.0 };
-    Ok(FrameOptions { fps, numbers, origin, rounding, ..FrameOptions::default() })
+    let units = container.header().units;
+    Ok(FrameOptions { fps, numbers, origin, rounding, units, ..FrameOptions::default() })
 }
 
 /// How many frames of so many points are decoded at a time.

@@ -4,6 +4,7 @@ use crate::decode::opened::{Container, DecodeError};
 use crate::origin::move_to;
 use cager_formats::{Error, FrameReader, open_frames};
 use cager_geometry::mesh::Point;
+use cager_geometry::units::Change;
 use std::path::{Path, PathBuf};
 
 /// Opens the frames of edited cages from the first.
@@ -16,6 +17,8 @@ pub struct EditedCages {
     /// Points of the model.
     points: u64,
     origin: Option<Point>,
+    /// What makes positions those of the container, where both say what theirs mean.
+    change: Change,
     reader: Box<dyn FrameReader>,
     reopen: Box<Reopen>,
     /// The frame that the reader gives next.
@@ -51,7 +54,8 @@ impl EditedCages {
         let vertices = header.rows_per_frame as usize;
         let reader = reopen().map_err(|error| named(error, vertices, header.points))?;
         let (points, origin) = (header.points, header.origin);
-        Ok(Self { path: path.to_owned(), vertices, points, origin, reader, reopen, next: 0, wide: Vec::new() })
+        let change = reader.units().change_to(header.units);
+        Ok(Self { path: path.to_owned(), vertices, points, origin, change, reader, reopen, next: 0, wide: Vec::new() })
     }
 
     /// Number of frames.
@@ -78,7 +82,9 @@ impl EditedCages {
         }
         self.next += 1;
         out.clear();
-        move_to(self.origin, self.wide.as_chunks_mut().0);
+        let points = self.wide.as_chunks_mut().0;
+        self.change.apply_to(points);
+        move_to(self.origin, points);
         out.extend(self.wide.iter().map(|&x| x as f32));
         match out.iter().position(|x| !x.is_finite()) {
             Some(k) => Err(self.fail(format!(

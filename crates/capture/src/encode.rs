@@ -15,6 +15,7 @@ use cager_core::inversion::{Analysis, PrepareContext, PrepareError, Solver, Solv
 use cager_formats::{Action, AtomicFile, FrameReader, Target};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Model, Point, diagonal};
+use cager_geometry::units::Units;
 use cager_proto::container;
 use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice};
 use rayon::prelude::*;
@@ -97,6 +98,8 @@ pub struct Job<'a> {
     pub goal: Option<Goal>,
     /// What was subtracted from rest pose, cage and frames, and is added to them again when the file is decoded.
     pub origin: Option<Point>,
+    /// What positions mean, as far as it is known.
+    pub units: Units,
     /// Whether the rest pose and the cage are stored as they are also where a goal would allow less.
     pub exact_rest: bool,
 }
@@ -179,9 +182,10 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
     // A bound holds in the unit of the rest pose that was given, and in that of the one that is stored.
     let unit = stored.map_or(given, |stored| stored.min(given));
     let (rest, cage) = meshes.as_ref().map_or((job.rest, job.cage), |meshes| (&meshes.rest.mesh, &meshes.checked));
-    let Job { frames, output, system, options, matrix, choose, memory, goal, origin, exact_rest, .. } = job;
+    let Job { frames, output, system, options, matrix, choose, memory, goal, origin, units, exact_rest, .. } = job;
     let frames = &mut *frames;
-    let job = Job { rest, cage, frames, output, system, options, matrix, choose, memory, goal, origin, exact_rest };
+    let job =
+        Job { rest, cage, frames, output, system, options, matrix, choose, memory, goal, origin, units, exact_rest };
     // What groups are coded in needs nothing of the solver, unless the coordinates are a numerical solution.
     let begins_early = goal.is_some() && system.pointwise().is_some();
     let clock_prepare = Instant::now();
@@ -212,6 +216,7 @@ pub fn encode(job: Job<'_>, progress: &dyn Fn(EncodeProgress)) -> Result<Encoded
         solver: &solver,
         frame_rate: job.frames.frame_rate(),
         origin: job.origin,
+        units: job.units,
     };
     let coded = meshes.as_ref().map(|meshes| (&meshes.rest, &meshes.cage));
     let out = BufWriter::with_capacity(1 << 20, file);

@@ -2,11 +2,11 @@
 //! frame numbers.
 
 use crate::belonging::{Belonging, Pass};
-use crate::mismatch::Up;
 use crate::origin::{move_to, own_origin};
 use crate::timing::Timing;
 use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
 use cager_geometry::mesh::Model;
+use cager_geometry::units::{Change, Units, Up};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -21,8 +21,12 @@ pub struct CaptureFiles {
     pub selection: FrameSelection,
     /// Whether gaps in the numbers of the files are allowed.
     pub allow_gaps: bool,
-    /// The up axis of the frames, if it differs from that of the rest pose.
+    /// The up axis of the frames, if it differs from that of the rest pose and files do not say it.
     pub up: Option<Up>,
+    /// What the file of the rest pose says of its positions: frames that say something else are changed to it.
+    pub rest_units: Units,
+    /// Metres of one unit, for those of both that do not say it.
+    pub metres_per_unit: Option<f64>,
     /// If the rest pose was welded: for each original point, its index after welding.
     pub weld: Option<Vec<u32>>,
     /// Frame rate and number of the first frame, where they are given.
@@ -61,16 +65,31 @@ impl CaptureFiles {
         }
         let numbers = self.timing.numbers(found);
         let frame_rate = self.timing.fps.or(inner.frame_rate());
+        let (change, units) = self.placed(inner.units());
         Ok(Box::new(Adapted {
             inner,
             files: self.clone(),
             first_of,
             numbers,
             frame_rate,
+            change,
+            units,
             frame: 0,
             values: Vec::new(),
             pass: self.belonging.clone().map(Pass::new),
         }))
+    }
+
+    /// What makes positions of frames that say this those of the rest pose, and what both mean then.
+    fn placed(&self, said: Units) -> (Change, Units) {
+        let unit = Units { metres_per_unit: self.metres_per_unit, up: None };
+        let (frames, rest) = (said.or(unit), self.rest_units.or(unit));
+        // Whoever tells the axis knows better than files that contradict it.
+        let told = self.up.map(Up::other);
+        let mut change = frames.change_to(rest);
+        change.turn_to = told.or(change.turn_to);
+        let units = rest.or(Units { up: told, metres_per_unit: None }).or(frames);
+        (change, units)
     }
 
     /// The reader; and if the frames have unwelded points, for each welded point its first original point.
@@ -109,6 +128,10 @@ struct Adapted {
     first_of: Option<Vec<u32>>,
     numbers: Vec<f64>,
     frame_rate: Option<f64>,
+    /// To the unit and the axes of the rest pose.
+    change: Change,
+    /// What positions mean then.
+    units: Units,
     frame: usize,
     /// A frame before it is welded.
     values: Vec<f64>,
@@ -134,7 +157,13 @@ impl FrameReader for Adapted {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.inner.notes()
+        let mut notes = self.inner.notes();
+        notes.extend(self.brought_together());
+        notes
+    }
+
+    fn units(&self) -> Units {
+        self.units
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
@@ -147,6 +176,7 @@ impl FrameReader for Adapted {
             out.clear();
             out.extend(first_of.iter().flat_map(|&point| points[point as usize]));
         }
+        self.change.apply_to(out.as_chunks_mut().0);
         if let Some(at) = out.iter().position(|x| x.abs() > f64::from(f32::MAX)) {
             let what = format!(
                 "frame {}: point {} has the coordinate {:e}, too large for single precision; repair the frame or scale the capture down",
@@ -155,14 +185,6 @@ impl FrameReader for Adapted {
                 out[at]
             );
             return Err(Error::Invalid { path: self.files.path.clone(), what });
-        }
-        for point in out.as_chunks_mut::<3>().0 {
-            let [x, y, z] = *point;
-            match self.files.up {
-                Some(Up::Z) => *point = [x, z, -y],
-                Some(Up::Y) => *point = [x, -z, y],
-                Some(Up::Other) | None => break,
-            }
         }
         move_to(self.files.origin, out.as_chunks_mut().0);
         self.frame += 1;
@@ -181,6 +203,14 @@ impl FrameReader for Adapted {
 }
 
 impl Adapted {
+    /// What is to be said where the files say other units or axes than the rest pose, and positions are changed for it.
+    fn brought_together(&self) -> Option<String> {
+        let own = Change { turn_to: self.change.turn_to.filter(|_| self.files.up.is_none()), ..self.change };
+        let path = self.files.path.display();
+        (!own.is_none())
+            .then(|| format!("{path}: its frames are {own}, as its unit and axes are not those of the rest pose"))
+    }
+
     /// Compares the frame that was just read with those before.
     fn compare(&mut self, frame: &[f64]) -> Result<(), Error> {
         let Some(pass) = &mut self.pass else { return Ok(()) };
@@ -199,5 +229,62 @@ impl Adapted {
         let mut all = self.files.open()?;
         while all.read_next(&mut self.values)? {}
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cager_formats::{FrameOptions, ScratchDir, create_frames};
+    use cager_geometry::mesh::Polygons;
+
+    const CENTIMETRES: Units = Units::new(Up::Z, 0.01);
+    const INCHES: Units = Units { up: None, metres_per_unit: Some(0.0254) };
+
+    /// The first point of a capture whose only one is (100, 200, 300), what it means, and what is said of it.
+    fn read(name: &str, adapt: impl FnOnce(&mut CaptureFiles)) -> ([f64; 3], Units, Vec<String>) {
+        let folder = ScratchDir::create(&std::env::temp_dir()).expect("a folder");
+        let path = folder.path().join(name);
+        let options = FrameOptions { units: CENTIMETRES, ..FrameOptions::default() };
+        let mut writer = create_frames(&path, 1, 1, &Polygons::new(), &options).expect("a file");
+        writer.write_frame(&[100.0, 200.0, 300.0]).expect("a frame");
+        writer.finish().expect("a file");
+        let mut files = CaptureFiles::new(&path, 1);
+        adapt(&mut files);
+        let mut reader = files.open().expect("a capture");
+        let mut values = Vec::new();
+        assert!(reader.read_next(&mut values).expect("a frame"));
+        ([values[0], values[1], values[2]], reader.units(), reader.notes())
+    }
+
+    #[test]
+    fn a_capture_is_brought_to_the_units_of_its_rest_pose_once_and_told() {
+        let (point, units, notes) = read("a.usdc", |files| files.rest_units = Units::METRES);
+        assert_eq!((point, units), ([1.0, 3.0, -2.0], Units::METRES));
+        let [note] = &notes[..] else { panic!("{notes:?}") };
+        assert!(note.contains("its frames are scaled by 0.01 and turned to Y up"), "{note}");
+        // The option turns it, and it is not turned again.
+        let (point, units, notes) = read("a.usdc", |files| {
+            (files.rest_units, files.up) = (Units::METRES, Some(Up::Z));
+        });
+        assert_eq!((point, units), ([1.0, 3.0, -2.0], Units::METRES));
+        assert!(notes[0].contains("scaled by 0.01,"), "{notes:?}");
+    }
+
+    #[test]
+    fn what_one_file_does_not_say_is_as_in_the_other_or_as_it_is_told() {
+        let as_it_is = [100.0, 200.0, 300.0];
+        assert_eq!(read("a.usdc", |_| ()), (as_it_is, CENTIMETRES, Vec::new()));
+        assert_eq!(read("a.usdc", |files| files.rest_units = CENTIMETRES), (as_it_is, CENTIMETRES, Vec::new()));
+        assert_eq!(read("a.npy", |_| ()), (as_it_is, Units::UNKNOWN, Vec::new()));
+        assert_eq!(read("a.npy", |files| files.rest_units = CENTIMETRES), (as_it_is, CENTIMETRES, Vec::new()));
+        assert_eq!(read("a.npy", |files| files.metres_per_unit = Some(0.0254)), (as_it_is, INCHES, Vec::new()));
+        let turned = read("a.npy", |files| files.up = Some(Up::Z));
+        let y_up = Units { up: Some(Up::Y), metres_per_unit: None };
+        assert_eq!(turned, ([100.0, 300.0, -200.0], y_up, Vec::new()));
+        let (point, units, notes) = read("a.npy", |files| {
+            (files.rest_units, files.metres_per_unit) = (Units::METRES, Some(0.01));
+        });
+        assert_eq!((point, units, notes.len()), ([1.0, 2.0, 3.0], Units::METRES, 1));
     }
 }

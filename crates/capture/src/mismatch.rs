@@ -8,6 +8,7 @@ pub mod watch;
 pub use cage::cage_mismatch;
 
 use cager_geometry::mesh::{Model, Point, bounds};
+use cager_geometry::units::Up;
 use cager_geometry::vector::distance;
 use std::fmt;
 
@@ -27,19 +28,8 @@ pub enum Mismatch {
     Order(f64),
     /// All frames are scaled by about this factor.
     Units(f64),
-    /// The axes y and z are exchanged.
-    Axes(Up),
-}
-
-/// The up axis of a capture whose axes differ from those of its rest pose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Up {
-    /// The second; the third does in the rest pose.
-    Y,
-    /// The third; the second does in the rest pose.
-    Z,
-    /// Neither of the two usual conversions leads from one to the other.
-    Other,
+    /// The axes y and z are exchanged: the one that points up in the capture, unless neither of the two usual conversions leads from one to the other.
+    Axes(Option<Up>),
 }
 
 /// Detects mismatches from some frames, including the first, points × 3 each; empty if the capture plausibly belongs to the rest pose. All
@@ -59,9 +49,9 @@ pub fn mismatches(rest: &Model, frames: &[Vec<f64>]) -> Vec<Mismatch> {
     if in_other_units(&compared) {
         found.push(Mismatch::Units(first.edges));
     }
-    let exchanged: Vec<Up> = compared.iter().filter_map(|frame| frame.turn.exchanged()).collect();
+    let exchanged: Vec<Mismatch> = compared.iter().filter_map(|frame| frame.turn.exchanged()).collect();
     if 5 * exchanged.len() >= 2 * compared.len() && !compared.iter().any(|frame| frame.turn.clearly_keeps_axes()) {
-        found.push(Mismatch::Axes(exchanged[0]));
+        found.push(exchanged[0]);
     }
     found
 }
@@ -192,8 +182,8 @@ struct AxisScores {
     with: f64,
     /// Best score of reflections that exchange them.
     mirrored: f64,
-    /// Up axis of the best such rotation.
-    up: Up,
+    /// Up axis of the best such rotation, where it is one of the two usual conversions.
+    up: Option<Up>,
 }
 
 impl AxisScores {
@@ -207,7 +197,7 @@ impl AxisScores {
             ([2, 1, 0], -1.0),
         ];
         let none = f64::NEG_INFINITY;
-        let mut best = Self { without: none, with: none, mirrored: none, up: Up::Other };
+        let mut best = Self { without: none, with: none, mirrored: none, up: None };
         for (order, parity) in ORDERS {
             for signs in 0..8 {
                 let sign: Point = std::array::from_fn(|k| if signs >> k & 1 == 0 { 1.0 } else { -1.0 });
@@ -220,9 +210,9 @@ impl AxisScores {
                 } else if fit > best.with {
                     best.with = fit;
                     best.up = match (order[1] == 2 && sign[1] > 0.0, order[2] == 1 && sign[2] > 0.0) {
-                        (true, false) => Up::Z,
-                        (false, true) => Up::Y,
-                        _ => Up::Other,
+                        (true, false) => Some(Up::Z),
+                        (false, true) => Some(Up::Y),
+                        _ => None,
                     };
                 }
             }
@@ -230,11 +220,11 @@ impl AxisScores {
         best
     }
 
-    /// The up axis, if y and z are clearly exchanged.
-    fn exchanged(&self) -> Option<Up> {
+    /// That y and z are exchanged, if they clearly are.
+    fn exchanged(&self) -> Option<Mismatch> {
         let best = self.with.max(self.mirrored);
         let mirror = 1.0 - self.mirrored < 0.5 * (1.0 - self.with);
-        Self::clearly(best, self.without).then_some(if mirror { Up::Other } else { self.up })
+        Self::clearly(best, self.without).then_some(Mismatch::Axes(self.up.filter(|_| !mirror)))
     }
 
     fn clearly_keeps_axes(&self) -> bool {
@@ -268,9 +258,13 @@ impl fmt::Display for Mismatch {
                     "frame 0 is {times} times {how} than the rest pose, and so are the others, as with other units"
                 )
             }
-            Self::Axes(Up::Y) => f.write_str("its axes y and z look exchanged: y is up where z is in the rest pose"),
-            Self::Axes(Up::Z) => f.write_str("its axes y and z look exchanged: z is up where y is in the rest pose"),
-            Self::Axes(Up::Other) => f.write_str("its axes look exchanged"),
+            Self::Axes(Some(Up::Y)) => {
+                f.write_str("its axes y and z look exchanged: y is up where z is in the rest pose")
+            }
+            Self::Axes(Some(Up::Z)) => {
+                f.write_str("its axes y and z look exchanged: z is up where y is in the rest pose")
+            }
+            Self::Axes(None) => f.write_str("its axes look exchanged"),
         }
     }
 }
@@ -353,8 +347,8 @@ mod tests {
                 );
             }
         }
-        assert_eq!(found(|_, [x, y, z]| [x, -z, y]), [[Mismatch::Axes(Up::Z)], [Mismatch::Axes(Up::Z)]]);
-        assert_eq!(found(|_, [x, y, z]| [x, z, -y]), [[Mismatch::Axes(Up::Y)], [Mismatch::Axes(Up::Y)]]);
+        assert_eq!(found(|_, [x, y, z]| [x, -z, y]), [[Mismatch::Axes(Some(Up::Z))], [Mismatch::Axes(Some(Up::Z))]]);
+        assert_eq!(found(|_, [x, y, z]| [x, z, -y]), [[Mismatch::Axes(Some(Up::Y))], [Mismatch::Axes(Some(Up::Y))]]);
         let mesh = tube();
         let n = mesh.points.len();
         let shuffled: Vec<f64> = (0..n).flat_map(|i| mesh.points[(i * 7919 + 13) % n]).collect();

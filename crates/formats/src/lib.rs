@@ -16,11 +16,11 @@ mod natural;
 mod scene;
 mod signature;
 mod text;
-mod units;
 mod usd;
 mod vat;
 
 pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
+pub use cager_geometry::units::{Units, Up};
 pub use error::{Action, Error};
 pub use frames::{
     CacheFormat, CageMesh, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence,
@@ -30,8 +30,7 @@ pub use frames::{
 pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{
-    MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_with_note, read_prim_with_note,
-    read_prim_with_units, write_model,
+    MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_bytes_with_units,
+    read_model_with_note, read_prim_with_note, read_prim_with_units, write_model,
 };
 pub use signature::Signature;
-pub use units::{Units, Up};

@@ -27,6 +27,8 @@ pub const FORMATS: &[Listed] = &[
     animated("npz", "NumPy archive", false, "frame rate"),
     animated("pc2", "point cache of 3ds Max and Blender", true, "frame numbers"),
     animated("mdd", "point cache of LightWave", true, "times"),
+    animated("mcx", "geometry cache of Maya", true, "frame rate, times"),
+    animated("mc", "the same, older", true, "frame rate, times"),
     animated("abc", "Alembic (Ogawa)", true, "frame rate, times"),
     animated("usdc", "Universal Scene Description, binary", true, "unit, up axis, frame rate, times"),
     animated("usdz", "the same as a package", true, "unit, up axis, frame rate, times"),

@@ -63,7 +63,7 @@ fn mesh(properties: &str) -> String {
 fn a_file_written_by_hand_is_read() {
     let mut reader = open(HAND, 3).unwrap();
     assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(25.0), vec![1.0, 2.0, 3.0]));
-    assert_eq!(reader.units(), Some(Units { up: Up::Z, metres_per_unit: 0.01 }));
+    assert_eq!(reader.units(), Units::new(Up::Z, 0.01));
     let tenth = f64::from(0.1_f32);
     let moved = |x: f64| vec![x, 0.0, 0.0, 1.0 + x, tenth, -0.5, 1.0 + x, 2.0, 3.0];
     assert_eq!(all(&mut *reader), [moved(0.0), moved(1.0), moved(2.0)]);

@@ -5,4 +5,5 @@ pub mod linalg;
 pub mod mesh;
 pub mod spatial;
 pub mod topology;
+pub mod units;
 pub mod vector;

@@ -1,8 +1,8 @@
 //! Point caches. The first byte says how many points are expected.
 
-use super::byte;
+use super::{byte, scenes};
 use crate::Target;
-use cager_formats::{CacheFormat, FrameReader, open_frames, open_frames_bytes};
+use cager_formats::{CacheFormat, FrameOptions, FrameReader, open_frames, open_frames_bytes};
 use std::io::{Cursor, Write};
 use std::path::Path;
 use zip::CompressionMethod;
@@ -93,6 +93,17 @@ pub(super) const MDD: Target = target(
     &["\0\0\0\u{2}"],
 );
 
+pub(super) const MCX: Target = target(
+    "mcx",
+    |bytes| read(CacheFormat::Mcx, bytes),
+    || {
+        let uneven = FrameOptions { numbers: vec![0.0, 1.0, 4.0], ..FrameOptions::default() };
+        let far = FrameOptions { origin: Some([1e6, 0.0, 0.0]), ..FrameOptions::default() };
+        [scenes::written("a.mcx", &[FrameOptions::default(), uneven]), scenes::written("a.mc", &[far])].concat()
+    },
+    &["FOR4", "FOR8", "MYCH", "TIME", "CHNM", "SIZE", "FVCA", "DVCA", "_normals", "\0\0\0\u{4}"],
+);
+
 /// Archives lie on the disk.
 pub(super) const NPZ: Target = target(
     "npz",
@@ -145,7 +156,7 @@ fn read(format: CacheFormat, mut bytes: &[u8]) {
         Ok(reader) => reader,
         Err(error) => {
             let text = error.to_string();
-            assert!(text.starts_with(&format!("{}: ", name.display())) && text.len() < 600, "{text}");
+            assert!(text.starts_with(&format!("{}: ", name.display())) && text.len() < 2000, "{text}");
             return;
         }
     };

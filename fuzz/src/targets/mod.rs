@@ -26,6 +26,7 @@ pub const TARGETS: &[Target] = &[
     frames::NPY,
     frames::PC2,
     frames::MDD,
+    frames::MCX,
     alembic::ABC,
     usd::USDC,
     usd::USDZ,

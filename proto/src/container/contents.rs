@@ -3,6 +3,7 @@
 use super::codec::{self, CODED};
 use super::reader::ContainerReader;
 use super::section::{Entry, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
+use super::units::UNITS_BYTES;
 use super::{Error, tag};
 use crate::le::u64_at;
 use std::io::{Read, Seek};
@@ -108,6 +109,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         for (tag, least, most) in [
             (tag::REST_FACES, most_faces, most_faces),
             (tag::ORIGIN, 0, 1),
+            (tag::UNITS, 0, 1),
             (tag::REST_COLORS, 0, 1),
             (tag::ELEMENTS, 0, 1),
             (tag::NUMBERS, 0, 1),
@@ -125,6 +127,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             let expected = match s.tag {
                 tag::REST_POINTS => h.points.checked_mul(3 * u64::from(s.width)),
                 tag::ORIGIN => Some(24),
+                tag::UNITS => Some(UNITS_BYTES as u64),
                 tag::REST_COLORS => h.points.checked_mul(3),
                 tag::REST_FACES => h.rest_faces.checked_add(h.rest_corners).and_then(|n| n.checked_mul(4)),
                 tag::CAGE_VERTICES => h.cage_vertices.checked_mul(3 * u64::from(s.width)),
@@ -139,7 +142,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
                 tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
                 tag::ORIGIN | tag::NUMBERS => s.width == 8,
-                tag::REST_COLORS | tag::ELEMENTS | tag::RESIDUAL => s.width == 1,
+                tag::UNITS | tag::REST_COLORS | tag::ELEMENTS | tag::RESIDUAL => s.width == 1,
                 _ => s.width > 0,
             };
             if expected != Some(s.raw_bytes) || !width_fits {

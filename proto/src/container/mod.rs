@@ -9,6 +9,7 @@ mod error;
 mod groups;
 mod reader;
 mod section;
+mod units;
 mod writer;
 
 pub use coded::most_residual_numbers;
@@ -17,6 +18,7 @@ pub use reader::{ContainerReader, SectionInfo};
 pub use writer::{ContainerWriter, colors_bytes};
 
 use cager_geometry::mesh::Point;
+use cager_geometry::units::Units;
 use serde::{Deserialize, Serialize};
 
 /// First bytes of every container. Like PNG's they show damage by text-mode transfers.
@@ -37,7 +39,7 @@ pub fn group_frames(points: usize, rows: usize) -> usize {
     fitting.clamp(1, MAX_GROUP_FRAMES)
 }
 
-/// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`], but for the origin.
+/// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`], but for the origin and the units.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Header {
     /// Definition of the coordinate systems by which decoders compute `Φ` anew.
@@ -69,6 +71,9 @@ pub struct Header {
     /// What is to be added to all positions of a capture that lies far away; stored in a section of its own.
     #[serde(skip)]
     pub origin: Option<Point>,
+    /// What positions mean, as far as the input said; stored in a section of its own.
+    #[serde(skip)]
+    pub units: Units,
 }
 
 impl Header {
@@ -93,6 +98,7 @@ pub(crate) fn are_frame_numbers(numbers: &[f64]) -> bool {
 pub(crate) mod tag {
     pub(crate) const HEADER: [u8; 4] = *b"HEAD";
     pub(crate) const ORIGIN: [u8; 4] = *b"ORIG";
+    pub(crate) const UNITS: [u8; 4] = *b"unit";
     pub(crate) const REST_POINTS: [u8; 4] = *b"RPTS";
     pub(crate) const REST_FACES: [u8; 4] = *b"RFAC";
     pub(crate) const REST_COLORS: [u8; 4] = *b"rcol";
@@ -105,9 +111,10 @@ pub(crate) mod tag {
     pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
     pub(crate) const REPORT: [u8; 4] = *b"summ";
     pub(crate) const RESIDUAL: [u8; 4] = *b"resi";
-    pub(crate) const KNOWN: [[u8; 4]; 14] = [
+    pub(crate) const KNOWN: [[u8; 4]; 15] = [
         HEADER,
         ORIGIN,
+        UNITS,
         REST_POINTS,
         REST_FACES,
         REST_COLORS,

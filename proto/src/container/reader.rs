@@ -3,7 +3,7 @@
 use super::codec::{self, CODED};
 use super::groups::Groups;
 use super::section::{self, Entry, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
-use super::{Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag};
+use super::{Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag, units};
 use crate::le::{self, f32_at, u64_at};
 use crate::report::{FrameError, Report, WorstError};
 use crate::wire;
@@ -64,6 +64,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         reader.read_contents(section::check_footer(&footer, file_bytes)?)?;
         reader.read_header()?;
         reader.check_sizes(true)?;
+        reader.read_units()?;
         reader.read_origin()?;
         Ok(reader)
     }
@@ -78,6 +79,8 @@ impl<R: Read + Seek> ContainerReader<R> {
         reader.scan()?;
         reader.read_header()?;
         reader.check_sizes(false)?;
+        // Positions decode without them.
+        let _ = reader.read_units();
         reader.read_origin()?;
         Ok(reader)
     }
@@ -362,6 +365,12 @@ impl<R: Read + Seek> ContainerReader<R> {
         if h.rows_per_frame == 0 || h.points > u64::from(u32::MAX) || h.cage_vertices > u64::from(u32::MAX) {
             return Err(Error::corrupt(entry.offset, "the header has impossible counts"));
         }
+        Ok(())
+    }
+
+    fn read_units(&mut self) -> Result<(), Error> {
+        let Some(entry) = self.sections_of(tag::UNITS).next() else { return Ok(()) };
+        self.header.units = units::from_bytes(&self.raw(entry)?, entry.offset)?;
         Ok(())
     }
 

@@ -3,11 +3,12 @@
 use super::codec::{self, CODED, CODED_STATIC, DIFFERENCE, PLANES, RAW};
 use super::reader::ContainerReader;
 use super::section::{self, HEADER_BYTES, SectionHeader};
-use super::{CHUNK_FRAMES, Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag};
+use super::{CHUNK_FRAMES, Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag, units};
 use crate::report::Report;
 use crate::wire;
 use cager_codec::{CodedMesh, encode_errors};
 use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::units::Units;
 use std::io::{Read, Seek, Write};
 
 /// Writes one container to anything that takes bytes. The same input gives the same bytes.
@@ -76,7 +77,7 @@ impl<W: Write> ContainerWriter<W> {
         let encoded =
             wire::encode::<_, MAX_HEADER_BYTES>(&writer.header).map_err(|e| Error::TooLarge(e.to_string()))?;
         writer.section(tag::HEADER, RAW, 1, 0, &encoded)?;
-        writer.write_origin()?;
+        writer.write_placement()?;
         writer.positions(tag::REST_POINTS, &rest.points, coded_rest)?;
         if let Some(coded) = coded_rest.filter(|_| !rest.faces.is_empty()) {
             let raw_bytes = 4 * (rest.faces.len() + rest.faces.indices().len());
@@ -112,20 +113,27 @@ impl<W: Write> ContainerWriter<W> {
         }
     }
 
-    /// Writes a container without an origin again with one; everything else keeps its bytes.
+    /// Writes a container again with another origin and other units; everything else keeps its bytes.
     ///
     /// # Errors
     /// Damage; an output that refuses.
-    pub fn copy_with_origin<R: Read + Seek>(from: &mut ContainerReader<R>, origin: Point, out: W) -> Result<W, Error> {
-        let mut writer = Self::empty(out, Header { origin: Some(origin), ..from.header().clone() });
+    pub fn copy_placed<R: Read + Seek>(
+        from: &mut ContainerReader<R>,
+        (origin, units): (Option<Point>, Units),
+        out: W,
+    ) -> Result<W, Error> {
+        let mut writer = Self::empty(out, Header { origin, units, ..from.header().clone() });
         writer.put(&section::prelude())?;
         for k in 0..from.entries.len() {
             let entry = from.entries[k];
+            if [tag::ORIGIN, tag::UNITS].contains(&entry.header.tag) {
+                continue;
+            }
             let payload = from.payload(entry)?;
             let SectionHeader { tag, codec, width, first, count, raw_bytes, .. } = entry.header;
             writer.payload((tag, codec, width), &payload, raw_bytes as usize, (first, count))?;
             if tag == tag::HEADER {
-                writer.write_origin()?;
+                writer.write_placement()?;
             }
         }
         writer.end()
@@ -239,10 +247,13 @@ impl<W: Write> ContainerWriter<W> {
         Ok(self.out)
     }
 
-    fn write_origin(&mut self) -> Result<(), Error> {
-        let Some(origin) = self.header.origin else { return Ok(()) };
-        let raw: Vec<u8> = origin.iter().flat_map(|x| x.to_le_bytes()).collect();
-        self.section(tag::ORIGIN, RAW, 8, 0, &raw)
+    /// Writes what positions mean and where they are, as far as there is anything to say.
+    fn write_placement(&mut self) -> Result<(), Error> {
+        if let Some(origin) = self.header.origin {
+            let raw: Vec<u8> = origin.iter().flat_map(|x| x.to_le_bytes()).collect();
+            self.section(tag::ORIGIN, RAW, 8, 0, &raw)?;
+        }
+        units::to_bytes(self.header.units).map_or(Ok(()), |raw| self.section(tag::UNITS, RAW, 1, 0, &raw))
     }
 
     fn write_errors(&mut self) -> Result<(), Error> {
@@ -355,6 +366,9 @@ fn too_many_frames() -> Error {
 fn check(header: &Header, rest: &Model, cage: &TriMesh) -> Result<(), Error> {
     if header.origin.is_some_and(|origin| origin.iter().any(|x| !x.is_finite())) {
         return Err(Error::TooLarge("an origin that is not finite".to_owned()));
+    }
+    if header.units.metres_per_unit.is_some_and(|metres| !Units::is_length(metres)) {
+        return Err(Error::Invalid("a unit that is no length".to_owned()));
     }
     if header.rows_per_frame == 0 {
         return Err(Error::Invalid("a frame without rows".to_owned()));

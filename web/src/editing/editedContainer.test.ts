@@ -11,6 +11,7 @@ import {
   openBytes,
   positionsOf,
   rawPart,
+  streamedPart,
   takeApart,
   withPart,
 } from '../../tests/support/containers';
@@ -126,6 +127,18 @@ it('keeps the colours of the model', async () => {
   const after = await openBytes(new Uint8Array(await container.arrayBuffer()));
   expect(after.problem).toBeNull();
   expect(after.static.colors).toEqual(colors);
+});
+
+it('keeps the units, which the page passes over', async () => {
+  const units = Uint8Array.from([...new Uint8Array(Float64Array.of(0.01).buffer), 2]);
+  const bytes = withPart(goldenBytes('coded-mvc'), rawPart('unit', units), 'HEAD');
+  const before = await openBytes(bytes);
+  expect(before.problem).toBeNull();
+  expect(await streamedPart(bytes, 1000)).toEqual(before.static);
+  const { container } = await writeEdited(bytesSource(bytes), before, [editOf(26)], { codec: new LocalCodec() });
+  const kept = takeApart(new Uint8Array(await container.arrayBuffer()))[1];
+  expect(parseFields(kept.header, 0).tag).toBe('unit');
+  expect(kept.payload).toEqual(units);
 });
 
 it('the header of a NumPy file is padded to a multiple of 64 bytes and names the shape', () => {

@@ -9,7 +9,7 @@ import { ContainerWriter } from '../container/writer';
 import { editedBlock, type CageEdit } from './cageEdit';
 
 /** Sections that hold whatever the cages are; they are taken over as they are. */
-const KEPT_BEFORE = ['HEAD', 'ORIG', 'RPTS', 'RFAC', 'rcol', 'CVTX', 'CTRI', 'ELEM'];
+const KEPT_BEFORE = ['HEAD', 'ORIG', 'unit', 'RPTS', 'RFAC', 'rcol', 'CVTX', 'CTRI', 'ELEM'];
 const CHUNK_FRAMES = 16;
 /** As `cager edit` writes it. */
 const NOT_MEASURED = 'the cages were edited: their errors are not measured';
@@ -43,7 +43,8 @@ export async function writeEdited(
 ): Promise<WrittenContainer> {
   const layout = await readContents(source, signal);
   const read = async (tag: string) => {
-    const entry = layout.get(tag);
+    // The page passes over units and lists them among all alone.
+    const entry = layout.get(tag) ?? layout.entries.find(({ fields }) => fields.tag === tag);
     return entry === undefined ? null : (await readSections(source, [entry], signal))[0];
   };
   const writer = new ContainerWriter();

@@ -8,7 +8,7 @@ use super::fortran::Transposed;
 use super::layout::{LONGEST_HEADER, Layout, Order};
 use super::times::Times;
 use super::widen::Scalar;
-use super::{CacheFormat, FrameReader, FrameSelection, mdd, npy, pc2};
+use super::{CacheFormat, FrameReader, FrameSelection, maya, mdd, npy, pc2};
 use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::glb;
@@ -38,6 +38,7 @@ pub(super) fn open<'a>(
         CacheFormat::Npy => npy::layout(&head, expected_points as u64, place),
         CacheFormat::Pc2 => pc2::layout(&head),
         CacheFormat::Mdd => mdd::layout(&head),
+        CacheFormat::Mcx | CacheFormat::Mc => return maya::open(path, source, length, expected_points, (prim, folder)),
         CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usda | CacheFormat::Usd => {
             return usd::open_frames(path, source, length, expected_points, prim);
         }

@@ -6,6 +6,7 @@ mod cut;
 mod files;
 mod fortran;
 mod layout;
+mod maya;
 mod mdd;
 mod merged;
 mod names;
@@ -30,9 +31,9 @@ mod write;
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Units;
 
 use crate::error::Error;
-use crate::units::Units;
 
 pub(crate) use block::read_values;
 pub use numbers::missing_frames;
@@ -75,9 +76,9 @@ pub trait FrameReader: Send {
         Vec::new()
     }
 
-    /// What the coordinates mean, where the source tells; they are given as they are stored.
-    fn units(&self) -> Option<Units> {
-        None
+    /// What the coordinates mean, as far as the source says; they are given as they are stored.
+    fn units(&self) -> Units {
+        Units::UNKNOWN
     }
 
     /// The file that the last frame was read from and the faces in it, where it has any.
@@ -111,6 +112,10 @@ pub enum CacheFormat {
     Pc2,
     /// Motion Designer point cache of LightWave.
     Mdd,
+    /// Geometry cache of Maya, with a text beside it.
+    Mcx,
+    /// The same with sizes of 32 bits.
+    Mc,
     /// Alembic in the Ogawa container: one polygon mesh, with the transforms above it.
     Abc,
     /// Universal Scene Description in binary: one polygon mesh, with the transforms above it.
@@ -129,10 +134,12 @@ pub enum CacheFormat {
 
 impl CacheFormat {
     /// All formats.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Npy,
         Self::Pc2,
         Self::Mdd,
+        Self::Mcx,
+        Self::Mc,
         Self::Abc,
         Self::Usdc,
         Self::Usdz,
@@ -153,6 +160,8 @@ impl CacheFormat {
             Self::Npy => "npy",
             Self::Pc2 => "pc2",
             Self::Mdd => "mdd",
+            Self::Mcx => "mcx",
+            Self::Mc => "mc",
             Self::Abc => "abc",
             Self::Usdc => "usdc",
             Self::Usdz => "usdz",

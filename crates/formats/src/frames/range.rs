@@ -5,10 +5,10 @@ use std::path::Path;
 use std::str::FromStr;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Units;
 
 use super::FrameReader;
 use crate::error::{Error, Fault};
-use crate::units::Units;
 
 /// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of their source. Written
 /// `A-B` or `A-BxSTEP`.
@@ -163,7 +163,7 @@ impl FrameReader for RangeReader {
         self.reader.notes()
     }
 
-    fn units(&self) -> Option<Units> {
+    fn units(&self) -> Units {
         self.reader.units()
     }
 

@@ -53,7 +53,7 @@ pub(super) fn unknown(path: &Path) -> Error {
     let what = match way_out(path) {
         Some(way_out) => way_out,
         None => format!(
-            "is not a capture that is read; give .npy .pc2 .mdd .abc .usdc .usdz .glb .npz, or {} files in a folder",
+            "is not a capture that is read; give .npy .pc2 .mdd .mcx .abc .usdc .usdz .glb .npz, or {} files in a folder",
             extensions(&MeshFormat::STILL)
         ),
     };

@@ -14,7 +14,7 @@ use crate::mesh::{MeshFormat, extensions};
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2`, `.mdd`, `.abc`, `.usd` or animated `.glb` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
+/// `source` is a `.npy`, `.pc2`, `.mdd`, `.mcx`, `.abc`, `.usd` or animated `.glb` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
 /// one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
 /// `10.obj` and `1.5.obj` before `2.obj`; other files, and in a folder hidden ones, are passed over. In a pattern every part of the path may be a glob
 /// or have `%04d` or `####` in place of a number; what is there by that name is no pattern.

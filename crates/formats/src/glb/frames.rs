@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Units;
 
 use super::buffers::{Buffers, LARGEST, Source, too_long};
 use super::builder::Builder;
@@ -116,6 +117,10 @@ impl Animation for MeshFrames {
 
     fn faces(&self) -> &Polygons {
         &self.faces
+    }
+
+    fn units(&self) -> Units {
+        Units::METRES
     }
 
     fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {

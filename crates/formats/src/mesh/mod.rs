@@ -14,13 +14,13 @@ use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
 use cager_geometry::mesh::{Model, Polygons};
+use cager_geometry::units::Units;
 
 use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::glb;
 use crate::signature::Signature;
 use crate::text::{Lines, quoted};
-use crate::units::Units;
 use crate::usd;
 
 pub(crate) use colors::{Colors, Scale, srgb};
@@ -159,11 +159,11 @@ pub fn read_prim_with_note(path: &Path, prim: Option<&str>) -> Result<(Model, Op
     read_prim_with_units(path, prim).map(|(model, note, _)| (model, note))
 }
 
-/// As [`read_prim_with_note`], with the unit and the upward axis of the points, where the file says them.
+/// As [`read_prim_with_note`], with the unit and the upward axis of the points, as far as the file says them.
 ///
 /// # Errors
 /// As [`read_prim_with_note`].
-pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>, Option<Units>), Error> {
+pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>, Units), Error> {
     let Parsed { model, left_out, units } = parse_file(path, prim)?;
     let faces = if left_out == 1 { "face" } else { "faces" };
     let note =
@@ -181,7 +181,16 @@ pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, O
 /// that are not read, [`Error::Invalid`] for a coordinate that is not finite, a face with a vertex
 /// that does not exist, and a file without points. Faces of fewer than three corners are left out.
 pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<Model, Error> {
-    read_bytes(format, name, bytes, Contents::PointsAndFaces, None).map(|parsed| parsed.model)
+    read_model_bytes_with_units(format, name, bytes).map(|(model, _)| model)
+}
+
+/// As [`read_model_bytes`], with the unit and the upward axis of the points, as far as the file says them.
+///
+/// # Errors
+/// As [`read_model_bytes`].
+pub fn read_model_bytes_with_units(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<(Model, Units), Error> {
+    let Parsed { model, units, .. } = read_bytes(format, name, bytes, Contents::PointsAndFaces, None)?;
+    Ok((model, units))
 }
 
 /// The faces of the file of a frame, and the text that they are in: most frames have the same ones, which are then not parsed again.
@@ -235,11 +244,11 @@ fn read_scene(
         let mut bytes = Vec::new();
         source.read_to_end(&mut bytes).map_err(|cause| Error::read(name, cause))?;
         let kind = glb::Source { is_text: true, folder };
-        return finished(format, name, &bytes, glb::read(&bytes, &kind, prim).map(Parsed::from));
+        return finished(format, name, &bytes, glb::read(&bytes, &kind, prim).map(Parsed::of_gltf));
     }
     let (model, left_out, units) = if format == MeshFormat::Abc {
         let (model, left_out) = alembic::read_model(name, source, length, prim)?;
-        (model, left_out, None)
+        (model, left_out, Units::UNKNOWN)
     } else {
         usd::read_model(name, source, length, prim)?
     };
@@ -261,7 +270,7 @@ fn read_bytes(
             MeshFormat::Ply => ply::read(bytes, contents),
             MeshFormat::Off => off::read(bytes, contents),
             MeshFormat::Stl => stl::read(bytes).map(Parsed::from),
-            MeshFormat::Glb => glb::read(bytes, &glb::Source::default(), prim).map(Parsed::from),
+            MeshFormat::Glb => glb::read(bytes, &glb::Source::default(), prim).map(Parsed::of_gltf),
             scene => return read_scene(scene, name, Cursor::new(bytes), bytes.len() as u64, (prim, None)),
         }
     };

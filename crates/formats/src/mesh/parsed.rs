@@ -1,8 +1,8 @@
 //! What a file of a mesh gave.
 
 use crate::error::Fault;
-use crate::units::Units;
 use cager_geometry::mesh::Model;
+use cager_geometry::units::Units;
 
 /// How much of a file is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,10 +16,15 @@ pub(super) struct Parsed {
     pub(super) model: Model,
     /// Faces of fewer than three corners, which are edges and points.
     pub(super) left_out: usize,
-    pub(super) units: Option<Units>,
+    pub(super) units: Units,
 }
 
 impl Parsed {
+    /// Of glTF, which is in metres with Y up.
+    pub(super) fn of_gltf(model: Model) -> Self {
+        Self { units: Units::METRES, ..Self::from(model) }
+    }
+
     /// Faces tell the normals of a mesh.
     pub(super) fn without_mesh_normals(mut self) -> Self {
         if !self.model.faces.is_empty() {
@@ -31,7 +36,7 @@ impl Parsed {
 
 impl From<Model> for Parsed {
     fn from(model: Model) -> Self {
-        Self { model, left_out: 0, units: None }
+        Self { model, left_out: 0, units: Units::UNKNOWN }
     }
 }
 

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Units;
 
 use super::failure::Failure;
 use super::matrix::{Matrix, apply};
 use crate::error::{Error, Fault};
 use crate::frames::{FrameReader, Times};
-use crate::units::Units;
 
 /// Frames that a scene may have however few of them it holds: repetitions take no room, nor do the points of what a transform moves. Of more it
 /// holds every other one.
@@ -36,8 +36,8 @@ pub(crate) trait Animation: Send {
     /// The faces of all frames.
     fn faces(&self) -> &Polygons;
 
-    fn units(&self) -> Option<Units> {
-        None
+    fn units(&self) -> Units {
+        Units::UNKNOWN
     }
 
     /// Reads a frame; gives whether all is finite.
@@ -96,7 +96,7 @@ impl<A: Animation> FrameReader for Reader<A> {
         self.mesh.times().note.iter().map(|note| format!("{}: {note}", self.path.display())).collect()
     }
 
-    fn units(&self) -> Option<Units> {
+    fn units(&self) -> Units {
         self.mesh.units()
     }
 

@@ -1,6 +1,7 @@
 //! The frames of one mesh of a layer.
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::{Units, Up};
 
 use super::choice::choose;
 use super::layer::{Attribute, Layer, Value};
@@ -9,10 +10,7 @@ use super::transform::Chain;
 use crate::error::Fault;
 use crate::frames::Times;
 use crate::scene::{Animation, Faces, Failure, MOST_REPEATED, determinant, most_corners, placed, topology_changes};
-use crate::units::{Units, Up};
 
-/// What is written where nobody says it.
-const USUAL: Units = Units { up: Up::Y, metres_per_unit: 1.0 };
 /// The unit of layers that do not say theirs: a centimetre.
 const USUAL_UNIT: f64 = 0.01;
 
@@ -68,14 +66,6 @@ impl<'a> MeshFrames<'a> {
         if opened.points == 0 {
             let what = "has a mesh without points in its first frame; export it with its points";
             return Err(Fault::invalid(what).into());
-        }
-        if let Some(Units { up, metres_per_unit }) = opened.units().filter(|units| !is_still && *units != USUAL) {
-            let up = if up == Up::Z { 'Z' } else { 'Y' };
-            let told = format!(
-                "it says {metres_per_unit} metres a unit and {up} up; coordinates are taken as they are, and USD that is decoded says metres and Y up"
-            );
-            let note = &mut opened.grid.times.note;
-            *note = Some(note.take().map_or(told.clone(), |note| format!("{note}; {told}")));
         }
         opened.turned ^= opened.is_mirrored()?;
         let places = opened.places(0);
@@ -150,11 +140,13 @@ impl Animation for MeshFrames<'_> {
         &self.faces.polygons
     }
 
-    fn units(&self) -> Option<Units> {
+    fn units(&self) -> Units {
         let stage = self.layer.stage();
-        let unit = stage.metres_per_unit.filter(|unit| unit.is_finite() && *unit > 0.0);
-        let up = if stage.up_is_z == Some(true) { Up::Z } else { Up::Y };
-        (unit.is_some() || stage.up_is_z.is_some()).then_some(Units { up, metres_per_unit: unit.unwrap_or(USUAL_UNIT) })
+        let unit = stage.metres_per_unit.filter(|&unit| Units::is_length(unit));
+        if unit.is_none() && stage.up_is_z.is_none() {
+            return Units::UNKNOWN;
+        }
+        Units::new(if stage.up_is_z == Some(true) { Up::Z } else { Up::Y }, unit.unwrap_or(USUAL_UNIT))
     }
 
     fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {

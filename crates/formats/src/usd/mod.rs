@@ -17,12 +17,12 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 use cager_geometry::mesh::Model;
+use cager_geometry::units::Units;
 
 use crate::error::{Error, Fault};
 use crate::frames::FrameReader;
 use crate::scene::{self, Animation, Failure};
 use crate::signature::Signature;
-use crate::units::Units;
 use binary::Binary;
 use layer::Layer;
 use mesh::MeshFrames;
@@ -47,7 +47,7 @@ pub(crate) fn read_model(
     source: impl Read + Seek + Send,
     length: u64,
     prim: Option<&str>,
-) -> Result<(Model, usize, Option<Units>), Error> {
+) -> Result<(Model, usize, Units), Error> {
     let open = || MeshFrames::open(open_layer(source, length)?, prim, true);
     let mesh = open().map_err(|failure: Failure| failure.at(path))?;
     let (points, left_out, units, mut values) = (mesh.points(), mesh.left_out(), mesh.units(), Vec::new());

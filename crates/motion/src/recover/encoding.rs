@@ -7,7 +7,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
-use cager_formats::{FrameReader, Target};
+use cager_formats::{FrameReader, Target, Units};
 use cager_geometry::mesh::{Model, Point};
 
 /// How a recovered animation is stored.
@@ -22,6 +22,8 @@ pub struct Encoding<'a> {
     pub offsets: bool,
     /// What was subtracted from all positions.
     pub origin: Option<Point>,
+    /// What positions mean, as far as it is known.
+    pub units: Units,
     /// Whether the rest pose is stored as it is rather than on a grid.
     pub exact_rest: bool,
 }
@@ -34,7 +36,7 @@ impl Encoding<'_> {
         frames: &mut dyn FrameReader,
         progress: &dyn Fn(EncodeProgress),
     ) -> Result<Encoded, EncodeError> {
-        let Self { output, system, goal, offsets, origin, exact_rest } = self;
+        let Self { output, system, goal, offsets, origin, units, exact_rest } = self;
         // Where points stay in their cages, all of them tell these exactly.
         let exact = goal.is_none() && !offsets;
         let choices = InversionChoices {
@@ -59,6 +61,7 @@ impl Encoding<'_> {
             memory,
             goal,
             origin,
+            units,
             exact_rest,
         };
         encode::encode(job, progress)

@@ -1,9 +1,9 @@
 //! Where a template begins: turned, moved and scaled to the first surface, where that was asked for; where not, whether it should have been.
 
 use super::{RecoverError, RecoverOptions};
-use cager_capture::mismatch::Up;
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::units::Up;
 use cager_geometry::vector::{cross, norm, sub};
 use cager_registration::{
     AlignOptions, Alignment, FitOptions, Observation, ObservationOptions, RegistrationError, Target, Template, align,
@@ -73,7 +73,6 @@ fn turned([x, y, z]: Point, up: Up) -> Point {
     match up {
         Up::Z => [x, -z, y],
         Up::Y => [x, z, -y],
-        Up::Other => [x, y, z],
     }
 }
 

@@ -157,13 +157,14 @@ pub(crate) fn check_model(
 mod tests {
     use super::*;
     use cager_demo::{Capture, Options};
+    use cager_formats::Units;
     use cager_proto::messages::SessionOptions;
 
     #[test]
     fn boundary_elements_count_as_memory_before_anything_is_prepared() {
         let Capture { rest, cage, .. } = Capture::new(&Options { points: 2000, frames: 1, cage_vertices: 300 });
         let cage = Cage::new(cage).expect("a cage");
-        let geometry = Geometry { rest, cage, matrix: None, coded: None, unit: 1.0 };
+        let geometry = Geometry { rest, cage, matrix: None, coded: None, unit: 1.0, units: Units::UNKNOWN };
         let checked = |system: &str, max_bytes: u64| {
             let options = SessionOptions { coordinates: Some(system.to_owned()), ..SessionOptions::default() };
             let valid = ValidOptions::of(&options).expect("options");

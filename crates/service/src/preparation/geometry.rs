@@ -9,7 +9,7 @@ use cager_capture::origin::move_to;
 use cager_codec::CodedMesh;
 use cager_core::cage::{Cage, CageError};
 use cager_core::regularize::Regularizer;
-use cager_formats::{MeshFormat, read_matrix_bytes, read_model_bytes};
+use cager_formats::{MeshFormat, Units, read_matrix_bytes, read_model_bytes_with_units};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use std::path::Path;
@@ -24,6 +24,8 @@ pub(crate) struct Geometry {
     pub(crate) coded: Option<(CodedMesh, CodedMesh)>,
     /// The unit of guaranteed errors: the diagonal of the rest pose as it was sent, or as it is stored, whichever is less.
     pub(crate) unit: f64,
+    /// What the file of the rest pose says of its positions.
+    pub(crate) units: Units,
 }
 
 fn read_matrix(content: &Content, valid: &ValidOptions) -> Result<Option<SparseMatrix>, ApiError> {
@@ -43,7 +45,7 @@ fn read_matrix(content: &Content, valid: &ValidOptions) -> Result<Option<SparseM
 /// # Errors
 /// Bytes that cannot be read; a cage that cannot be used.
 pub(crate) fn read(content: &Content, valid: &ValidOptions) -> Result<Geometry, ApiError> {
-    let rest = read_part("rest", &content.rest.name, &content.rest.bytes)?;
+    let (rest, units) = read_part_with_units("rest", &content.rest.name, &content.rest.bytes)?;
     let cage = read_cage(&content.cage, valid)?;
     let matrix = read_matrix(content, valid)?;
     let given = diagonal(&rest.points);
@@ -55,8 +57,9 @@ pub(crate) fn read(content: &Content, valid: &ValidOptions) -> Result<Geometry, 
             cage: checked,
             matrix,
             coded: Some((rest, cage)),
+            units,
         },
-        None => Geometry { rest, cage, matrix, coded: None, unit: given },
+        None => Geometry { rest, cage, matrix, coded: None, unit: given, units },
     })
 }
 
@@ -104,9 +107,13 @@ pub(crate) fn cage_of(file: &NamedFile, origin: Option<Point>) -> Result<Cage, A
 /// # Errors
 /// Bytes that cannot be read.
 pub(crate) fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, ApiError> {
+    read_part_with_units(part, name, bytes).map(|(model, _)| model)
+}
+
+fn read_part_with_units(part: &str, name: &str, bytes: &[u8]) -> Result<(Model, Units), ApiError> {
     let path = Path::new(name);
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
-    read_model_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))
+    read_model_bytes_with_units(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))
 }
 
 pub(super) fn geometry(detail: String) -> ApiError {

@@ -9,7 +9,7 @@ use crate::store::{StoredPart, Workshop};
 use cager_capture::coding::Goal;
 use cager_capture::encode::Encoded;
 use cager_core::coordinates::CoordinateSystem;
-use cager_formats::{Error, Target};
+use cager_formats::{Error, Target, Units};
 use cager_motion::recover::{Encoding, JOINTS_RATE, RecoverError, Recovered};
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
@@ -32,6 +32,7 @@ pub(super) fn results(
         goal,
         offsets: options.offsets,
         origin: job.meta.origin,
+        units: Units::UNKNOWN,
         exact_rest: options.exact_rest,
     };
     let stopped = || source.is_stopped();

@@ -3,7 +3,7 @@
 use crate::preparation::{check_told, goal};
 use crate::problem::{self, ApiError};
 use cager_capture::coding::Goal;
-use cager_capture::mismatch::Up;
+use cager_geometry::units::Up;
 use cager_motion::recover::RecoverOptions;
 use cager_proto::messages::SessionOptions;
 use cager_proto::recovery_messages::{Placing, RecoveryOptions};

@@ -38,6 +38,7 @@ impl<W: Write> ContainerFrames<W> {
             solver: &prepared.solver,
             frame_rate: session.meta.options.frame_rate,
             origin: None,
+            units: geometry.units,
         };
         let coded = geometry.coded.as_ref().map(|(rest, cage)| (rest, cage));
         let writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(plain)?;

@@ -19,7 +19,7 @@ use cager_capture::timing::Timing;
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_explore::TransferError;
-use cager_formats::{FrameReader, Target};
+use cager_formats::{FrameReader, Target, Units};
 use cager_geometry::mesh::Model;
 use cager_motion::recover::Encoding;
 use cager_motion::transfer::{self, MethodChoice, MotionFile, TransferFailed, Transferred, about_origin, decoded};
@@ -170,6 +170,7 @@ impl Service {
             // The cage does not hold all of the motion.
             offsets: true,
             origin: job.meta.origin,
+            units: Units::UNKNOWN,
             exact_rest: options.exact_rest,
         };
         let stopped = || self.is_stopped(job);

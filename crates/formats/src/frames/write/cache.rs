@@ -6,8 +6,10 @@ use cager_geometry::mesh::{Point, Polygons};
 
 use super::super::CacheFormat;
 use super::super::{mdd, npy, pc2};
+use super::maya::{Blocks, ticks};
 use super::output::{Announced, FrameOptions, FrameWriter, check_precision};
-use crate::atomic::{AtomicFile, Target};
+use super::scene::name;
+use crate::atomic::{AtomicFile, Target, commit_together};
 use crate::error::{Error, Fault};
 
 pub(super) struct CacheWriter {
@@ -17,6 +19,8 @@ pub(super) struct CacheWriter {
     /// What is added to all positions, in double precision.
     origin: Option<Point>,
     bytes: Vec<u8>,
+    /// What a cache of Maya has around the positions of frames, and the text beside it.
+    maya: Option<(Blocks, AtomicFile)>,
 }
 
 /// How positions are stored.
@@ -24,6 +28,7 @@ enum Numbers {
     Single,
     SingleBigEndian,
     Double,
+    DoubleBigEndian,
 }
 
 impl CacheWriter {
@@ -38,6 +43,9 @@ impl CacheWriter {
             let (numbers, bytes) = if options.origin.is_some() { (Numbers::Double, 8) } else { (Numbers::Single, 4) };
             let header = npy::header(points, frames, bytes);
             return Self::begin(announced, target, (numbers, options.origin), |file| file.write_all(&header));
+        }
+        if matches!(format, CacheFormat::Mcx | CacheFormat::Mc) {
+            return Self::create_maya(announced, target, format == CacheFormat::Mcx, options);
         }
         check_precision(options, &announced.path)?;
         let (Ok(points), Ok(frames)) = (i32::try_from(points), i32::try_from(frames)) else {
@@ -61,6 +69,31 @@ impl CacheWriter {
         })
     }
 
+    fn create_maya(
+        announced: Announced,
+        target: &Target,
+        is_wide: bool,
+        options: &FrameOptions,
+    ) -> Result<Self, Error> {
+        let Announced { path, points, frames, .. } = &announced;
+        if !is_wide && *points > i32::MAX as usize / 24 {
+            let what = "cannot hold so many points, as its blocks have no room for more than 2 GiB; write .mcx instead";
+            return Err(Fault::unsupported(what).at(path));
+        }
+        let (ticks, is_double) = (ticks(*frames, options).map_err(|fault| fault.at(path))?, options.origin.is_some());
+        let name = format!("{}Shape", name(path));
+        let blocks = Blocks { is_wide, name, points: *points as u32, is_double, ticks };
+        let beside = path.with_extension("xml");
+        let target_beside = if target.replaces() { Target::Replacing(beside) } else { Target::New(beside) };
+        let mut text = AtomicFile::create(&target_beside)?;
+        let written = text.write_all(blocks.text(options).as_bytes());
+        written.map_err(|cause| Error::write(target_beside.path(), cause))?;
+        let numbers = if is_double { Numbers::DoubleBigEndian } else { Numbers::SingleBigEndian };
+        let header = blocks.header();
+        let writer = Self::begin(announced, target, (numbers, options.origin), |file| file.write_all(&header))?;
+        Ok(Self { maya: Some((blocks, text)), ..writer })
+    }
+
     fn begin(
         announced: Announced,
         target: &Target,
@@ -69,7 +102,7 @@ impl CacheWriter {
     ) -> Result<Self, Error> {
         let mut file = AtomicFile::create(target)?;
         header(&mut file).map_err(|cause| Error::write(&announced.path, cause))?;
-        Ok(Self { announced, file, numbers, origin, bytes: Vec::new() })
+        Ok(Self { announced, file, numbers, origin, bytes: Vec::new(), maya: None })
     }
 }
 
@@ -77,6 +110,9 @@ impl FrameWriter for CacheWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
         self.bytes.clear();
+        if let Some((blocks, _)) = &self.maya {
+            self.bytes.extend(blocks.before(self.announced.written));
+        }
         let moved: Option<Vec<f64>> = self
             .origin
             .map(|origin| positions.iter().zip(origin.iter().cycle()).map(|(&x, o)| f64::from(x) + o).collect());
@@ -86,6 +122,10 @@ impl FrameWriter for CacheWriter {
             Numbers::Single => self.bytes.extend(singles.iter().flat_map(|x| x.to_le_bytes())),
             Numbers::SingleBigEndian => self.bytes.extend(singles.iter().flat_map(|x| x.to_be_bytes())),
             Numbers::Double => self.bytes.extend(moved.iter().flatten().flat_map(|x| x.to_le_bytes())),
+            Numbers::DoubleBigEndian => self.bytes.extend(moved.iter().flatten().flat_map(|x| x.to_be_bytes())),
+        }
+        if let Some((blocks, _)) = &self.maya {
+            self.bytes.extend(blocks.behind());
         }
         self.file.write_all(&self.bytes).map_err(|cause| Error::write(&self.announced.path, cause))?;
         self.announced.written += 1;
@@ -98,6 +138,7 @@ impl FrameWriter for CacheWriter {
 
     fn finish(self: Box<Self>) -> Result<(), Error> {
         self.announced.check_complete()?;
-        self.file.commit()
+        // The cache first, as the text says that it is there.
+        commit_together([self.file].into_iter().chain(self.maya.map(|(_, text)| text)).collect())
     }
 }

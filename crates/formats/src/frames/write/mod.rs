@@ -1,6 +1,7 @@
 //! Frames to files.
 
 mod cache;
+mod maya;
 mod mesh;
 mod morphs;
 mod output;
@@ -40,7 +41,7 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 
 /// Begins an output of `frames` frames of `points` points each.
 ///
-/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`; `.gltf`, which gets its numbers in a `.bin` file beside it. `.vat` becomes a folder of a mesh and the
+/// The extension of `path` says what: `.npy` (frames × points × 3, `<f4`, or `<f8` with an origin), `.pc2`, `.mdd`, `.mcx` and `.mc` with an `.xml` file beside them, or `.abc`, `.usdc`, `.usdz`, `.usd`, `.glb` with `faces`; `.gltf`, which gets its numbers in a `.bin` file beside it. `.vat` becomes a folder of a mesh and the
 /// images that move it, as OpenVAT has them. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
@@ -98,7 +99,7 @@ pub fn create_frames(
         }
         Some(format) => Ok(Box::new(CacheWriter::create(announced, &target, format, options)?)),
         None => Err(Fault::unsupported(
-            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .abc .usdc .usdz .glb .gltf, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
+            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .mcx .abc .usdc .usdz .glb .gltf, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
         )
         .at(path)),
     }

@@ -3,9 +3,10 @@
 use std::io::{BufWriter, Write};
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Change;
 
 use super::super::CacheFormat;
-use super::output::{Announced, FrameOptions, FrameWriter, check_precision};
+use super::output::{Announced, FrameOptions, FrameWriter, check_precision, extend_changed};
 use super::scene::name;
 use crate::atomic::{AtomicFile, Target, commit_together};
 use crate::error::{Error, Fault};
@@ -22,6 +23,8 @@ pub(super) struct MorphWriter {
     data: Option<AtomicFile>,
     wanted: Wanted,
     scene: MorphScene,
+    /// To metres with Y up.
+    change: Change,
     frames: Vec<f32>,
     notes: Vec<String>,
 }
@@ -37,10 +40,15 @@ impl MorphWriter {
         if options.origin.is_some() {
             check_precision(options, path)?;
         }
+        let change = options.change_to_metres();
         let wanted = Wanted {
             targets: options.morphs.targets,
             max_error: options.morphs.max_error,
-            diagonal: options.morphs.diagonal.filter(|diagonal| *diagonal > 0.0),
+            diagonal: options
+                .morphs
+                .diagonal
+                .map(|diagonal| change.scale * diagonal)
+                .filter(|&diagonal| diagonal > 0.0),
         };
         check(&announced, faces, &wanted).map_err(|fault| fault.at(path))?;
         let (times, note) = times(announced.frames, options).map_err(|fault| fault.at(path))?;
@@ -48,7 +56,7 @@ impl MorphWriter {
             name: name(path),
             triangles: faces.triangulated(),
             times,
-            origin: options.origin.unwrap_or_default(),
+            origin: change.apply(options.origin.unwrap_or_default()),
             floats: options.morphs.floats,
             normals: options.morphs.normals,
         };
@@ -58,7 +66,7 @@ impl MorphWriter {
             _ => None,
         };
         let file = AtomicFile::create(target)?;
-        Ok(Self { announced, file, data, wanted, scene, frames: Vec::new(), notes })
+        Ok(Self { announced, file, data, wanted, scene, change, frames: Vec::new(), notes })
     }
 
     /// Writes the file, once all frames are there.
@@ -138,7 +146,7 @@ fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<Stri
 impl FrameWriter for MorphWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
-        self.frames.extend_from_slice(positions);
+        extend_changed(&mut self.frames, positions, &self.change);
         if self.announced.written + 1 == self.announced.frames {
             let written = self.write();
             // What was not written is not counted, so that nothing is finished.

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::{Point, Polygons};
+use cager_geometry::units::{Change, Units};
 
 use crate::error::{Error, Fault};
-use crate::units::Units;
 
 /// The frames of an output, one after another; dropped before [`FrameWriter::finish`] they leave nothing.
 pub trait FrameWriter: Send {
@@ -46,16 +46,16 @@ pub trait FrameWriter: Send {
 /// What some formats store beside the positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
-    /// Frames per second, for the times in `.mdd`, `.abc`, `.usdc` and `.glb`: 24 by default.
+    /// Frames per second, for the times in `.mdd`, `.mcx`, `.abc`, `.usdc` and `.glb`: 24 by default.
     pub fps: f64,
-    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.abc`, `.usdc` and `.glb`; 0, 1, 2, … where the list is empty.
+    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.mcx`, `.abc`, `.usdc` and `.glb`; 0, 1, 2, … where the list is empty.
     pub numbers: Vec<f64>,
     /// What is added to all positions, which are then written in double precision by the formats that have it.
     pub origin: Option<Point>,
     /// What rounding may lose where an origin is added; formats of single precision that lose more are refused.
     pub rounding: f64,
-    /// What the positions mean, for the formats that say it; metres and Y up where nothing is told.
-    pub units: Option<Units>,
+    /// What the positions mean, for the formats that say it: USD as it is, and glTF in metres with Y up, which is what USD says of what is not told.
+    pub units: Units,
     /// The cage that is kept beside the mesh, in USD alone.
     pub cage: Option<CageMesh>,
     /// How `.glb` and `.gltf` hold the frames.
@@ -87,6 +87,11 @@ pub struct MorphOptions {
 }
 
 impl FrameOptions {
+    /// What makes positions those of glTF.
+    pub(super) fn change_to_metres(&self) -> Change {
+        self.units.change_to(Units::METRES)
+    }
+
     pub(super) fn number(&self, frame: usize) -> f64 {
         self.numbers.get(frame).copied().unwrap_or(frame as f64)
     }
@@ -106,11 +111,20 @@ impl Default for FrameOptions {
             numbers: Vec::new(),
             origin: None,
             rounding: 0.0,
-            units: None,
+            units: Units::UNKNOWN,
             cage: None,
             morphs: MorphOptions::default(),
         }
     }
+}
+
+/// Adds the positions of a frame after a change of coordinates.
+pub(super) fn extend_changed(out: &mut Vec<f32>, positions: &[f32], change: &Change) {
+    if change.is_none() {
+        return out.extend_from_slice(positions);
+    }
+    let changed = |point: &[f32; 3]| change.apply(point.map(f64::from)).map(|x| x as f32);
+    out.extend(positions.as_chunks().0.iter().flat_map(changed));
 }
 
 /// Refuses formats of single precision where it loses too much about an origin.

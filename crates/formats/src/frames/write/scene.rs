@@ -10,11 +10,8 @@ use crate::alembic::{self, Numbers, Schedule};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 use crate::mesh::check_face;
-use crate::units::{Units, Up};
 use crate::usd::{self, Scene};
 
-/// Where files say the unit and nobody told it.
-const USUAL: Units = Units { up: Up::Y, metres_per_unit: 1.0 };
 /// Bytes that a package may have.
 const LONGEST_PACKAGE: usize = 0xf000_0000;
 
@@ -50,7 +47,7 @@ impl SceneWriter {
                 name,
                 fps: options.fps,
                 codes: (0..announced.frames).map(|frame| options.number(frame)).collect(),
-                units: options.units.unwrap_or(USUAL),
+                units: options.units,
                 origin: options.origin,
                 is_packed: format == CacheFormat::Usdz,
             };

@@ -3,8 +3,9 @@
 use std::io::BufWriter;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Change;
 
-use super::output::{Announced, FrameOptions, FrameWriter, check_precision};
+use super::output::{Announced, FrameOptions, FrameWriter, check_precision, extend_changed};
 use super::scene::name;
 use crate::atomic::{AtomicDir, Target};
 use crate::error::{Error, Fault};
@@ -20,6 +21,8 @@ pub(super) struct TextureWriter {
     announced: Announced,
     folder: AtomicDir,
     scene: Scene,
+    /// To metres with Y up.
+    change: Change,
     frames: Vec<f32>,
     notes: Vec<String>,
 }
@@ -40,15 +43,16 @@ impl TextureWriter {
         let note = step
             .is_none()
             .then(|| format!("{}: its frames are played at even times, as images have no others", path.display()));
+        let change = options.change_to_metres();
         let scene = Scene {
             name: name(path),
             triangles: faces.triangulated(),
             fps: options.fps / step.unwrap_or(1.0),
-            origin: options.origin.unwrap_or_default(),
+            origin: change.apply(options.origin.unwrap_or_default()),
         };
         let is_own = |name: &str| ENDINGS.iter().any(|ending| name.ends_with(ending));
         let folder = AtomicDir::create(path, |name| target.replaces() && is_own(name))?;
-        Ok(Self { announced, folder, scene, frames: Vec::new(), notes: note.into_iter().collect() })
+        Ok(Self { announced, folder, scene, change, frames: Vec::new(), notes: note.into_iter().collect() })
     }
 
     /// Writes the files, once all frames are there.
@@ -82,7 +86,7 @@ fn check(announced: &Announced, faces: &Polygons) -> Result<(), Fault> {
 impl FrameWriter for TextureWriter {
     fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
         self.announced.admit(positions)?;
-        self.frames.extend_from_slice(positions);
+        extend_changed(&mut self.frames, positions, &self.change);
         if self.announced.written + 1 == self.announced.frames {
             let written = self.write();
             // What was not written is not counted, so that nothing is finished.

@@ -6,9 +6,9 @@ mod tables;
 use std::io::{self, Seek, Write};
 
 use cager_geometry::mesh::{Point, Polygons};
+use cager_geometry::units::{Units, Up};
 
 use super::binary::{ATTRIBUTE, MAGIC, PRIM, ROOT, kind};
-use crate::units::{Units, Up};
 use sink::Sink;
 use tables::{Next, Tables, integers};
 
@@ -29,6 +29,7 @@ pub(crate) struct Scene {
     pub(crate) fps: f64,
     /// Time codes of all frames, ascending.
     pub(crate) codes: Vec<f64>,
+    /// Metres and Y up where nothing is said.
     pub(crate) units: Units,
     /// The translation above the mesh, which keeps exact what lies far away.
     pub(crate) origin: Option<Point>,
@@ -112,13 +113,13 @@ impl<W: Write + Seek> MeshWriter<W> {
         tables.token(";-)");
         let (name, fps) = (self.scene.name.clone(), self.double(self.scene.fps)?);
         let (start, end) = (self.scene.codes.first().copied(), self.scene.codes.last().copied());
-        let up = if self.scene.units.up == Up::Z { "Z" } else { "Y" };
+        let up = if self.scene.units.up == Some(Up::Z) { "Z" } else { "Y" };
         let token = |tables: &mut Tables, text: &str| INLINED | value(kind::TOKEN, tables.token(text).into());
         let root = [
             ("defaultPrim", token(&mut tables, &name)),
             ("endTimeCode", self.double(end.unwrap_or(0.0))?),
             ("framesPerSecond", fps),
-            ("metersPerUnit", self.double(self.scene.units.metres_per_unit)?),
+            ("metersPerUnit", self.double(self.scene.units.metres_per_unit.unwrap_or(1.0))?),
             ("startTimeCode", self.double(start.unwrap_or(0.0))?),
             ("timeCodesPerSecond", fps),
             ("upAxis", token(&mut tables, up)),

@@ -1,0 +1,236 @@
+//! Maya's geometry cache in one file, `.mcx` or the older `.mc`: a header, then a block for each frame with its time in ticks and the arrays of its
+//! channels, all big-endian. Chunks of `.mcx` count their bytes in 64 bits and end at multiples of eight. The text beside it says how long a frame is.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+use cager_geometry::mesh::Polygons;
+
+use super::FrameReader;
+use super::block::read_values;
+use super::times::Times;
+use super::widen::Scalar;
+use crate::error::{Error, Fault};
+use crate::scene::{self, Animation, Failure, shown};
+
+/// Ticks of a second.
+pub(super) const TICKS: f64 = 6000.0;
+/// Bytes of the text beside a cache that are looked at, and of the name of a channel.
+const MOST_TEXT: u64 = 1 << 16;
+const MOST_NAME: u64 = 1 << 10;
+/// Channels that a message lists.
+const LISTED: usize = 4;
+
+/// Opens the frames of a channel in a file of `length` bytes; `prim` names one of several.
+pub(super) fn open<'a>(
+    path: &Path,
+    source: impl Read + Seek + Send + 'a,
+    length: u64,
+    expected_points: usize,
+    (prim, folder): (Option<&str>, Option<&Path>),
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let told = folder.and_then(|_| frame_rate(&path.with_extension("xml")));
+    let cache = Cache::open(source, length, prim, told);
+    scene::open(path, cache.map_err(|failure| failure.at(path))?, expected_points)
+}
+
+/// The frame rate that the text beside a cache says, where there is one that does.
+fn frame_rate(path: &Path) -> Option<f64> {
+    let mut text = Vec::new();
+    File::open(path).ok()?.take(MOST_TEXT).read_to_end(&mut text).ok()?;
+    let text = String::from_utf8_lossy(&text);
+    let (_, behind) = text.split_once("TimePerFrame=\"")?;
+    let ticks: f64 = behind.split('"').next()?.parse().ok()?;
+    (1.0..=1e6).contains(&ticks).then_some(TICKS / ticks)
+}
+
+struct Cache<R> {
+    chunks: Chunks<R>,
+    times: Times,
+    frames: Vec<Array>,
+    faces: Polygons,
+    block: Vec<u8>,
+}
+
+/// Where the positions of a frame are.
+struct Array {
+    start: u64,
+    scalar: Scalar,
+    points: u32,
+}
+
+/// The name of a channel and what it has in a frame.
+type Channel = (Vec<u8>, Array);
+
+impl<R: Read + Seek> Cache<R> {
+    fn open(source: R, length: u64, prim: Option<&str>, told: Option<f64>) -> Result<Self, Failure> {
+        let mut chunks = Chunks::open(source, length)?;
+        // Behind the header.
+        let mut at = chunks.chunk(0, length)?.end;
+        let (mut frames, mut times, mut name) = (Vec::new(), Vec::new(), None);
+        while at < length {
+            let group = chunks.chunk(at, length)?;
+            at = group.end;
+            let (time, channels) = chunks.frame(group)?;
+            let Some(time) = time else {
+                let what = "is one frame of a cache with a file for each; export it again as one file";
+                return Err(Fault::unsupported(what).into());
+            };
+            let found = match &name {
+                None => Some(choose(channels, prim)?),
+                Some(name) => channels.into_iter().find(|(found, _)| found == name),
+            };
+            let Some((chosen, array)) = found else {
+                return Err(damaged(&format!("frame {} lacks the channel that is read", frames.len())));
+            };
+            let points = frames.first().map_or(array.points, |first: &Array| first.points);
+            if array.points != points || points == 0 {
+                let (found, frame) = (array.points, frames.len());
+                let what = format!(
+                    "has {found} points in frame {frame}, and {points} in frame 0; export a mesh with all its points in every frame"
+                );
+                return Err(Fault::invalid(what).into());
+            }
+            name = Some(chosen);
+            frames.push(array);
+            times.push(f64::from(time) / TICKS);
+        }
+        if frames.is_empty() {
+            return Err(Fault::invalid("holds no frames; export the cache again").into());
+        }
+        Ok(Self { chunks, times: Times::of(&times, told)?, frames, faces: Polygons::new(), block: Vec::new() })
+    }
+}
+
+/// The channel that is meant, of those that are no normals.
+fn choose(channels: Vec<Channel>, prim: Option<&str>) -> Result<Channel, Fault> {
+    let mut meant: Vec<Channel> = channels.into_iter().filter(|(name, _)| !name.ends_with(b"_normals")).collect();
+    if let Some(prim) = prim.filter(|_| meant.len() > 1) {
+        let at = meant.iter().position(|(name, _)| name == prim.as_bytes());
+        meant = at.map(|at| vec![meant.swap_remove(at)]).unwrap_or(meant);
+    }
+    if meant.len() == 1 {
+        return Ok(meant.swap_remove(0));
+    }
+    let told = |(name, array): &Channel| format!("{} ({} points)", shown(&String::from_utf8_lossy(name)), array.points);
+    let names: Vec<String> = meant.iter().take(LISTED).map(told).collect();
+    Err(Fault::invalid(format!(
+        "holds {} channels of positions{}; export the one mesh alone, or name its channel with --prim, where the command has it",
+        meant.len(),
+        if names.is_empty() { String::new() } else { format!(", among them {}", names.join(", ")) }
+    )))
+}
+
+impl<R: Read + Seek + Send> Animation for Cache<R> {
+    fn points(&self) -> usize {
+        self.frames[0].points as usize
+    }
+
+    fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    fn times(&self) -> &Times {
+        &self.times
+    }
+
+    fn faces(&self) -> &Polygons {
+        &self.faces
+    }
+
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
+        let Array { start, scalar, .. } = self.frames[frame];
+        // Every value is overwritten below.
+        out.resize(3 * self.points(), 0.0);
+        Ok(read_values(&mut self.chunks.source, start, scalar, &mut self.block, out)?)
+    }
+}
+
+/// A file as chunks: four letters, a number of bytes, and as many bytes.
+struct Chunks<R> {
+    source: R,
+    /// Whether they are those of `.mcx`, which have four bytes of any value behind the letters.
+    is_wide: bool,
+}
+
+struct Chunk {
+    tag: [u8; 4],
+    start: u64,
+    end: u64,
+}
+
+impl<R: Read + Seek> Chunks<R> {
+    fn open(source: R, length: u64) -> Result<Self, Failure> {
+        let mut chunks = Self { source, is_wide: false };
+        let tag = chunks.bytes(0, length)?;
+        chunks.is_wide = tag == *b"FOR8";
+        let kind = chunks.bytes(if chunks.is_wide { 16 } else { 8 }, length)?;
+        if ![*b"FOR4", *b"FOR8"].contains(&tag) || kind != *b"CACH" {
+            return Err(damaged("it does not begin as one"));
+        }
+        Ok(chunks)
+    }
+
+    /// The bytes at an offset of what ends there.
+    fn bytes<const N: usize>(&mut self, at: u64, end: u64) -> Result<[u8; N], Failure> {
+        if at + N as u64 > end {
+            return Err(damaged("it ends within a chunk"));
+        }
+        let mut bytes = [0; N];
+        self.source.seek(SeekFrom::Start(at))?;
+        self.source.read_exact(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// The chunk at an offset of what ends there.
+    fn chunk(&mut self, at: u64, end: u64) -> Result<Chunk, Failure> {
+        let tag = self.bytes(at, end)?;
+        let (start, size) = if self.is_wide {
+            (at + 16, u64::from_be_bytes(self.bytes(at + 8, end)?))
+        } else {
+            (at + 8, u32::from_be_bytes(self.bytes(at + 4, end)?).into())
+        };
+        match start.checked_add(size).filter(|&to| to <= end) {
+            Some(to) => Ok(Chunk { tag, start, end: to }),
+            None => Err(damaged("a chunk is larger than what it is in")),
+        }
+    }
+
+    /// The time of a block in ticks, where it says one, and its channels of vectors.
+    fn frame(&mut self, group: Chunk) -> Result<(Option<i32>, Vec<Channel>), Failure> {
+        if self.bytes::<4>(group.start, group.end)? != *b"MYCH" {
+            return Err(damaged("a block does not begin where the one before ends"));
+        }
+        let (mut at, mut channels) = (group.start + 4, Vec::new());
+        let (mut time, mut name, mut points) = (None, Vec::new(), 0);
+        while at < group.end {
+            let Chunk { tag, start, end } = self.chunk(at, group.end)?;
+            let size = end - start;
+            match &tag {
+                b"TIME" => time = Some(i32::from_be_bytes(self.bytes(start, end)?)),
+                b"SIZE" => points = u32::from_be_bytes(self.bytes(start, end)?),
+                b"CHNM" => {
+                    name = vec![0; size.min(MOST_NAME) as usize];
+                    self.source.seek(SeekFrom::Start(start))?;
+                    self.source.read_exact(&mut name)?;
+                    name.truncate(name.iter().position(|&byte| byte == 0).unwrap_or(name.len()));
+                }
+                b"FVCA" | b"DVCA" => {
+                    let scalar = if tag == *b"FVCA" { Scalar::F32Big } else { Scalar::F64Big };
+                    if size != 3 * scalar.size() as u64 * u64::from(points) {
+                        return Err(damaged("an array has another size than its channel says"));
+                    }
+                    channels.push((std::mem::take(&mut name), Array { start, scalar, points }));
+                }
+                _ => {}
+            }
+            at = start + size.next_multiple_of(if self.is_wide { 8 } else { 4 });
+        }
+        Ok((time, channels))
+    }
+}
+
+fn damaged(what: &str) -> Failure {
+    Fault::damaged(format!("is not a whole cache of Maya: {what}; copy or export it again")).into()
+}
