@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::units::Units;
 
 use super::merged::Merged;
 use super::names::Sequence;
@@ -96,6 +97,12 @@ impl FrameReader for SequenceReader {
 
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
+    }
+
+    fn units(&self) -> Units {
+        // All files are of one format.
+        let format = self.sequence.files.first().and_then(|path| MeshFormat::guess(path));
+        if format == Some(MeshFormat::Glb) { Units::METRES } else { Units::UNKNOWN }
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {
