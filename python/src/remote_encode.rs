@@ -220,9 +220,9 @@ fn damaged(error: container::Error) -> Fault {
 }
 
 impl Left {
-    /// Within a short time and without retries.
+    /// Within a short time, and again where the service is busy.
     async fn delete(self, client: Client) {
-        let client = client.with_options(ClientOptions { retries: 0, ..ClientOptions::default() });
+        let client = client.with_options(ClientOptions { retries: 3, ..ClientOptions::default() });
         let all = async {
             if let Some(session) = self.session {
                 let _ = client.delete(&session).await;

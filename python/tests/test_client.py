@@ -165,9 +165,9 @@ def test_a_kept_session_is_listed_followed_downloaded_and_deleted(client, single
             await client.download(session["id"], path)
         await client.download(session["id"], path, overwrite=True)
         await client.delete(session["id"])
-        with pytest.raises(cager.CagerError, match=session["id"]):
+        with pytest.raises(cager.CagerError, match="there is no session with this id"):
             await client.session(session["id"])
-        with pytest.raises(cager.CagerError, match=session["id"]):
+        with pytest.raises(cager.CagerError, match="there is no session with this id"):
             await anext(client.follow(session["id"]))
         return await client.sessions()
 
