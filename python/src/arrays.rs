@@ -73,6 +73,14 @@ impl<'py> Floats<'py> {
         Ok(Self { values: Values::Double(values), name })
     }
 
+    /// The array itself, for Python.
+    pub(crate) fn array(&self) -> &Bound<'py, PyAny> {
+        match &self.values {
+            Values::Single(array) => array.as_any(),
+            Values::Double(array) => array.as_any(),
+        }
+    }
+
     fn shape(&self) -> &[usize] {
         match &self.values {
             Values::Single(array) => array.shape(),

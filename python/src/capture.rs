@@ -22,7 +22,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
-use tempfile::TempPath;
+use tempfile::{NamedTempFile, TempPath};
 
 /// Frames that are decoded at a time, in bytes.
 const BATCH_BYTES: usize = 64 << 20;
@@ -57,11 +57,11 @@ impl Capture {
         Self::open(path.to_path_buf(), Some(path))
     }
 
-    /// Tells Python of what the user should know of the encoding.
-    pub(crate) fn warn(&self, py: Python<'_>) -> PyResult<()> {
+    /// Tells Python of what the user should know of the encoding, `level` frames of the stack up.
+    pub(crate) fn warn(&self, py: Python<'_>, level: i32) -> PyResult<()> {
         self.warnings.iter().try_for_each(|words| {
             let words = CString::new(words.replace('\0', ""))?;
-            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &words, 1)
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &words, level)
         })
     }
 
@@ -223,6 +223,14 @@ impl Capture {
     }
 }
 
+/// An empty file for a container that has no name yet.
+pub(crate) fn temporary() -> Result<NamedTempFile, Fault> {
+    let made = tempfile::Builder::new().prefix("cager-").suffix(".cager").tempfile();
+    made.map_err(|error| {
+        of("the folder of temporary files", format!("cannot be written to ({error}); set TMPDIR to another"))
+    })
+}
+
 /// What tells a file from one that was written in its place: its length, and when it was written.
 type Stamp = (u64, Option<SystemTime>);
 
@@ -374,15 +382,7 @@ impl Capture {
                 Ok(reader)
             };
             let edited = EditedCages::of_frames(Path::new("cages"), &container, Box::new(reopen))?;
-            let temporary = tempfile::Builder::new().prefix("cager-").suffix(".cager").tempfile();
-            let path = temporary
-                .map_err(|error| {
-                    of(
-                        "the folder of temporary files",
-                        format!("cannot be written to ({error}); set TMPDIR to another"),
-                    )
-                })?
-                .into_temp_path();
+            let path = temporary()?.into_temp_path();
             let made = edit(container, &self.path, edited, &Target::Replacing(path.to_path_buf()), &mut |_| ())?;
             commit_together(vec![made.container])?;
             Self::of_encoding(path)

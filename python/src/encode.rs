@@ -1,7 +1,7 @@
 //! Encodes arrays into a container.
 
 use crate::arrays::{frame_arrays, frame_views, model};
-use crate::capture::Capture;
+use crate::capture::{Capture, temporary};
 use crate::fault::{Fault, computing, of};
 use crate::frames::Frames;
 use crate::geometry::{cage, cage_mesh, design_goal, designed, of_rest, system};
@@ -22,18 +22,31 @@ use tempfile::TempPath;
 
 /// What is asked of an encoding.
 #[derive(Clone, Copy)]
-struct Asked {
-    max_error: Option<f64>,
-    mean_error: Option<f64>,
-    vertices: Option<usize>,
-    seed: u64,
-    system: &'static dyn CoordinateSystem,
-    force: bool,
+pub(crate) struct Asked {
+    pub(crate) max_error: Option<f64>,
+    pub(crate) mean_error: Option<f64>,
+    pub(crate) vertices: Option<usize>,
+    pub(crate) seed: u64,
+    pub(crate) system: &'static dyn CoordinateSystem,
+    pub(crate) frame_rate: Option<f64>,
+    pub(crate) force: bool,
 }
 
 impl Asked {
-    /// What the file is to meet, with a cage that was given or not: a mean error is what a cage meets that is designed for it.
-    fn goal(self, has_cage: bool) -> Result<Option<Goal>, Fault> {
+    /// Refuses what cannot be met, with a cage that was given or not.
+    pub(crate) fn check(self, has_cage: bool) -> Result<(), Fault> {
+        if has_cage && self.vertices.is_some() {
+            return Err(of("vertices", "either they are given or cage; leave one of them out"));
+        }
+        self.goal(has_cage)?;
+        if let Some(rate) = self.frame_rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            return Err(of("frame_rate", format!("is {rate}; give a positive number of frames per second")));
+        }
+        Ok(())
+    }
+
+    /// What the file is to meet: a mean error is what a cage meets that is designed for it.
+    pub(crate) fn goal(self, has_cage: bool) -> Result<Option<Goal>, Fault> {
         let fraction = |name, error: f64| {
             if error > 0.0 && error < 1.0 {
                 return Ok(error);
@@ -74,15 +87,10 @@ pub(crate) fn encode<'py>(
 ) -> Result<Capture, Fault> {
     let mut rest = model(rest, faces, ["rest", "faces"])?;
     let mesh = cage.map(|(vertices, faces)| cage_mesh(&vertices, &faces)).transpose()?;
-    let asked = Asked { max_error, mean_error, vertices, seed, system: system(coordinates, "coordinates")?, force };
-    if mesh.is_some() && vertices.is_some() {
-        return Err(of("vertices", "either they are given or cage; leave one of them out"));
-    }
+    let system = system(coordinates, "coordinates")?;
+    let asked = Asked { max_error, mean_error, vertices, seed, system, frame_rate, force };
     // What is wrong with it is told before anything is computed.
-    asked.goal(mesh.is_some())?;
-    if let Some(rate) = frame_rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-        return Err(of("frame_rate", format!("is {rate}; give a positive number of frames per second")));
-    }
+    asked.check(mesh.is_some())?;
     let given = frame_arrays(frames, "frames")?;
     let views = frame_views(&given)?;
     let watch = Watch::new(progress);
@@ -93,7 +101,7 @@ pub(crate) fn encode<'py>(
         let path = encoded(&rest, mesh, &frames, asked, &watch)?;
         Capture::of_encoding(path)
     })?;
-    capture.warn(py)?;
+    capture.warn(py, 1)?;
     Ok(capture)
 }
 
@@ -110,12 +118,7 @@ fn encoded(
         Some(mesh) => cage_of(rest, mesh, frames.origin, asked.force)?,
         None => cage(designed(rest, frames, &design_options(rest, frames, asked, goal, watch)?, watch)?)?,
     };
-    let temporary = tempfile::Builder::new().prefix("cager-").suffix(".cager").tempfile();
-    let path = temporary
-        .map_err(|error| {
-            of("the folder of temporary files", format!("cannot be written to ({error}); set TMPDIR to another"))
-        })?
-        .into_temp_path();
+    let path = temporary()?.into_temp_path();
     let system = asked.system;
     let choices = InversionChoices { is_coded: goal.is_some(), ..InversionChoices::coded(system) };
     let total = frames.views.len().max(1) as f64;
@@ -146,7 +149,7 @@ fn encoded(
 }
 
 /// A cage that was given, unless it looks like that of another model.
-fn cage_of(rest: &Model, mut mesh: TriMesh, origin: Option<Point>, force: bool) -> Result<Cage, Fault> {
+pub(crate) fn cage_of(rest: &Model, mut mesh: TriMesh, origin: Option<Point>, force: bool) -> Result<Cage, Fault> {
     move_to(origin, &mut mesh.vertices);
     let cage = cage(mesh.clone())?;
     match cage_mismatch(&mesh, rest).filter(|_| !force) {
@@ -156,7 +159,7 @@ fn cage_of(rest: &Model, mut mesh: TriMesh, origin: Option<Point>, force: bool) 
 }
 
 /// How a cage is designed, of as many vertices as suit what the file is to meet.
-fn design_options(
+pub(crate) fn design_options(
     rest: &Model,
     frames: &Frames<'_>,
     asked: Asked,

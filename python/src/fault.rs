@@ -35,7 +35,12 @@ macro_rules! told {
         }
     )*};
 }
-told!(cager_formats::Error, cager_capture::decode::DecodeError, cager_capture::coding::CodingError);
+told!(
+    cager_formats::Error,
+    cager_capture::decode::DecodeError,
+    cager_capture::coding::CodingError,
+    cager_client::ClientError
+);
 
 impl From<PyErr> for Fault {
     fn from(error: PyErr) -> Self {
@@ -61,24 +66,29 @@ impl From<Fault> for PyErr {
     }
 }
 
-/// Computes with several threads. A process that is forked off another lacks those of its parent, and would wait for them for ever.
+/// Computes with several threads.
 pub(crate) fn computing<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
+    computing_allowed()?;
+    detached(py, work)
+}
+
+/// A process that is forked off another lacks the threads of its parent, and would wait for them for ever.
+pub(crate) fn computing_allowed() -> Result<(), Fault> {
     static FIRST: OnceLock<u32> = OnceLock::new();
     let here = std::process::id();
     if *FIRST.get_or_init(|| here) != here {
         let what = "this process was forked off one that had used cager before, and lacks its threads; start it with the method \"spawn\" or \"forkserver\", as multiprocessing.get_context(\"spawn\") does";
         return Err(Fault::Told(what.to_owned()));
     }
-    detached(py, work)
+    Ok(())
 }
 
 /// Works while other threads of Python run. A panic is an error as well.
 pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
-    py.detach(|| {
-        catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
-            Err(Fault::Told(
-                "stopped by a fault in cager itself, told above; please report it with what you gave".to_owned(),
-            ))
-        })
-    })
+    py.detach(|| catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(own_fault())))
+}
+
+/// A panic.
+pub(crate) fn own_fault() -> Fault {
+    Fault::Told("stopped by a fault in cager itself, told above; please report it with what you gave".to_owned())
 }

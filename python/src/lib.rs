@@ -1,12 +1,18 @@
 //! The Python module `cager`: captures as numpy arrays, encoded into `.cager` files and decoded from them.
 
 mod arrays;
+mod call;
 mod capture;
+mod client;
 mod encode;
 mod export;
 mod fault;
+mod follow;
 mod frames;
 mod geometry;
+mod kept_frames;
+mod loop_progress;
+mod remote_encode;
 mod watch;
 
 /// Captures of animated meshes as numpy arrays, in light and editable .cager files.
@@ -16,6 +22,8 @@ mod cager {
 
     #[pymodule_export]
     use crate::capture::{Capture, open};
+    #[pymodule_export]
+    use crate::client::Client;
     #[pymodule_export]
     use crate::encode::encode;
     #[pymodule_export]

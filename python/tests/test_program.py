@@ -51,6 +51,6 @@ def test_the_program_writes_the_same_bytes(small, tmp_path, cage, options, argum
 def test_the_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     readme = Path(__file__).parents[1] / "README.md"
-    (example,) = re.findall(r"```python\n(.*?)```", readme.read_text(), re.S)
+    example = re.findall(r"```python\n(.*?)```", readme.read_text(), re.S)[0]
     exec(compile(example, str(readme), "exec"), {})
     assert capsys.readouterr().out.startswith("12 (500, 3) (12, ")

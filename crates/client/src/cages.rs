@@ -5,16 +5,24 @@ use crate::create::MeshFile;
 use crate::error::ClientError;
 use crate::events::{Events, EventsOf};
 use crate::jobs::finite;
+use crate::source::FrameSource;
 use bytes::Bytes;
 use cager_proto::cage_messages::{CageJob, CageJobList, CageOptions, CageProgress, CageState};
 use cager_proto::messages::Problem;
 use futures_util::stream::BoxStream;
 use reqwest::Method;
+use std::io;
 use std::time::{Duration, Instant};
 
 /// Polling intervals of [`Client::wait_cage`].
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const MAX_PAUSE: Duration = Duration::from_secs(2);
+
+/// Most frames sent; a design samples no more.
+const MAX_SAMPLED_FRAMES: u32 = 160;
+
+/// Most bytes of frames sent, unless two frames are larger.
+const MAX_SAMPLE_BYTES: usize = 512 << 20;
 
 /// What a cage is designed from.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +42,17 @@ impl NewCage {
     /// A cage with the service's defaults.
     pub fn new(rest: MeshFile, frames: MeshFile) -> Self {
         Self { rest, frames, options: CageOptions::default(), idempotency_key: None }
+    }
+
+    /// A cage designed from evenly spaced frames of a capture, the first and the last among them. `frames` is read from the beginning and
+    /// left there.
+    ///
+    /// # Errors
+    /// [`ClientError::Source`].
+    pub fn of_frames(rest: MeshFile, frames: &mut impl FrameSource) -> Result<Self, ClientError> {
+        let (count, bytes) = sample(frames)?;
+        let options = CageOptions { frames: Some(count), ..CageOptions::default() };
+        Ok(Self { options, ..Self::new(rest, MeshFile::new("frames.f32", bytes)) })
     }
 }
 
@@ -141,4 +160,58 @@ fn reason(job: CageJob) -> Problem {
         detail: "the service does not say why; look at its log".to_owned(),
         ..Problem::default()
     })
+}
+
+/// Number and bytes of evenly spaced frames, including the first and the last.
+fn sample(frames: &mut impl FrameSource) -> Result<(u32, Vec<u8>), ClientError> {
+    let frame_bytes = 12 * frames.points().max(1);
+    let most = u32::try_from(MAX_SAMPLE_BYTES / frame_bytes).unwrap_or(u32::MAX).clamp(2, MAX_SAMPLED_FRAMES);
+    let all = match frames.frames() {
+        Some(all) => all,
+        None => counted(frames)?,
+    };
+    let count = all.min(most);
+    let mut bytes = Vec::with_capacity(count as usize * frame_bytes);
+    let mut values = Vec::new();
+    for k in 0..count {
+        let wanted = if count > 1 { u64::from(k) * u64::from(all - 1) / u64::from(count - 1) } else { 0 };
+        let frame = wanted as u32;
+        let failed = |cause| ClientError::Source { frame, cause };
+        frames.seek(frame).map_err(failed)?;
+        if !frames.read(&mut values).map_err(failed)? {
+            let what = format!("frame {frame} is not there any more; get the capture again");
+            return Err(failed(io::Error::other(what)));
+        }
+        bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
+    }
+    frames.seek(0).map_err(|cause| ClientError::Source { frame: 0, cause })?;
+    Ok((count, bytes))
+}
+
+/// Counts the frames of a source of unknown length by reading it.
+fn counted(frames: &mut impl FrameSource) -> Result<u32, ClientError> {
+    let (mut frame, mut values) = (0, Vec::new());
+    frames.seek(0).map_err(|cause| ClientError::Source { frame, cause })?;
+    while frames.read(&mut values).map_err(|cause| ClientError::Source { frame, cause })? {
+        frame += 1;
+    }
+    Ok(frame)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::MemoryFrames;
+
+    #[test]
+    fn frames_are_sampled_evenly_from_the_first_to_the_last() {
+        let values: Vec<f32> = (0..400).flat_map(|t| [t as f32; 6]).collect();
+        let (count, bytes) = sample(&mut MemoryFrames::new(2, values)).expect("frames");
+        assert_eq!((count, bytes.len()), (160, 160 * 24));
+        let first = |frame: usize| f32::from_le_bytes(bytes[24 * frame..][..4].try_into().expect("four bytes"));
+        assert_eq!([first(0), first(159)], [0.0, 399.0]);
+        assert!((1..160).all(|k| (2.0..=3.0).contains(&(first(k) - first(k - 1)))));
+        let (count, _) = sample(&mut MemoryFrames::new(2, vec![0.0; 18])).expect("frames");
+        assert_eq!(count, 3);
+    }
 }
