@@ -158,9 +158,10 @@ soak: ## kill the service a hundred times under load; KILLS and SEED change how 
 	CAGER_SOAK_KILLS=$(or $(KILLS),100) $(if $(SEED),CAGER_SOAK_SEED=$(SEED)) \
 		$(CARGO) test --release --locked --test reliability -- --exact --nocapture soak::a_service_that_is_killed_keeps_what_it_said
 
-lint: ## formatting, clippy and documentation, all warnings denied
+lint: ## formatting, clippy and documentation, all warnings denied; and whether the command line builds without the service
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
+	$(CARGO) check --workspace --no-default-features --locked
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
 	@$(MAKE) --no-print-directory page-lint
 
