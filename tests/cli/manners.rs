@@ -47,6 +47,9 @@ fn manual_pages_are_those_of_the_commands() {
     assert!(page.starts_with(".ie") || page.contains(".TH"), "{page}");
     assert!(page.contains("regularizer") && page.contains("EXAMPLE") | page.contains("Example"), "{page}");
     assert!(dir.path("man1/cager.1").is_file());
-    let said = dir.cager("man -o nowhere").run();
-    assert!(said.status == Some(1) && said.stderr.contains("nowhere"), "{}", said.stderr);
+    // A folder is made where there is none, but not in the place of a file.
+    dir.cager("man -o new/man1").succeeds();
+    assert!(dir.path("new/man1/cager.1").is_file());
+    let said = dir.cager("man -o new/man1/cager.1").run();
+    assert!(said.status == Some(1) && said.stderr.contains("new/man1/cager.1: cannot be made"), "{}", said.stderr);
 }
