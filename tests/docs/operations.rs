@@ -23,7 +23,10 @@ fn every_metric_is_in_the_table_and_described_and_no_other() {
         assert!(document.contains(&format!("| `{metric}` |")), "{metric} is missing in {DOCUMENT}");
         assert!(described.contains(&format!("!(\"{metric}\",")), "{metric} is not described");
     }
-    let unknown: BTreeSet<_> = words(&document).difference(&metrics).cloned().collect();
+    // Part of a module's name, by which a log is filtered.
+    let crates = BTreeSet::from(["cager_service".to_owned()]);
+    let unknown: BTreeSet<_> =
+        words(&document).difference(&metrics).filter(|word| !crates.contains(*word)).cloned().collect();
     assert!(unknown.is_empty(), "{unknown:?} are in {DOCUMENT} but not in the sources");
 }
 
