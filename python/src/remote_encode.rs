@@ -15,6 +15,7 @@ use cager_client::messages::{CageSource, FrameResult, SessionOptions};
 use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewCage, NewSession, UploadOptions};
 use cager_formats::obj_bytes;
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::units::Units;
 use cager_proto::container::{self, ContainerReader, ContainerWriter};
 use futures_util::StreamExt as _;
 use pyo3::prelude::*;
@@ -198,7 +199,7 @@ async fn filled(client: &Client, id: &str, frames: KeptFrames, progress: &Arc<Lo
         // The service was sent positions about an origin that it does not know.
         let placed = temporary()?;
         let out = BufWriter::new(placed.reopen().map_err(ClientError::Output)?);
-        let out = ContainerWriter::copy_with_origin(&mut container, origin, out).map_err(damaged)?;
+        let out = ContainerWriter::copy_placed(&mut container, (Some(origin), Units::UNKNOWN), out).map_err(damaged)?;
         out.into_inner().map_err(|error| ClientError::Output(error.into_error()))?;
         Capture::of_encoding(placed.into_temp_path())
     })

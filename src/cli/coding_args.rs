@@ -142,8 +142,14 @@ impl FromStr for TargetSize {
 }
 
 /// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked. A mean error is what a cage meets that is designed for it.
-pub(super) fn goal(coding: &CodingArgs, has_cage: bool, rest: &Model, frames: usize) -> Result<Option<Goal>> {
-    let unit = coding.units().metres_per_unit;
+pub(super) fn goal(
+    coding: &CodingArgs,
+    units: Units,
+    has_cage: bool,
+    rest: &Model,
+    frames: usize,
+) -> Result<Option<Goal>> {
+    let unit = units.metres_per_unit;
     Ok(match (coding.max_error, coding.target_size, coding.quality) {
         (Some(ErrorBound::Fraction(error)), ..) => Some(Goal::MaxError(error)),
         (Some(ErrorBound::Metres(length)), ..) => {

@@ -36,7 +36,7 @@ pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     (files.rest_units, files.metres_per_unit) = (said, args.coding.unit.map(Unit::metres));
     files.take_origin(&mut rest);
     // What is wrong with it is told before anything is computed.
-    goal(&args.coding, args.cage.is_some(), &rest, 1)?;
+    goal(&args.coding, args.coding.units(), args.cage.is_some(), &rest, 1)?;
     let cage = args
         .cage
         .as_ref()
@@ -86,7 +86,7 @@ fn dry_run(
             checked_options(args, rest, cage, matrix.as_ref())?;
             let system = args.solver.coordinates;
             let frames = read_files(files)?;
-            match goal(&args.coding, args.cage.is_some(), rest, frames)? {
+            match goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, frames)? {
                 None => {
                     format!("cages of {}, and the rest pose", size(frames, system.values(cage).unknowns(), "unknowns"))
                 }
@@ -162,7 +162,7 @@ fn encode_locally(
         matrix: matrix.as_ref(),
         choose,
         memory,
-        goal: goal(&args.coding, args.cage.is_some(), rest, announced)?,
+        goal: goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, announced)?,
         origin: files.origin,
         units,
         exact_rest: args.coding.exact_rest,

@@ -77,7 +77,7 @@ pub(super) fn run(
         frame_rate: frames.frame_rate(),
         frames: frames.frames(),
         ..coding_options(
-            goal(&args.coding, args.cage.is_some(), rest, frames.frames().unwrap_or(1) as usize)?,
+            goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, frames.frames().unwrap_or(1) as usize)?,
             args.coding.exact_rest,
         )
     };

@@ -88,7 +88,7 @@ pub(super) fn sized_design(args: &EncodeArgs, files: &CaptureFiles, rest: &Model
 fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<Option<usize>> {
     let mut reader = files.open()?;
     let total = reader.frames();
-    let goal = goal(&args.coding, args.cage.is_some(), rest, total)?;
+    let goal = goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, total)?;
     let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.coding.mean_error) else { return Ok(None) };
     let frames = sample_frames(reader.as_mut(), CAGE_SIZE_FRAMES, true).map_err(|error| name_files(error, args))?;
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
@@ -109,7 +109,7 @@ fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Resu
 pub(super) fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<SolverOptions> {
     let unknowns = args.solver.coordinates.values(cage).unknowns();
     // The number of frames says how large a file may be, not whether it is coded.
-    let is_coded = goal(&args.coding, args.cage.is_some(), rest, 1)?.is_some();
+    let is_coded = goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, 1)?.is_some();
     Ok(inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns))
 }
 

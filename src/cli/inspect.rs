@@ -88,7 +88,7 @@ fn as_text(name: &str, report: &Report, sections: &[Section]) -> Result<String> 
         writeln!(out, "  origin    {x} {y} {z}, added to all positions")?;
     }
     let unit = report.metres_per_unit.map(|metres| format!("1 is {metres} m"));
-    let up = report.up.as_ref().map(|up| format!("{} up", plain(up)));
+    let up = report.up.as_ref().map(|up| format!("{} up", plain(up).to_uppercase()));
     if let Some(units) = unit.into_iter().chain(up).reduce(|unit, up| format!("{unit}, {up}")) {
         writeln!(out, "  units     {units}")?;
     }

@@ -38,7 +38,15 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     if let (Some(address), false) = (args.service.server.as_deref(), args.outputs.dry_run)
         && let [(output, report)] = &targets[..]
     {
-        return recover_remote::run(args, address, &templates[0].0, &stretches[0], output, report.clone(), joints);
+        return recover_remote::run(
+            args,
+            address,
+            (&templates[0].0, templates[0].2),
+            &stretches[0],
+            output,
+            report.clone(),
+            joints,
+        );
     }
     let person = person(args)?;
     if args.outputs.dry_run {
@@ -112,11 +120,16 @@ fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Un
     if args.scale == Align::Auto {
         units.metres_per_unit = None;
     }
+    if args.align == Align::Auto || args.scale == Align::Auto {
+        // It may be turned in any way.
+        units.up = None;
+    }
     units.up = args.up.or(units.up);
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", path.display());
     }
-    goal(&args.coding, true, &template, 1)?;
+    let units = units.or(args.coding.units());
+    goal(&args.coding, units, true, &template, 1)?;
     let origin = own_origin(&template.points);
     if origin.is_some() && args.rig.is_some() {
         bail!(
@@ -125,7 +138,7 @@ fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Un
         );
     }
     move_to(origin, &mut template.points);
-    Ok((template, origin, units.or(args.coding.units())))
+    Ok((template, origin, units))
 }
 
 /// What is known of a person.

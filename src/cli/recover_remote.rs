@@ -11,14 +11,14 @@ use cager_client::messages::SessionOptions;
 use cager_client::recovery_messages::{Placing, RecoveryOptions, RecoveryState};
 use cager_formats::{AtomicFile, MeshSequence, Target, commit_together};
 use cager_geometry::mesh::Model;
-use cager_geometry::units::Up;
+use cager_geometry::units::{Units, Up};
 use std::path::PathBuf;
 
 /// Has a service recover what the arguments say.
 pub(super) fn run(
     args: &RecoverArgs,
     address: &str,
-    template: &Model,
+    template: (&Model, Units),
     files: &MeshSequence,
     output: &Target,
     report: Option<Target>,
@@ -65,8 +65,13 @@ pub(super) fn run(
     ))
 }
 
-fn options(args: &RecoverArgs, template: &Model, frames: usize, has_rig: bool) -> Result<RecoveryOptions> {
-    let goal = goal(&args.coding, true, template, frames)?;
+fn options(
+    args: &RecoverArgs,
+    (template, units): (&Model, Units),
+    frames: usize,
+    has_rig: bool,
+) -> Result<RecoveryOptions> {
+    let goal = goal(&args.coding, units, true, template, frames)?;
     let SessionOptions { max_error, mean_error, target_size, quality, exact_rest, .. } =
         coding_options(goal, args.coding.exact_rest);
     let placing = |align| (align == Align::Auto).then_some(Placing::Auto);

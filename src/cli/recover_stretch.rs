@@ -128,7 +128,7 @@ impl Stretching<'_> {
         let Self { args, output, origin, units, .. } = *self;
         let Recovered { rest, cage, mut frames, report, joints, mut warnings, .. } = recovered;
         let count = report.frames.len();
-        let goal = goal(&args.coding, true, &rest, count)?;
+        let goal = goal(&args.coding, units, true, &rest, count)?;
         if args.offsets && goal.is_none() {
             warnings.push(
                 "--offsets: cages alone are stored, without what leaves them; add --max-error to store that too"

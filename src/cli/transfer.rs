@@ -42,7 +42,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let origin = own_origin(&target.points);
     move_to(origin, &mut target.points);
     // What is wrong with them is told before anything is computed.
-    goal(&args.coding, true, &target, 1)?;
+    goal(&args.coding, units, true, &target, 1)?;
     let design = DesignOptions {
         goal: design_goal(args.cage_vertices, args.coding.mean_error, target.points.len())?,
         ..DesignOptions::default()
@@ -64,7 +64,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
         return Ok(());
     }
     if let Some(address) = &args.service.server {
-        transfer_remote::run(args, address, (&source, &target), (&output, report))?;
+        transfer_remote::run(args, address, (&source, &target, units), (&output, report))?;
         source.warn_of_departures();
         return Ok(());
     }
@@ -159,7 +159,7 @@ fn write(
     warn(&design.warnings);
     let cage = Cage::new(design.cage).with_context(|| args.target.display().to_string())?;
     let system: &'static dyn CoordinateSystem = &MeanValue;
-    let goal = goal(&args.coding, true, target, report.frames)?;
+    let goal = goal(&args.coding, units, true, target, report.frames)?;
     let choices = InversionChoices {
         system,
         handles: None,

@@ -13,13 +13,14 @@ use cager_client::transfer_messages::{TransferOptions, TransferStage};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
 use cager_formats::{AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_prim_with_note};
 use cager_geometry::mesh::Model;
+use cager_geometry::units::Units;
 use std::path::{Path, PathBuf};
 
 /// Has a service move what the arguments say. Frames are read into memory, in double precision.
 pub(super) fn run(
     args: &TransferMotionArgs,
     address: &str,
-    (source, target): (&MotionSource, &Model),
+    (source, target, units): (&MotionSource, &Model, Units),
     (output, report): (&Target, Option<Target>),
 ) -> Result<()> {
     let mut container = AtomicFile::create(output)?;
@@ -27,7 +28,7 @@ pub(super) fn run(
     let file = |path: &PathBuf| mesh_file(path);
     let frames = args.source_rest.as_ref().map(|_| source.frames(Path::new(""))).transpose()?;
     let count = frames.as_ref().map_or_else(|| source.check_frames(), |frames| Ok(frames.frames()))?;
-    let mut options = options(args, goal(&args.coding, true, target, count)?)?;
+    let mut options = options(args, goal(&args.coding, units, true, target, count)?)?;
     let sent = match (frames, &args.source_rest) {
         (Some(mut frames), Some(rest)) => {
             options.frame_rate = frames.frame_rate();

@@ -85,7 +85,7 @@ fn files_that_say_nothing_follow_what_is_told_and_containers_stay_as_they_were()
     assert_eq!(read(&dir, &small, "a.usdc").0, Units::new(Up::Y, 0.01));
     // Edited cages keep it.
     dir.cager("decode out.cager --cages -o cages.usdc").succeeds();
-    dir.cager("edit out.cager --cages cages.usdc -o edited.cager").succeeds();
+    dir.cager("edit out.cager --with-cages cages.usdc -o edited.cager").succeeds();
     assert!(dir.cager("inspect edited.cager").succeeds().stdout.contains("units     1 is 0.01 m\n"));
 }
 

@@ -19,6 +19,8 @@ pub(super) const TICKS: f64 = 6000.0;
 /// Bytes of the text beside a cache that are looked at, and of the name of a channel.
 const MOST_TEXT: u64 = 1 << 16;
 const MOST_NAME: u64 = 1 << 10;
+/// Most channels of a block.
+const MOST_CHANNELS: usize = 1 << 12;
 /// Channels that a message lists.
 const LISTED: usize = 4;
 
@@ -218,6 +220,9 @@ impl<R: Read + Seek> Chunks<R> {
                 }
                 b"FVCA" | b"DVCA" => {
                     let scalar = if tag == *b"FVCA" { Scalar::F32Big } else { Scalar::F64Big };
+                    if channels.len() == MOST_CHANNELS {
+                        return Err(damaged(&format!("a block has more than {MOST_CHANNELS} channels")));
+                    }
                     if size != 3 * scalar.size() as u64 * u64::from(points) {
                         return Err(damaged("an array has another size than its channel says"));
                     }

@@ -13,6 +13,7 @@ use crate::auth::Scope;
 use crate::problem::{self, ApiError};
 use crate::resources::{ResourceUse, Resources};
 use crate::service::Service;
+use crate::tasks::blocking;
 use axum::extract::{Path, Request, State};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::Response;
@@ -139,11 +140,13 @@ async fn sessions(State(operated): State<Operated>, Query(query): Query<PageQuer
     let more = page.len() > PAGE;
     page.truncate(PAGE);
     let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
-    let listed = |session: &Arc<crate::session::Session>| TenantSession {
-        tenant: session.meta.tenant.clone(),
-        session: session.view_with(0),
-    };
-    Ok(Json(AllSessions { sessions: page.iter().map(listed).collect(), next }))
+    let mut sessions = Vec::with_capacity(page.len());
+    for session in page {
+        // One whose frames cannot be read is listed without them.
+        let _ = session.ensure_loaded().await;
+        sessions.push(TenantSession { tenant: session.meta.tenant.clone(), session: session.view_with(0) });
+    }
+    Ok(Json(AllSessions { sessions, next }))
 }
 
 async fn delete_session(State(operated): State<Operated>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
@@ -172,8 +175,9 @@ struct Evicted {
 }
 
 /// Drops cached solvers from memory, and frames of sessions that nobody uses at the moment. What is in use stays, and all can be loaded again.
-async fn evict(State(operated): State<Operated>) -> Json<Evicted> {
+async fn evict(State(operated): State<Operated>) -> JsonResult<Evicted> {
     let services = (operated.services)();
     let bytes = services.iter().map(|service| service.solvers.evict()).sum();
-    Json(Evicted { bytes, sessions: services.iter().map(|service| service.registry.unload(Duration::ZERO)).sum() })
+    let unload = move || services.iter().map(|service| service.registry.unload(Duration::ZERO)).sum();
+    Ok(Json(Evicted { bytes, sessions: blocking(unload).await? }))
 }

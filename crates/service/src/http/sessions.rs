@@ -44,6 +44,8 @@ pub(crate) async fn create(
     let parts = timeout(patience, multipart::read(&service, &tenant, request)).await.map_err(|_| too_slow())??;
     let new = NewSession { uploaded: parts.uploaded, options: parts.options, idempotency_key, room: parts.room };
     let session = service.create(&tenant, new).await?;
+    // One that was made before may have to be read again. What cannot be read is told by its own address.
+    let _ = session.ensure_loaded().await;
     let location = format!("/v1/sessions/{}", session.meta.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(session.view())).into_response())
 }

@@ -6,7 +6,7 @@ use super::groups::Groups;
 use super::registry::Registry;
 use crate::sync::lock;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{Ordering, fence};
 use std::time::{Duration, Instant};
 
 /// How long the frames of a session stay in memory that nobody asks for: lists of sessions ask for those that they show.
@@ -25,9 +25,10 @@ impl Session {
         }
     }
 
-    /// Forgets its frames, which are loaded again when they are needed; `is_used` says whether anybody has the session. Returns whether there were any.
-    fn unload(&self, is_used: impl Fn() -> bool) -> bool {
-        let Ok(appending) = self.appending.try_lock() else { return false };
+    /// Takes its frames out of memory, which are loaded again when they are needed; `is_used` says whether anybody has the session. `None` where there are
+    /// none, or it is used.
+    fn unload(&self, is_used: impl Fn() -> bool) -> Option<(Frames, Groups)> {
+        let appending = self.appending.try_lock().ok()?;
         let is_at_work = *appending || lock(&self.lane).strong_count() > 0 || lock(&self.waiting).busy;
         if is_at_work
             || is_used()
@@ -35,33 +36,35 @@ impl Session {
             || self.has_failed()
             || self.facts().is_none()
         {
-            return false;
+            return None;
         }
-        let (Ok(mut frames), Ok(mut groups)) = (self.frames.try_lock(), self.groups.try_lock()) else { return false };
+        let (mut frames, mut groups) = (self.frames.try_lock().ok()?, self.groups.try_lock().ok()?);
         // Who comes by now waits for the first lock, and loads them.
         self.loaded.store(false, Ordering::SeqCst);
+        fence(Ordering::SeqCst);
         if is_used() || frames.is_pending() || frames.is_empty() || !groups.are_stored() {
             self.loaded.store(true, Ordering::SeqCst);
-            return false;
+            return None;
         }
         let is_sealed = frames.is_sealed();
-        *frames = Frames::default();
-        *groups = Groups::default();
+        let taken = (std::mem::take(&mut *frames), std::mem::take(&mut *groups));
         if is_sealed {
             frames.seal();
         }
-        true
+        Some(taken)
     }
 }
 
 impl Registry {
-    /// Forgets the frames of sessions that nobody has used for so long; gives how many sessions these were.
+    /// Forgets the frames of sessions that nobody has used for so long; gives how many sessions these were. Blocks.
     pub(crate) fn unload(&self, idle: Duration) -> usize {
         let is_idle = |session: &&Arc<Session>| lock(&session.last_used).elapsed() >= idle;
         // Nobody finds a session meanwhile. Those who know it already are counted.
-        self.with_sessions(|sessions| {
-            let unloaded = |session: &&Arc<Session>| session.unload(|| Arc::strong_count(session) > 1);
-            sessions.filter(is_idle).filter(unloaded).count()
-        })
+        let unloaded: Vec<_> = self.with_sessions(|sessions| {
+            let unloaded = |session: &Arc<Session>| session.unload(|| Arc::strong_count(session) > 1);
+            sessions.filter(is_idle).filter_map(unloaded).collect()
+        });
+        // To free them takes time, for which nobody waits.
+        unloaded.len()
     }
 }

@@ -33,7 +33,7 @@ use commit::{CommitQueue, Committer};
 use facts::Facts;
 use frames::Frames;
 use groups::Groups;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Instant;
 use tokio::sync::watch;
@@ -225,6 +225,7 @@ impl Session {
     /// Damaged frames, after which the session has failed; I/O errors.
     pub(crate) fn load(&self) -> Result<(), ApiError> {
         self.used();
+        fence(Ordering::SeqCst);
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
         }
@@ -244,6 +245,7 @@ impl Session {
     /// As [`Self::load`], on the blocking pool.
     pub(crate) async fn ensure_loaded(self: &Arc<Self>) -> Result<(), ApiError> {
         self.used();
+        fence(Ordering::SeqCst);
         if self.loaded.load(Ordering::Acquire) {
             return Ok(());
         }

@@ -143,7 +143,8 @@ impl Service {
                 session.forget_if_idle();
             }
         }
-        self.registry.unload(idle::IDLE);
+        let registry = Arc::clone(&self.registry);
+        let _ = blocking(move || registry.unload(idle::IDLE)).await;
     }
 
     /// Deletes the jobs of a kind that have expired.
