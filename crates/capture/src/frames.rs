@@ -243,7 +243,7 @@ mod tests {
 
     /// The first point of a capture whose only one is (100, 200, 300), what it means, and what is said of it.
     fn read(name: &str, adapt: impl FnOnce(&mut CaptureFiles)) -> ([f64; 3], Units, Vec<String>) {
-        let folder = ScratchDir::create(&std::env::temp_dir()).expect("a folder");
+        let folder = ScratchDir::create(std::env::temp_dir()).expect("a folder");
         let path = folder.path().join(name);
         let options = FrameOptions { units: CENTIMETRES, ..FrameOptions::default() };
         let mut writer = create_frames(&path, 1, 1, &Polygons::new(), &options).expect("a file");

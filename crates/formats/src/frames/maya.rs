@@ -156,6 +156,7 @@ struct Chunks<R> {
     is_wide: bool,
 }
 
+#[derive(Clone, Copy)]
 struct Chunk {
     tag: [u8; 4],
     start: u64,
