@@ -1,6 +1,6 @@
 //! `GET /v1/sessions/{id}/export`.
 
-use crate::support::{Capture, TestApp, folder};
+use crate::support::{Capture, TestApp, eventually, folder};
 use std::process::Command;
 
 /// What `cager decode` makes of a container.
@@ -38,8 +38,8 @@ async fn a_completed_session_is_written_in_the_formats_of_other_programs() {
         app.get_with(&path, &[("if-none-match", reply.header("etag"))]).await.expect(304);
     }
     // Nothing of them is left.
-    let left = std::fs::read_dir(app.data().join("tmp")).expect("a folder").count();
-    assert_eq!(left, 0);
+    let left = || std::fs::read_dir(app.data().join("tmp")).expect("a folder").count();
+    eventually("that they are removed", async || (left() == 0).then_some(())).await;
 }
 
 #[tokio::test]
