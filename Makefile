@@ -137,7 +137,7 @@ $(FARM): Makefile
 buckets: $(SEAWEEDFS) ## the service with its files in S3; installs SeaweedFS, and needs PostgreSQL
 	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test blobs
 	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- process::bucket process::shards
-	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test reliability -- soak::several
+	CAGER_TEST_PROCESSES=2 CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test reliability -- soak::several neighbours::responses
 	tests/database/stories.sh $(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- --test-threads 4 --skip process::bucket --skip process::shards --skip process::database
 
 $(SEAWEEDFS): Makefile

@@ -5,7 +5,7 @@ use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design;
 use super::dry_run::{read_files, tell_dry_run};
-use super::{grouped, progress, read_model, read_with_units, tell, warn};
+use super::{grouped, progress, read_like, read_with_units, tell, warn};
 use anyhow::{Result, bail};
 use cager_cages::{BoundingShape, DesignOptions, EncloseError, EncloseOptions, Style, bounding_shape, enclose};
 use cager_capture::design::default_vertices;
@@ -105,7 +105,7 @@ struct Motion<'a> {
 
 impl<'a> Motion<'a> {
     fn new(args: &'a CageArgs, (rest, units): (&Model, Units), frames: &Path) -> Result<Self> {
-        let start = args.improve.as_ref().map(|path| read_model(path).map(|model| (path, model))).transpose()?;
+        let start = args.improve.as_ref().map(|path| read_like(path, units).map(|model| (path, model))).transpose()?;
         let options = DesignOptions {
             goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
             style: args.style.unwrap_or(Style::Editable),

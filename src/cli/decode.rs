@@ -4,14 +4,13 @@ use super::args::DecodeArgs;
 use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
 use super::stretches::StretchList;
-use super::{grouped, plain, progress, read_with_units, tell, warn};
+use super::{grouped, plain, progress, read_like, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::cage_export::write_cages;
 use cager_capture::decode::joined::{Joining, decode_joined};
 use cager_capture::decode::{self, Decoding};
 use cager_capture::edited::EditedCages;
-use cager_formats::{FrameRange, Target, Units};
-use cager_geometry::mesh::Model;
+use cager_formats::{FrameRange, Target};
 use std::path::Path;
 use std::time::Instant;
 
@@ -27,7 +26,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let output = Outputs::new(args.outputs, inputs.into_iter().flatten())?.frames(&args.output)?;
     let container = if args.salvage { decode::open_cut(&args.input) } else { decode::open(&args.input) }?;
     let edited = transfer.with_cages.as_ref().map(|path| EditedCages::open(path, &container)).transpose()?;
-    let model = transfer.model.as_ref().map(|path| model_like(path, container.header().units)).transpose()?;
+    let model = transfer.model.as_ref().map(|path| read_like(path, container.header().units)).transpose()?;
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
     drop(container);
     // Checked against the file that has the frames.
@@ -96,13 +95,6 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         grouped(found.points),
         clock.elapsed().as_secs_f64()
     ))
-}
-
-/// Another model, in the units of the container where both say theirs.
-fn model_like(path: &Path, units: Units) -> Result<Model> {
-    let (mut model, said) = read_with_units(path, None)?;
-    said.change_to(units).apply_to(&mut model.points);
-    Ok(model)
 }
 
 /// Decodes the files of a list as one sequence.

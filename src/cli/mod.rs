@@ -150,6 +150,13 @@ fn read_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Units), ca
     Ok((model, units))
 }
 
+/// A mesh, in the units and axes of another one where both say theirs.
+fn read_like(path: &Path, units: Units) -> Result<Model, cager_formats::Error> {
+    let (mut model, said) = read_with_units(path, None)?;
+    said.change_to(units).apply_to(&mut model.points);
+    Ok(model)
+}
+
 /// Whether a file is a scene that may have several meshes, by its name.
 fn is_scene(path: &Path) -> bool {
     CacheFormat::from_path(path).is_some_and(CacheFormat::is_scene)

@@ -20,8 +20,7 @@ pub(super) fn read_cage(path: &Path, flip: bool, (origin, units): (Option<Point>
     let change = said.change_to(units);
     if !change.is_none() {
         change.apply_to(&mut model.points);
-        let what =
-            format!("{}: the cage is {change}, as its unit and axes are not those of the rest pose", path.display());
+        let what = format!("{}: the cage is {change}, as its unit and axes are not those of its model", path.display());
         warn(&[what]);
     }
     if model.faces.is_empty() {

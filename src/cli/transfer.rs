@@ -55,7 +55,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
         read.with_context(|| path.display().to_string())
     });
     let pairs = pairs.transpose()?.unwrap_or_default();
-    let given = cage(args, method, &source.rest, (&target, origin))?;
+    let given = cage(args, method, &source.rest, (&target, origin, units))?;
     if args.outputs.dry_run {
         let frames = source.check_frames()?;
         let what = format!("{} frames of {} points", grouped(frames), grouped(target.points.len()));
@@ -101,11 +101,12 @@ fn cage(
     args: &TransferMotionArgs,
     method: MethodChoice,
     source: &Model,
-    (target, origin): (&Model, Option<Point>),
+    (target, origin, units): (&Model, Option<Point>, Units),
 ) -> Result<Option<Cage>> {
     let Some(path) = &args.cage else { return Ok(None) };
-    let (inside, origin) = if method == MethodChoice::Fitted { (source, None) } else { (target, origin) };
-    let cage = read_cage(path, false, (origin, Units::UNKNOWN))?;
+    let around_source = (source, (None, Units::UNKNOWN));
+    let (inside, place) = if method == MethodChoice::Fitted { around_source } else { (target, (origin, units)) };
+    let cage = read_cage(path, false, place)?;
     check_cage((path, cage.mesh()), inside, &args.checks)?;
     Ok(Some(cage))
 }

@@ -103,4 +103,15 @@ fn a_rest_pose_a_cage_and_a_capture_are_brought_together() {
     assert!(off < 1e-4, "{off}");
     // A length needs no --unit where the rest pose says it.
     encode(&dir, names, "--max-error 5mm");
+    // A cage to improve is brought to the rest pose, too; what its rounding changes, the search for a better one makes larger.
+    let cage = as_model(&small.cage);
+    write(&dir, "cage.usdc", CENTIMETRES, &cage.faces, &[cage.points.as_flattened().to_vec()]);
+    let improved = ["cage.glb", "cage.usdc"].map(|start| {
+        let line = format!("cage --rest rest.usdc --frames walk.usdc --improve {start} -o improved.obj --overwrite");
+        dir.cager(&line).succeeds();
+        cager_formats::read_model(&dir.path("improved.obj")).expect("a cage").points
+    });
+    let pairs = improved[0].as_flattened().iter().zip(improved[1].as_flattened());
+    let off = pairs.fold(0.0_f64, |far, (a, b)| far.max((a - b).abs()));
+    assert!(off < 0.01, "{off}");
 }

@@ -229,7 +229,8 @@ impl Resources {
     pub(crate) fn tenants_in_use(&self) -> BTreeSet<String> {
         let budgets = [&self.requests, &self.streams, &self.completing, &self.frame_memory, &self.upload_memory];
         let more = [&self.parse_slots, &self.queued_frames, &self.coding, &self.download_memory, &self.spool_space];
-        budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).collect()
+        // What passes through without a token is nobody's.
+        budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).filter(|name| !name.is_empty()).collect()
     }
 
     /// Shared resources that a tenant uses.

@@ -1,5 +1,6 @@
 //! Requests that another process answers.
 
+use crate::admission::{Budget, Exhausted, Permit};
 use crate::http::until;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
@@ -7,6 +8,7 @@ use axum::body::Body;
 use axum::extract::Request;
 use axum::response::Response;
 use cager_store::Membership;
+use futures_util::future::{BoxFuture, FutureExt, Shared};
 use futures_util::stream;
 use http::header::{
     CONNECTION, CONTENT_LENGTH, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER,
@@ -28,6 +30,10 @@ const MOST_HOPS: u32 = 3;
 const CONNECT: Duration = Duration::from_secs(2);
 /// How long a request may go on elsewhere, once this process has given up its shards.
 const AFTER_END: Duration = Duration::from_secs(2);
+/// Memory of a response that passes through and that nobody reads: the connections' buffers on both sides.
+const PASSING_BYTES: u64 = 512 << 10;
+/// Smaller responses are in the connection's buffers at once.
+const SMALL_BYTES: u64 = 16 << 10;
 /// Headers of one connection.
 const OF_CONNECTION: [HeaderName; 8] = [
     CONNECTION,
@@ -46,30 +52,51 @@ pub(super) enum Sent {
     Answered(Response),
     /// The other process has taken nothing of it.
     NotTaken(Request),
-    /// It has taken it, and is gone.
-    Lost(ApiError),
+    /// There is no response, and why: `lost` where the other process has taken it and is gone.
+    Refused(ApiError, &'static str),
 }
 
-/// For how long a request may go on elsewhere.
+/// A moment after this process has given up all it had.
+pub(super) type GivenUp = Shared<BoxFuture<'static, ()>>;
+
+/// What is asked until then is still answered; a request that is sent again has no more time.
+pub(super) fn given_up(ended: CancellationToken) -> GivenUp {
+    let moment = async move {
+        ended.cancelled().await;
+        sleep(AFTER_END).await;
+    };
+    moment.boxed().shared()
+}
+
+/// For how long a request may go on elsewhere, and what its response may take here.
 pub(super) struct Going {
     /// Who lives.
     pub(super) seen: watch::Receiver<Membership>,
     /// This process ends.
-    pub(super) ended: CancellationToken,
+    pub(super) given_up: GivenUp,
+    /// Memory of responses, and whose this one is.
+    pub(super) room: (Arc<Budget>, String),
 }
 
 impl Going {
-    /// Ends when the process at `address` has ended, or a moment after this one has given up all it had: what is asked in between is still answered.
-    async fn over(mut self, address: String) {
+    /// Ends when the process at `address` has ended, or this one has given up all it had.
+    async fn over(mut seen: watch::Receiver<Membership>, given_up: GivenUp, address: String) {
         let is_gone = |seen: &Membership| !seen.processes.values().any(|known| *known == address);
         tokio::select! {
             // An error means that this process ends.
-            _ = self.seen.wait_for(is_gone) => {}
-            () = async {
-                self.ended.cancelled().await;
-                sleep(AFTER_END).await;
-            } => {}
+            _ = seen.wait_for(is_gone) => {}
+            () = given_up => {}
         }
+    }
+
+    /// Memory for a response: the process that works has none of it any more where it was sent.
+    fn room_for(&self, body: &impl http_body::Body) -> Result<Option<Permit>, Exhausted> {
+        let bytes = body.size_hint().exact().unwrap_or(PASSING_BYTES).min(PASSING_BYTES);
+        if bytes <= SMALL_BYTES {
+            return Ok(None);
+        }
+        let (memory, tenant) = &self.room;
+        memory.try_take(tenant, bytes).map(Some)
     }
 }
 
@@ -103,7 +130,7 @@ impl Forwarder {
         let hops = parts.headers.get(HOPS).and_then(|hops| hops.to_str().ok()?.parse().ok()).unwrap_or(0u32);
         if hops >= MOST_HOPS {
             let detail = "the sessions of this tenant are moving between processes; try again";
-            return Sent::Lost(ApiError::new(problem::BUSY, detail).retry_after(1));
+            return Sent::Refused(ApiError::new(problem::BUSY, detail).retry_after(1), "no_holder");
         }
         let path = parts.uri.path_and_query().map_or("/", |path| path.as_str());
         let mut headers = end_to_end(&parts.headers);
@@ -120,7 +147,7 @@ impl Forwarder {
         if has_body {
             sent = sent.body(reqwest::Body::wrap_stream(taken_when_read(Arc::clone(&body))));
         }
-        let mut over = Box::pin(going.over(address.to_owned()));
+        let mut over = Box::pin(Going::over(going.seen.clone(), going.given_up.clone(), address.to_owned()));
         let answered = tokio::select! {
             answered = sent.send() => answered,
             () = &mut over => return unanswered(parts, &body, has_body, "one of the two has ended"),
@@ -130,7 +157,10 @@ impl Forwarder {
                 metrics::counter!("cager_forwarded_total").increment(1);
                 let (mut head, body) = http::Response::<reqwest::Body>::from(response).into_parts();
                 head.headers = end_to_end(&head.headers);
-                Sent::Answered(Response::from_parts(head, until(Body::new(body), over, ())))
+                match going.room_for(&body) {
+                    Ok(room) => Sent::Answered(Response::from_parts(head, until(Body::new(body), over, room))),
+                    Err(full) => Sent::Refused(full.refusal("memory for downloads"), "download_memory"),
+                }
             }
             Err(error) => {
                 tracing::warn!(address, %error, "another process does not answer");
@@ -145,7 +175,7 @@ impl Forwarder {
 fn unanswered(parts: http::request::Parts, body: &Mutex<Option<Body>>, seen_by_body: bool, why: &str) -> Sent {
     match lock(body).take() {
         Some(body) if seen_by_body || parts.method.is_safe() => Sent::NotTaken(Request::from_parts(parts, body)),
-        _ => Sent::Lost(ended(why)),
+        _ => Sent::Refused(ended(why), "lost"),
     }
 }
 

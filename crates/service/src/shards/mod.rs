@@ -22,7 +22,7 @@ use axum::Router;
 use axum::extract::Request;
 use axum::response::{IntoResponse, Response};
 use cager_store::{Members, Membership};
-use forward::{Forwarder, Going, Sent};
+use forward::{Forwarder, Going, Sent, given_up};
 use http::request::Parts;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex};
@@ -83,6 +83,16 @@ enum Asked {
     Any,
 }
 
+impl Asked {
+    /// Whose limits its response counts for.
+    fn tenant(&self) -> &str {
+        match self {
+            Self::Shard(_, tenant) => tenant,
+            Self::Any => "",
+        }
+    }
+}
+
 impl Shards {
     /// The services of this process.
     pub(crate) fn services(&self) -> Vec<Arc<Service>> {
@@ -110,6 +120,7 @@ impl Shards {
         let mut request = Request::from_parts(parts, body);
         let mut news = self.seen.subscribe();
         let deadline = Instant::now() + PATIENCE;
+        let given_up = given_up(self.ended.clone());
         // What waits counts as a request of its tenant, as what is at work does.
         let mut place = None;
         loop {
@@ -121,14 +132,15 @@ impl Shards {
                 return answered.into_response().map(|body| until(body, cut, here.token));
             }
             if let Some(address) = self.elsewhere(&asked) {
-                let going = Going { seen: self.seen.subscribe(), ended: self.ended.clone() };
+                let room = (Arc::clone(&self.resources.download_memory), asked.tenant().to_owned());
+                let going = Going { seen: self.seen.subscribe(), given_up: given_up.clone(), room };
                 match self.forwarder.send(request, &address, going).await {
                     Sent::Answered(response) => return response,
-                    Sent::Lost(error) => return self.refuse(error, &path, "lost"),
+                    Sent::Refused(error, reason) => return self.refuse(error, &path, reason),
                     Sent::NotTaken(again) => request = again,
                 }
             }
-            if self.stop.is_cancelled() && self.is_alone() {
+            if self.stop.is_cancelled() && (self.is_alone() || given_up.peek().is_some()) {
                 let stopping = ApiError::new(problem::STOPPING, "the service is stopping").retry_after(5);
                 return self.refuse(stopping, &path, "stopping");
             }
