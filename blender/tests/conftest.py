@@ -1,6 +1,7 @@
 """Blender as a Python module with the extension installed from its zip, CAGER_EXTENSION, and captures to try it on."""
 
 import os
+import sys
 import tempfile
 from types import SimpleNamespace
 
@@ -18,6 +19,19 @@ MODULE = "bl_ext.user_default.cager"
 def pytest_configure(config):
     config.addinivalue_line("filterwarnings", "ignore::DeprecationWarning")
     bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+
+
+def pytest_sessionfinish(session, exitstatus):
+    session.config.exit_status = int(exitstatus)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    # As a module, Blender 4.2 frees the panels of extensions after Python has ended, and crashes.
+    if bpy.app.version < (4, 5):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(config.exit_status)
 
 
 @pytest.fixture

@@ -75,16 +75,16 @@ short! {
     usdz "usdz" 30_000;
     usda "usda" 20_000;
     glb_frames "glb-frames" 20_000;
-    npz "npz" 6_000;
+    npz "npz" 3_000;
     container "container" 30_000;
     record "record" 360_000;
     frames "frames" 240_000;
-    new_session "new-session" 24_000;
-    new_cage "new-cage" 12_000;
-    range "range" 120_000;
+    new_session "new-session" 12_000;
+    new_cage "new-cage" 6_000;
+    range "range" 60_000;
     tokens "tokens" 30_000;
     config "config" 30_000;
-    log "log" 30_000;
-    solver "solver" 30_000;
-    small_files "small-files" 30_000;
+    log "log" 3_000;
+    solver "solver" 15_000;
+    small_files "small-files" 6_000;
 }

@@ -8,7 +8,7 @@ async def call(start):
     ended = loop.create_future()
 
     def end(finish):
-        if not ended.done():
+        if ended and not ended.done():
             ended.set_result(finish)
 
     stop = start(loop.call_soon_threadsafe, end)
@@ -17,5 +17,7 @@ async def call(start):
     except asyncio.CancelledError:
         stop()
         await asyncio.wait([ended], timeout=10)
+        # Its result goes now, not with what keeps this exception.
+        ended = None
         raise
     return finish()

@@ -4,21 +4,24 @@ use crate::call::{Call, awaitable};
 use crate::fault::Fault;
 use crate::geometry::array;
 use cager_client::{CageFrame, ClientError};
-use futures_util::StreamExt as _;
-use futures_util::stream::BoxStream;
+use futures_util::stream::{BoxStream, Peekable};
+use futures_util::{FutureExt as _, StreamExt as _};
 use pyo3::IntoPyObjectExt as _;
 use pyo3::exceptions::PyStopAsyncIteration;
 use pyo3::prelude::*;
+use std::pin::Pin;
 use std::sync::Arc;
 use tokio::sync::Mutex;
 
+type Solved = Result<CageFrame, ClientError>;
+
 /// Cages that come as they are solved, with the numbers of their frames.
 #[pyclass(frozen, module = "cager")]
-pub(crate) struct Cages(Arc<Mutex<BoxStream<'static, Result<CageFrame, ClientError>>>>);
+pub(crate) struct Cages(Arc<Mutex<Peekable<BoxStream<'static, Solved>>>>);
 
 impl Cages {
-    pub(crate) fn new(stream: BoxStream<'static, Result<CageFrame, ClientError>>) -> Self {
-        Self(Arc::new(Mutex::new(stream)))
+    pub(crate) fn new(stream: BoxStream<'static, Solved>) -> Self {
+        Self(Arc::new(Mutex::new(stream.peekable())))
     }
 }
 
@@ -31,9 +34,16 @@ impl Cages {
     fn __anext__<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Fault> {
         let stream = Arc::clone(&self.0);
         awaitable(py, async move |Call { mut stop, .. }: Call| {
-            // The stream goes on where it was when a call is cancelled.
-            let next = stop.or(async { Ok(stream.lock().await.next().await.transpose()?) }).await?;
+            // Taken when it is given to Python only, so that a call that is cancelled leaves it to the next one.
+            let mut stream = stop
+                .or(async {
+                    let mut stream = stream.lock_owned().await;
+                    Pin::new(&mut *stream).peek().await;
+                    Ok(stream)
+                })
+                .await?;
             Ok(move |py: Python<'_>| {
+                let next = stream.next().now_or_never().flatten().transpose()?;
                 let cage = next.ok_or_else(|| PyStopAsyncIteration::new_err(()))?;
                 Ok((cage.frame, array(py, cage.values)?).into_py_any(py)?)
             })

@@ -149,6 +149,23 @@ def test_what_the_callback_raises_is_passed_on_and_leaves_nothing(client, single
     assert asyncio.run(client.sessions()) == []
 
 
+async def interrupted(cages):
+    """The frames of cages, where two of three calls are cancelled at one moment or another."""
+    frames, calls = [], 0
+    while True:
+        call = asyncio.ensure_future(cages.__anext__())
+        await asyncio.sleep(0.0002 * (calls % 7))
+        calls += 1
+        if calls % 3:
+            call.cancel()
+        try:
+            frames.append((await call)[0])
+        except asyncio.CancelledError:
+            continue
+        except StopAsyncIteration:
+            return frames
+
+
 def test_a_kept_session_is_listed_followed_downloaded_and_deleted(client, single, tmp_path):
     async def kept():
         capture = await encoding(client, single, name="walk", keep=True)
@@ -158,6 +175,7 @@ def test_a_kept_session_is_listed_followed_downloaded_and_deleted(client, single
         cages = [(frame, cage) async for frame, cage in client.follow(session["id"], first=4)]
         assert [frame for frame, _ in cages] == [4, 5, 6, 7, 8, 9]
         assert np.array_equal(np.stack([cage for _, cage in cages]), capture.cages[4:])
+        assert await interrupted(client.follow(session["id"], first=4)) == [4, 5, 6, 7, 8, 9]
         path = tmp_path / "walk.cager"
         await client.download(session["id"], path)
         assert path.read_bytes() == contents(capture, tmp_path / "other.cager")

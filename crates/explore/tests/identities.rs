@@ -118,21 +118,19 @@ fn turning_source_and_target_together_turns_the_result() {
         let [one, two] = [plain, other].map(|transfer| transfer.report().registration.score);
         assert!((one - two).abs() < 1e-6, "{name}: {one} {two}");
     };
-    for pose in [Pose::Relative, Pose::Absolute] {
+    for (pose, faces) in [(Pose::Relative, true), (Pose::Absolute, false)] {
         let options = FittedOptions { pose, ..FittedOptions::default() };
         let on_mesh =
             |source: &Caged, target: &TriMesh| FittedTransfer::new(&source.source(), target, &options).unwrap();
         check(&format!("{pose:?}"), &on_mesh(&source, &target), &on_mesh(&turned_source, &turned(&target)));
-        for faces in [true, false] {
-            let in_cage = |source: &Caged, around: &Caged| {
-                let model = model_of(&around.rest);
-                let model = if faces { model } else { Model { points: model.points, ..Model::default() } };
-                let body = CagedTarget { model: &model, cage: &around.cage, phi: around.phi.as_ref() };
-                FittedTransfer::through_cage(&source.source(), &body, &options).unwrap()
-            };
-            let name = format!("{pose:?}, through a cage, with faces: {faces}");
-            check(&name, &in_cage(&source, &around), &in_cage(&turned_source, &turned_around));
-        }
+        let in_cage = |source: &Caged, around: &Caged| {
+            let model = model_of(&around.rest);
+            let model = if faces { model } else { Model { points: model.points, ..Model::default() } };
+            let body = CagedTarget { model: &model, cage: &around.cage, phi: around.phi.as_ref() };
+            FittedTransfer::through_cage(&source.source(), &body, &options).unwrap()
+        };
+        let name = format!("{pose:?}, through a cage, with faces: {faces}");
+        check(&name, &in_cage(&source, &around), &in_cage(&turned_source, &turned_around));
     }
 }
 
