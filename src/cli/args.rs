@@ -285,7 +285,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: PathBuf,
 
-    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd, .abc, .usdc or animated .glb.
+    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd, .mcx, .abc, .usdc or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 

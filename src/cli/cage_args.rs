@@ -20,7 +20,7 @@ pub(crate) struct CageArgs {
     #[arg(long, value_name = "REST", required = true)]
     pub(crate) rest: Vec<PathBuf>,
 
-    /// Capture to design the cage from, as for encode: a folder or quoted glob of mesh files, .npy, .pc2, .mdd, .abc, .usdc or animated .glb.
+    /// Capture to design the cage from, as for encode: a folder or quoted glob of mesh files, .npy, .pc2, .mdd, .mcx, .abc, .usdc or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: Option<PathBuf>,
 

@@ -47,7 +47,7 @@ pub(crate) struct ExploreArgs {
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = weight)]
     weights: Option<Vec<f64>>,
 
-    /// Where to write: .npy .pc2 .mdd .abc .usdc .glb, a folder (OUT/) of .obj files, or for one shape .obj .ply .off .stl.
+    /// Where to write: .npy .pc2 .mdd .mcx .abc .usdc .glb, a folder (OUT/) of .obj files, or for one shape .obj .ply .off .stl.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
 

@@ -14,7 +14,7 @@ pub(crate) struct TransferArgs {
     pub(crate) cages: bool,
 
     /// Move the model by these cages instead: those of --cages, edited; folder, quoted glob or numbered name of mesh files, .npy,
-    /// .pc2, .mdd, .abc or .usdc, of any number of frames.
+    /// .pc2, .mdd, .mcx, .abc or .usdc, of any number of frames.
     #[arg(long, value_name = "EDITED")]
     pub(crate) with_cages: Option<PathBuf>,
 
@@ -63,7 +63,7 @@ pub(crate) struct EditArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Edited cages: folder, quoted glob or numbered name of mesh files, .npy, .pc2, .mdd, .abc or .usdc, of any number of frames.
+    /// Edited cages: folder, quoted glob or numbered name of mesh files, .npy, .pc2, .mdd, .mcx, .abc or .usdc, of any number of frames.
     #[arg(long, value_name = "EDITED")]
     pub(crate) with_cages: PathBuf,
 

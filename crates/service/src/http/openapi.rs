@@ -81,7 +81,7 @@ pub(crate) struct NewTransferForm {
     /// Source in its rest pose, with faces, a file whose name ends in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = String, format = Binary, required = false)]
     source_rest: Vec<u8>,
-    /// Its frames, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd, .abc or .usdc (one mesh); else raw little-endian f32,
+    /// Its frames, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd, .mcx, .abc or .usdc (one mesh); else raw little-endian f32,
     /// frame after frame, whose number `options.frames` says.
     #[schema(value_type = String, format = Binary, required = false)]
     source_frames: Vec<u8>,
@@ -128,7 +128,7 @@ pub(crate) struct NewCageForm {
     /// Model in its rest pose, a file whose name ends in .obj, .ply, .off, .stl, .glb, .abc or .usdc.
     #[schema(value_type = String, format = Binary)]
     rest: Vec<u8>,
-    /// Frames of its motion, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd, .abc or .usdc (one mesh); else
+    /// Frames of its motion, points in the order of the rest pose: a file whose name ends in .npy (frames × points × 3), .pc2, .mdd, .mcx, .abc or .usdc (one mesh); else
     /// raw little-endian f32, frame after frame, whose number `options.frames` says.
     #[schema(value_type = String, format = Binary)]
     frames: Vec<u8>,
