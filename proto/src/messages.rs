@@ -364,6 +364,15 @@ pub struct SentFrame {
     pub blake3: String,
 }
 
+/// Gives a session another name.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Rename {
+    /// Its name from now on, at most 200 characters; empty for none.
+    pub name: String,
+}
+
 /// Says that no more frames are coming.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

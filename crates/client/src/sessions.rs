@@ -3,7 +3,7 @@
 use crate::body::json;
 use crate::client::Client;
 use crate::error::{ClientError, Failure};
-use cager_proto::messages::{Complete, Problem, Session, SessionList, SessionState};
+use cager_proto::messages::{Complete, Problem, Rename, Session, SessionList, SessionState};
 use reqwest::Method;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -81,6 +81,19 @@ impl Client {
             tokio::time::sleep(pause.min(limit - waited)).await;
             pause = pause.mul_f64(1.25).min(MAX_PAUSE);
         }
+    }
+
+    /// Gives a session another name; an empty one is none.
+    ///
+    /// # Errors
+    /// [`ClientError::Refused`] with status 404 for an unknown id and 422 for a name that is too long, and those of the connection.
+    pub async fn rename(&self, id: &str, name: &str) -> Result<Session, ClientError> {
+        let rename = Rename { name: name.to_owned() };
+        self.retrying(|| async {
+            let request = self.request(Method::PATCH, &["v1", "sessions", id], &[]).await?;
+            json(self, self.send(request.json(&rename)).await?).await
+        })
+        .await
     }
 
     /// Declares that the capture has `frames` frames, which completes the session and writes its container.

@@ -80,7 +80,7 @@ pub struct NewRecord<'a> {
     pub created_ms: u64,
     /// [`Phase::Creating`], [`Phase::Importing`] or [`Phase::Open`].
     pub phase: Phase,
-    /// Its description, which never changes.
+    /// Its description.
     pub meta: &'a [u8],
 }
 
@@ -120,6 +120,8 @@ pub struct Record {
 pub enum Change {
     /// How far its life has come.
     Phase(Phase),
+    /// Its description.
+    Meta(Vec<u8>),
     /// How its preparation or its work ended.
     Outcome(Vec<u8>),
     /// With what a session was completed.

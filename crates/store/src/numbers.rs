@@ -34,6 +34,7 @@ pub(crate) fn phase(number: u8) -> Option<Phase> {
 pub(crate) fn column(change: &Change) -> &'static str {
     match change {
         Change::Phase(_) => "phase",
+        Change::Meta(_) => "meta",
         Change::Outcome(_) => "outcome",
         Change::Completion(_) => "completion",
         Change::Announcement(_) => "announcement",

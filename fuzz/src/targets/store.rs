@@ -87,6 +87,7 @@ fn meta() -> SessionMeta {
     let idempotency = Some(cager_service::store::Idempotency { key: "k".into(), fingerprint: "f".into() });
     SessionMeta {
         made_cage: None,
+        renamed: None,
         id: ID.into(),
         tenant: "t".into(),
         created_ms: 1,

@@ -102,7 +102,7 @@ pub(crate) async fn get(
     if is_known(&headers, &format!("\"{etag}\"")) {
         return Ok((StatusCode::NOT_MODIFIED, [(ETAG, format!("\"{etag}\""))]).into_response());
     }
-    let name = file_name(session.meta.options.name.as_deref(), format.extension());
+    let name = file_name(session.name().as_deref(), format.extension());
     let (file, length, space) = made(&service, &session, &tenant.name, &completion, (format, &name)).await?;
     let read = move |range: Range<u64>| {
         // Its disk space is held while it is sent.

@@ -90,7 +90,7 @@ pub(super) fn cors(config: &ServeConfig) -> Option<CorsLayer> {
         name("cager-rows"),
         name("x-request-id"),
     ];
-    let methods = [Method::GET, Method::HEAD, Method::POST, Method::DELETE];
+    let methods = [Method::GET, Method::HEAD, Method::POST, Method::PATCH, Method::DELETE];
     let layer = CorsLayer::new().allow_methods(methods).allow_headers(asked).expose_headers(shown);
     (!origins.is_empty()).then(|| layer.allow_origin(origins).max_age(Duration::from_secs(3600)))
 }

@@ -34,7 +34,7 @@ use utoipa_axum::routes;
 fn quick() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::new()
         .routes(routes!(sessions::list))
-        .routes(routes!(sessions::get, sessions::delete))
+        .routes(routes!(sessions::get, sessions::rename, sessions::delete))
         .routes(routes!(coordinates::handles))
         .routes(routes!(coordinates::get))
         .routes(routes!(cage::get))

@@ -13,7 +13,7 @@ use crate::session::create::NewSession;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
-use cager_proto::messages::{Complete, Session, SessionList, SessionState};
+use cager_proto::messages::{Complete, Rename, Session, SessionList, SessionState};
 use http::{StatusCode, header};
 use serde::Deserialize;
 use std::sync::Arc;
@@ -103,6 +103,16 @@ pub(crate) async fn list(
 #[utoipa::path(get, path = "/v1/sessions/{id}", operation_id = "get_session", tag = "sessions", params(openapi::Id), responses((status = 200, description = "The session", body = Session)))]
 pub(crate) async fn get(RequestedSession { session, .. }: RequestedSession) -> Json<Session> {
     Json(session.view())
+}
+
+/// Gives a session another name. Its files stay as they are.
+#[utoipa::path(patch, path = "/v1/sessions/{id}", operation_id = "rename_session", tag = "sessions", params(openapi::Id), request_body = Rename, responses((status = 200, description = "The session", body = Session)))]
+pub(crate) async fn rename(
+    RequestedSession { session, .. }: RequestedSession,
+    Body(rename): Body<Rename>,
+) -> JsonResult<Session> {
+    session.rename(rename.name).await?;
+    Ok(Json(session.view()))
 }
 
 /// Deletes a session with all that belongs to it; what runs for it stops.

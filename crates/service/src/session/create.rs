@@ -105,6 +105,7 @@ impl Service {
             key,
             solver_version: cager_core::SOLVER_VERSION,
             options,
+            renamed: None,
             made_cage,
             idempotency,
         };

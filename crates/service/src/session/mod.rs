@@ -12,6 +12,7 @@ pub(crate) mod groups;
 mod idle;
 mod last_groups;
 pub(crate) mod registry;
+mod rename;
 mod resume;
 pub(crate) mod retention;
 pub(crate) mod solve;
@@ -43,6 +44,10 @@ use upload::FrameJob;
 /// A session in memory.
 pub(crate) struct Session {
     pub(crate) meta: SessionMeta,
+    /// What it is called.
+    name: Mutex<Option<String>>,
+    /// Taken while it is given another name.
+    renaming: Mutex<()>,
     store: Store,
     committer: Committer,
     webhooks: Arc<Webhooks>,
@@ -129,6 +134,8 @@ impl Session {
         }
         let goal = ValidOptions::of(&meta.options).ok().and_then(|valid| valid.goal);
         Self {
+            name: Mutex::new(rename::name_of(&meta)),
+            renaming: Mutex::default(),
             meta,
             store: service.store.clone(),
             committer: service.committer.clone(),

@@ -51,7 +51,7 @@ impl Session {
         };
         View {
             id: self.meta.id.clone(),
-            name: options.name.clone(),
+            name: self.name(),
             state: state_of(&status.phase),
             created: self.meta.created_ms as f64 / 1e3,
             points: facts.map(|f| f.points),

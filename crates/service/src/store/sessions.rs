@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
-/// Metadata of a session, fixed at its creation.
+/// Metadata of a session, fixed at its creation but for its name.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct SessionMeta {
     /// Its id; also the name of its folder.
@@ -25,6 +25,9 @@ pub struct SessionMeta {
     pub solver_version: u32,
     /// Options as requested.
     pub options: SessionOptions,
+    /// The name that it was given later.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub renamed: Option<String>,
     /// Digest of the inputs from which its cage was made, if the service made it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub made_cage: Option<ContentKey>,
@@ -100,6 +103,14 @@ impl Store {
     /// [`StoreError::Io`] with `AlreadyExists` where the id is taken.
     pub fn create_session(&self, meta: &SessionMeta) -> Result<(), StoreError> {
         self.create(meta, Vec::new(), |_| Ok(()))
+    }
+
+    /// Changes the metadata of a session; durable on `Ok`.
+    ///
+    /// # Errors
+    /// Not found where it was deleted.
+    pub fn change_session(&self, meta: &SessionMeta) -> Result<(), StoreError> {
+        self.change(key(&meta.id), &[Change::Meta(self.sealed(SessionMeta::KIND.name(), meta)?)])
     }
 
     /// Atomically writes the session's container, replacing an existing one; durable on `Ok`. A [`StoreError`] inside the [`io::Error`]

@@ -64,7 +64,9 @@ pub(super) fn columns(changes: &[Change]) -> BTreeMap<&'static str, Box<dyn ToSq
 fn value(change: &Change) -> Box<dyn ToSql + Sync + '_> {
     match change {
         Change::Phase(to) => Box::new(i16::from(numbers::phase_number(*to))),
-        Change::Outcome(bytes) | Change::Completion(bytes) | Change::Announcement(bytes) => Box::new(&bytes[..]),
+        Change::Meta(bytes) | Change::Outcome(bytes) | Change::Completion(bytes) | Change::Announcement(bytes) => {
+            Box::new(&bytes[..])
+        }
         Change::Damage(what) => Box::new(&what[..]),
         Change::Attempts(count) | Change::Declared(count) | Change::Reached(count) => Box::new(i64::from(*count)),
     }

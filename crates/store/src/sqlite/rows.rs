@@ -41,7 +41,7 @@ pub(super) fn change(connection: &Connection, number: i64, change: &Change) -> R
             phase = numbers::phase_number(*to);
             &phase
         }
-        Change::Outcome(bytes) | Change::Completion(bytes) | Change::Announcement(bytes) => bytes,
+        Change::Meta(bytes) | Change::Outcome(bytes) | Change::Completion(bytes) | Change::Announcement(bytes) => bytes,
         Change::Damage(what) => what,
         Change::Attempts(count) | Change::Declared(count) | Change::Reached(count) => count,
     };

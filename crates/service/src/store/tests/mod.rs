@@ -57,6 +57,7 @@ pub(crate) fn meta(id: &str) -> SessionMeta {
         key: KEY,
         options: SessionOptions { lambda: Some(0.1 + 0.2), name: Some("Ärmel".into()), ..SessionOptions::default() },
         solver_version: cager_core::SOLVER_VERSION,
+        renamed: None,
         made_cage: None,
         idempotency: Some(Idempotency { key: "k".into(), fingerprint: "f".into() }),
     }

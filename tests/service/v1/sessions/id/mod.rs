@@ -9,4 +9,5 @@ mod events;
 mod export;
 mod frames;
 mod handles;
+mod rename;
 mod sent;
