@@ -8,9 +8,7 @@ export function adjacency(faces: Polygons, points: number): ByVertex {
     starts[a + 1]++;
     starts[b + 1]++;
   });
-  for (let v = 0; v < points; v++) {
-    starts[v + 1] += starts[v];
-  }
+  for (let v = 0; v < points; v++) starts[v + 1] += starts[v];
   const ends = starts.slice();
   const items = new Uint32Array(starts[points]);
   forEachEdge(faces, (a, b) => {
@@ -43,9 +41,7 @@ function forEachEdge({ counts, corners }: Polygons, call: (a: number, b: number)
     let a = corners[first + count - 1];
     for (let k = first; k < first + count; k++) {
       const b = corners[k];
-      if (a !== b) {
-        call(a, b);
-      }
+      if (a !== b) call(a, b);
       a = b;
     }
     first += count;

@@ -16,9 +16,7 @@ it('a long list does what a short one does', () => {
     } else {
       const at = plain.lastIndexOf(end);
       expect(edges.remove(end)).toBe(at >= 0);
-      if (at >= 0) {
-        plain.splice(at, 1);
-      }
+      if (at >= 0) plain.splice(at, 1);
     }
     longest = Math.max(longest, plain.length);
     expect(edges.newest()).toEqual(plain.slice(-16));

@@ -15,9 +15,7 @@ export function polygonsOf(triangles: Uint32Array): Polygons {
 /** Fans of triangles around each face's first corner, three indices each. */
 export function triangulated({ counts, corners }: Polygons): Uint32Array {
   let total = 0;
-  for (let face = 0; face < counts.length; face++) {
-    total += Math.max(counts[face] - 2, 0);
-  }
+  for (let face = 0; face < counts.length; face++) total += Math.max(counts[face] - 2, 0);
   const triangles = new Uint32Array(3 * total);
   let out = 0;
   let first = 0;

@@ -73,9 +73,7 @@ describe.each(['coded-mvc', 'definition3-mvc'])('the file %s', (name) => {
     for (let turn = 0; turn < 150; turn++) {
       const parts = takeApart(intact);
       const { payload } = parts[random(parts.length)];
-      for (let k = random(4); k >= 0; k--) {
-        payload[random(payload.length)] = random(2) === 0 ? 0xff : random(256);
-      }
+      for (let k = random(4); k >= 0; k--) payload[random(payload.length)] = random(2) === 0 ? 0xff : random(256);
       const bytes = putTogether(parts);
       expect((await complaint(bytes)) ?? 'Fine.', `turn ${turn}`).toMatch(SENTENCES);
       expect((await streamComplaint(bytes)) ?? 'Fine.', `turn ${turn}`).toMatch(SENTENCES);

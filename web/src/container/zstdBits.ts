@@ -5,9 +5,7 @@ export class BackwardBits {
 
   constructor(private readonly bytes: Uint8Array) {
     const last = bytes.length > 0 ? bytes[bytes.length - 1] : 0;
-    if (last === 0) {
-      throw new Error('its bits have no beginning');
-    }
+    if (last === 0) throw new Error('its bits have no beginning');
     this.left = 8 * (bytes.length - 1) + 31 - Math.clz32(last);
   }
 
@@ -17,9 +15,7 @@ export class BackwardBits {
     this.left -= count;
     const left = this.left;
     const mask = (1 << count) - 1;
-    if (left < 0) {
-      return left + count > 0 ? ((bytes[0] | (bytes[1] << 8) | (bytes[2] << 16)) << -left) & mask : 0;
-    }
+    if (left < 0) return left + count > 0 ? ((bytes[0] | (bytes[1] << 8) | (bytes[2] << 16)) << -left) & mask : 0;
     const at = left >> 3;
     const word = bytes[at] | (bytes[at + 1] << 8) | (bytes[at + 2] << 16) | (bytes[at + 3] << 24);
     return (word >>> (left & 7)) & mask;

@@ -28,9 +28,7 @@ export function stateTable(counts: readonly number[], log: number): StateTable {
   const next = counts.map((count) => Math.abs(count));
   let end = size;
   counts.forEach((count, symbol) => {
-    if (count < 0) {
-      symbols[--end] = symbol;
-    }
+    if (count < 0) symbols[--end] = symbol;
   });
   const step = (size >> 1) + (size >> 3) + 3;
   let at = 0;
@@ -70,9 +68,7 @@ export function readStateTable(bytes: Uint8Array, mostLog: number, mostSymbols: 
     return value;
   };
   const log = read(4) + 5;
-  if (log > mostLog) {
-    throw new Error('a table is too large');
-  }
+  if (log > mostLog) throw new Error('a table is too large');
   const counts: number[] = [];
   let left = 1 << log;
   while (left > 0 && counts.length < mostSymbols) {
@@ -85,24 +81,18 @@ export function readStateTable(bytes: Uint8Array, mostLog: number, mostSymbols: 
       position += width - 1;
     } else {
       value = read(width);
-      if (value >= half) {
-        value -= short;
-      }
+      if (value >= half) value -= short;
     }
     const count = value - 1;
     counts.push(count);
     left -= Math.abs(count);
     for (let more = count === 0 ? 3 : 0; more === 3;) {
       more = read(2);
-      for (let k = 0; k < more && counts.length < mostSymbols; k++) {
-        counts.push(0);
-      }
+      for (let k = 0; k < more && counts.length < mostSymbols; k++) counts.push(0);
     }
   }
   const used = (position + 7) >> 3;
-  if (left !== 0 || used > bytes.length) {
-    throw new Error('a table is impossible');
-  }
+  if (left !== 0 || used > bytes.length) throw new Error('a table is impossible');
   return [stateTable(counts, log), used];
 }
 
@@ -110,9 +100,7 @@ export function readStateTable(bytes: Uint8Array, mostLog: number, mostSymbols: 
 export function readHuffmanTable(bytes: Uint8Array): [HuffmanTable, number] {
   const size = bytes[0];
   const used = 1 + (size < 128 ? size : (size - 126) >> 1);
-  if (!(used <= bytes.length)) {
-    throw new Error('it is cut');
-  }
+  if (!(used <= bytes.length)) throw new Error('it is cut');
   const described = bytes.subarray(1, used);
   const weights =
     size < 128
@@ -121,9 +109,7 @@ export function readHuffmanTable(bytes: Uint8Array): [HuffmanTable, number] {
   const sum = weights.reduce((total, weight) => total + ((1 << weight) >> 1), 0);
   const log = 32 - Math.clz32(sum);
   const rest = (1 << log) - sum;
-  if (sum === 0 || log > LONGEST_CODE || (rest & (rest - 1)) !== 0) {
-    throw new Error('its codes are impossible');
-  }
+  if (sum === 0 || log > LONGEST_CODE || (rest & (rest - 1)) !== 0) throw new Error('its codes are impossible');
   // The last weight is what makes the codes complete.
   weights.push(32 - Math.clz32(rest));
   const symbols = new Uint8Array(1 << log);
@@ -170,7 +156,5 @@ export function decodeHuffman(stream: Uint8Array, { log, symbols, bits }: Huffma
     const length = bits[state];
     state = ((state << length) | source.read(length)) & mask;
   }
-  if (source.left !== -log) {
-    throw new Error('its codes do not end where they should');
-  }
+  if (source.left !== -log) throw new Error('its codes do not end where they should');
 }

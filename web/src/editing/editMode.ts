@@ -33,7 +33,6 @@ export class EditMode {
     this.keeper = new EditKeeper(player, () => this.host.requestUpdate());
   }
 
-  /** Part of a narrow picture's height that the panel takes, as its style says. */
   get panelShare(): number {
     return this.isOn ? 0.38 : 0;
   }
@@ -106,7 +105,6 @@ export class EditMode {
     ></cager-edit-panel>`;
   }
 
-  /** Hands a key press to the editor; whether it was for it. */
   pressKey(event: KeyboardEvent): boolean {
     return this.isOn && (this.editor?.pressKey(event) ?? false);
   }

@@ -1,9 +1,8 @@
 import { html, nothing } from 'lit';
 import type { CageEdit, FrameRange } from './cageEdit';
-import { glyphs } from '../style/glyphs';
+import { iconButton } from '../style/parts';
 import type { CageEditor } from './editor';
-import { angleOf, type Motion } from './motion';
-import { degrees, timesAs } from './text';
+import { angleOf, type Motion, degrees, timesAs } from './motion';
 
 /** An edit in the list: whether it counts, its vertices and frames; of the one that is worked on, fields for its range. */
 export function editRow(editor: CageEditor, edit: CageEdit) {
@@ -25,9 +24,7 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
         <span>${name}<span class="muted">${amountOf(motion)}</span></span>
         <span class="muted figures">${range.first === range.last ? range.first : `${range.first}–${range.last}`}</span>
       </button>
-      <button class="quiet icon" aria-label=${`Remove edit of ${name}`} title="Remove" @click=${() => model.remove(id)}>
-        ${glyphs.trash}
-      </button>
+      ${iconButton('trash', `Remove edit of ${name}`, () => model.remove(id), 'Remove')}
     </div>
     ${isActive ? rangeFields(editor, edit) : nothing}
   </li>`;

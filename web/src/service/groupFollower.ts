@@ -62,7 +62,6 @@ export class GroupFollower {
     this.connection?.stop.abort();
   }
 
-  /** Reads a connection until it ends, whyever. */
   private async receive(connection: ContainerConnection) {
     const { stream, pieces } = connection;
     this.connection = connection;

@@ -2,9 +2,10 @@ import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
 import type { Figures } from '../sessions/figures';
 import { count, counted, percent, perSecond, ratio as times, size, span } from '../text';
-import { errorChart } from './errorChart';
 import { sampledFrames } from './motionCage';
-import type { Stage, UploadJob } from './uploadJob';
+import type { Stage, UploadJob, Measured } from './uploadJob';
+import { axisOf } from '../charts/axis';
+import { plot, thinned, type Series } from '../charts/plot';
 
 export interface JobActions {
   readonly stop: () => void;
@@ -33,7 +34,6 @@ const TITLES: Readonly<Record<Stage, string>> = {
   failed: 'Upload failed',
 };
 
-/** An upload: how far it is, what its errors are, and what can be done about it. */
 export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
   const { session, plan, stage } = job;
   const total = plan.frames.frames;
@@ -123,5 +123,32 @@ function containerFacts(figures: Figures | null) {
     <span>file of <b>${size(bytes)}</b></span>
     ${ratio === null ? nothing : html`<span><b>${times(ratio)}</b> smaller than the frames</span>`}
     ${meanL2 === null ? nothing : html`<span>mean error <b>${percent(meanL2, 2)}</b></span>`}
+  `;
+}
+
+export function errorChart(measured: Measured) {
+  const top = measured.linf.reduce((most, value) => (value > most ? value : most), 0);
+  if (top === 0) return html``;
+  const series = (values: Float32Array, color: string): Series => ({
+    label: '',
+    color: `var(--cager-${color})`,
+    mark: 'line',
+    points: thinned(values, (frame) => (frame + 0.5) / values.length),
+  });
+  const lines = [series(measured.linf, 'cage'), series(measured.l2, 'accent')];
+  return html`
+    <figure class="errors">
+      <figcaption class="row fine">
+        <span class="key linf"></span>Worst point <span class="key"></span>RMS of all points
+        <span class="scale figures">up to ${percent(top, 2)} of the diagonal</span>
+      </figcaption>
+      <div
+        class="area"
+        role="img"
+        aria-label="Errors of the frames so far: worst point ${percent(top, 2)} of the diagonal"
+      >
+        ${plot({ x: axisOf([0, 1], 0), y: axisOf([0, 1.05 * top], 0), series: lines })}
+      </div>
+    </figure>
   `;
 }

@@ -57,7 +57,6 @@ export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder,
   `;
 }
 
-/** A file, or a row of them, and what it is taken for. */
 export function itemRow(item: Item, onRole: (role: Role) => void) {
   const bytes = item.files.reduce((sum, file) => sum + file.size, 0);
   return html`

@@ -1,5 +1,5 @@
 import { html } from 'lit';
-import { glyphs } from '../style/glyphs';
+import { iconButton } from '../style/parts';
 import { terms } from '../style/terms';
 import { keyLabel, SHORTCUTS } from './shortcuts';
 
@@ -10,7 +10,6 @@ const GESTURES = [
   ['Frame all', 'Double-click', 'Double-tap'],
 ] as const;
 
-/** Words of the page, gestures and keys. */
 export function helpSheet(close: () => void) {
   return html`<dialog
     class="sheet"
@@ -19,7 +18,7 @@ export function helpSheet(close: () => void) {
   >
     <header>
       <h2 id="help-title">CageR help</h2>
-      <button class="quiet icon" aria-label="Close" @click=${close}>${glyphs.close}</button>
+      ${iconButton('close', 'Close', close)}
     </header>
     ${terms}
     <h3 class="fine">Mouse and touch</h3>

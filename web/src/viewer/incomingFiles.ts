@@ -15,7 +15,6 @@ export interface FilesHost extends HTMLElement {
   requestUpdate(): void;
 }
 
-/** Files that somebody drops on the viewer or chooses, and what is done with them. */
 export class IncomingFiles {
   private isHeldAbove = false;
   /** A container that was dropped on an open capture, and what came with it. */

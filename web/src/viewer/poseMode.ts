@@ -15,7 +15,6 @@ export class PoseMode {
 
   constructor(private readonly host: PoseHost) {}
 
-  /** Part of a narrow picture's height that the panel takes, as its style says. */
   get panelShare(): number {
     return this.isOn ? 0.38 : 0;
   }
