@@ -3,12 +3,11 @@
  * first time; docs/FORMAT.md, "Faces".
  */
 
-import { adjacency } from './adjacency';
+import { adjacency, type Polygons } from './polygons';
 import { CodedDataError } from './error';
 import { type Gate, Gates, MAX_TO_COME } from './gates';
 import { IntegerModels } from './integers';
 import { OpenEdges } from './openEdges';
-import type { Polygons } from './polygons';
 import { BinaryModels, RangeDecoder } from './rangeDecoder';
 import { MAX_FAR_POINTS, decodeOrder } from './vertexOrder';
 

@@ -4,8 +4,7 @@
  * `crates/codec/src/hierarchy.rs` is the reference.
  */
 
-import { adjacency } from './adjacency';
-import type { Polygons } from './polygons';
+import { adjacency, type Polygons } from './polygons';
 
 /** Rounds end when so few vertices are left; these are not predicted. */
 const COARSEST = 48;

@@ -3,8 +3,7 @@
  * triangles with a common edge the two far corners are predicted from each other. `crates/codec/src/parallelograms.rs` is the reference.
  */
 
-import { type ByVertex, byVertex } from './byVertex';
-import { type Polygons, triangulated } from './polygons';
+import { type ByVertex, byVertex, type Polygons, triangulated } from './polygons';
 
 /** Vertices in order, each with what predicts it. */
 export interface Predictions {

@@ -3,11 +3,9 @@
 import { CodedDataError } from './error';
 import { IntegerModels, MAX_RESIDUAL_SIZE, MAX_SIZE, SIZE_CLASSES, sizeClass } from './integers';
 import { parallelogramPredictions, type Predictions } from './parallelograms';
-import type { Polygons } from './polygons';
+import { type Polygons, type ByVertex, adjacency } from './polygons';
 import { PredictionWeights, WEIGHTS_BYTES } from './predictionWeights';
 import { RangeDecoder } from './rangeDecoder';
-import { adjacency } from './adjacency';
-import type { ByVertex } from './byVertex';
 
 /** Origin (three f64) and step (f64) of the grid. */
 const GRID_BYTES = 32;

@@ -3,7 +3,7 @@
  * vertices stand in a list, those near the ones numbered last in front, and each is told by its place in the list; docs/FORMAT.md, "Faces".
  */
 
-import type { ByVertex } from './byVertex';
+import type { ByVertex } from './polygons';
 import { CodedDataError } from './error';
 import { SIZE_CLASSES, sizeClass } from './integers';
 import { BinaryModels, type RangeDecoder } from './rangeDecoder';

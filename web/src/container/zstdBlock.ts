@@ -1,7 +1,7 @@
 /** Compressed blocks of zstd (RFC 8878, section 3.1.1.3). */
 
-import { BackwardBits } from './zstdBits';
 import {
+  BackwardBits,
   decodeHuffman,
   readHuffmanTable,
   readStateTable,

@@ -12,11 +12,7 @@ import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
 import type { Vector } from '../coordinates/vector';
 import { Projection } from '../render/projection';
-
-export interface EditorHost extends HTMLElement {
-  readonly player: Player | null;
-  readonly renderRoot: HTMLElement | DocumentFragment;
-}
+import type { ViewerHost } from '../viewer/host';
 
 /** Milliseconds after which another press of an arrow key is a step of its own. */
 const PAUSE = 1200;
@@ -41,7 +37,7 @@ export class CageEditor extends EventTarget {
   private chosenTool: MotionKind = 'move';
 
   constructor(
-    private readonly host: EditorHost,
+    private readonly host: ViewerHost,
     readonly player: Player,
   ) {
     super();

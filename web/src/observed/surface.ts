@@ -1,5 +1,5 @@
 import { Triangle, Vector3 } from 'three';
-import { type ByVertex, byVertex } from '../codec/byVertex';
+import { type ByVertex, byVertex } from '../codec/polygons';
 import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
 import { UnusableFile } from '../files/frameSource';
 import { extensionOf, objPoints } from '../files/meshes';

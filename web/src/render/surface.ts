@@ -1,6 +1,5 @@
 import type { StaticPart } from '../capture';
-import { byVertex } from '../codec/byVertex';
-import { type Polygons, triangulated } from '../codec/polygons';
+import { byVertex, type Polygons, triangulated } from '../codec/polygons';
 
 export interface Surface {
   /** Three points of each triangle; polygons are cut into fans. */

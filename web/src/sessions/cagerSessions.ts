@@ -6,7 +6,7 @@ import { ServiceProblem, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import { controls, pageLayout } from '../style/controls';
-import { terms } from '../style/terms';
+import { terms } from '../style/parts';
 import { tokens } from '../style/tokens';
 import { cardsStyle } from './cardsStyle';
 import { download, type Format } from './download';

@@ -7,14 +7,6 @@ import type { Stage, UploadJob, Measured } from './uploadJob';
 import { axisOf } from '../charts/axis';
 import { plot, thinned, type Series } from '../charts/plot';
 
-export interface JobActions {
-  readonly stop: () => void;
-  readonly takeBest: () => void;
-  readonly goOn: () => void;
-  readonly discard: () => void;
-  readonly another: () => void;
-}
-
 const STEPS: readonly (readonly [Stage, string])[] = [
   ['designing', 'Design cage'],
   ['creating', 'Upload meshes'],
@@ -34,7 +26,7 @@ const TITLES: Readonly<Record<Stage, string>> = {
   failed: 'Upload failed',
 };
 
-export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
+export function jobView(job: UploadJob, furthest: Stage, discard: () => void, startOver: () => void) {
   const { session, plan, stage } = job;
   const total = plan.frames.frames;
   const name = job.request.options.name ?? 'the capture';
@@ -82,19 +74,19 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
         }
         ${
           stage === 'designing' && job.design?.vertices
-            ? html`<button type="button" @click=${actions.takeBest}>Use this cage</button>`
+            ? html`<button type="button" @click=${() => job.takeBest()}>Use this cage</button>`
             : nothing
         }
-        ${job.isActive ? html`<button type="button" @click=${actions.stop}>Stop</button>` : nothing}
+        ${job.isActive ? html`<button type="button" @click=${() => job.stop()}>Stop</button>` : nothing}
         ${
           stage === 'stopped' || stage === 'failed'
-            ? html`<button type="button" class="primary" @click=${actions.goOn}>
+            ? html`<button type="button" class="primary" @click=${() => void job.run()}>
                   ${job.isAnew ? 'Start again' : stage === 'stopped' ? 'Resume' : 'Try again'}
                 </button>
-                <button type="button" @click=${actions.discard}>${session ? 'Delete upload' : 'Dismiss'}</button>`
+                <button type="button" @click=${discard}>${session ? 'Delete upload' : 'Dismiss'}</button>`
             : nothing
         }
-        ${stage === 'completed' ? html`<button type="button" @click=${actions.another}>Upload another capture</button>` : nothing}
+        ${stage === 'completed' ? html`<button type="button" @click=${startOver}>Upload another capture</button>` : nothing}
       </div>
       ${stage === 'sending' ? html`<p class="muted">You can watch while it uploads. The upload continues while this tab is open, and can be resumed later.</p>` : nothing}
     </section>

@@ -9,16 +9,7 @@ import type { Player } from './player';
 import { PointMarks } from './pointMarks';
 import { percent, sentence } from '../text';
 import { boundsOf } from '../coordinates/topology';
-
-export interface BesideHost extends HTMLElement {
-  readonly player: Player | null;
-  readonly renderRoot: ParentNode;
-  /** The second capture, where the page set one. */
-  beside: Capture | null;
-  requestUpdate(): void;
-  applyColors(): void;
-  report(problem: string): void;
-}
+import type { ViewerHost } from './host';
 
 /** A second capture in the viewer, beside the first one: its picture, its name and its errors. */
 export class BesideMode {
@@ -30,7 +21,7 @@ export class BesideMode {
   private marks: PointMarks | null = null;
   private opening = new AbortController();
 
-  constructor(private readonly host: BesideHost) {}
+  constructor(private readonly host: ViewerHost) {}
 
   /** Shows a file beside the capture, in place of what is there. */
   async open(file: File) {

@@ -1,6 +1,5 @@
 import { html } from 'lit';
-import { iconButton } from '../style/parts';
-import { terms } from '../style/terms';
+import { iconButton, terms } from '../style/parts';
 import { keyLabel, SHORTCUTS } from './shortcuts';
 
 const GESTURES = [

@@ -1,19 +1,13 @@
 import { html, nothing } from 'lit';
 import type { PoseView } from '../poses';
-import type { Player } from './player';
-
-interface PoseHost {
-  readonly player: Player | null;
-  requestUpdate(): void;
-  report(problem: string): void;
-}
+import type { ViewerHost } from './host';
 
 /** Shapes between frames in a viewer: loads what shows them when it is first used. */
 export class PoseMode {
   isOn = false;
   private view: PoseView | null = null;
 
-  constructor(private readonly host: PoseHost) {}
+  constructor(private readonly host: ViewerHost) {}
 
   get panelShare(): number {
     return this.isOn ? 0.38 : 0;

@@ -6,14 +6,7 @@ import type { Player } from './player';
 import { viewFromText } from './viewState';
 import type { Capture } from '../capture';
 import { guarded } from '../service/token';
-
-export interface ViewsHost {
-  /** The present view, as links have it. */
-  readonly viewText: string;
-  goTo(view: string): void;
-  requestUpdate(): void;
-  report(problem: string): void;
-}
+import type { ViewerHost } from './host';
 
 type Side = Pick<CameraState, 'azimuth' | 'elevation'>;
 
@@ -28,7 +21,7 @@ const PROJECTIONS = [
   [true, 'Orthographic'],
 ] as const;
 
-export function viewsPanel(player: Player, host: ViewsHost, close: () => void) {
+export function viewsPanel(player: Player, host: ViewerHost, close: () => void) {
   const { destination } = player.controls;
   const isFrom = ({ azimuth, elevation }: Side) =>
     destination.isParallel === true && destination.azimuth === azimuth && destination.elevation === elevation;
