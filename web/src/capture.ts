@@ -111,7 +111,6 @@ export interface LiveStatus {
 /** A capture that is being looked at, from a file, a finished session or one that is still running. */
 export interface Capture {
   readonly name: string;
-  /** Id of the session that it is. */
   session?: string;
   /** The same whenever this capture is opened; what the browser keeps of it is found by this. */
   identity?: string;

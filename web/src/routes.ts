@@ -1,6 +1,6 @@
 /** Routes of the page, all in the fragment: `#/`, `#/session/ID`, `#/recovery/ID`, `#/transfer/ID`, `#/file`, `#/upload`. What follows `?` is the state of the view, for links. */
 
-import type { JobKind } from './viewer/jobCapture';
+import type { JobKind } from './viewer/serviceCapture';
 
 export type Route =
   { page: 'sessions' } | { page: 'session' | JobKind; id: string } | { page: 'file' } | { page: 'upload' };
@@ -23,7 +23,6 @@ export function parseFragment(fragment: string): Location {
   return { route: { page: 'sessions' }, view };
 }
 
-/** The fragment of a route, with its `#`. */
 export function fragmentOf(route: Route, view = new URLSearchParams()): string {
   const path =
     route.page === 'sessions'

@@ -1,4 +1,3 @@
-/** Has the browser save something under a name. */
 export function save(content: Blob, name: string) {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(content);

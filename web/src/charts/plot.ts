@@ -4,7 +4,6 @@ import type { Axis } from './axis';
 /** x, and y where there is one. */
 export type Point = readonly [number, number | null];
 
-/** A line or a set of points in a chart. */
 export interface Series {
   readonly label: string;
   /** CSS, may depend on the theme. */

@@ -7,9 +7,7 @@ import { IntegerModels, MAX_CONTEXT_SIZE, SIZE_CLASSES, sizeClass } from './inte
 import { RangeDecoder } from './rangeDecoder';
 import { decodeTrajectories } from './trajectories';
 
-/** Most frames of a group. */
 export const MAX_FRAMES = 1024;
-/** Most rows of a cage. */
 export const MAX_ROWS = 4096;
 /** Whether the basis is rotated (u8), the step (f64) and the number of components (u16). */
 const HEAD_BYTES = 11;
@@ -28,20 +26,15 @@ export interface CageNumbers {
 
 /** Reads the numbers of a group of so many frames. */
 export function decodeCageNumbers(bytes: Uint8Array, frames: number, rows: number): CageNumbers {
-  if (bytes.length < HEAD_BYTES) {
-    throw new CodedDataError('a group of cages is cut');
-  }
+  if (bytes.length < HEAD_BYTES) throw new CodedDataError('a group of cages is cut');
   const head = new DataView(bytes.buffer, bytes.byteOffset, HEAD_BYTES);
   const kind = head.getUint8(0);
   const step = head.getFloat64(1, true);
   const components = head.getUint16(9, true);
-  if (kind > 1) {
-    throw new CodedDataError('a group of cages has an unknown basis');
-  }
+  if (kind > 1) throw new CodedDataError('a group of cages has an unknown basis');
   const possible = Number.isFinite(step) && step > 0 && components <= Math.min(frames, 3 * rows);
-  if (frames > MAX_FRAMES || rows > MAX_ROWS || !possible) {
+  if (frames > MAX_FRAMES || rows > MAX_ROWS || !possible)
     throw new CodedDataError('a group of cages has impossible counts');
-  }
   const decoder = new RangeDecoder(bytes.subarray(HEAD_BYTES));
   const trajectories = decodeTrajectories(decoder, frames, components);
   const numbers = decodeNumbers(decoder, components, 3 * rows);
@@ -73,9 +66,7 @@ export function cagesOf(group: CageNumbers, basis: CageBasis, rest: Float64Array
   const differences = multiply(trajectories, shapes, frames, components, 3 * rows);
   const cages = new Float32Array(differences.length);
   for (let frame = 0; frame < frames; frame++) {
-    for (let k = 0, at = frame * rest.length; k < rest.length; k++, at++) {
-      cages[at] = differences[at] + rest[k];
-    }
+    for (let k = 0, at = frame * rest.length; k < rest.length; k++, at++) cages[at] = differences[at] + rest[k];
   }
   return cages;
 }
@@ -93,12 +84,8 @@ function decodeNumbers(decoder: RangeDecoder, components: number, width: number)
       const at = 6 + value;
       const axis = value % 3;
       let around = 8 * sizes[at - 3] + 4 * sizes[at - 6] + 8 * before[at] + 4 * twoBefore[at];
-      if (axis >= 1) {
-        around += 6 * sizes[at - 1];
-      }
-      if (axis === 2) {
-        around += 3 * sizes[at - 2];
-      }
+      if (axis >= 1) around += 6 * sizes[at - 1];
+      if (axis === 2) around += 3 * sizes[at - 2];
       const number = models.signed(decoder, SIZE_CLASSES * axis + sizeClass(around));
       found[k * width + value] = number;
       sizes[at] = Math.min(Math.abs(number), MAX_CONTEXT_SIZE);

@@ -45,9 +45,7 @@ class WorkerCodec implements Codec {
       }
       const call = { id: this.nextId++, method, args };
       this.queue.push({ call, signal, resolve: resolve as (result: unknown) => void, reject });
-      if (this.queue.length === 1) {
-        this.send();
-      }
+      if (this.queue.length === 1) this.send();
     });
   }
 
@@ -55,7 +53,6 @@ class WorkerCodec implements Codec {
     this.fail(new DOMException('The capture was closed.', 'AbortError'));
   }
 
-  /** Sends the first call that is still wanted. */
   private send(): void {
     for (let next = this.queue.at(0); next !== undefined; next = this.queue.at(0)) {
       if (next.signal?.aborted !== true) {
@@ -77,11 +74,8 @@ class WorkerCodec implements Codec {
 
   private answer(answer: Answer): void {
     const { resolve, reject } = this.queue.shift()!;
-    if ('failure' in answer) {
-      reject(answer.damaged ? new CodedDataError(answer.failure) : new Error(answer.failure));
-    } else {
-      resolve(answer.result);
-    }
+    if ('failure' in answer) reject(answer.damaged ? new CodedDataError(answer.failure) : new Error(answer.failure));
+    else resolve(answer.result);
     this.send();
   }
 

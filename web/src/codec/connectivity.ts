@@ -3,12 +3,11 @@
  * first time; docs/FORMAT.md, "Faces".
  */
 
-import { adjacency } from './adjacency';
+import { adjacency, type Polygons } from './polygons';
 import { CodedDataError } from './error';
 import { type Gate, Gates, MAX_TO_COME } from './gates';
 import { IntegerModels } from './integers';
 import { OpenEdges } from './openEdges';
-import type { Polygons } from './polygons';
 import { BinaryModels, RangeDecoder } from './rangeDecoder';
 import { MAX_FAR_POINTS, decodeOrder } from './vertexOrder';
 
@@ -29,9 +28,8 @@ export function decodeFaces(bytes: Uint8Array, points: number, faces: number, co
   const decoder = new RangeDecoder(bytes);
   const polygons = new Walk(decoder, points, faces, corners).run();
   const isFar = decoder.bits(1) === 1;
-  if (isFar && points > MAX_FAR_POINTS) {
+  if (isFar && points > MAX_FAR_POINTS)
     throw new CodedDataError('the order of so many vertices cannot have been written');
-  }
   const numbers = new Uint32Array(points);
   decodeOrder(decoder, adjacency(polygons, points), isFar).forEach((vertex, number) => (numbers[vertex] = number));
   return { counts: polygons.counts, corners: polygons.corners.map((vertex) => numbers[vertex]) };
@@ -46,7 +44,6 @@ class Walk {
   private readonly facesAt: Uint32Array;
   /** The last face, counted from 1, that each vertex is a corner of. */
   private readonly faceOf: Uint32Array;
-  /** How many vertices were met. */
   private met = 0;
   private readonly gates = new Gates();
   private arity = 3;
@@ -79,34 +76,26 @@ class Walk {
   run(): Polygons {
     do {
       for (let gate = this.gate(); gate !== null; gate = this.gate()) {
-        if (this.decoder.bit(this.across, this.acrossContext(gate)) === 1) {
-          this.face(gate);
-        } else {
-          this.close(gate[0], gate[1]);
-        }
+        if (this.decoder.bit(this.across, this.acrossContext(gate)) === 1) this.face(gate);
+        else this.close(gate[0], gate[1]);
       }
     } while (this.part());
-    if (this.facesRead !== this.counts.length || this.cornersRead !== this.corners.length) {
+    if (this.facesRead !== this.counts.length || this.cornersRead !== this.corners.length)
       throw new CodedDataError(WRONG_COUNTS);
-    }
     return { counts: this.counts, corners: this.corners };
   }
 
   /** Reads the first face of another part of the mesh; false where there is none. */
   private part(): boolean {
     const follows = this.decoder.bit(this.more, 0) === 1;
-    if (follows) {
-      this.face(null);
-    }
+    if (follows) this.face(null);
     return follows;
   }
 
   /** The next edge that still waits for a face. */
   private gate(): Gate | null {
     for (let gate = this.gates.take(); gate !== null; gate = this.gates.take()) {
-      if (this.leaving[gate[0]].has(gate[1])) {
-        return gate;
-      }
+      if (this.leaving[gate[0]].has(gate[1])) return gate;
     }
     return null;
   }
@@ -118,21 +107,16 @@ class Walk {
   /** The edge waits no longer; false if it did not. */
   private close(from: number, to: number): boolean {
     const wasOpen = this.leaving[from].remove(to);
-    if (wasOpen) {
-      this.arriving[to].remove(from);
-    }
+    if (wasOpen) this.arriving[to].remove(from);
     return wasOpen;
   }
 
   /** Reads a face, which begins with the opposite of the gate's edge where there is a gate, and takes it into the walk. */
   private face(gate: Gate | null): void {
-    if (this.decoder.bit(this.sameArity, 0) === 1) {
-      this.arity = this.arities.natural(this.decoder, 0);
-    }
+    if (this.decoder.bit(this.sameArity, 0) === 1) this.arity = this.arities.natural(this.decoder, 0);
     const room = this.corners.length - this.cornersRead;
-    if (this.arity === 0 || this.arity > room || this.facesRead === this.counts.length) {
+    if (this.arity === 0 || this.arity > room || this.facesRead === this.counts.length)
       throw new CodedDataError(WRONG_COUNTS);
-    }
     this.counts[this.facesRead++] = this.arity;
     const face = gate === null ? [] : [gate[1], gate[0]].slice(0, this.arity);
     face.forEach((vertex) => (this.faceOf[vertex] = this.facesRead));
@@ -164,27 +148,19 @@ class Walk {
         nearer.push(from);
       }
     }
-    for (const [from, to] of opened) {
-      this.gates.add(from, to, Math.min(this.facesAt[from], this.facesAt[to]));
-    }
+    for (const [from, to] of opened) this.gates.add(from, to, Math.min(this.facesAt[from], this.facesAt[to]));
     nearer.forEach((vertex) => this.requeueOpenEdges(vertex));
   }
 
   /** Sorts the open edges of a vertex anew where none of their ends has fewer faces to come. */
   private requeueOpenEdges(vertex: number): void {
     const toCome = this.facesAt[vertex];
-    if (toCome >= MAX_TO_COME) {
-      return;
-    }
+    if (toCome >= MAX_TO_COME) return;
     for (const end of this.leaving[vertex].newest().slice(-MAX_NEARER)) {
-      if (this.facesAt[end] >= toCome) {
-        this.gates.add(vertex, end, toCome);
-      }
+      if (this.facesAt[end] >= toCome) this.gates.add(vertex, end, toCome);
     }
     for (const end of this.arriving[vertex].newest().slice(-MAX_NEARER)) {
-      if (this.facesAt[end] >= toCome) {
-        this.gates.add(end, vertex, toCome);
-      }
+      if (this.facesAt[end] >= toCome) this.gates.add(end, vertex, toCome);
     }
   }
 
@@ -197,14 +173,10 @@ class Walk {
     const first = face[0];
     const previous = face[face.length - 1];
     const { near, both } = this.near(previous, first, closes);
-    if (this.decoder.bit(this.firstTime, this.firstTimeContext(previous, first, both)) === 1) {
-      return this.newVertex();
-    }
+    if (this.decoder.bit(this.firstTime, this.firstTimeContext(previous, first, both)) === 1) return this.newVertex();
     const base = MAX_NEAR * (2 * this.lastOnes(previous, first) + (both ? 1 : 0));
     for (let k = 0; k < near.length; k++) {
-      if (this.decoder.bit(this.place, base + k) === 0) {
-        return near[k];
-      }
+      if (this.decoder.bit(this.place, base + k) === 0) return near[k];
     }
     return this.metVertex();
   }
@@ -220,14 +192,11 @@ class Walk {
     }
     const near: number[] = [];
     for (const x of [...ofBoth.reverse(), ...ofOne, ...[...back].reverse()]) {
-      if (near.length < MAX_NEAR && !this.isCorner(x) && !near.includes(x)) {
-        near.push(x);
-      }
+      if (near.length < MAX_NEAR && !this.isCorner(x) && !near.includes(x)) near.push(x);
     }
     return { near, both: ofBoth.length > 0 };
   }
 
-  /** Whether a vertex is a corner of the face that is read. */
   private isCorner(vertex: number): boolean {
     return this.faceOf[vertex] === this.facesRead;
   }
@@ -245,11 +214,8 @@ class Walk {
     return (this.facesAt[previous] === 1 ? 1 : 0) + (this.facesAt[first] === 1 ? 2 : 0);
   }
 
-  /** Takes a vertex met for the first time. */
   private newVertex(): number {
-    if (this.met === this.points) {
-      throw new CodedDataError(WRONG_COUNTS);
-    }
+    if (this.met === this.points) throw new CodedDataError(WRONG_COUNTS);
     // Of the face that is read it is a corner now.
     this.facesAt[this.met] = Math.min(this.faceCounts.natural(this.decoder, 0) + 1, MAX_COUNT);
     return this.met++;
@@ -258,9 +224,7 @@ class Walk {
   /** Reads a vertex that was met, but that nothing leads to. */
   private metVertex(): number {
     const turn = this.decoder.bits(32 - Math.clz32(this.met));
-    if (turn >= this.met) {
-      throw new CodedDataError('a face names a vertex that was not met');
-    }
+    if (turn >= this.met) throw new CodedDataError('a face names a vertex that was not met');
     return turn;
   }
 }

@@ -3,9 +3,7 @@
 /** `A·B`, n × p, of A n × m and B m × p. */
 export function multiply(a: Float64Array, b: Float64Array, n: number, m: number, p: number): Float64Array {
   const out = new Float64Array(n * p);
-  for (let i = 0; i < n; i++) {
-    addRows(out.subarray(i * p, (i + 1) * p), b, p, 0, m, a, i * m, 1);
-  }
+  for (let i = 0; i < n; i++) addRows(out.subarray(i * p, (i + 1) * p), b, p, 0, m, a, i * m, 1);
   return out;
 }
 
@@ -33,9 +31,7 @@ export function transposedTimesSelf(lower: Float64Array, n: number): Float64Arra
   for (let i = 0; i < n; i++) {
     const row = out.subarray(i * n, i * n + i + 1);
     addRows(row, lower, n, i, n, lower, i, n);
-    for (let j = 0; j < i; j++) {
-      out[j * n + i] = row[j];
-    }
+    for (let j = 0; j < i; j++) out[j * n + i] = row[j];
   }
   return out;
 }
@@ -47,9 +43,7 @@ export function solveTransposed(lower: Float64Array, x: Float64Array, n: number,
     sum.fill(0);
     addRows(sum, x, p, k + 1, n, lower, k, n);
     const scale = 1 / lower[k * n + k];
-    for (let j = 0, at = k * p; j < p; j++, at++) {
-      x[at] = (x[at] - sum[j]) * scale;
-    }
+    for (let j = 0, at = k * p; j < p; j++, at++) x[at] = (x[at] - sum[j]) * scale;
   }
 }
 
@@ -81,9 +75,7 @@ function addRows(
   }
   for (; k < to; k++) {
     const factor = factors[start + k * step];
-    for (let j = 0, at = k * stride; j < sum.length; j++, at++) {
-      sum[j] += factor * matrix[at];
-    }
+    for (let j = 0, at = k * stride; j < sum.length; j++, at++) sum[j] += factor * matrix[at];
   }
 }
 
@@ -100,8 +92,6 @@ function dot(values: Float64Array, a: number, b: number, length: number): number
     s2 += values[a + k + 2] * values[b + k + 2];
     s3 += values[a + k + 3] * values[b + k + 3];
   }
-  for (; k < length; k++) {
-    s0 += values[a + k] * values[b + k];
-  }
+  for (; k < length; k++) s0 += values[a + k] * values[b + k];
   return s0 + s1 + s2 + s3;
 }

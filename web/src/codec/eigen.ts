@@ -12,19 +12,13 @@ const ROWS = 4;
 
 /** Eigenvectors of a symmetric matrix n × n as columns, in the order of descending eigenvalues; null where the matrix is not finite. */
 export function eigenvectors(matrix: Float64Array, n: number): Float64Array | null {
-  if (!matrix.every((x) => Number.isFinite(x))) {
-    return null;
-  }
+  if (!matrix.every((x) => Number.isFinite(x))) return null;
   const { diagonal, offDiagonal, vectors } = tridiagonalise(matrix, n);
-  if (!diagonalise(diagonal, offDiagonal, vectors, n)) {
-    return null;
-  }
+  if (!diagonalise(diagonal, offDiagonal, vectors, n)) return null;
   const order = Array.from(diagonal.keys()).sort((a, b) => diagonal[b] - diagonal[a]);
   const sorted = new Float64Array(n * n);
   for (let i = 0; i < n; i++) {
-    for (let k = 0; k < n; k++) {
-      sorted[i * n + k] = vectors[i * n + order[k]];
-    }
+    for (let k = 0; k < n; k++) sorted[i * n + k] = vectors[i * n + order[k]];
   }
   return sorted;
 }
@@ -40,9 +34,7 @@ function tridiagonalise(matrix: Float64Array, n: number) {
     const v = a.subarray(i * n, i * n + i);
     diagonal[i] = a[i * n + i];
     offDiagonal[i - 1] = reflector(v, scales, i);
-    if (scales[i] === 0) {
-      continue;
-    }
+    if (scales[i] === 0) continue;
     // p = scale·A v, then A ← A − v wᵀ − w vᵀ with w = p − ½ scale (pᵀv) v; of A the lower half.
     p.fill(0, 0, i);
     for (let r = 0; r < i; r++) {
@@ -59,14 +51,10 @@ function tridiagonalise(matrix: Float64Array, n: number) {
       p[r] *= scales[i];
       inner += p[r] * v[r];
     }
-    for (let r = 0; r < i; r++) {
-      p[r] -= 0.5 * scales[i] * inner * v[r];
-    }
+    for (let r = 0; r < i; r++) p[r] -= 0.5 * scales[i] * inner * v[r];
     for (let r = 0; r < i; r++) {
       const row = r * n;
-      for (let c = 0; c <= r; c++) {
-        a[row + c] -= v[r] * p[c] + p[r] * v[c];
-      }
+      for (let c = 0; c <= r; c++) a[row + c] -= v[r] * p[c] + p[r] * v[c];
     }
   }
   diagonal[0] = n > 0 ? a[0] : 0;
@@ -80,19 +68,13 @@ function tridiagonalise(matrix: Float64Array, n: number) {
 function reflector(v: Float64Array, scales: Float64Array, at: number): number {
   const last = v.length - 1;
   let squares = 0;
-  for (let k = 0; k < last; k++) {
-    squares += v[k] * v[k];
-  }
-  if (squares === 0) {
-    return v[last];
-  }
+  for (let k = 0; k < last; k++) squares += v[k] * v[k];
+  if (squares === 0) return v[last];
   const length = Math.sqrt(squares + v[last] * v[last]);
   const target = v[last] > 0 ? -length : length;
   // With v divided by its last entry, head, 2 / |v|² is −head / target.
   const head = v[last] - target;
-  for (let k = 0; k < last; k++) {
-    v[k] /= head;
-  }
+  for (let k = 0; k < last; k++) v[k] /= head;
   v[last] = 1;
   scales[at] = -head / target;
   return target;
@@ -104,9 +86,7 @@ function reflections(a: Float64Array, scales: Float64Array, n: number): Float64A
   const sums = new Float64Array(n);
   for (let i = 0; i < n; i++) {
     q[i * n + i] = 1;
-    if (scales[i] === 0) {
-      continue;
-    }
+    if (scales[i] === 0) continue;
     const v = a.subarray(i * n, i * n + i);
     sums.fill(0, 0, i);
     let r = 0;
@@ -119,21 +99,15 @@ function reflections(a: Float64Array, scales: Float64Array, n: number): Float64A
         sums[c] += v0 * q[at] + v1 * q[at + n] + v2 * q[at + 2 * n] + v3 * q[at + 3 * n];
       }
     }
-    for (; r < i; r++) {
-      addScaled(sums, 0, q, r * n, v[r], i);
-    }
-    for (let row = 0; row < i; row++) {
-      addScaled(q, row * n, sums, 0, -scales[i] * v[row], i);
-    }
+    for (; r < i; r++) addScaled(sums, 0, q, r * n, v[r], i);
+    for (let row = 0; row < i; row++) addScaled(q, row * n, sums, 0, -scales[i] * v[row], i);
   }
   return q;
 }
 
 /** Adds a multiple of one vector to another, both of this length. */
 function addScaled(to: Float64Array, at: number, from: Float64Array, start: number, factor: number, length: number) {
-  for (let k = 0; k < length; k++) {
-    to[at + k] += factor * from[start + k];
-  }
+  for (let k = 0; k < length; k++) to[at + k] += factor * from[start + k];
 }
 
 /** Turns a tridiagonal matrix to a diagonal one, and the columns of `vectors` with it; false if it does not converge. */
@@ -141,21 +115,12 @@ function diagonalise(diagonal: Float64Array, offDiagonal: Float64Array, vectors:
   const rotations = new Rotations(vectors, n);
   let end = n - 1;
   for (let steps = 0; end > 0; steps++) {
-    if (steps > MAX_STEPS * n) {
-      return false;
-    }
+    if (steps > MAX_STEPS * n) return false;
     let start = end;
-    while (start > 0 && !isSmall(diagonal, offDiagonal, start - 1)) {
-      start--;
-    }
-    if (start > 0) {
-      offDiagonal[start - 1] = 0;
-    }
-    if (start === end) {
-      end--;
-    } else {
-      step(diagonal, offDiagonal, start, end, rotations);
-    }
+    while (start > 0 && !isSmall(diagonal, offDiagonal, start - 1)) start--;
+    if (start > 0) offDiagonal[start - 1] = 0;
+    if (start === end) end--;
+    else step(diagonal, offDiagonal, start, end, rotations);
   }
   rotations.apply();
   return true;
@@ -176,9 +141,7 @@ function step(d: Float64Array, e: Float64Array, start: number, end: number, rota
     const length = Math.sqrt(x * x + z * z);
     const c = length > 0 ? x / length : 1;
     const s = length > 0 ? z / length : 0;
-    if (k > start) {
-      e[k - 1] = length;
-    }
+    if (k > start) e[k - 1] = length;
     const a = d[k];
     const b = e[k];
     const g = d[k + 1];
@@ -207,9 +170,7 @@ class Rotations {
   ) {}
 
   add(column: number, cosine: number, sine: number): void {
-    if (this.count === ROTATIONS) {
-      this.apply();
-    }
+    if (this.count === ROTATIONS) this.apply();
     this.columns[this.count] = column;
     this.cosines[this.count] = cosine;
     this.sines[this.count] = sine;

@@ -10,20 +10,16 @@ const LEFT_OUT = 12;
 /** What the numbers that are left are below. */
 const NUMBERS = 2 ** (32 - LEFT_OUT);
 
-/** Decodes the errors of so many frames. */
 export function decodeFrameErrors(bytes: Uint8Array, frames: number): FrameErrors {
   const decoder = new RangeDecoder(bytes);
   const errors = { l2: new Float32Array(frames), linf: new Float32Array(frames) };
   const series = [new ErrorSeries(errors.l2), new ErrorSeries(errors.linf)];
   for (let frame = 0; frame < frames; frame++) {
-    for (const each of series) {
-      each.read(decoder, frame);
-    }
+    for (const each of series) each.read(decoder, frame);
   }
   return errors;
 }
 
-/** One of the two errors of all frames. */
 class ErrorSeries {
   private readonly models = new IntegerModels(SIZE_CLASSES);
   private readonly words: Uint32Array;
@@ -39,8 +35,7 @@ class ErrorSeries {
     this.before += difference;
     this.around = (this.around + Math.min(Math.abs(difference), MAX_CONTEXT_SIZE)) >> 1;
     this.words[frame] = this.before << LEFT_OUT;
-    if (this.before < 0 || this.before >= NUMBERS || this.errors[frame] < 0) {
+    if (this.before < 0 || this.before >= NUMBERS || this.errors[frame] < 0)
       throw new CodedDataError('an error of a frame is negative or out of range');
-    }
   }
 }

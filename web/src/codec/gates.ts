@@ -19,9 +19,7 @@ class GateQueue {
   }
 
   take(): Gate | null {
-    if (this.next === this.ends.length) {
-      return null;
-    }
+    if (this.next === this.ends.length) return null;
     const gate: Gate = [this.ends[this.next], this.ends[this.next + 1]];
     this.next += 2;
     if (this.next === this.ends.length || (this.next >= MIN_DROPPED && 2 * this.next >= this.ends.length)) {
@@ -45,9 +43,7 @@ export class Gates {
   take(): Gate | null {
     for (const queue of this.queues) {
       const gate = queue.take();
-      if (gate !== null) {
-        return gate;
-      }
+      if (gate !== null) return gate;
     }
     return null;
   }

@@ -11,7 +11,6 @@ import { type Polygons } from './polygons';
 import { decodePositions } from './positions';
 import { decodeResidual } from './residual';
 
-/** Decodes the coded sections of one capture. */
 export class GroupDecoder {
   private model: { polygons: Polygons; points: number } | null = null;
   private hierarchy: Hierarchy | null = null;
@@ -37,26 +36,20 @@ export class GroupDecoder {
 
   /** Adds coordinates of sampled points to the basis of cages, points × columns; `isFirst` begins a new basis. */
   addCoordinates(coordinates: Float64Array, columns: number, rows: number, isFirst: boolean): void {
-    if (isFirst || this.basis === null) {
-      this.basis = new CageBasis(rows);
-    }
+    if (isFirst || this.basis === null) this.basis = new CageBasis(rows);
     this.basis.add(coordinates, columns);
   }
 
   /** The cages of a group of so many frames, frames × rows × 3. */
   cages(bytes: Uint8Array, frames: number, rest: Float64Array): Float32Array {
     const numbers = decodeCageNumbers(bytes, frames, rest.length / 3);
-    if (this.basis === null) {
-      throw new CodedDataError('there are no coordinates for the basis of the cages');
-    }
+    if (this.basis === null) throw new CodedDataError('there are no coordinates for the basis of the cages');
     return cagesOf(numbers, this.basis, rest);
   }
 
   /** {@link decodeResidual} of the model of {@link setModel}. */
   residual(bytes: Uint8Array, frames: number, mostNumbers: number): Residual {
-    if (this.model === null) {
-      throw new CodedDataError('there is no model for the residual');
-    }
+    if (this.model === null) throw new CodedDataError('there is no model for the residual');
     this.hierarchy ??= vertexHierarchy(this.model.polygons, this.model.points);
     return decodeResidual(bytes, this.hierarchy, frames, mostNumbers);
   }

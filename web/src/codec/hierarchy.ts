@@ -4,8 +4,7 @@
  * `crates/codec/src/hierarchy.rs` is the reference.
  */
 
-import { adjacency } from './adjacency';
-import type { Polygons } from './polygons';
+import { adjacency, type Polygons } from './polygons';
 
 /** Rounds end when so few vertices are left; these are not predicted. */
 const COARSEST = 48;
@@ -31,15 +30,11 @@ export function vertexHierarchy(faces: Polygons, points: number): Hierarchy {
     for (const v of fewestNeighboursFirst(left, near)) {
       if (blocked[v] !== round && near[v].length > 0) {
         blocked[v] = round;
-        for (const w of near[v]) {
-          blocked[w] = round;
-        }
+        for (const w of near[v]) blocked[w] = round;
         removed.push(v);
       }
     }
-    if (removed.length === before) {
-      break;
-    }
+    if (removed.length === before) break;
     for (let k = before; k < removed.length; k++) {
       const v = removed[k];
       gone[v] = 1;
@@ -55,9 +50,7 @@ export function vertexHierarchy(faces: Polygons, points: number): Hierarchy {
   const parents: number[] = [];
   for (let k = removed.length - 1, at = left.length; k >= 0; k--, at++) {
     order[at] = removed[k];
-    for (const parent of parentsOf[k]) {
-      parents.push(parent);
-    }
+    for (const parent of parentsOf[k]) parents.push(parent);
     starts[at + 1] = parents.length;
   }
   return { order, starts, parents: Uint32Array.from(parents) };
@@ -74,18 +67,12 @@ function fewestNeighboursFirst(vertices: Uint32Array, near: readonly (readonly n
   const places: number[] = [];
   for (const v of vertices) {
     const count = near[v].length;
-    while (places.length <= count + 1) {
-      places.push(0);
-    }
+    while (places.length <= count + 1) places.push(0);
     places[count + 1]++;
   }
-  for (let k = 1; k < places.length; k++) {
-    places[k] += places[k - 1];
-  }
+  for (let k = 1; k < places.length; k++) places[k] += places[k - 1];
   const sorted = new Uint32Array(vertices.length);
-  for (const v of vertices) {
-    sorted[places[near[v].length]++] = v;
-  }
+  for (const v of vertices) sorted[places[near[v].length]++] = v;
   return sorted;
 }
 
@@ -95,12 +82,8 @@ function join(near: readonly number[][], v: number, neighboursOfV: readonly numb
   for (const w of neighboursOfV) {
     const list = near[w];
     const place = lowerBound(list, v);
-    if (list[place] === v) {
-      list.splice(place, 1);
-    }
-    if (hub < 0 || list.length < near[hub].length || (list.length === near[hub].length && w < hub)) {
-      hub = w;
-    }
+    if (list[place] === v) list.splice(place, 1);
+    if (hub < 0 || list.length < near[hub].length || (list.length === near[hub].length && w < hub)) hub = w;
   }
   for (const w of neighboursOfV) {
     if (w !== hub) {
@@ -112,9 +95,7 @@ function join(near: readonly number[][], v: number, neighboursOfV: readonly numb
 
 function insert(ascending: number[], x: number): void {
   const place = lowerBound(ascending, x);
-  if (ascending[place] !== x) {
-    ascending.splice(place, 0, x);
-  }
+  if (ascending[place] !== x) ascending.splice(place, 0, x);
 }
 
 /** Number of entries below x. */
@@ -122,11 +103,8 @@ function lowerBound(ascending: readonly number[], x: number): number {
   let [low, high] = [0, ascending.length];
   while (low < high) {
     const middle = (low + high) >> 1;
-    if (ascending[middle] < x) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
+    if (ascending[middle] < x) low = middle + 1;
+    else high = middle;
   }
   return low;
 }

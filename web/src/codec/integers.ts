@@ -12,7 +12,6 @@ export const MAX_SIZE = 2 ** 28;
 export const MAX_CONTEXT_SIZE = 2 ** 20;
 /** Sizes of residuals are kept up to this. */
 export const MAX_RESIDUAL_SIZE = 2 ** 16;
-/** Number of classes of {@link sizeClass}. */
 export const SIZE_CLASSES = 16;
 
 const EDGES = [1, 3, 5, 8, 12, 17, 24, 34, 48, 70, 100, 150, 230, 400, 900];
@@ -38,17 +37,11 @@ export class IntegerModels {
   signed(decoder: RangeDecoder, context: number): number {
     const models = this.contexts;
     const base = PER_CONTEXT * context;
-    if (decoder.bit(models, base) === 0) {
-      return 0;
-    }
+    if (decoder.bit(models, base) === 0) return 0;
     const negative = decoder.bit(models, base + 1) === 1;
     let size = 1;
-    while (size <= UNARY && decoder.bit(models, base + 1 + size) === 1) {
-      size++;
-    }
-    if (size > UNARY) {
-      size = Math.min(UNARY + this.largeSize(decoder), MAX_SIZE);
-    }
+    while (size <= UNARY && decoder.bit(models, base + 1 + size) === 1) size++;
+    if (size > UNARY) size = Math.min(UNARY + this.largeSize(decoder), MAX_SIZE);
     return negative ? -size : size;
   }
 
@@ -56,9 +49,7 @@ export class IntegerModels {
   natural(decoder: RangeDecoder, context: number): number {
     const base = PER_CONTEXT * context + 2;
     for (let size = 0; size < UNARY; size++) {
-      if (decoder.bit(this.contexts, base + size) === 0) {
-        return size;
-      }
+      if (decoder.bit(this.contexts, base + size) === 0) return size;
     }
     const count = this.digits(decoder, 31);
     const number = ((1 << count) >>> 0) + decoder.bits(count);
@@ -68,18 +59,14 @@ export class IntegerModels {
   /** What a size is above {@link UNARY}. */
   private largeSize(decoder: RangeDecoder): number {
     const count = this.digits(decoder, 28);
-    if (count === 0) {
-      return 1;
-    }
+    if (count === 0) return 1;
     const leading = 2 | decoder.bit(this.leading, count);
     return leading * 2 ** (count - 1) + decoder.bits(count - 1);
   }
 
   private digits(decoder: RangeDecoder, most: number): number {
     let count = 0;
-    while (count < most && decoder.bit(this.exponent, count) === 1) {
-      count++;
-    }
+    while (count < most && decoder.bit(this.exponent, count) === 1) count++;
     return count;
   }
 }

@@ -32,9 +32,7 @@ it('products are sums of products', () => {
   const [a, b] = [numbers(5 * 7), numbers(7 * 3, 2)];
   const out = multiply(a, b, 5, 7, 3);
   let sum = 0;
-  for (let k = 0; k < 7; k++) {
-    sum += a[4 * 7 + k] * b[k * 3 + 1];
-  }
+  for (let k = 0; k < 7; k++) sum += a[4 * 7 + k] * b[k * 3 + 1];
   expect(out[4 * 3 + 1]).toBeCloseTo(sum, 14);
 });
 

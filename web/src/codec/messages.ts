@@ -22,9 +22,7 @@ export function transferables(value: unknown): ArrayBuffer[] {
   const found = new Set<ArrayBuffer>();
   const visit = (part: unknown): void => {
     if (ArrayBuffer.isView(part)) {
-      if (part.buffer instanceof ArrayBuffer) {
-        found.add(part.buffer);
-      }
+      if (part.buffer instanceof ArrayBuffer) found.add(part.buffer);
     } else if (typeof part === 'object' && part !== null) {
       Object.values(part).forEach(visit);
     }

@@ -24,21 +24,15 @@ export class OpenEdges {
 
   /** Removes the newest edge to this end; false where there is none. */
   remove(end: number): boolean {
-    if (this.many !== null) {
-      return this.many.remove(end);
-    }
+    if (this.many !== null) return this.many.remove(end);
     const at = this.few.lastIndexOf(end);
-    if (at >= 0) {
-      this.few.splice(at, 1);
-    }
+    if (at >= 0) this.few.splice(at, 1);
     return at >= 0;
   }
 
   /** The last ones, the oldest of them first; not to be changed. */
   newest(): readonly number[] {
-    if (this.many !== null) {
-      return this.many.newest(NEWEST);
-    }
+    if (this.many !== null) return this.many.newest(NEWEST);
     return this.few.length > NEWEST ? this.few.slice(-NEWEST) : this.few;
   }
 }
@@ -60,43 +54,27 @@ class LinkedEnds {
 
   add(end: number): void {
     const link: Link = { end, older: this.last, newer: null };
-    if (this.last !== null) {
-      this.last.newer = link;
-    }
+    if (this.last !== null) this.last.newer = link;
     this.last = link;
     const same = this.byEnd.get(end);
-    if (same === undefined) {
-      this.byEnd.set(end, [link]);
-    } else {
-      same.push(link);
-    }
+    if (same === undefined) this.byEnd.set(end, [link]);
+    else same.push(link);
   }
 
   remove(end: number): boolean {
     const same = this.byEnd.get(end);
-    if (same === undefined) {
-      return false;
-    }
+    if (same === undefined) return false;
     const { older, newer } = same.pop()!;
-    if (same.length === 0) {
-      this.byEnd.delete(end);
-    }
-    if (older !== null) {
-      older.newer = newer;
-    }
-    if (newer !== null) {
-      newer.older = older;
-    } else {
-      this.last = older;
-    }
+    if (same.length === 0) this.byEnd.delete(end);
+    if (older !== null) older.newer = newer;
+    if (newer !== null) newer.older = older;
+    else this.last = older;
     return true;
   }
 
   newest(most: number): number[] {
     const ends: number[] = [];
-    for (let link = this.last; link !== null && ends.length < most; link = link.older) {
-      ends.push(link.end);
-    }
+    for (let link = this.last; link !== null && ends.length < most; link = link.older) ends.push(link.end);
     return ends.reverse();
   }
 }

@@ -3,8 +3,7 @@
  * triangles with a common edge the two far corners are predicted from each other. `crates/codec/src/parallelograms.rs` is the reference.
  */
 
-import { type ByVertex, byVertex } from './byVertex';
-import { type Polygons, triangulated } from './polygons';
+import { type ByVertex, byVertex, type Polygons, triangulated } from './polygons';
 
 /** Vertices in order, each with what predicts it. */
 export interface Predictions {
@@ -35,13 +34,9 @@ function facingCorners(triangles: Uint32Array, points: number): number[] {
       const other = farCorners.get(to * points + from);
       // Of faces that name a vertex twice nothing is predicted.
       const distinct = from !== to && other !== far && far !== from && far !== to && other !== from && other !== to;
-      if (other !== undefined && distinct) {
-        pairs.push(far, other, from, to);
-      }
+      if (other !== undefined && distinct) pairs.push(far, other, from, to);
       const edge = from * points + to;
-      if (!farCorners.has(edge)) {
-        farCorners.set(edge, far);
-      }
+      if (!farCorners.has(edge)) farCorners.set(edge, far);
     }
   }
   return pairs;
@@ -78,23 +73,15 @@ class Ordering {
       const candidate = this.queue.take();
       if (candidate !== null) {
         const { vertex, near, count } = candidate;
-        if (this.placed[vertex] === 0 && count >= this.counts[vertex]) {
-          this.place(vertex, near);
-        }
+        if (this.placed[vertex] === 0 && count >= this.counts[vertex]) this.place(vertex, near);
         continue;
       }
-      while (seed < this.points && (this.placed[seed] === 1 || this.hasNoFace(seed))) {
-        seed++;
-      }
-      if (seed === this.points) {
-        break;
-      }
+      while (seed < this.points && (this.placed[seed] === 1 || this.hasNoFace(seed))) seed++;
+      if (seed === this.points) break;
       this.place(seed, this.lastOr(seed));
     }
     for (let vertex = 0; vertex < this.points; vertex++) {
-      if (this.placed[vertex] === 0) {
-        this.add(vertex, this.lastOr(vertex));
-      }
+      if (this.placed[vertex] === 0) this.add(vertex, this.lastOr(vertex));
     }
     return { order: this.order, starts: this.starts, triples: this.triples, near: this.near };
   }
@@ -113,13 +100,9 @@ class Ordering {
     for (let k = pairsOf.starts[vertex]; k < pairsOf.starts[vertex + 1]; k++) {
       const pair = 4 * pairsOf.items[k];
       const [a, b, from, to] = [pairs[pair], pairs[pair + 1], pairs[pair + 2], pairs[pair + 3]];
-      if (placed[from] === 0 || placed[to] === 0) {
-        continue;
-      }
+      if (placed[from] === 0 || placed[to] === 0) continue;
       if (placed[a] === 1 && placed[b] === 1) {
-        if (vertex === a || vertex === b) {
-          this.triples.push(from, to, vertex === a ? b : a);
-        }
+        if (vertex === a || vertex === b) this.triples.push(from, to, vertex === a ? b : a);
       } else if (placed[a] === 1 || placed[b] === 1) {
         const expected = placed[a] === 1 ? b : a;
         this.counts[expected]++;
@@ -130,9 +113,7 @@ class Ordering {
       const triangle = 3 * trianglesOf.items[k];
       for (let corner = 0; corner < 3; corner++) {
         const other = triangles[triangle + corner];
-        if (placed[other] === 0 && this.counts[other] === 0) {
-          this.queue.add(0, other, vertex);
-        }
+        if (placed[other] === 0 && this.counts[other] === 0) this.queue.add(0, other, vertex);
       }
     }
     this.add(vertex, near);
@@ -153,9 +134,7 @@ class CandidateQueue {
   private top = -1;
 
   add(count: number, vertex: number, near: number): void {
-    while (this.queues.length <= count) {
-      this.queues.push({ items: [], next: 0 });
-    }
+    while (this.queues.length <= count) this.queues.push({ items: [], next: 0 });
     this.queues[count].items.push(vertex, near);
     this.top = Math.max(this.top, count);
   }

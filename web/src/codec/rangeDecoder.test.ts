@@ -33,9 +33,7 @@ class Reference {
   private digit(p: bigint): number {
     const scale = this.range >> 16n;
     const quantile = BigInt.asUintN(64, this.point - this.lower) / scale;
-    if (quantile >= 2n ** 16n) {
-      throw new CodedDataError('damaged');
-    }
+    if (quantile >= 2n ** 16n) throw new CodedDataError('damaged');
     const digit = quantile < p ? 0 : 1;
     this.lower = BigInt.asUintN(64, this.lower + (digit === 1 ? scale * p : 0n));
     this.range = digit === 1 ? scale * (2n ** 16n - p) : scale * p;
@@ -80,9 +78,7 @@ describe('RangeDecoder', () => {
           expect(() => decoder.bit(models, model)).toThrow(CodedDataError);
           break;
         }
-        if (decoder.bit(models, model) !== expected) {
-          expect.fail(`seed ${seed}, digit ${k}`);
-        }
+        if (decoder.bit(models, model) !== expected) expect.fail(`seed ${seed}, digit ${k}`);
         digits++;
       }
     }

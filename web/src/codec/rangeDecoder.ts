@@ -36,9 +36,7 @@ export class RangeDecoder {
   private readonly interval = new Uint32Array(4);
 
   constructor(bytes: Uint8Array) {
-    if (bytes.length % 4 !== 0) {
-      throw new CodedDataError('coded numbers are cut');
-    }
+    if (bytes.length % 4 !== 0) throw new CodedDataError('coded numbers are cut');
     this.words = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
     this.interval[0] = 0xffffffff;
     this.interval[1] = 0xffffffff;
@@ -69,18 +67,14 @@ export class RangeDecoder {
       state[at] = fast + (((65535 - fast) / fastRate) | 0);
       state[at + 1] = slow + (((65535 - slow) / slowRate) | 0);
     }
-    if (met < SLOW_RATE) {
-      state[at + 2] = met + 1;
-    }
+    if (met < SLOW_RATE) state[at + 2] = met + 1;
     return digit;
   }
 
   /** Reads a number of so many binary digits, all equally likely, the highest first. */
   bits(count: number): number {
     let number = 0;
-    for (let k = 0; k < count; k++) {
-      number = ((number << 1) | this.digit(1 << 15)) >>> 0;
-    }
+    for (let k = 0; k < count; k++) number = ((number << 1) | this.digit(1 << 15)) >>> 0;
     return number;
   }
 
@@ -108,9 +102,8 @@ export class RangeDecoder {
       rangeLow = (wholeLow - splitLow) >>> 0;
       high = (high - splitHigh - (low < splitLow ? 1 : 0)) >>> 0;
       low = (low - splitLow) >>> 0;
-      if (high > rangeHigh || (high === rangeHigh && low >= rangeLow)) {
+      if (high > rangeHigh || (high === rangeHigh && low >= rangeLow))
         throw new CodedDataError('coded numbers are damaged');
-      }
     }
     if (rangeHigh === 0) {
       rangeHigh = rangeLow;
@@ -131,9 +124,7 @@ export class RangeDecoder {
       return this.words.getUint32(this.next - 4, true);
     }
     this.past++;
-    if (this.past > MAX_PAST) {
-      throw new CodedDataError('coded numbers are damaged');
-    }
+    if (this.past > MAX_PAST) throw new CodedDataError('coded numbers are damaged');
     return 0;
   }
 }

@@ -2,7 +2,6 @@
 
 import type { Residual } from '../capture';
 import { MAX_FRAMES } from './cages';
-import { decodeCorrections } from './corrections';
 import { CodedDataError } from './error';
 import type { Hierarchy } from './hierarchy';
 import { IntegerModels, MAX_RESIDUAL_SIZE, SIZE_CLASSES, sizeClass } from './integers';
@@ -25,13 +24,10 @@ const PARTS = 16;
  */
 export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: number, mostNumbers: number): Residual {
   const points = hierarchy.order.length;
-  if (frames > MAX_FRAMES || points * frames > MAX_POSITIONS) {
+  if (frames > MAX_FRAMES || points * frames > MAX_POSITIONS)
     throw new CodedDataError('a group has too many positions');
-  }
   const isHead = (parted: boolean) => bytes.length >= HEAD_BYTES + (parted ? 4 : 0);
-  if (!isHead(false) || !isHead((bytes[9] & 0x80) !== 0)) {
-    throw new CodedDataError('a residual is cut');
-  }
+  if (!isHead(false) || !isHead((bytes[9] & 0x80) !== 0)) throw new CodedDataError('a residual is cut');
   const head = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
   const step = head.getFloat64(0, true);
   const parted = (head.getUint16(8, true) & PARTED) !== 0;
@@ -41,9 +37,8 @@ export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: 
   const second = first + head.getUint32(18, true);
   const end = second + (parted ? head.getUint32(HEAD_BYTES, true) : 0);
   const tooMany = rank > Math.min(frames, 3 * points) || 3 * points * rank > mostNumbers || end > bytes.length;
-  if (tooMany || !Number.isFinite(step) || !Number.isFinite(correctionStep)) {
+  if (tooMany || !Number.isFinite(step) || !Number.isFinite(correctionStep))
     throw new CodedDataError('a residual has impossible counts');
-  }
   const decoder = new RangeDecoder(bytes.subarray(first, second));
   const trajectories = Float32Array.from(decodeTrajectories(decoder, frames, rank));
   const shapes = new Float32Array(rank * 3 * points);
@@ -51,9 +46,7 @@ export function decodeResidual(bytes: Uint8Array, hierarchy: Hierarchy, frames: 
   const unit = step / PARTS;
   for (let k = 0; k < rank; k++) {
     const parts = components.next();
-    for (let at = 0, out = k * 3 * points; at < parts.length; at++, out++) {
-      shapes[out] = parts[at] * unit;
-    }
+    for (let at = 0, out = k * 3 * points; at < parts.length; at++, out++) shapes[out] = parts[at] * unit;
   }
   return { rank, trajectories, shapes, ...decodeCorrections(bytes.subarray(end), frames, points, correctionStep) };
 }
@@ -131,9 +124,7 @@ class Components {
   next(): Float64Array {
     const { found, before, sizes } = this;
     const predicts = this.decoder.bit(this.kind, 0) === 1;
-    for (const part of this.parts) {
-      part.read(predicts, found, before, sizes);
-    }
+    for (const part of this.parts) part.read(predicts, found, before, sizes);
     this.before = sizes;
     this.sizes = before;
     return found;
@@ -151,12 +142,54 @@ export function addResidual(residual: Residual, frame: number, positions: Float3
       sums[at] += factor * shapes[from];
     }
   }
-  for (let at = 0; at < positions.length; at++) {
-    positions[at] += sums[at];
-  }
+  for (let at = 0; at < positions.length; at++) positions[at] += sums[at];
   for (let k = correctionStarts[frame]; k < correctionStarts[frame + 1]; k++) {
-    for (let axis = 0; axis < 3; axis++) {
-      positions[3 * correctedPoints[k] + axis] += correctionVectors[3 * k + axis];
+    for (let axis = 0; axis < 3; axis++) positions[3 * correctedPoints[k] + axis] += correctionVectors[3 * k + axis];
+  }
+}
+
+/** The corrections of a group of frames, as in `Residual` of `capture.ts`. */
+export interface Corrections {
+  readonly correctionStarts: Uint32Array;
+  readonly correctedPoints: Uint32Array;
+  readonly correctionVectors: Float32Array;
+}
+
+/**
+ * Decodes the corrections of a group, none of no bytes.
+ *
+ * @param step unit of the corrections.
+ */
+export function decodeCorrections(bytes: Uint8Array, frames: number, points: number, step: number): Corrections {
+  const correctionStarts = new Uint32Array(frames + 1);
+  const vertices: number[] = [];
+  const vectors: number[] = [];
+  if (bytes.length > 0) {
+    const decoder = new RangeDecoder(bytes);
+    const counts = new IntegerModels(1);
+    const gaps = new IntegerModels(1);
+    const steps = new IntegerModels(3);
+    // Numbers of high probability take next to no bytes.
+    let left = (1 << 20) + 64 * bytes.length;
+    let count = 0;
+    for (let frame = 0; frame < frames; frame++) {
+      count = Math.max(0, count + counts.signed(decoder, 0));
+      left -= count;
+      if (left < 0 || count > points) throw new CodedDataError('there are more corrections than there can be');
+      let next = 0;
+      for (let k = 0; k < count; k++) {
+        const vertex = next + gaps.natural(decoder, 0);
+        if (vertex >= points) throw new CodedDataError('a correction is of no point');
+        vertices.push(vertex);
+        for (let axis = 0; axis < 3; axis++) vectors.push(steps.signed(decoder, axis) * step);
+        next = vertex + 1;
+      }
+      correctionStarts[frame + 1] = vertices.length;
     }
   }
+  return {
+    correctionStarts,
+    correctedPoints: Uint32Array.from(vertices),
+    correctionVectors: Float32Array.from(vectors),
+  };
 }

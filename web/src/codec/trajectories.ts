@@ -36,9 +36,7 @@ function inverseCosines(n: number): Float64Array {
   const matrix = new Float64Array(n * n);
   for (let k = 0; k < n; k++) {
     const scale = Math.sqrt((k === 0 ? 1 : 2) / n);
-    for (let t = 0; t < n; t++) {
-      matrix[t * n + k] = scale * Math.cos((Math.PI * (t + 0.5) * k) / n);
-    }
+    for (let t = 0; t < n; t++) matrix[t * n + k] = scale * Math.cos((Math.PI * (t + 0.5) * k) / n);
   }
   return matrix;
 }

@@ -1,6 +1,6 @@
 import { expect, it } from 'vitest';
 import { randomNumbers } from '../../tests/support/containers';
-import { adjacency } from './adjacency';
+import { adjacency } from './polygons';
 import { RecencyList } from './vertexOrder';
 
 it('vertices that are moved stand in front in the order in which they stood', () => {

@@ -3,11 +3,59 @@
  * vertices stand in a list, those near the ones numbered last in front, and each is told by its place in the list; docs/FORMAT.md, "Faces".
  */
 
-import type { ByVertex } from './byVertex';
+import type { ByVertex } from './polygons';
 import { CodedDataError } from './error';
-import { CountedSet } from './fenwick';
 import { SIZE_CLASSES, sizeClass } from './integers';
 import { BinaryModels, type RangeDecoder } from './rangeDecoder';
+
+/** A set of numbers below a limit that is counted in a Fenwick tree. */
+export class CountedSet {
+  private readonly sums: Uint32Array;
+  /** The largest power of two that is not above the limit. */
+  private readonly reach: number;
+  private size = 0;
+
+  constructor(limit: number) {
+    this.sums = new Uint32Array(limit + 1);
+    let reach = 1;
+    while (2 * reach <= limit) reach *= 2;
+    this.reach = reach;
+  }
+
+  get count(): number {
+    return this.size;
+  }
+
+  /** The number of the set that has so many of it below; null where there is none. */
+  find(rank: number): number | null {
+    if (rank < 0 || rank >= this.size) return null;
+    const { sums } = this;
+    let at = 0;
+    let rest = rank;
+    for (let reach = this.reach; reach >= 1; reach /= 2) {
+      if (at + reach < sums.length && sums[at + reach] <= rest) {
+        at += reach;
+        rest -= sums[at];
+      }
+    }
+    return at;
+  }
+
+  add(number: number): void {
+    this.size++;
+    for (let at = number + 1; at < this.sums.length; at += at & -at) this.sums[at]++;
+  }
+
+  remove(number: number): void {
+    this.size--;
+    for (let at = number + 1; at < this.sums.length; at += at & -at) this.sums[at]--;
+  }
+
+  clear(): void {
+    this.size = 0;
+    this.sums.fill(0);
+  }
+}
 
 /** Vertices with more neighbours move none of them when one of these is numbered. */
 const MAX_PASSED_ON = 16;
@@ -28,17 +76,13 @@ export function decodeOrder(decoder: RangeDecoder, { starts, items }: ByVertex, 
   const places = new Places();
   for (let number = 0; number < order.length; number++) {
     const vertex = list.take(places.read(decoder));
-    if (vertex === null) {
-      throw new CodedDataError('vertices are not those that the faces name');
-    }
+    if (vertex === null) throw new CodedDataError('vertices are not those that the faces name');
     order[number] = vertex;
     const [start, end] = [starts[vertex], starts[vertex + 1]];
     if (isFar) {
       for (let k = start; k < end; k++) {
         const w = items[k];
-        if (starts[w + 1] - starts[w] <= MAX_PASSED_ON) {
-          list.choose(items, starts[w], starts[w + 1]);
-        }
+        if (starts[w + 1] - starts[w] <= MAX_PASSED_ON) list.choose(items, starts[w], starts[w + 1]);
       }
       list.moveChosen();
     }
@@ -70,17 +114,13 @@ export class RecencyList {
     this.waiting = new CountedSet(capacity);
     this.chosen = new Uint32Array(points);
     this.isChosen = new Uint8Array(points);
-    for (let vertex = points - 1; vertex >= 0; vertex--) {
-      this.push(vertex);
-    }
+    for (let vertex = points - 1; vertex >= 0; vertex--) this.push(vertex);
   }
 
   /** Takes out the vertex that has so many before it; null where there are not so many. */
   take(place: number): number | null {
     const time = this.waiting.find(this.waiting.count - 1 - place);
-    if (time === null) {
-      return null;
-    }
+    if (time === null) return null;
     this.waiting.remove(time);
     const vertex = this.at[time];
     this.times[vertex] = GONE;
@@ -100,9 +140,7 @@ export class RecencyList {
 
   /** Moves the chosen vertices to the front, where they keep their order. */
   moveChosen(): void {
-    if (this.next + this.chosenCount > this.at.length) {
-      this.renew();
-    }
+    if (this.next + this.chosenCount > this.at.length) this.renew();
     const times = this.chosen.subarray(0, this.chosenCount);
     for (let k = 0; k < times.length; k++) {
       this.isChosen[times[k]] = 0;
@@ -130,9 +168,7 @@ export class RecencyList {
     this.next = 0;
     for (let time = 0; time < end; time++) {
       const vertex = this.at[time];
-      if (this.times[vertex] === time) {
-        this.push(vertex);
-      }
+      if (this.times[vertex] === time) this.push(vertex);
     }
   }
 }
@@ -146,14 +182,10 @@ class Places {
   read(decoder: RangeDecoder): number {
     const context = 32 * sizeClass(this.before);
     let count = 0;
-    while (count < MAX_DIGITS && decoder.bit(this.digits, context + count) === 1) {
-      count++;
-    }
+    while (count < MAX_DIGITS && decoder.bit(this.digits, context + count) === 1) count++;
     const modelled = Math.min(count, 2);
     let number = 1;
-    for (let k = 0; k < modelled; k++) {
-      number = 2 * number + decoder.bit(this.leading, 4 * count + number);
-    }
+    for (let k = 0; k < modelled; k++) number = 2 * number + decoder.bit(this.leading, 4 * count + number);
     number = number * 2 ** (count - modelled) + decoder.bits(count - modelled);
     this.before = number - 1;
     return this.before;

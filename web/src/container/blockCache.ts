@@ -21,7 +21,6 @@ export class BlockCache {
 
   constructor(private readonly load: (first: number, signal: AbortSignal) => Promise<FrameBlock>) {}
 
-  /** The block that begins with frame `first`. */
   async get(first: number, signal?: AbortSignal): Promise<FrameBlock> {
     signal?.throwIfAborted();
     const done = this.done.get(first);
@@ -35,9 +34,7 @@ export class BlockCache {
       return await orAborted(pending.promise, signal);
     } finally {
       pending.waiting--;
-      if (pending.waiting === 0 && !pending.ahead) {
-        this.giveUp(first, pending);
-      }
+      if (pending.waiting === 0 && !pending.ahead) this.giveUp(first, pending);
     }
   }
 
@@ -45,33 +42,23 @@ export class BlockCache {
   prefetch(first: number): void {
     for (const [other, pending] of this.pending) {
       pending.ahead = false;
-      if (other !== first && pending.waiting === 0) {
-        this.giveUp(other, pending);
-      }
+      if (other !== first && pending.waiting === 0) this.giveUp(other, pending);
     }
-    if (!this.done.has(first)) {
-      this.start(first).ahead = true;
-    }
+    if (!this.done.has(first)) this.start(first).ahead = true;
   }
 
   clear(): void {
-    for (const [first, pending] of this.pending) {
-      this.giveUp(first, pending);
-    }
+    for (const [first, pending] of this.pending) this.giveUp(first, pending);
     this.done.clear();
   }
 
   private start(first: number): Pending {
     const running = this.pending.get(first);
-    if (running !== undefined) {
-      return running;
-    }
+    if (running !== undefined) return running;
     const abort = new AbortController();
     const promise = this.load(first, abort.signal).then(
       (block) => {
-        if (this.remove(first, pending)) {
-          this.keep(block);
-        }
+        if (this.remove(first, pending)) this.keep(block);
         return block;
       },
       (error: unknown) => {
@@ -100,17 +87,13 @@ export class BlockCache {
     this.done.delete(block.first);
     this.done.set(block.first, block);
     const [oldest] = this.done.keys();
-    if (this.done.size > KEPT_BLOCKS) {
-      this.done.delete(oldest);
-    }
+    if (this.done.size > KEPT_BLOCKS) this.done.delete(oldest);
   }
 }
 
 /** The promise's result, or the signal's reason as soon as it is aborted. */
 function orAborted<T>(promise: Promise<T>, signal: AbortSignal | undefined): Promise<T> {
-  if (signal === undefined) {
-    return promise;
-  }
+  if (signal === undefined) return promise;
   return new Promise((resolve, reject) => {
     const abort = () => reject(signal.reason as Error);
     signal.addEventListener('abort', abort, { once: true });

@@ -67,9 +67,7 @@ export class BlockDecoder {
     try {
       added = await adding;
     } catch (error) {
-      if (!isDamage(error)) {
-        throw error;
-      }
+      if (!isDamage(error)) throw error;
       problem = error;
     }
     return { block: { first, count, cages, residual: added }, problem };
@@ -80,13 +78,10 @@ export class BlockDecoder {
    */
   async phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
     const { part } = this;
-    if (this.basis === null && this.given === null && part.rowsPerFrame <= MAX_ROWS) {
+    if (this.basis === null && this.given === null && part.rowsPerFrame <= MAX_ROWS)
       this.prepareBasis().catch(() => undefined);
-    }
     const { computed } = this;
-    if (computed === null) {
-      return computePhi(part, { onProgress, signal });
-    }
+    if (computed === null) return computePhi(part, { onProgress, signal });
     this.computed = null;
     this.onProgress = onProgress;
     return computed.finally(() => signal.throwIfAborted());
@@ -94,12 +89,10 @@ export class BlockDecoder {
 
   private async cages({ entry, payload }: Section, signal: AbortSignal | undefined): Promise<Float32Array> {
     const { codec, count } = entry.fields;
-    if (codec !== CODEC.coded) {
+    if (codec !== CODEC.coded)
       return new Float32Array(decodePayload(entry, payload, 3 * this.part.rowsPerFrame).buffer);
-    }
-    if (this.part.rowsPerFrame > MAX_ROWS) {
+    if (this.part.rowsPerFrame > MAX_ROWS)
       throw damaged(entry.offset, `a coded frame has ${this.part.rowsPerFrame} rows`);
-    }
     await (this.basis ?? this.prepareBasis());
     return located(entry, this.codec.call('cages', [payload, count, restRows(this.part)], signal));
   }
@@ -153,9 +146,8 @@ export class BlockDecoder {
       const indices = sampled.slice(start, start + batch);
       const rows = await given(part, pointsAt(part.rest, indices), indices);
       const columns = indices.length > 0 ? rows.length / indices.length : part.rowsPerFrame;
-      if (columns < part.rowsPerFrame || !Number.isInteger(columns)) {
+      if (columns < part.rowsPerFrame || !Number.isInteger(columns))
         throw new Error(`The coordinates have ${columns} columns, not ${part.rowsPerFrame}. Reload the page.`);
-      }
       await codec.call('addCoordinates', [rows, columns, part.rowsPerFrame, start === 0]);
     }
   }
@@ -177,8 +169,6 @@ function pointsAt(positions: Float64Array, indices: Uint32Array): Float64Array {
 function restRows({ system, cage, rowsPerFrame }: StaticPart): Float64Array {
   const rows = new Float64Array(3 * rowsPerFrame);
   rows.set(cage.positions);
-  if (system === 'green-free') {
-    new TiedNormals(cage).write(cage.positions, rows, cage.positions.length);
-  }
+  if (system === 'green-free') new TiedNormals(cage).write(cage.positions, rows, cage.positions.length);
   return rows;
 }

@@ -12,17 +12,13 @@ import { decompress } from './zstd';
 export function decodePayload({ fields, offset }: Entry, payload: Uint8Array, stride = 1): Uint8Array<ArrayBuffer> {
   const { codec, rawBytes, width } = fields;
   if (codec === CODEC.raw) {
-    if (payload.length !== rawBytes) {
-      throw damaged(offset, 'a section does not have the size it declares');
-    }
+    if (payload.length !== rawBytes) throw damaged(offset, 'a section does not have the size it declares');
     return payload.slice();
   }
-  if (codec !== CODEC.planes && codec !== CODEC.difference) {
+  if (codec !== CODEC.planes && codec !== CODEC.difference)
     throw unknownFeature(`codec ${codec} of the section ${fields.tag}`);
-  }
-  if (codec === CODEC.difference && rawBytes % 4 !== 0) {
+  if (codec === CODEC.difference && rawBytes % 4 !== 0)
     throw damaged(offset, 'a section does not have the size it declares');
-  }
   let planes: Uint8Array<ArrayBuffer>;
   try {
     planes = decompress(payload, rawBytes);
@@ -30,24 +26,18 @@ export function decodePayload({ fields, offset }: Entry, payload: Uint8Array, st
     const reason = error instanceof Error ? error.message : 'it is damaged';
     throw damaged(offset, `a section cannot be decompressed (${reason})`);
   }
-  if (codec === CODEC.planes) {
-    return joinPlanes(planes, width);
-  }
+  if (codec === CODEC.planes) return joinPlanes(planes, width);
   const words = new Uint32Array(joinPlanes(planes, 4).buffer);
   undoDifferences(words, stride);
   return new Uint8Array(words.buffer);
 }
 
 function joinPlanes(planes: Uint8Array<ArrayBuffer>, width: number): Uint8Array<ArrayBuffer> {
-  if (width === 1) {
-    return planes;
-  }
+  if (width === 1) return planes;
   const count = Math.floor(planes.length / width);
   const out = new Uint8Array(planes.length);
   for (let plane = 0; plane < width; plane++) {
-    for (let k = 0, from = plane * count, to = plane; k < count; k++, from++, to += width) {
-      out[to] = planes[from];
-    }
+    for (let k = 0, from = plane * count, to = plane; k < count; k++, from++, to += width) out[to] = planes[from];
   }
   out.set(planes.subarray(count * width), count * width);
   return out;

@@ -53,14 +53,14 @@ describe.each(['coded-mvc', 'definition3-mvc'])('the file %s', (name) => {
   });
 
   it('cut at any length gives a sentence', async () => {
-    for (let length = 0; length < intact.length; length += length < 60 ? 1 : 23) {
+    for (let length = 0; length < intact.length; length += length < 60 ? 1 : 47) {
       expect(await complaint(intact.subarray(0, length)), `${length} bytes`).toMatch(SENTENCES);
       expect(await streamComplaint(intact.subarray(0, length)), `${length} bytes`).toBeNull();
     }
   });
 
   it('with a bit changed anywhere gives a sentence', async () => {
-    for (let at = 0; at < intact.length; at += 5) {
+    for (let at = 0; at < intact.length; at += 11) {
       const bytes = intact.slice();
       bytes[at] ^= 1 << (at & 7);
       expect(await complaint(bytes), `byte ${at}`).toMatch(SENTENCES);
@@ -70,12 +70,10 @@ describe.each(['coded-mvc', 'definition3-mvc'])('the file %s', (name) => {
 
   it('with numbers in its payloads changed and right checksums gives a sentence or a capture', async () => {
     const random = randomNumbers(7);
-    for (let turn = 0; turn < 150; turn++) {
+    for (let turn = 0; turn < 60; turn++) {
       const parts = takeApart(intact);
       const { payload } = parts[random(parts.length)];
-      for (let k = random(4); k >= 0; k--) {
-        payload[random(payload.length)] = random(2) === 0 ? 0xff : random(256);
-      }
+      for (let k = random(4); k >= 0; k--) payload[random(payload.length)] = random(2) === 0 ? 0xff : random(256);
       const bytes = putTogether(parts);
       expect((await complaint(bytes)) ?? 'Fine.', `turn ${turn}`).toMatch(SENTENCES);
       expect((await streamComplaint(bytes)) ?? 'Fine.', `turn ${turn}`).toMatch(SENTENCES);

@@ -1,4 +1,4 @@
-import { isRequired } from './tag';
+import { isRequired } from './section';
 
 /** What a person who opened a container can do about it. */
 export type ContainerErrorKind = 'not-a-container' | 'newer' | 'damaged' | 'changed';

@@ -54,9 +54,7 @@ describe.each(GOLDEN)('the golden file %s', (name) => {
 
 /** Φ of the golden files with harmonic coordinates, as `GET …/coordinates` of the service answered for their model and cage. */
 function harmonicPhi(name: string): Float32Array | undefined {
-  if (!name.includes('harmonic')) {
-    return undefined;
-  }
+  if (!name.includes('harmonic')) return undefined;
   const text = name === 'coded-harmonic' ? golden['coded-harmonic'] : golden['definition3-harmonic'];
   return new Float32Array(Uint8Array.from(Buffer.from(text, 'base64')).buffer);
 }

@@ -23,12 +23,8 @@ export interface Head {
 
 /** Checks what the section of the header says before it is read. */
 export function checkHeadSection({ fields, offset }: Entry): void {
-  if (fields.codec !== CODEC.raw) {
-    throw damaged(offset, 'the header is compressed');
-  }
-  if (fields.width !== 1 || fields.rawBytes > MAX_BYTES) {
-    throw damaged(offset, 'the header is too large');
-  }
+  if (fields.codec !== CODEC.raw) throw damaged(offset, 'the header is compressed');
+  if (fields.width !== 1 || fields.rawBytes > MAX_BYTES) throw damaged(offset, 'the header is too large');
 }
 
 /** Parses the raw content of `HEAD`, whose section begins at `offset`. */
@@ -47,23 +43,16 @@ export function parseHead(bytes: Uint8Array, offset: number): Head {
     frameRate: reader.optionalF64(),
   };
   reader.end();
-  if (head.frameRate !== null && !(Number.isFinite(head.frameRate) && head.frameRate > 0)) {
+  if (head.frameRate !== null && !(Number.isFinite(head.frameRate) && head.frameRate > 0))
     throw damaged(offset, 'the frame rate is not a positive number');
-  }
   const impossible = head.rowsPerFrame === 0 || head.points > MAX_COUNT || head.cageVertices > MAX_COUNT;
-  if (impossible || (head.restFaces === 0 && head.restCorners > 0)) {
+  if (impossible || (head.restFaces === 0 && head.restCorners > 0))
     throw damaged(offset, 'the header has impossible counts');
-  }
-  if (!isKnownSystem(system)) {
-    throw unknownFeature(`coordinates ${system}`);
-  }
-  if (definition !== DEFINITION) {
-    throw unknownFeature(`coordinates of definition ${definition}`);
-  }
+  if (!isKnownSystem(system)) throw unknownFeature(`coordinates ${system}`);
+  if (definition !== DEFINITION) throw unknownFeature(`coordinates of definition ${definition}`);
   const rows = head.cageVertices + (system === 'green-free' ? head.cageFaces : 0);
-  if (head.rowsPerFrame !== rows) {
+  if (head.rowsPerFrame !== rows)
     throw damaged(offset, `a frame has ${head.rowsPerFrame} rows where the cage has ${rows}`);
-  }
   return { ...head, system };
 }
 
@@ -71,7 +60,6 @@ function isKnownSystem(name: string): name is CoordinateSystem {
   return SYSTEMS.includes(name);
 }
 
-/** Reads fields back to back. */
 class FieldReader {
   private readonly view: DataView;
   private at = 0;
@@ -114,23 +102,17 @@ class FieldReader {
 
   optionalF64(): number | null {
     const there = this.view.getUint8(this.advance(1));
-    if (there > 1) {
-      throw damaged(this.offset, 'the header cannot be read');
-    }
+    if (there > 1) throw damaged(this.offset, 'the header cannot be read');
     return there === 1 ? this.f64() : null;
   }
 
   end(): void {
-    if (this.at !== this.bytes.length) {
-      throw damaged(this.offset, 'bytes are left over after the header');
-    }
+    if (this.at !== this.bytes.length) throw damaged(this.offset, 'bytes are left over after the header');
   }
 
   private advance(length: number): number {
     const start = this.at;
-    if (length > this.bytes.length - start) {
-      throw damaged(this.offset, 'the header is cut');
-    }
+    if (length > this.bytes.length - start) throw damaged(this.offset, 'the header is cut');
     this.at = start + length;
     return start;
   }

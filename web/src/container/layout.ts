@@ -2,8 +2,16 @@
 
 import { damaged, unknownFeature } from './error';
 import type { Head } from './head';
-import { CODEC, type Entry, HEADER_BYTES, isCoded, PRELUDE_BYTES, type SectionFields } from './section';
-import { KNOWN_TAGS, isRequired } from './tag';
+import {
+  CODEC,
+  type Entry,
+  HEADER_BYTES,
+  isCoded,
+  PRELUDE_BYTES,
+  type SectionFields,
+  KNOWN_TAGS,
+  isRequired,
+} from './section';
 
 const MAX_FRAMES = 2 ** 32 - 1;
 const MIB = 2 ** 20;
@@ -38,34 +46,25 @@ export class Layout {
     return bytes;
   }
 
-  /** The one section with this tag. */
   get(tag: string): Entry | undefined {
     return this.byTag.get(tag);
   }
 
   add(entry: Entry): void {
     const { tag, first, count, codec } = entry.fields;
-    if (!KNOWN_TAGS.has(tag) && isRequired(tag)) {
-      throw unknownFeature(tag);
-    }
-    if (tag === 'TOC_') {
-      throw damaged(entry.offset, 'the table of contents is not at the end');
-    }
+    if (!KNOWN_TAGS.has(tag) && isRequired(tag)) throw unknownFeature(tag);
+    if (tag === 'TOC_') throw damaged(entry.offset, 'the table of contents is not at the end');
     const residual = this.pendingResidual;
     const follows = tag === 'FRAM' && residual?.fields.first === first && residual.fields.count === count;
-    if ((residual !== null && !follows) || (tag === 'resi' && codec !== CODEC.coded)) {
+    if ((residual !== null && !follows) || (tag === 'resi' && codec !== CODEC.coded))
       throw damaged(entry.offset, 'a residual is not followed by its frames');
-    }
     this.pendingResidual = tag === 'resi' ? entry : null;
     if (tag === 'FRAM') {
-      if (first !== this.frames || count === 0 || first + count > MAX_FRAMES) {
+      if (first !== this.frames || count === 0 || first + count > MAX_FRAMES)
         throw damaged(entry.offset, 'the frames are not in order');
-      }
       this.chunks.push({ frames: entry, residual });
     } else if (tag !== 'resi' && KNOWN_TAGS.has(tag)) {
-      if (this.byTag.has(tag)) {
-        throw damaged(entry.offset, `the section ${tag} is there twice`);
-      }
+      if (this.byTag.has(tag)) throw damaged(entry.offset, `the section ${tag} is there twice`);
       this.byTag.set(tag, entry);
     }
     this.entries.push(entry);
@@ -75,42 +74,30 @@ export class Layout {
   /** Checks that all sections of a whole file are there. */
   checkComplete(head: Head): void {
     this.checkStatic(head);
-    if (this.pendingResidual !== null) {
+    if (this.pendingResidual !== null)
       throw damaged(this.pendingResidual.offset, 'a residual is not followed by its frames');
-    }
-    if (!this.byTag.has('ERRS')) {
-      throw damaged(this.end, 'the section ERRS is missing');
-    }
+    if (!this.byTag.has('ERRS')) throw damaged(this.end, 'the section ERRS is missing');
   }
 
   /** Checks that the sections of model and cage are there. */
   checkStatic(head: Head): void {
     for (const tag of ['RPTS', 'CVTX', 'CTRI', ...(head.restFaces > 0 ? ['RFAC'] : [])]) {
-      if (!this.byTag.has(tag)) {
-        throw damaged(this.end, `the section ${tag} is missing`);
-      }
+      if (!this.byTag.has(tag)) throw damaged(this.end, `the section ${tag} is missing`);
     }
     const unexpected = head.restFaces === 0 ? this.byTag.get('RFAC') : undefined;
-    if (unexpected !== undefined) {
-      throw damaged(unexpected.offset, 'the section RFAC is there without faces');
-    }
+    if (unexpected !== undefined) throw damaged(unexpected.offset, 'the section RFAC is there without faces');
     const elements = this.byTag.get('ELEM');
-    if (elements !== undefined && head.system !== 'harmonic') {
+    if (elements !== undefined && head.system !== 'harmonic')
       throw damaged(elements.offset, `coordinates ${head.system} have no boundary elements`);
-    }
   }
 
-  /** Chunk that has a frame; undefined beyond the last. */
   chunkOf(frame: number): Chunk | undefined {
     let [low, high] = [0, this.chunks.length];
     while (low < high) {
       const middle = (low + high) >> 1;
       const { first, count } = this.chunks[middle].frames.fields;
-      if (first + count <= frame) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
+      if (first + count <= frame) low = middle + 1;
+      else high = middle;
     }
     return this.chunks.at(low);
   }
@@ -123,19 +110,15 @@ export class Layout {
 export function checkSize(entry: Entry, head: Head, frames: number, fileBytes: number): void {
   const { fields, offset } = entry;
   const [widths, expected] = expectedSize(fields, head, frames);
-  if (!widths.includes(fields.width) || fields.rawBytes !== expected) {
+  if (!widths.includes(fields.width) || fields.rawBytes !== expected)
     throw damaged(offset, 'a section does not have the size that the header gives it');
-  }
-  if (fields.rawBytes > mostRawBytes(fields, fileBytes)) {
+  if (fields.rawBytes > mostRawBytes(fields, fileBytes))
     throw damaged(offset, 'a section declares more bytes than the file can hold');
-  }
 }
 
 /** Most bytes that a section may decode to in a file of so many bytes. */
 function mostRawBytes({ tag, codec }: Pick<SectionFields, 'tag' | 'codec'>, fileBytes: number): number {
-  if (tag === 'summ') {
-    return 4 * MIB + 16 * fileBytes;
-  }
+  if (tag === 'summ') return 4 * MIB + 16 * fileBytes;
   return isCoded(codec) ? 2 * MIB + 16 * fileBytes : 12 * MIB + 48 * fileBytes;
 }
 

@@ -44,26 +44,20 @@ export async function decodeStatic(
 
 function decodeOrigin({ entry, payload }: Section): Float64Array {
   const origin = new Float64Array(decodePayload(entry, payload).slice().buffer);
-  if (!origin.every(Number.isFinite)) {
-    throw damaged(entry.offset, 'the origin is not finite');
-  }
+  if (!origin.every(Number.isFinite)) throw damaged(entry.offset, 'the origin is not finite');
   return origin;
 }
 
 async function decodeModelFaces(head: Head, section: Section | undefined, codec: Codec): Promise<Polygons> {
-  if (section === undefined) {
-    return NO_POLYGONS;
-  }
+  if (section === undefined) return NO_POLYGONS;
   const { entry, payload } = section;
-  if (isCoded(entry)) {
+  if (isCoded(entry))
     return located(entry, codec.call('faces', [payload, head.points, head.restFaces, head.restCorners]));
-  }
   const words = new Uint32Array(decodePayload(entry, payload).buffer);
   const counts = words.slice(0, head.restFaces);
   const corners = words.slice(head.restFaces);
-  if (counts.reduce((sum, count) => sum + count, 0) !== corners.length) {
+  if (counts.reduce((sum, count) => sum + count, 0) !== corners.length)
     throw damaged(entry.offset, 'the faces of the model do not have as many corners as there are');
-  }
   checkIndices(corners, head.points, entry);
   return { counts, corners };
 }
@@ -78,9 +72,8 @@ async function decodeCage(head: Head, faces: Section, vertices: Section, codec: 
   }
   const call = codec.call('faces', [payload, cageVertices, cageFaces, 3 * cageFaces]);
   const polygons = await located(entry, call);
-  if (polygons.counts.some((count) => count !== 3)) {
+  if (polygons.counts.some((count) => count !== 3))
     throw damaged(entry.offset, 'the cage has faces that are no triangles');
-  }
   return { positions: await decodePoints(vertices, polygons, cageVertices, codec), triangles: polygons.corners };
 }
 
@@ -99,9 +92,7 @@ async function decodePoints(
     positions = entry.fields.width === 4 ? Float64Array.from(new Float32Array(buffer)) : new Float64Array(buffer);
   }
   const bad = positions.findIndex((x) => !Number.isFinite(x));
-  if (bad >= 0) {
-    throw damaged(entry.offset, `position ${Math.floor(bad / 3)} is not finite`);
-  }
+  if (bad >= 0) throw damaged(entry.offset, `position ${Math.floor(bad / 3)} is not finite`);
   return positions;
 }
 
@@ -120,7 +111,5 @@ export async function located<T>(entry: Entry, decoded: Promise<T>): Promise<T> 
 
 function checkIndices(indices: Uint32Array, points: number, entry: Entry): void {
   const bad = indices.find((index) => index >= points);
-  if (bad !== undefined) {
-    throw damaged(entry.offset, `a face names point ${bad} of ${points}`);
-  }
+  if (bad !== undefined) throw damaged(entry.offset, `a face names point ${bad} of ${points}`);
 }

@@ -11,10 +11,9 @@ import { checkSize, type Chunk, type Layout } from './layout';
 import { decodePayload } from './codecs';
 import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
 import { readContents, readSections, scanSections } from './sectionReader';
-import { checkPrelude, CODEC, type Entry, PRELUDE_BYTES } from './section';
+import { checkPrelude, CODEC, type Entry, PRELUDE_BYTES, KNOWN_TAGS } from './section';
 import { EndsCache, type Source } from './source';
 import { decodeErrors, decodeFrameNumbers, decodeReport, NO_ERRORS } from './tail';
-import { KNOWN_TAGS } from './tag';
 
 /** Bytes at either end that are read at once: most of the static part of coded captures, and all that comes behind the frames of most. */
 const FIRST_BYTES = 1 << 16;
@@ -46,14 +45,10 @@ export async function openContainer(source: Source, options: OpenOptions = {}): 
   const { layout, problem } = await readLayout(ends, signal);
   const head = await readHead(ends, layout, signal);
   layout.checkStatic(head);
-  if (problem === null) {
-    layout.checkComplete(head);
-  }
+  if (problem === null) layout.checkComplete(head);
   for (const entry of layout.entries) {
     const { tag } = entry.fields;
-    if (KNOWN_TAGS.has(tag) && tag !== 'HEAD') {
-      checkSize(entry, head, layout.frames, source.size);
-    }
+    if (KNOWN_TAGS.has(tag) && tag !== 'HEAD') checkSize(entry, head, layout.frames, source.size);
   }
   const codec = options.codec ?? createCodec();
   try {
@@ -73,18 +68,14 @@ async function readLayout(source: Source, signal?: AbortSignal): Promise<{ layou
   try {
     return { layout: await readContents(source, signal), problem: null };
   } catch (error) {
-    if (!isDamage(error)) {
-      throw error;
-    }
+    if (!isDamage(error)) throw error;
     return { layout: await scanSections(source, signal), problem: error.message };
   }
 }
 
 async function readHead(source: Source, layout: Layout, signal?: AbortSignal): Promise<Head> {
   const entry = layout.get('HEAD');
-  if (entry === undefined) {
-    throw damaged(layout.end, 'the section HEAD is missing');
-  }
+  if (entry === undefined) throw damaged(layout.end, 'the section HEAD is missing');
   checkHeadSection(entry);
   const [{ payload }] = await readSections(source, [entry], signal);
   return parseHead(decodePayload(entry, payload), entry.offset);
@@ -102,9 +93,7 @@ async function readStatic(
     const entries = tags.map((tag) => layout.get(tag)).filter((entry) => entry !== undefined);
     entries.sort((a, b) => a.offset - b.offset);
     const sections = new Map<string, Section>();
-    for (const section of await readSections(source, entries, signal)) {
-      sections.set(section.entry.fields.tag, section);
-    }
+    for (const section of await readSections(source, entries, signal)) sections.set(section.entry.fields.tag, section);
     const colors = sections.get('rcol');
     const part = await decodeStatic(head, sections, codec);
     return colors === undefined ? part : { ...part, colors: decodePayload(colors.entry, colors.payload) };
@@ -112,9 +101,7 @@ async function readStatic(
   try {
     return { part: await read([...STATIC_TAGS, 'rcol']), problem: null };
   } catch (error) {
-    if (layout.get('rcol') === undefined || !isTolerable(error, 'rcol')) {
-      throw error;
-    }
+    if (layout.get('rcol') === undefined || !isTolerable(error, 'rcol')) throw error;
     return { part: await read(STATIC_TAGS), problem: (error as Error).message };
   }
 }
@@ -149,16 +136,13 @@ class FileCapture implements ContainerCapture {
 
   async block(frame: number, signal?: AbortSignal): Promise<FrameBlock> {
     const chunk = frame >= 0 ? this.layout.chunkOf(frame) : undefined;
-    if (chunk === undefined) {
+    if (chunk === undefined)
       throw new RangeError(`The capture has ${this.frames} frames, so there is no frame ${frame}.`);
-    }
     const { first, count } = chunk.frames.fields;
     const block = await this.cache.get(first, signal);
     // After the last comes the first one, as in a loop.
     const next = first + count < this.frames ? first + count : 0;
-    if (next !== first) {
-      this.cache.prefetch(next);
-    }
+    if (next !== first) this.cache.prefetch(next);
     return block;
   }
 
@@ -196,16 +180,12 @@ class FileCapture implements ContainerCapture {
 
   private async readOptional(tag: string, take: (section: Section) => unknown, signal?: AbortSignal): Promise<void> {
     const entry = this.layout.get(tag);
-    if (entry === undefined) {
-      return;
-    }
+    if (entry === undefined) return;
     try {
       const [section] = await readSections(this.source, [entry], signal);
       await take(section);
     } catch (error) {
-      if (!isTolerable(error, tag)) {
-        throw error;
-      }
+      if (!isTolerable(error, tag)) throw error;
       this.report(error);
     }
   }
@@ -215,9 +195,7 @@ class FileCapture implements ContainerCapture {
     try {
       const sections = await this.readChunk({ frames, residual }, signal);
       const { block, problem } = await this.blocks.decode(sections.frames, sections.residual, this.source.size, signal);
-      if (problem !== null) {
-        this.report(problem);
-      }
+      if (problem !== null) this.report(problem);
       return block;
     } catch (error) {
       this.report(error);
@@ -231,16 +209,12 @@ class FileCapture implements ContainerCapture {
     signal: AbortSignal,
   ): Promise<{ frames: Section; residual: Section | null }> {
     const read = async (entries: Entry[]) => readSections(this.source, entries, signal);
-    if (residual === null) {
-      return { frames: (await read([frames]))[0], residual: null };
-    }
+    if (residual === null) return { frames: (await read([frames]))[0], residual: null };
     try {
       const [first, second] = await read([residual, frames]);
       return { frames: second, residual: first };
     } catch (error) {
-      if (!isDamage(error)) {
-        throw error;
-      }
+      if (!isDamage(error)) throw error;
       const [section] = await read([frames]);
       this.report(error);
       return { frames: section, residual: null };

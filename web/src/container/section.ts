@@ -43,34 +43,22 @@ export interface Entry {
 
 /** Checks the first bytes of a file; fewer than a prelude has are those of a file that was cut, or of another one. */
 export function checkPrelude(bytes: Uint8Array): void {
-  if (bytes.length === 0 || !startsWith(bytes, MAGIC.slice(0, bytes.length))) {
-    throw notAContainer();
-  }
-  if (bytes.length < PRELUDE_BYTES) {
-    throw damaged(bytes.length, 'the file was cut');
-  }
+  if (bytes.length === 0 || !startsWith(bytes, MAGIC.slice(0, bytes.length))) throw notAContainer();
+  if (bytes.length < PRELUDE_BYTES) throw damaged(bytes.length, 'the file was cut');
   const view = viewOf(bytes);
-  if (crc32c(bytes.subarray(0, 12)) !== view.getUint32(12, true)) {
+  if (crc32c(bytes.subarray(0, 12)) !== view.getUint32(12, true))
     throw damaged(0, 'the checksum of the first bytes does not match');
-  }
   const version = view.getUint16(8, true);
-  if (version !== 1) {
-    throw newerVersion(version);
-  }
-  if (view.getUint16(10, true) !== 0) {
-    throw unknownFeature('flags');
-  }
+  if (version !== 1) throw newerVersion(version);
+  if (view.getUint16(10, true) !== 0) throw unknownFeature('flags');
 }
 
 /** Reads the header of a section that begins at `offset`. */
 export function parseHeader(bytes: Uint8Array, offset: number): SectionHeader {
   const view = viewOf(bytes);
-  if (crc32c(bytes.subarray(0, 36)) !== view.getUint32(36, true)) {
+  if (crc32c(bytes.subarray(0, 36)) !== view.getUint32(36, true))
     throw damaged(offset, "the checksum of a section's header does not match");
-  }
-  if (view.getUint16(6, true) !== 0) {
-    throw damaged(offset + 6, 'reserved bytes are not zero');
-  }
+  if (view.getUint16(6, true) !== 0) throw damaged(offset + 6, 'reserved bytes are not zero');
   return { ...parseFields(bytes, offset), payloadCrc: view.getUint32(32, true) };
 }
 
@@ -92,12 +80,10 @@ export function parseFields(bytes: Uint8Array, offset: number): SectionFields {
 export function checkFooter(bytes: Uint8Array, fileBytes: number): number {
   const offset = fileBytes - FOOTER_BYTES;
   const view = viewOf(bytes);
-  if (!startsWith(bytes.subarray(16), FOOTER_MAGIC)) {
+  if (!startsWith(bytes.subarray(16), FOOTER_MAGIC))
     throw damaged(offset, 'the end is missing, as of a file that was cut');
-  }
-  if (crc32c(bytes.subarray(0, 20)) !== view.getUint32(20, true) || safeInteger(view, 8, offset) !== fileBytes) {
+  if (crc32c(bytes.subarray(0, 20)) !== view.getUint32(20, true) || safeInteger(view, 8, offset) !== fileBytes)
     throw damaged(offset, 'the end does not fit the file');
-  }
   return safeInteger(view, 0, offset);
 }
 
@@ -112,12 +98,19 @@ export function viewOf(bytes: Uint8Array): DataView {
 /** A u64 that is a length or a count: none that memory or a file could have is beyond what a number holds exactly. */
 export function safeInteger(view: DataView, at: number, offset: number): number {
   const number = view.getBigUint64(at, true);
-  if (number > BigInt(Number.MAX_SAFE_INTEGER)) {
-    throw damaged(offset, 'a length or count is impossible');
-  }
+  if (number > BigInt(Number.MAX_SAFE_INTEGER)) throw damaged(offset, 'a length or count is impossible');
   return Number(number);
 }
 
 function startsWith(bytes: Uint8Array, start: readonly number[]): boolean {
   return start.every((byte, k) => bytes[k] === byte);
+}
+
+export const KNOWN_TAGS: ReadonlySet<string> = new Set(
+  'HEAD ORIG RPTS RFAC rcol CVTX CTRI ELEM FRAM resi ERRS fnum summ TOC_'.split(' '),
+);
+
+/** Whether a reader that does not know the section must refuse the file. */
+export function isRequired(tag: string): boolean {
+  return !/^[a-z]/.test(tag);
 }

@@ -1,11 +1,17 @@
 /** The sections of a container that arrives in pieces of any size, one after another. */
 
-import { ByteQueue } from './byteQueue';
 import { crc32c } from './crc32c';
 import { Layout } from './layout';
 import type { Section } from './meshes';
-import { checkPrelude, type Entry, HEADER_BYTES, parseHeader, PRELUDE_BYTES, type SectionHeader } from './section';
-import { KNOWN_TAGS } from './tag';
+import {
+  checkPrelude,
+  type Entry,
+  HEADER_BYTES,
+  parseHeader,
+  PRELUDE_BYTES,
+  type SectionHeader,
+  KNOWN_TAGS,
+} from './section';
 
 /** What arrived: a section's header, all of it, or the table of contents that ends the sections. Unknown sections are passed over. */
 export type Arrival =
@@ -83,5 +89,39 @@ export class SectionParser {
     this.state = 'header';
     const isIntact = crc32c(payload) === fields.payloadCrc;
     return { kind: 'section', section: { entry: { offset, fields }, payload }, header, isIntact };
+  }
+}
+
+/** Bytes that arrive in pieces of any size and are taken in pieces of others. */
+export class ByteQueue {
+  private buffer = new Uint8Array(1 << 12);
+  private start = 0;
+  private end = 0;
+
+  get length(): number {
+    return this.end - this.start;
+  }
+
+  append(piece: Uint8Array): void {
+    if (this.end + piece.length > this.buffer.length) {
+      const needed = this.length + piece.length;
+      const target = needed > this.buffer.length / 2 ? new Uint8Array(2 * needed) : this.buffer;
+      target.set(this.buffer.subarray(this.start, this.end));
+      [this.buffer, this.start, this.end] = [target, 0, this.length];
+    }
+    this.buffer.set(piece, this.end);
+    this.end += piece.length;
+  }
+
+  /** Takes so many bytes from the front, a copy; null if there are fewer. */
+  take(length: number): Uint8Array | null {
+    if (length > this.length) return null;
+    this.start += length;
+    return this.buffer.slice(this.start - length, this.start);
+  }
+
+  /** Takes all there is, at most so many bytes. */
+  takeUpTo(length: number): Uint8Array {
+    return this.take(Math.min(length, this.length))!;
   }
 }

@@ -1,7 +1,6 @@
 /** Where the bytes of a container are, to be read at random. */
 
 export interface Source {
-  /** Length in bytes. */
   readonly size: number;
   /** Exactly `length` bytes from `offset` on, which both lie within the size. */
   read(offset: number, length: number, signal?: AbortSignal): Promise<Uint8Array>;
@@ -14,7 +13,6 @@ export function bytesSource(bytes: Uint8Array): Source {
   };
 }
 
-/** A file that was chosen or dropped. */
 export function blobSource(blob: Blob): Source {
   return {
     size: blob.size,
@@ -56,13 +54,9 @@ export class EndsCache implements Source {
     const head = this.first.subarray(offset, end);
     const tail = this.last.subarray(Math.max(0, offset - behind), Math.max(0, end - behind));
     const missing = length - head.length - tail.length;
-    if (missing === 0 && (head.length === 0 || tail.length === 0)) {
-      return head.length > 0 ? head : tail;
-    }
+    if (missing === 0 && (head.length === 0 || tail.length === 0)) return head.length > 0 ? head : tail;
     const middle = missing > 0 ? await this.source.read(offset + head.length, missing, signal) : new Uint8Array(0);
-    if (middle.length === length) {
-      return middle;
-    }
+    if (middle.length === length) return middle;
     const bytes = new Uint8Array(length);
     bytes.set(head);
     bytes.set(middle, head.length);

@@ -7,9 +7,8 @@ import { checksumDamage, damaged, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize } from './layout';
 import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
-import { type Entry, HEADER_BYTES } from './section';
+import { type Entry, HEADER_BYTES, KNOWN_TAGS } from './section';
 import { type Arrival, SectionParser } from './sectionParser';
-import { KNOWN_TAGS } from './tag';
 
 /** A section and its header as it is in the file. */
 export interface StoredSection extends Section {
@@ -96,9 +95,8 @@ export class ContainerStream {
       // Colours may be among the sections of the static part, or anywhere else.
       this.isBegun ||= !STATIC_TAGS.includes(tag) && tag !== 'rcol';
     }
-    if (tag === 'resi' || tag === 'FRAM') {
+    if (tag === 'resi' || tag === 'FRAM')
       this.begun = { frames: first + count, bytes: this.begun.bytes + HEADER_BYTES + payloadBytes };
-    }
   }
 
   private takeSection({ section, header, isIntact }: Arrival & { kind: 'section' }): StoredChunk | null {

@@ -11,9 +11,7 @@ export const NO_ERRORS: FrameErrors = { l2: new Float32Array(0), linf: new Float
 
 /** `ERRS`: errors of all of so many frames. */
 export async function decodeErrors({ entry, payload }: Section, frames: number, codec: Codec): Promise<FrameErrors> {
-  if (entry.fields.codec === CODEC.codedStatic) {
-    return located(entry, codec.call('errors', [payload, frames]));
-  }
+  if (entry.fields.codec === CODEC.codedStatic) return located(entry, codec.call('errors', [payload, frames]));
   const pairs = new Float32Array(decodePayload(entry, payload).buffer);
   const take = (place: number) => Float32Array.from({ length: pairs.length / 2 }, (_, k) => pairs[2 * k + place]);
   return { l2: take(0), linf: take(1) };
@@ -22,9 +20,8 @@ export async function decodeErrors({ entry, payload }: Section, frames: number, 
 /** `fnum`: the number of each frame where it comes from. */
 export function decodeFrameNumbers({ entry, payload }: Section): Float64Array {
   const numbers = new Float64Array(decodePayload(entry, payload).buffer);
-  if (!numbers.every((x, k) => Number.isFinite(x) && (k === 0 || numbers[k - 1] < x))) {
+  if (!numbers.every((x, k) => Number.isFinite(x) && (k === 0 || numbers[k - 1] < x)))
     throw damaged(entry.offset, 'the numbers of the frames do not ascend');
-  }
   return numbers;
 }
 
@@ -34,13 +31,11 @@ export function decodeReport({ entry, payload }: Section): Readonly<Record<strin
   try {
     report = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(decodePayload(entry, payload)));
   } catch (error) {
-    if (error instanceof SyntaxError || error instanceof TypeError) {
+    if (error instanceof SyntaxError || error instanceof TypeError)
       throw damaged(entry.offset, 'the report cannot be read');
-    }
     throw error;
   }
-  if (typeof report !== 'object' || report === null || Array.isArray(report)) {
+  if (typeof report !== 'object' || report === null || Array.isArray(report))
     throw damaged(entry.offset, 'the report is not an object');
-  }
   return report as Record<string, unknown>;
 }

@@ -1,7 +1,7 @@
 /** Compressed blocks of zstd (RFC 8878, section 3.1.1.3). */
 
-import { BackwardBits } from './zstdBits';
 import {
+  BackwardBits,
   decodeHuffman,
   readHuffmanTable,
   readStateTable,
@@ -74,36 +74,21 @@ export class BlockDecoder {
     const headerBytes = isCoded ? [3, 3, 4, 5][format] : [1, 2, 1, 3][format];
     const width = isCoded ? [10, 10, 14, 18][format] : [5, 12, 5, 20][format];
     let header = 0;
-    for (let k = headerBytes; k-- > 0;) {
-      header = header * 256 + (block[k] ?? 0);
-    }
+    for (let k = headerBytes; k-- > 0;) header = header * 256 + (block[k] ?? 0);
     header = Math.floor(header / (!isCoded && format % 2 === 0 ? 8 : 16));
     const size = header % 2 ** width;
     const stored = isCoded ? Math.floor(header / 2 ** width) : kind === 0 ? size : 1;
     const end = headerBytes + stored;
-    if (size > MAX_BLOCK || end > block.length) {
-      throw new Error('its literals are too long');
-    }
+    if (size > MAX_BLOCK || end > block.length) throw new Error('its literals are too long');
     const bytes = block.subarray(headerBytes, end);
-    if (kind === 0) {
-      return [bytes, end];
-    }
+    if (kind === 0) return [bytes, end];
     const literals = new Uint8Array(size);
-    if (kind === 1) {
-      return [literals.fill(bytes[0]), end];
-    }
+    if (kind === 1) return [literals.fill(bytes[0]), end];
     let at = 0;
-    if (kind === 2) {
-      [this.huffman, at] = readHuffmanTable(bytes);
-    }
-    if (this.huffman === null) {
-      throw new Error('its codes are missing');
-    }
-    if (format === 0) {
-      decodeHuffman(bytes.subarray(at), this.huffman, literals);
-    } else {
-      decodeFour(bytes.subarray(at), this.huffman, literals);
-    }
+    if (kind === 2) [this.huffman, at] = readHuffmanTable(bytes);
+    if (this.huffman === null) throw new Error('its codes are missing');
+    if (format === 0) decodeHuffman(bytes.subarray(at), this.huffman, literals);
+    else decodeFour(bytes.subarray(at), this.huffman, literals);
     return [literals, end];
   }
 
@@ -111,9 +96,7 @@ export class BlockDecoder {
   private sequences(bytes: Uint8Array, literals: Uint8Array, out: Uint8Array, start: number, most: number): number {
     let [at, taken] = [start, 0];
     const copyLiterals = (count: number): void => {
-      if (count > literals.length - taken || count > most - at) {
-        throw new Error('it is longer than declared');
-      }
+      if (count > literals.length - taken || count > most - at) throw new Error('it is longer than declared');
       out.set(literals.subarray(taken, taken + count), at);
       taken += count;
       at += count;
@@ -142,31 +125,22 @@ export class BlockDecoder {
         const literalLength = LITERAL_LENGTHS.bases[literalCode] + bits.read(LITERAL_LENGTHS.bits[literalCode]);
         copyLiterals(literalLength);
         const offset = this.offsetOf(value, literalLength);
-        if (offset > at || offset < 1 || matchLength > most - at) {
+        if (offset > at || offset < 1 || matchLength > most - at)
           throw new Error('it is longer than declared, or refers to what is not there');
-        }
         if (offset >= matchLength) {
           out.copyWithin(at, at - offset, at - offset + matchLength);
         } else {
-          for (let k = at; k < at + matchLength; k++) {
-            out[k] = out[k - offset];
-          }
+          for (let k = at; k < at + matchLength; k++) out[k] = out[k - offset];
         }
         at += matchLength;
         left--;
-        if (left === 0) {
-          break;
-        }
+        if (left === 0) break;
         literalState = literalTable.bases[literalState] + bits.read(literalTable.bits[literalState]);
         matchState = matchTable.bases[matchState] + bits.read(matchTable.bits[matchState]);
         offsetState = offsetTable.bases[offsetState] + bits.read(offsetTable.bits[offsetState]);
-        if (bits.left < 0) {
-          throw new Error('it is cut');
-        }
+        if (bits.left < 0) throw new Error('it is cut');
       }
-      if (bits.left !== 0) {
-        throw new Error('its bits do not end where they should');
-      }
+      if (bits.left !== 0) throw new Error('its bits do not end where they should');
     }
     copyLiterals(literals.length - taken);
     return at;
@@ -178,14 +152,10 @@ export class BlockDecoder {
     let at = start + 1;
     this.tables = KINDS.map(({ usual, log, codes }, kind) => {
       const mode = (modes >> (6 - 2 * kind)) & 3;
-      if (mode === 0) {
-        return usual;
-      }
+      if (mode === 0) return usual;
       if (mode === 1) {
         const code = bytes[at++];
-        if (!(code < codes)) {
-          throw new Error('a code is impossible');
-        }
+        if (!(code < codes)) throw new Error('a code is impossible');
         return singleState(code);
       }
       if (mode === 2) {
@@ -194,9 +164,7 @@ export class BlockDecoder {
         return table;
       }
       const before = this.tables.at(kind);
-      if (before === undefined) {
-        throw new Error('a table is missing');
-      }
+      if (before === undefined) throw new Error('a table is missing');
       return before;
     });
     return at;
@@ -207,9 +175,7 @@ export class BlockDecoder {
     const { recent } = this;
     const which = literalLength === 0 ? value : value - 1;
     const offset = value > 3 ? value - 3 : which === 3 ? recent[0] - 1 : recent[which];
-    if (value > 3 || which > 1) {
-      recent[2] = recent[1];
-    }
+    if (value > 3 || which > 1) recent[2] = recent[1];
     if (value > 3 || which > 0) {
       recent[1] = recent[0];
       recent[0] = offset;
@@ -224,9 +190,7 @@ function decodeFour(bytes: Uint8Array, table: HuffmanTable, out: Uint8Array): vo
   let at = 6;
   for (let k = 0; k < 4; k++) {
     const length = k < 3 ? bytes[2 * k] | (bytes[2 * k + 1] << 8) : bytes.length - at;
-    if (at + length > bytes.length) {
-      throw new Error('it is cut');
-    }
+    if (at + length > bytes.length) throw new Error('it is cut');
     decodeHuffman(bytes.subarray(at, at + length), table, out.subarray(part * k, k < 3 ? part * (k + 1) : undefined));
     at += length;
   }

@@ -1,6 +1,28 @@
 /** Entropy coding of zstd (RFC 8878, section 4): tables of finite state entropy and of Huffman codes. */
 
-import { BackwardBits } from './zstdBits';
+/** Bits of a stream of zstd, which is read from its end: the highest bit that is set in its last byte marks where it begins. */
+export class BackwardBits {
+  /** Bits that are left; below zero after more were read than there are. */
+  left: number;
+
+  constructor(private readonly bytes: Uint8Array) {
+    const last = bytes.length > 0 ? bytes[bytes.length - 1] : 0;
+    if (last === 0) throw new Error('its bits have no beginning');
+    this.left = 8 * (bytes.length - 1) + 31 - Math.clz32(last);
+  }
+
+  /** The next bits, 24 at the most, as a number; zeros where there are no more. */
+  read(count: number): number {
+    const { bytes } = this;
+    this.left -= count;
+    const left = this.left;
+    const mask = (1 << count) - 1;
+    if (left < 0) return left + count > 0 ? ((bytes[0] | (bytes[1] << 8) | (bytes[2] << 16)) << -left) & mask : 0;
+    const at = left >> 3;
+    const word = bytes[at] | (bytes[at + 1] << 8) | (bytes[at + 2] << 16) | (bytes[at + 3] << 24);
+    return (word >>> (left & 7)) & mask;
+  }
+}
 
 /** Of each state of finite state entropy its symbol, the bits to read, and what is added to them to give the next state. */
 export interface StateTable {
@@ -28,9 +50,7 @@ export function stateTable(counts: readonly number[], log: number): StateTable {
   const next = counts.map((count) => Math.abs(count));
   let end = size;
   counts.forEach((count, symbol) => {
-    if (count < 0) {
-      symbols[--end] = symbol;
-    }
+    if (count < 0) symbols[--end] = symbol;
   });
   const step = (size >> 1) + (size >> 3) + 3;
   let at = 0;
@@ -70,9 +90,7 @@ export function readStateTable(bytes: Uint8Array, mostLog: number, mostSymbols: 
     return value;
   };
   const log = read(4) + 5;
-  if (log > mostLog) {
-    throw new Error('a table is too large');
-  }
+  if (log > mostLog) throw new Error('a table is too large');
   const counts: number[] = [];
   let left = 1 << log;
   while (left > 0 && counts.length < mostSymbols) {
@@ -85,24 +103,18 @@ export function readStateTable(bytes: Uint8Array, mostLog: number, mostSymbols: 
       position += width - 1;
     } else {
       value = read(width);
-      if (value >= half) {
-        value -= short;
-      }
+      if (value >= half) value -= short;
     }
     const count = value - 1;
     counts.push(count);
     left -= Math.abs(count);
     for (let more = count === 0 ? 3 : 0; more === 3;) {
       more = read(2);
-      for (let k = 0; k < more && counts.length < mostSymbols; k++) {
-        counts.push(0);
-      }
+      for (let k = 0; k < more && counts.length < mostSymbols; k++) counts.push(0);
     }
   }
   const used = (position + 7) >> 3;
-  if (left !== 0 || used > bytes.length) {
-    throw new Error('a table is impossible');
-  }
+  if (left !== 0 || used > bytes.length) throw new Error('a table is impossible');
   return [stateTable(counts, log), used];
 }
 
@@ -110,9 +122,7 @@ export function readStateTable(bytes: Uint8Array, mostLog: number, mostSymbols: 
 export function readHuffmanTable(bytes: Uint8Array): [HuffmanTable, number] {
   const size = bytes[0];
   const used = 1 + (size < 128 ? size : (size - 126) >> 1);
-  if (!(used <= bytes.length)) {
-    throw new Error('it is cut');
-  }
+  if (!(used <= bytes.length)) throw new Error('it is cut');
   const described = bytes.subarray(1, used);
   const weights =
     size < 128
@@ -121,9 +131,7 @@ export function readHuffmanTable(bytes: Uint8Array): [HuffmanTable, number] {
   const sum = weights.reduce((total, weight) => total + ((1 << weight) >> 1), 0);
   const log = 32 - Math.clz32(sum);
   const rest = (1 << log) - sum;
-  if (sum === 0 || log > LONGEST_CODE || (rest & (rest - 1)) !== 0) {
-    throw new Error('its codes are impossible');
-  }
+  if (sum === 0 || log > LONGEST_CODE || (rest & (rest - 1)) !== 0) throw new Error('its codes are impossible');
   // The last weight is what makes the codes complete.
   weights.push(32 - Math.clz32(rest));
   const symbols = new Uint8Array(1 << log);
@@ -170,7 +178,5 @@ export function decodeHuffman(stream: Uint8Array, { log, symbols, bits }: Huffma
     const length = bits[state];
     state = ((state << length) | source.read(length)) & mask;
   }
-  if (source.left !== -log) {
-    throw new Error('its codes do not end where they should');
-  }
+  if (source.left !== -log) throw new Error('its codes do not end where they should');
 }

@@ -12,7 +12,6 @@ const MAX_WORKERS = 8;
 /** Milliseconds between reports: drawing each of them would take the processor from the computation. */
 const REPORT_EVERY = 200;
 
-/** What a computation of Φ reports and heeds. */
 export interface ComputeOptions {
   readonly signal?: AbortSignal;
   /** Called with the fraction of the rows that are there. */

@@ -18,7 +18,6 @@ export const cross = (a: Vector, b: Vector): Vector => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
-/** Point `index` of a list of coordinates. */
 export function pointAt(positions: ArrayLike<number>, index: number): Vector {
   return [positions[3 * index], positions[3 * index + 1], positions[3 * index + 2]];
 }

@@ -20,7 +20,6 @@ export interface CageEdit {
   /** What happens to them where the edit is whole. */
   readonly motion: Motion;
   readonly range: FrameRange;
-  /** Whether it counts. */
   readonly enabled: boolean;
 }
 
@@ -73,7 +72,6 @@ export function editedBlock(
   return { ...block, cages, residual: null };
 }
 
-/** Whether an edit changes anything. */
 export function counts({ enabled, motion }: CageEdit): boolean {
   return enabled && !isIdentity(motion);
 }

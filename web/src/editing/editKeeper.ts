@@ -8,7 +8,6 @@ const REST = 300;
 
 /** Writes the edits of a capture into the browser as they change, and finds those that were left there. */
 export class EditKeeper {
-  /** Edits from before, until somebody takes them up or throws them away. */
   offer: KeptEdits | null = null;
   /** How the last change was kept; null before the first. */
   keeping: Keeping | null = null;

@@ -1,20 +1,79 @@
-import { html, nothing } from 'lit';
+import { html, nothing, css, LitElement } from 'lit';
 import type { Player } from '../viewer/player';
 import { counts, weightAt, type FrameRange } from './cageEdit';
 import { EditKeeper } from './editKeeper';
 import type { CageEditor } from './editor';
-import './keptOffer';
+import { customElement, property } from 'lit/decorators.js';
+import { controls } from '../style/controls';
+import { counted } from '../text';
+import type { KeptEdits } from './keptEdits';
+import type { ViewerHost } from '../viewer/host';
+
+/**
+ * Says that a capture has edits from before.
+ *
+ * @fires takeup when they are to be there again
+ * @fires throwaway when they are to be forgotten
+ */
+@customElement('cager-kept-offer')
+export class KeptOffer extends LitElement {
+  static override styles = [
+    controls,
+    css`
+      :host {
+        position: absolute;
+        z-index: 3;
+        top: var(--cager-space-3);
+        left: 50%;
+        translate: -50% 0;
+        display: flex;
+        flex-wrap: wrap;
+        align-items: center;
+        justify-content: center;
+        gap: var(--cager-space-2) var(--cager-space-3);
+        width: max-content;
+        max-width: min(460px, calc(100% - 2 * 90px));
+        padding: var(--cager-space-2) var(--cager-space-3);
+        border: 1px solid color-mix(in srgb, var(--cager-accent) 60%, transparent);
+        border-radius: var(--cager-radius-large);
+        background: var(--cager-surface);
+        box-shadow: var(--cager-shadow);
+      }
+      p {
+        flex: 1 1 220px;
+      }
+      @container (max-width: 1000px) {
+        :host {
+          top: calc(var(--cager-space-3) + 64px);
+        }
+      }
+      @container (max-width: 680px) {
+        :host {
+          left: var(--cager-space-2);
+          max-width: calc(100% - 2 * var(--cager-space-2) - 62px);
+          translate: none;
+        }
+      }
+    `,
+  ];
+
+  @property({ attribute: false }) kept!: KeptEdits;
+
+  override render() {
+    const { edits, changed } = this.kept;
+    const when = new Date(changed).toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'short' });
+    return html`
+      <p role="status">${counted(edits.length, 'edit')} kept in this browser, from ${when}</p>
+      <div class="row">
+        <button class="primary" @click=${() => this.dispatchEvent(new Event('takeup'))}>Restore</button>
+        <button @click=${() => this.dispatchEvent(new Event('throwaway'))}>Discard</button>
+      </div>
+    `;
+  }
+}
 
 /** What the timeline shows before there is an edit: a strip without a range. */
 const NO_FRAMES: FrameRange = { first: 0, last: -1, easeIn: 0, easeOut: 0 };
-
-export interface EditHost extends HTMLElement {
-  readonly player: Player | null;
-  readonly renderRoot: HTMLElement | DocumentFragment;
-  requestUpdate(): void;
-  readonly updateComplete: Promise<boolean>;
-  report(problem: string): void;
-}
 
 /** Edit mode of a viewer: loads the editor when it is first used, and answers for it until it is loaded. */
 export class EditMode {
@@ -23,7 +82,7 @@ export class EditMode {
   private showedCage = false;
   private keeper: EditKeeper | null = null;
 
-  constructor(private readonly host: EditHost) {
+  constructor(private readonly host: ViewerHost) {
     host.addEventListener('rangechange', (event) => this.setRange((event as CustomEvent<FrameRange>).detail));
     host.addEventListener('rangeend', () => this.editor?.model.endStep());
   }
@@ -33,7 +92,6 @@ export class EditMode {
     this.keeper = new EditKeeper(player, () => this.host.requestUpdate());
   }
 
-  /** Part of a narrow picture's height that the panel takes, as its style says. */
   get panelShare(): number {
     return this.isOn ? 0.38 : 0;
   }
@@ -106,7 +164,6 @@ export class EditMode {
     ></cager-edit-panel>`;
   }
 
-  /** Hands a key press to the editor; whether it was for it. */
   pressKey(event: KeyboardEvent): boolean {
     return this.isOn && (this.editor?.pressKey(event) ?? false);
   }

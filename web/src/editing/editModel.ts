@@ -2,7 +2,6 @@ import type { StaticPart } from '../capture';
 import { fitted, weightAt, type CageEdit, type FrameRange } from './cageEdit';
 import { CageGraph, type FalloffMeasure } from './falloff';
 import { gripOf, weightsOf, type Grip } from './grip';
-import { History } from './history';
 import { combined, type Motion, type MotionKind } from './motion';
 import { AXES, mirrorOf, type Axis, type Mirror } from './symmetry';
 
@@ -25,7 +24,6 @@ const SYMMETRIC = 0.5;
 
 /** Edits of one capture's cages: chosen vertices, settings, the edits and their history. Knows nothing of pictures and pointers. */
 export class EditModel {
-  /** Called after every change. */
   onChange: () => void = () => undefined;
   readonly graph: CageGraph;
   /** Planes across which the cage is symmetric, by their axes. */
@@ -81,7 +79,6 @@ export class EditModel {
     this.onChange();
   }
 
-  /** The edit whose range is shown. */
   get active(): CageEdit | null {
     return this.edits.find(({ id }) => id === this.shownId) ?? null;
   }
@@ -211,4 +208,54 @@ export function rangeAround(frame: number, frames: number, reach: Reach): FrameR
   const ease = reach === 'around' ? EASE_FRAMES : 0;
   const [first, last] = [Math.max(0, frame - ease), Math.min(frames - 1, frame + ease)];
   return fitted({ first, last, easeIn: frame - first, easeOut: last - frame }, frames);
+}
+
+export class History<T> {
+  private past: T[] = [];
+  private future: T[] = [];
+  private step: string | null = null;
+
+  constructor(private state: T) {}
+
+  get present(): T {
+    return this.state;
+  }
+
+  get canUndo(): boolean {
+    return this.past.length > 0;
+  }
+
+  get canRedo(): boolean {
+    return this.future.length > 0;
+  }
+
+  /** Goes on to a state. Changes that follow each other with the same name are one step: a drag is undone at once. */
+  change(state: T, step: string | null = null): void {
+    if (step === null || step !== this.step) this.past.push(this.state);
+    this.step = step;
+    this.state = state;
+    this.future = [];
+  }
+
+  /** Ends a step: the next change is one of its own, whatever its name. */
+  endStep(): void {
+    this.step = null;
+  }
+
+  undo(): boolean {
+    return this.move(this.past, this.future);
+  }
+
+  redo(): boolean {
+    return this.move(this.future, this.past);
+  }
+
+  private move(from: T[], to: T[]): boolean {
+    const state = from.pop();
+    if (state === undefined) return false;
+    to.push(this.state);
+    this.state = state;
+    this.step = null;
+    return true;
+  }
 }

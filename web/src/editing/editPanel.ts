@@ -4,17 +4,16 @@ import { glyphs } from '../style/glyphs';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/controls';
 import { sentence } from '../text';
-import { editNotes } from './editNotes';
-import { editRow } from './editRow';
+import { editNotes, mouseAndKeys, editRow } from './editParts';
 import { editPanelStyle } from './editPanelStyle';
 import type { CageEditor } from './editor';
 import type { EditSettings, Reach } from './editModel';
 import { exportEdited, obstacle, type ExportKind } from './exporter';
 import type { Keeping } from './keptEdits';
 import { TOOL_KEYS } from './keys';
-import { mouseAndKeys } from './mouseAndKeys';
 import type { MotionKind } from './motion';
 import { AXES, type Axis } from './symmetry';
+import { iconButton, segments } from '../style/parts';
 
 /** Largest radius of the falloff, as a fraction of the rest pose's diagonal. */
 const LARGEST_RADIUS = 0.6;
@@ -24,10 +23,10 @@ const REACHES: readonly (readonly [Reach, string])[] = [
   ['all', 'All frames'],
 ];
 
-const TOOLS: readonly (readonly [MotionKind, string])[] = [
-  ['move', 'Move'],
-  ['rotate', 'Rotate'],
-  ['scale', 'Scale'],
+const TOOLS: readonly (readonly [MotionKind, string, string])[] = [
+  ['move', 'Move', `Move (${TOOL_KEYS.move.toUpperCase()})`],
+  ['rotate', 'Rotate', `Rotate (${TOOL_KEYS.rotate.toUpperCase()})`],
+  ['scale', 'Scale', `Scale (${TOOL_KEYS.scale.toUpperCase()})`],
 ];
 
 /**
@@ -69,7 +68,7 @@ export class EditPanel extends LitElement {
         ${this.action('undo', 'Undo (Ctrl Z)', !model.canUndo, () => model.undo())}
         ${this.action('redo', 'Redo (Ctrl Shift Z)', !model.canRedo, () => model.redo())}
         ${this.action('reset', 'Remove all edits', edits.length === 0, () => model.reset())}
-        <button class="quiet icon" title="Done (E)" aria-label="Done" @click=${this.leave}>${glyphs.close}</button>
+        ${iconButton('close', 'Done', () => this.leave(), 'Done (E)')}
       </header>
       <p class="visually-hidden" role="status">${said}</p>
       <div class="body">
@@ -117,23 +116,12 @@ export class EditPanel extends LitElement {
   private toolRow() {
     const { editor } = this;
     const isAlone = editor.model.selection.length === 1 && editor.model.settings.radius === 0;
-    return html`<div class="segments" role="group" aria-label="Tool">
-        ${TOOLS.map(
-          ([tool, label]) =>
-            html`<button
-              aria-pressed=${editor.tool === tool}
-              title=${`${label} (${TOOL_KEYS[tool].toUpperCase()})`}
-              @click=${() => (editor.tool = tool)}
-            >
-              ${label}
-            </button>`,
-        )}
-      </div>
-      ${
-        isAlone && editor.tool !== 'move'
-          ? html`<p class="muted">A single vertex has nothing to turn or scale: select more, or set a falloff.</p>`
-          : nothing
-      }`;
+    return html`${segments('Tool', TOOLS, editor.tool, (tool) => (editor.tool = tool))}
+    ${
+      isAlone && editor.tool !== 'move'
+        ? html`<p class="muted">A single vertex has nothing to turn or scale: select more, or set a falloff.</p>`
+        : nothing
+    }`;
   }
 
   private settingRows(settings: EditSettings) {
@@ -168,13 +156,8 @@ export class EditPanel extends LitElement {
       <div class="segments" role="group" aria-labelledby="symmetry">
         ${planes.map((axis) => this.planeButton(axis, settings, () => set({ symmetry: axis })))}
       </div>
-      <div class="setting fine" id="reach">Apply new edits to</div>
-      <div class="segments" role="group" aria-labelledby="reach">
-        ${REACHES.map(
-          ([reach, label]) =>
-            html`<button aria-pressed=${settings.reach === reach} @click=${() => set({ reach })}>${label}</button>`,
-        )}
-      </div>
+      <div class="setting fine" aria-hidden="true">Apply new edits to</div>
+      ${segments('Apply new edits to', REACHES, settings.reach, (reach) => set({ reach }))}
     `;
   }
 

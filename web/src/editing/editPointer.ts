@@ -20,7 +20,6 @@ interface Held {
   readonly y: number;
 }
 
-/** A press of the pointer and what becomes of it. */
 type Gesture =
   | (Held & {
       readonly kind: 'drag';
@@ -63,7 +62,6 @@ export class EditPointer {
     return this.gesture !== null;
   }
 
-  /** What of the gizmo is pointed at or dragged. */
   get constraint(): Constraint | null {
     return this.gesture?.kind === 'drag' ? this.gesture.constraint : this.pointed;
   }

@@ -18,7 +18,7 @@ import {
 import { parseFields } from '../container/section';
 import { diagonalOf } from '../coordinates/topology';
 import { editedBlock, type CageEdit } from './cageEdit';
-import { npyHeader } from './decodedFrames';
+import { npyHeader } from './exporter';
 import { writeEdited } from './editedContainer';
 
 const NAMES = ['definition3-mvc', 'definition3-green', 'definition3-green-free', 'coded-mvc'];

@@ -16,7 +16,6 @@ const NOT_MEASURED = 'the cages were edited: their errors are not measured';
 
 export interface WrittenContainer {
   readonly container: Blob;
-  /** Frames with another cage than before. */
   readonly changed: number;
 }
 
@@ -118,9 +117,8 @@ export async function* chunksOf(
         throw new Error(`Frame ${first + k} is not where the capture says; load it again.`);
       for (let frame = skipped; frame < skipped + taken; frame++, k++) {
         const own = edited.cages.subarray(frame * width, (frame + 1) * width);
-        if (!own.every(Number.isFinite)) {
+        if (!own.every(Number.isFinite))
           throw new Error(`A vertex of frame ${block.first + frame} is too far away to be stored; move it closer.`);
-        }
         rows.set(own, k * width);
         const before = block.cages.subarray(frame * width, (frame + 1) * width);
         isChanged.push(own.some((x, at) => x !== before[at]));

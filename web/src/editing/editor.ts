@@ -1,5 +1,5 @@
 import type { Player } from '../viewer/player';
-import { resolvedColor } from '../style/resolvedColor';
+import { resolvedColor } from '../viewer/stageColors';
 import { sought } from '../viewer/transport';
 import { counts, editedRows } from './cageEdit';
 import { EditModel } from './editModel';
@@ -7,22 +7,16 @@ import { EditPointer } from './editPointer';
 import { gizmoAt, type Gizmo } from './gizmo';
 import { meanOf } from './grip';
 import { keyCommand, keyMotion, type KeyCommand } from './keys';
-import type { Motion, MotionKind } from './motion';
+import { type Motion, type MotionKind, degrees, timesAs } from './motion';
 import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
 import type { Vector } from '../coordinates/vector';
 import { Projection } from '../render/projection';
-import { degrees, timesAs } from './text';
-
-export interface EditorHost extends HTMLElement {
-  readonly player: Player | null;
-  readonly renderRoot: HTMLElement | DocumentFragment;
-}
+import type { ViewerHost } from '../viewer/host';
 
 /** Milliseconds after which another press of an arrow key is a step of its own. */
 const PAUSE = 1200;
 
-/** What is said of vertices after something was done to them. */
 const DONE: Readonly<Record<MotionKind, string>> = { move: 'moved', rotate: 'rotated', scale: 'scaled' };
 
 /** Picks and moves vertices of a cage in the picture of a player, by pointer and by keys. */
@@ -30,7 +24,6 @@ export class CageEditor extends EventTarget {
   readonly model: EditModel;
   /** Whether picking adds to what is chosen, for fingers that have no shift key. */
   addsToSelection = false;
-  /** What was done last, for screen readers. */
   said = '';
   /** Vertices of the cage and gizmo where they were drawn last. */
   places: readonly (PlacedVertex | null)[] = [];
@@ -44,7 +37,7 @@ export class CageEditor extends EventTarget {
   private chosenTool: MotionKind = 'move';
 
   constructor(
-    private readonly host: EditorHost,
+    private readonly host: ViewerHost,
     readonly player: Player,
   ) {
     super();
@@ -77,12 +70,10 @@ export class CageEditor extends EventTarget {
     this.draw();
   }
 
-  /** The frame that vertices are moved in. */
   get frame(): number {
     return Math.round(this.player.transport.position);
   }
 
-  /** Draws vertices and gizmo above the picture as it is now. */
   draw() {
     const { stage } = this.player;
     const { clientWidth, clientHeight } = stage.canvas;
@@ -218,9 +209,8 @@ export class CageEditor extends EventTarget {
   settle() {
     const { transport } = this.player;
     const position = Math.round(transport.position);
-    if (transport.playing || position !== transport.position) {
+    if (transport.playing || position !== transport.position)
       this.player.transport = { ...sought(transport, position), playing: false };
-    }
   }
 
   /** The middle of the chosen vertices, in the scene's unit. */

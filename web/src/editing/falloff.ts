@@ -1,7 +1,5 @@
 import type { TriangleMesh } from '../capture';
-import { adjacency } from '../codec/adjacency';
-import type { ByVertex } from '../codec/byVertex';
-import { polygonsOf } from '../codec/polygons';
+import { adjacency, type ByVertex, polygonsOf } from '../codec/polygons';
 
 /** How far away a vertex is: along the edges of the cage, or straight through space. */
 export type FalloffMeasure = 'surface' | 'space';

@@ -31,7 +31,6 @@ export interface Arrow {
   readonly opacity: number;
 }
 
-/** A square between two arrows, by its corners. */
 export interface Square {
   readonly axis: 0 | 1 | 2;
   readonly corners: readonly Place[];

@@ -3,7 +3,6 @@ import { displacement, mirrored, type Motion } from './motion';
 import type { Vector } from '../coordinates/vector';
 import type { Mirror } from './symmetry';
 
-/** What follows when vertices are moved. */
 export interface GripSettings {
   /** In the capture's unit; 0 moves the chosen vertices alone. */
   readonly radius: number;

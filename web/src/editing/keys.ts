@@ -5,7 +5,6 @@ import type { Projection } from '../render/projection';
 /** What a key press asks for while a cage is edited. Directions are those of the picture. */
 export type KeyCommand =
   | { readonly kind: 'undo' | 'redo' | 'clear' | 'leave' | 'enter' }
-  /** The next or the previous vertex by number. */
   | { readonly kind: 'step'; readonly by: 1 | -1 }
   | { readonly kind: 'tool'; readonly tool: MotionKind }
   /** The vertex beside the chosen one; y points down. */

@@ -25,9 +25,8 @@ export function angleOf([x, y, z, w]: Quaternion): number {
 /** One motion after another of the same kind. */
 export function combined(first: Motion, second: Motion): Motion {
   if (first.kind === 'move' && second.kind === 'move') return { kind: 'move', by: plus(first.by, second.by) };
-  if (first.kind === 'rotate' && second.kind === 'rotate') {
+  if (first.kind === 'rotate' && second.kind === 'rotate')
     return { kind: 'rotate', rotation: new Turn(...second.rotation).multiply(new Turn(...first.rotation)).toArray() };
-  }
   if (first.kind === 'scale' && second.kind === 'scale') {
     const [a, b] = [first.factors, second.factors];
     return { kind: 'scale', factors: [a[0] * b[0], a[1] * b[1], a[2] * b[2]] };
@@ -35,7 +34,6 @@ export function combined(first: Motion, second: Motion): Motion {
   throw new TypeError('Motions of different kinds are different edits.');
 }
 
-/** Whether a motion leaves everything where it is. */
 export function isIdentity(motion: Motion): boolean {
   if (motion.kind === 'move') return motion.by.every((x) => x === 0);
   if (motion.kind === 'scale') return motion.factors.every((factor) => factor === 1);
@@ -45,9 +43,7 @@ export function isIdentity(motion: Motion): boolean {
 /** The motion on the other side of the plane across an axis. */
 export function mirrored(motion: Motion, axis: 0 | 1 | 2): Motion {
   const flipped = (v: Vector, isFlipped: (k: number) => boolean) => v.map((x, k) => (isFlipped(k) ? -x : x));
-  if (motion.kind === 'move') {
-    return { kind: 'move', by: flipped(motion.by, (k) => k === axis) as unknown as Vector };
-  }
+  if (motion.kind === 'move') return { kind: 'move', by: flipped(motion.by, (k) => k === axis) as unknown as Vector };
   if (motion.kind === 'scale') return motion;
   const [x, y, z, w] = motion.rotation;
   // A mirror turns rotations about its own axis to themselves, and all others the other way.
@@ -68,4 +64,15 @@ export function displacement(motion: Motion, part: number, arm: Vector): Vector 
   if (norm([x, y, z]) === 0) return [0, 0, 0];
   const turn = new Turn(...rotationAbout([x, y, z], part * angleOf(motion.rotation)));
   return sub(new Vector3(...arm).applyQuaternion(turn).toArray(), arm);
+}
+
+/** An angle in radians, in degrees. */
+export function degrees(angle: number): string {
+  return `${Math.round((180 * angle) / Math.PI)}°`.replace('-', '−');
+}
+
+/** Factors along x, y and z: one number where they are the same. */
+export function timesAs(factors: Vector): string {
+  const words = factors.map((factor) => factor.toFixed(2));
+  return new Set(words).size === 1 ? `× ${words[0]}` : `× (${words.join(', ')})`;
 }

@@ -1,17 +1,13 @@
 import { OUTER_RING, type Constraint, type Gizmo, type Ring } from './gizmo';
 import type { PlacedVertex, Rectangle } from './picking';
 
-/** Colours as canvases take them. */
 export interface OverlayColors {
   readonly vertex: string;
   readonly chosen: string;
-  /** Around dots and lines, so that they stand out. */
   readonly outline: string;
-  /** Of the axes x, y and z. */
   readonly axes: readonly [string, string, string];
 }
 
-/** What is drawn above the picture while a cage is edited. */
 export interface OverlayState {
   readonly vertices: readonly (PlacedVertex | null)[];
   readonly selection: ReadonlySet<number>;
@@ -19,7 +15,6 @@ export interface OverlayState {
   readonly weights: Float64Array | null;
   readonly hovered: number;
   readonly gizmo: Gizmo | null;
-  /** What of the gizmo is pointed at or dragged. */
   readonly constraint: Constraint | null;
   readonly band: Rectangle | null;
   /** How far the drag goes, in words. */
@@ -155,7 +150,6 @@ function drawRing(context: CanvasRenderingContext2D, { axis, points }: Ring, isH
   context.globalAlpha = 1;
 }
 
-/** The angle or the factor above the gizmo. */
 function drawLabel(context: CanvasRenderingContext2D, { middle }: Gizmo, label: string, colors: OverlayColors) {
   context.font = `600 14px ${getComputedStyle(context.canvas).fontFamily}`;
   context.textAlign = 'center';

@@ -1,7 +1,6 @@
 import { cross, dot, normalized, sub, type Vector } from '../coordinates/vector';
 import type { Place, Projection } from '../render/projection';
 
-/** A vertex of the cage in the picture. */
 export interface PlacedVertex extends Place {
   /** Whether the cage's surface there looks away from the eye. */
   readonly isBehind: boolean;

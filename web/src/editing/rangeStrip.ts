@@ -171,7 +171,6 @@ export class RangeStrip extends LitElement {
   }
 }
 
-/** The weight of an edit over the frames of a capture. */
 function drawing(range: FrameRange, shareOf: (frame: number) => number) {
   const { first, last } = range;
   const points = [`${shareOf(first)},1`];

@@ -1,6 +1,5 @@
 import type { CageGraph } from './falloff';
 
-/** The axis that a plane of symmetry is across. */
 export type Axis = 'x' | 'y' | 'z';
 export const AXES: readonly Axis[] = ['x', 'y', 'z'];
 
@@ -9,7 +8,6 @@ export interface Mirror {
   readonly axis: 0 | 1 | 2;
   /** The mirror image of each vertex: the vertex itself if it lies on the plane, −1 if no vertex matches. */
   readonly partner: Int32Array;
-  /** Share of the vertices that have one. */
   readonly share: number;
 }
 

@@ -21,7 +21,6 @@ export interface Item {
   /** In the order of the numbers in their names. */
   readonly files: readonly File[];
   readonly role: Role;
-  /** Roles that it can have. */
   readonly choices: readonly Role[];
   /** Why it is not used, for kinds of files that cannot be. */
   readonly remark: string;

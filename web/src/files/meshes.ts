@@ -33,9 +33,8 @@ export async function objPoints(file: File): Promise<Float32Array> {
     const line = text.slice(at, end).trimStart();
     if (line.startsWith('v ') || line.startsWith('v\t')) {
       const [x, y, z] = line.slice(2).trim().split(/\s+/, 3).map(Number);
-      if (!Number.isFinite(x) || !Number.isFinite(y) || !Number.isFinite(z)) {
+      if (!Number.isFinite(x) || !Number.isFinite(y) || !Number.isFinite(z))
         throw new UnusableFile(file.name, `point ${values.length / 3} is “${line.trim()}”, which is not a position.`);
-      }
       values.push(x, y, z);
     }
     at = end + 1;
@@ -44,7 +43,6 @@ export async function objPoints(file: File): Promise<Float32Array> {
   return Float32Array.from(values);
 }
 
-/** A frame per `.obj` file, in the order given. */
 export class ObjFrames implements FrameSource {
   readonly frames: number;
   readonly description: string;

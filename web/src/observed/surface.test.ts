@@ -1,6 +1,5 @@
 import { expect, test } from 'vitest';
-import { readSurface } from './read';
-import { NearestSurface } from './surface';
+import { readSurface, NearestSurface } from './surface';
 
 /** Numbers that look random, the same every time. */
 function numbers(count: number): Float32Array {

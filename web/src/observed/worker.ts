@@ -1,6 +1,5 @@
-import { readSurface } from './read';
+import { readSurface, NearestSurface } from './surface';
 import { sentence } from '../text';
-import { NearestSurface } from './surface';
 import type { Asked, Answer } from './surfaces';
 
 /** Files of large surfaces are not read again while these are kept. */

@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 import { openOriginal } from './original';
 import { pointErrors } from './pointErrors';
-import { pointAt } from './pointAt';
+import { pointAt } from '../viewer/pointMarks';
 
 /** A point cache whose frame f has point p at (f, p, 0). */
 function pointCache(frames: number, points: number, name = 'walk.pc2'): File {

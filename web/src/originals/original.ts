@@ -1,7 +1,7 @@
 import type { Capture } from '../capture';
 import { counted } from '../text';
 import { classify, type Dropped } from '../files/classify';
-import { framesOf } from '../files/frames';
+import { framesOf } from '../files/frameFiles';
 import type { FrameSource } from '../files/frameSource';
 import { extensionOf } from '../files/meshes';
 
@@ -108,9 +108,8 @@ function numbersFor(
   name: string,
 ): Float64Array | null {
   if (frames === known) return null;
-  if (frameNumbers?.every((number) => Number.isSafeInteger(number) && number >= 0 && number < frames)) {
+  if (frameNumbers?.every((number) => Number.isSafeInteger(number) && number >= 0 && number < frames))
     return frameNumbers;
-  }
   // Frames of a session that is running are still to come.
   if (!complete && frames > known) return null;
   throw new Error(

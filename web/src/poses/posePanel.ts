@@ -3,11 +3,10 @@ import { customElement, property } from 'lit/decorators.js';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/controls';
 import { numberAt, numberText } from '../viewer/frameNumbers';
-import { glyphs } from '../style/glyphs';
+import { iconButton } from '../style/parts';
 import type { PoseView } from './poseView';
 import { cornerOf } from './weights';
 
-/** The pad reaches this far from its middle, where corners are at 1. */
 const REACH = 1.25;
 /** How far a press of an arrow key moves the mark. */
 const STEP = 0.05;
@@ -92,14 +91,7 @@ export class PosePanel extends LitElement {
     return html`<section class="panel glass" aria-label="Blend poses" @keydown=${this.keepKey}>
       <header>
         <h2 class="grow">Blend poses</h2>
-        <button
-          class="quiet icon"
-          title="Close (N)"
-          aria-label="Close"
-          @click=${() => this.dispatchEvent(new Event('leave'))}
-        >
-          ${glyphs.close}
-        </button>
+        ${iconButton('close', 'Close', () => this.dispatchEvent(new Event('leave')), 'Close (N)')}
       </header>
       <div class="body">
         ${failure !== null ? html`<p role="alert">${failure}</p>` : nothing}
@@ -110,13 +102,7 @@ export class PosePanel extends LitElement {
             html`<div class="row">
               <span class="grow">Frame ${this.numberOf(frame)}</span>
               <span class="figures muted">${k < weights.length ? `${Math.round(100 * weights[k])} %` : ''}</span>
-              <button
-                class="quiet icon"
-                aria-label="Remove frame ${this.numberOf(frame)}"
-                @click=${() => view.choose(poses.filter((other) => other !== frame))}
-              >
-                ${glyphs.close}
-              </button>
+              ${iconButton('close', `Remove frame ${this.numberOf(frame)}`, () => view.choose(poses.filter((other) => other !== frame)))}
             </div>`,
         )}
         <button @click=${this.add}>Add this frame</button>

@@ -4,7 +4,6 @@ import { Service } from '../service/service';
 import type { Player } from '../viewer/player';
 import { polygonWeights, reachable } from './weights';
 
-/** A shape space of the service, and the frames that are its poses. */
 interface Space {
   readonly id: string;
   readonly poses: readonly number[];
@@ -16,7 +15,6 @@ interface Space {
  * @fires change when something else is shown
  */
 export class PoseView extends EventTarget {
-  /** Frames whose shapes are blended. */
   poses: readonly number[] = [];
   /** Where between them: of two, from 0 to 1; of more, a place in their polygon. */
   place: readonly [number, number] = [0.5, 0];

@@ -138,7 +138,6 @@ function rounded(value: number, digits: number): number {
   return Number(value.toFixed(digits));
 }
 
-/** Has a camera look from where a state says. */
 export function aim(camera: PerspectiveCamera, state: CameraState) {
   camera.position.set(...eyeOf(state));
   camera.lookAt(...state.target);

@@ -12,7 +12,6 @@ const GLIDE = 0.06;
 export class CameraControls {
   /** Called when the camera will move, so that pictures are drawn until {@link advance} says that it rests. */
   onMove: () => void = () => undefined;
-  /** Called when somebody begins to move the camera. */
   onGrab: () => void = () => undefined;
   private shown: CameraState = HOME;
   private wanted: CameraState = HOME;
@@ -39,12 +38,10 @@ export class CameraControls {
     return this.shown;
   }
 
-  /** Where the camera is on its way to. */
   get destination(): CameraState {
     return this.wanted;
   }
 
-  /** Moves the camera, gliding unless `atOnce`. */
   go(camera: CameraState, atOnce = false) {
     this.wanted = camera;
     if (atOnce || this.stillness.matches) this.shown = camera;

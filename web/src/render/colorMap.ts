@@ -19,14 +19,12 @@ export class ColorMap {
     return [blend(0), blend(1), blend(2)];
   }
 
-  /** As `count` RGBA texels. */
   texels(count: number): Uint8Array<ArrayBuffer> {
     const found = new Uint8Array(4 * count);
     for (let k = 0; k < count; k++) found.set([...this.color(k / (count - 1)), 255], 4 * k);
     return found;
   }
 
-  /** As a CSS gradient, from left to right. */
   get gradient(): string {
     return `linear-gradient(90deg, ${this.anchors.map((color) => `rgb(${color.join(' ')})`).join(', ')})`;
   }

@@ -16,8 +16,7 @@ import { diagonalOf, middleOf } from '../coordinates/topology';
 import { fanTextures, floatTexture, phiTexture } from './dataTextures';
 import { normalShader, positionShader } from './decodeShaders';
 import { cageSize, layoutOf, meanOf, packPhi, WIDTH, type PhiLayout } from './packing';
-import { Pass, target } from './pass';
-import { placedFrame, type PlacedFrame } from './placedFrame';
+import { Pass, target, placedFrame, type PlacedFrame } from './pass';
 import { multiply, type ColumnValues } from './product';
 import type { Surface } from './surface';
 
@@ -137,9 +136,8 @@ export class Decoder {
 
   /** Takes Φ, points × columns. */
   async setPhi(phi: Float32Array): Promise<void> {
-    if (phi.length !== this.points * this.columns) {
+    if (phi.length !== this.points * this.columns)
       throw new Error('The coordinates are not those of this model and cage; reload the page.');
-    }
     if (this.multiplier === 'page') {
       this.phi = phi;
       return;

@@ -5,7 +5,6 @@ import type { FromResidualWorker, ToResidualWorker } from './residualWorker';
 import { moduleWorker } from '../moduleWorker';
 import residualWorkerAddress from './residualWorker.ts?worker&url';
 
-/** What a frame is decoded from. */
 export interface FrameData {
   /** `rowsPerFrame × 3`. */
   readonly rows: Float32Array;
@@ -29,7 +28,6 @@ export class FrameStore {
   onReplaced: () => void = () => undefined;
   /** Called when frames that are loaded ahead do not come: `frame` and those that are read together with it. */
   onFailure: (frame: number, error: unknown) => void = () => undefined;
-  /** Called with every block that comes. */
   onBlock: (block: FrameBlock) => void = () => undefined;
   /** Changes frames as they are taken out; null leaves them as they are. Edited ones have no offsets, which belong to cages as they were captured. */
   edit: FrameEdit | null = null;
@@ -59,7 +57,6 @@ export class FrameStore {
     capture.events.addEventListener('replaced', () => this.replace(), { signal: this.stop.signal });
   }
 
-  /** The frame, if all of it is here. */
   peek(frame: number): FrameData | null {
     const final = this.find(frame, false);
     const data = final && this.dataOf(final, frame);

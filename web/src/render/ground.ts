@@ -20,6 +20,9 @@ import {
   groundVertexShader,
   shadowFragmentShader,
   shadowVertexShader,
+  BACKDROP_SQUARES,
+  backdropFragmentShader,
+  backdropVertexShader,
 } from './sceneShaders';
 
 /** Texels along a side of the shadow. */
@@ -27,7 +30,6 @@ const SHADOW_SIZE = 160;
 /** Half the side of the square that the shadow covers, and the height up to which something casts one, in diagonals. */
 const [SHADOW_REACH, SHADOW_HEIGHT] = [0.8, 0.9];
 
-/** The ground: a grid that fades with the distance, and the model's soft shadow on it. */
 export class Ground {
   readonly mesh: Mesh;
   readonly middle = new Vector3(0, -0.5, 0);
@@ -118,5 +120,37 @@ function shadowTarget(): WebGLRenderTarget {
     minFilter: LinearFilter,
     magFilter: LinearFilter,
     depthBuffer: true,
+  });
+}
+
+/** What is behind everything: one colour that passes into another from top to bottom. */
+export class Backdrop {
+  readonly mesh: Mesh;
+  private readonly colors = { top: { value: new Color() }, bottom: { value: new Color() } };
+
+  constructor() {
+    this.mesh = new Mesh(
+      numberedGeometry(gridTriangles(BACKDROP_SQUARES)),
+      shaderMaterial(backdropVertexShader, backdropFragmentShader, this.colors, {
+        depthTest: false,
+        depthWrite: false,
+      }),
+    );
+    this.mesh.frustumCulled = false;
+  }
+
+  /** Takes CSS colours in sRGB. */
+  setColors(top: string, bottom: string) {
+    this.colors.top.value.set(top).convertLinearToSRGB();
+    this.colors.bottom.value.set(bottom).convertLinearToSRGB();
+  }
+}
+
+/** Triangles of a square of so many squares along a side; vertices are numbered row by row. */
+function gridTriangles(squares: number): Uint32Array {
+  const corners = [0, 1, squares + 1, squares + 1, 1, squares + 2];
+  return Uint32Array.from({ length: 6 * squares * squares }, (_, k) => {
+    const square = Math.floor(k / 6);
+    return square + Math.floor(square / squares) + corners[k % 6];
   });
 }

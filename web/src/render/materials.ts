@@ -32,7 +32,6 @@ export function shaderMaterial(
   });
 }
 
-/** A geometry of numbers alone: the vertex shader looks up what belongs to them. */
 export function numberedGeometry(index: Uint32Array): BufferGeometry {
   return new BufferGeometry().setIndex(new BufferAttribute(index, 1));
 }

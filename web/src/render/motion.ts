@@ -1,4 +1,4 @@
-import type { FrameBlock } from '../capture';
+import type { FrameBlock, Capture } from '../capture';
 import { boundsOf } from '../coordinates/topology';
 import { errorsOf } from '../originals/pointErrors';
 import type { Decoder } from './decoder';
@@ -22,7 +22,6 @@ interface Extent {
  * Residuals are left out; whoever frames the motion leaves more room than they take.
  */
 export class Motion {
-  /** Called when a frame has become known. */
   onGrowth: () => void = () => undefined;
   private readonly samples: Uint32Array;
   /** Rows of Φ of the samples; null before Φ is there. */
@@ -65,7 +64,6 @@ export class Motion {
     for (const block of this.waiting.splice(0)) this.include(block);
   }
 
-  /** Takes note of frames that have come. */
   include(block: FrameBlock) {
     if (!this.weights && !this.isCageAlone) {
       this.waiting.push({ ...block, residual: null });
@@ -195,4 +193,36 @@ export function farthestPoints(points: ArrayLike<number>, count: number): Uint32
 function extentOf(positions: Float32Array): Extent {
   const { low, high } = boundsOf(positions);
   return { box: [...low, ...high], mean: meanOf(positions, positions.length / 3), positions };
+}
+
+/** Frames that are looked at, evenly spread: the blocks around them are all there is of most captures. */
+const FRAMES = 32;
+/** How long to wait for what is played. */
+const WAIT_MILLISECONDS = 200;
+
+/**
+ * Reads frames of a finished capture for what they say of its motion, one block after another, as long as the connection has time for them. Those that do not
+ * come are left to whoever plays them.
+ *
+ * @param isBusy whether something waits for frames that are to be shown
+ */
+export async function surveyMotion(
+  capture: Capture,
+  motion: Motion,
+  isBusy: () => boolean,
+  signal: AbortSignal,
+): Promise<void> {
+  if (!capture.complete) return;
+  const last = capture.frames - 1;
+  const wanted = new Set(Array.from({ length: FRAMES }, (_, k) => Math.round((k * last) / (FRAMES - 1))));
+  for (const frame of wanted) {
+    while (isBusy() && !signal.aborted) await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
+    if (signal.aborted) return;
+    if (motion.knows(frame)) continue;
+    try {
+      motion.include(await capture.block(frame, signal));
+    } catch {
+      continue;
+    }
+  }
 }

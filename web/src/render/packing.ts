@@ -31,7 +31,6 @@ export interface PhiLayout {
   readonly layers: number;
 }
 
-/** What a graphics processor can hold. */
 export interface TextureLimits {
   readonly size: number;
   readonly layers: number;
@@ -56,7 +55,6 @@ export function layoutOf(points: number, columns: number, limits: TextureLimits)
   return { blocks, bands, bandsPerLayer, height: bandsPerLayer * blocks, layers };
 }
 
-/** Φ as texels. */
 export interface PackedPhi {
   /** Full floats; or integers t of which `scale · t·|t| / 32767²` are the entries: finer near zero, where most of them are. */
   readonly texels: Int16Array | Float32Array;
@@ -115,7 +113,6 @@ export function compacted(value: number, scale: number): number {
   return Math.sign(value) * Math.round(32767 * Math.sqrt(Math.min(1, Math.abs(value) / scale)));
 }
 
-/** The entry of an integer. */
 export function expanded(integer: number, scale: number): number {
   return scale * (integer / 32767) * Math.abs(integer / 32767);
 }
@@ -144,7 +141,6 @@ export function cageSize(capture: Pick<StaticPart, 'cage' | 'rest'>): number {
   return (GROWTH * Math.sqrt(squares / Math.max(1, vertices))) / (diagonalOf(capture.rest) || 1);
 }
 
-/** Mean of the first `count` points. */
 export function meanOf(positions: ArrayLike<number>, count: number): [number, number, number] {
   const sum: [number, number, number] = [0, 0, 0];
   for (let k = 0; k < 3 * count; k++) sum[k % 3] += positions[k];

@@ -8,23 +8,26 @@ import {
   RGBAFormat,
   WebGLRenderTarget,
   type FloatType,
-  type HalfFloatType,
+  HalfFloatType,
   type IUniform,
   type Texture,
   type WebGLRenderer,
+  type DataTexture,
 } from 'three';
-import { coverVertexShader } from './decodeShaders';
+import { coverVertexShader, normalShader } from './decodeShaders';
 import { numberedGeometry, shaderMaterial } from './materials';
 import { WIDTH } from './packing';
+import { floatTexture } from './dataTextures';
 
 /** A fragment shader that runs once for every texel of a target. */
 export class Pass {
-  readonly uniforms: Record<string, IUniform>;
   private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly camera = new Camera();
 
-  constructor(fragmentShader: string, uniforms: Record<string, IUniform>) {
-    this.uniforms = uniforms;
+  constructor(
+    fragmentShader: string,
+    readonly uniforms: Record<string, IUniform>,
+  ) {
     const drawing = { depthTest: false, depthWrite: false, blending: NoBlending };
     const material = shaderMaterial(coverVertexShader, fragmentShader, uniforms, drawing);
     this.mesh = new Mesh(numberedGeometry(Uint32Array.of(0, 1, 2)), material);
@@ -52,4 +55,18 @@ export function target(bands: number, type: typeof FloatType | typeof HalfFloatT
     magFilter: NearestFilter,
     depthBuffer: false,
   });
+}
+
+/** A frame that is given as positions: these, the normals that follow, and the pass that computes them. */
+export interface PlacedFrame {
+  readonly positions: DataTexture;
+  readonly normals: WebGLRenderTarget;
+  readonly pass: Pass;
+}
+
+/** @param like computes normals of decoded frames of the same model */
+export function placedFrame(bands: number, like: Pass): PlacedFrame {
+  const positions = floatTexture(new Float32Array(4 * WIDTH * bands), WIDTH, bands);
+  const pass = new Pass(normalShader, { ...like.uniforms, positions: { value: positions } });
+  return { positions, normals: target(bands, HalfFloatType), pass };
 }

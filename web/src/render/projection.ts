@@ -9,7 +9,6 @@ export interface Place {
   readonly depth: number;
 }
 
-/** A half-line: what lies behind a place in the picture. */
 export interface Ray {
   readonly origin: Vector;
   /** Of unit length. */
@@ -40,12 +39,10 @@ export class Projection {
     return { x: (at.x / 2 + 0.5) * this.width, y: (0.5 - at.y / 2) * this.height, depth: at.z };
   }
 
-  /** The point at a place. */
   point({ x, y, depth }: Place): Vector {
     return new Vector3((2 * x) / this.width - 1, 1 - (2 * y) / this.height, depth).applyMatrix4(this.inverse).toArray();
   }
 
-  /** What lies behind a place. */
   ray(x: number, y: number): Ray {
     const origin = this.point({ x, y, depth: -1 });
     return { origin, direction: normalized(sub(this.point({ x, y, depth: 0.5 }), origin)) };

@@ -190,7 +190,6 @@ void main() {
   shade = vec4(blended + noise / 255.0, 1.0);
 }`;
 
-/** The ground: a large square around a middle. */
 export const groundVertexShader = `${header}
 uniform mat4 viewMatrix;
 uniform mat4 projectionMatrix;

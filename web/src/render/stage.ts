@@ -13,15 +13,13 @@ import {
 import type { StaticPart } from '../capture';
 import type { Surface } from '../observed/surface';
 import { boundsOf } from '../coordinates/topology';
-import { Backdrop } from './backdrop';
+import { Backdrop, Ground } from './ground';
 import { CageView } from './cageView';
 import { aim, aimParallel, cornersOf, FIELD_OF_VIEW, type CameraState } from './camera';
 import { Decoder, type Pose } from './decoder';
-import type { Covered, Layers, Side, StageColors } from './drawn';
-import { Ground } from './ground';
+import { type Covered, type Layers, type Side, type StageColors, drawSide } from './drawn';
 import { ModelView } from './modelView';
 import { ObservedView } from './observedView';
-import { drawSide } from './sides';
 import { surfaceOf } from './surface';
 import { createRenderer, isSoftwareRendered } from './webgl';
 
@@ -290,7 +288,6 @@ export class Stage {
     return turned;
   }
 
-  /** Corners of a box around the model at rest. */
   restCorners(): Float64Array {
     const rest = Float32Array.from(this.capture.rest);
     this.decoder.place(rest);
@@ -372,7 +369,6 @@ export class Stage {
     this.lowerGround();
   }
 
-  /** Keeps the ground below all frames that are known. */
   private lowerGround() {
     const level = this.lowest[this.up] - CLEARANCE;
     if (level >= this.ground.middle.y) return;

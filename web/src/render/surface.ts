@@ -1,8 +1,6 @@
 import type { StaticPart } from '../capture';
-import { byVertex } from '../codec/byVertex';
-import { type Polygons, triangulated } from '../codec/polygons';
+import { byVertex, type Polygons, triangulated } from '../codec/polygons';
 
-/** The model's polygons, prepared for drawing and for normals. */
 export interface Surface {
   /** Three points of each triangle; polygons are cut into fans. */
   readonly triangles: Uint32Array;

@@ -3,10 +3,9 @@ import { customElement, property } from 'lit/decorators.js';
 import { controls } from '../style/controls';
 import { count } from '../text';
 import type { CageFigures, Report } from './data';
-import { footer } from './footer';
+import { footer, table, viewsOf } from './table';
 import { joined, RestPose } from './geometry/modelInCage';
 import { reportStyle } from './reportStyle';
-import { table, viewsOf } from './table';
 import { condition, percents, seconds } from './text';
 import type { View } from './views';
 

@@ -13,7 +13,6 @@ export type Report =
 /** A model at rest in its cage; of a large model some points. */
 export interface ModelInCage {
   readonly mesh: {
-    /** Points that the model has. */
     readonly of: number;
     readonly diagonal: number;
     readonly up: 'x' | 'y' | 'z';

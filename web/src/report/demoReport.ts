@@ -3,11 +3,10 @@ import { customElement, property } from 'lit/decorators.js';
 import { controls } from '../style/controls';
 import type { ChartOptions } from '../charts/chart';
 import type { Figure, Report } from './data';
-import { footer } from './footer';
+import { footer, charts, table, viewsOf } from './table';
 import { RestPose } from './geometry/modelInCage';
 import { methodColor } from './methods';
 import { reportStyle } from './reportStyle';
-import { charts, table, viewsOf } from './table';
 import { decimals } from './text';
 import type { Moments, View } from './views';
 
@@ -112,7 +111,6 @@ function motionOf(geometry: (Report & { kind: 'demo' })['geometry']) {
   return { views, moments, framed: cages };
 }
 
-/** Positions at a place between two frames. */
 function blended(all: Float32Array, frames: number): (place: number) => Float32Array {
   const size = all.length / frames;
   return (place) => {

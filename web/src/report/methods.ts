@@ -37,7 +37,6 @@ export function isDashed({ regularizer }: Look): boolean {
   return ['global', 'truncated-svd', 'tikhonov'].includes(regularizer);
 }
 
-/** The method of the paper, at any threshold. */
 export function isPaperMethod({ handles, regularizer }: Look): boolean {
   return handles === 'maxvol' && regularizer === 'laplacian';
 }

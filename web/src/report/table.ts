@@ -61,7 +61,6 @@ export function viewsOf(
   ></report-views>`;
 }
 
-/** A name with the colour that it has in all charts. */
 export function colored(color: string, name: string) {
   return html`<i class="dot" .style=${`background:${color}`}></i>${name}`;
 }
@@ -75,7 +74,17 @@ export function caption(what: string, reading: Cell, paper = '') {
   return html`<p class="caption"><b>${what}</b> ${reading} <i>${paper}</i></p>`;
 }
 
-/** A legend of a colour map. */
 export function colorScale(low: string, high: string, gradient: string) {
   return html`<div class="scale row fine figures">${low}<i .style=${`background:${gradient}`}></i>${high}</div>`;
+}
+
+/** What stands at the end of a report, and how its views are moved. */
+export function footer(origin: TemplateResult) {
+  return html`<footer>
+    <p>
+      Drag a view to orbit its whole group, drag with the right button to pan; click it and scroll, or pinch, to zoom.
+      Drag across a chart to zoom in, double-click to zoom out, and click a name below it to hide a series.
+    </p>
+    <p>${origin}</p>
+  </footer>`;
 }

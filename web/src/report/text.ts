@@ -37,7 +37,6 @@ export function seconds(value: Known): string {
   });
 }
 
-/** A word as a shell takes it. */
 export function quoted(word: string): string {
   return /^[\w\-./:@%+=,]+$/.test(word) ? word : `'${word.replaceAll("'", String.raw`'\''`)}'`;
 }

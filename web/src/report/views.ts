@@ -4,15 +4,13 @@ import { repeat } from 'lit/directives/repeat.js';
 import { Color } from 'three';
 import { framed, HOME, nearlySame, type CameraState } from '../render/camera';
 import { CameraControls } from '../render/cameraControls';
-import { resolvedColor } from '../style/resolvedColor';
+import { resolvedColor, stageColors } from '../viewer/stageColors';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
 import { sentence } from '../text';
 import { Quality } from '../viewer/quality';
-import { stageColors } from '../viewer/stageColors';
 import { DrawingScene, type Drawing, type DrawingColors } from './geometry/drawing';
-import { homeView, pictureShape } from './geometry/framing';
-import { keyedCamera } from './geometry/keyedCamera';
+import { homeView, pictureShape, keyedCamera } from './geometry/framing';
 import { Painter } from './geometry/painter';
 import { saveSideBySide } from './savedSheet';
 import { viewsStyle } from './viewsStyle';
@@ -28,7 +26,6 @@ export interface View {
   readonly framed?: Float32Array;
 }
 
-/** Moments that a group of views goes through. */
 export interface Moments {
   readonly count: number;
   readonly first: number;
@@ -45,7 +42,6 @@ export class Views extends LitElement {
   static override styles = [controls, viewsStyle];
 
   @property({ attribute: false }) views: readonly View[] = [];
-  /** Positions that all views frame, x y z each. */
   @property({ attribute: false }) framed: Float32Array = new Float32Array(0);
   @property({ attribute: false }) moments: Moments | null = null;
   /** What the group shows, for people who do not see it. */

@@ -11,7 +11,6 @@ export async function fetched(url: string, init: RequestInit): Promise<Response>
   }
 }
 
-/** The body of an answer to a request with this signal. */
 export async function bodyOf(response: Response, signal: AbortSignal | undefined): Promise<ArrayBuffer> {
   try {
     return await response.arrayBuffer();

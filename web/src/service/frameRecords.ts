@@ -9,7 +9,6 @@ const MAGIC = 0x46524743; // "CGRF", little-endian
 const VERSION = 1;
 const CAGE = 3;
 
-/** The solved cage of one frame. */
 export interface CageRecord {
   readonly frame: number;
   /** Root mean square and largest error as fractions of the diagonal; NaN: not measured. */
@@ -53,9 +52,8 @@ export class CageRecordReader {
   private take(): CageRecord {
     const view = this.view;
     const [magic, version, kind] = [view.getUint32(0, true), view.getUint16(4, true), view.getUint16(6, true)];
-    if (magic !== MAGIC || version !== VERSION || kind !== CAGE || view.getUint32(12, true) !== this.rows) {
+    if (magic !== MAGIC || version !== VERSION || kind !== CAGE || view.getUint32(12, true) !== this.rows)
       throw new BrokenRecord('The service sent unexpected data.');
-    }
     const payload = this.record.slice(HEADER_BYTES);
     if (crc32c(payload) !== view.getUint32(24, true)) throw new BrokenRecord('A frame was corrupted in transit.');
     // Platforms that run browsers are little-endian, as records are.

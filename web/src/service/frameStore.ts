@@ -73,7 +73,6 @@ export class FrameStore {
   }
 }
 
-/** Errors of frames, in arrays that grow. */
 export class GrowingErrors {
   private l2 = new Float32Array(256).fill(Number.NaN);
   private linf = new Float32Array(256).fill(Number.NaN);

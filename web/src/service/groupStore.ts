@@ -19,7 +19,6 @@ export class GroupStore {
     while (this.keptBytes > this.mostBytes && this.groups.length > 1) this.keptBytes -= bytesOf(this.groups.shift()!);
   }
 
-  /** The group that a frame belongs to, where it is here. */
   of(frame: number): StoredChunk | null {
     return this.groups.find((group) => isWithin(group, frame)) ?? null;
   }
@@ -42,7 +41,6 @@ export class GroupStore {
   }
 }
 
-/** Frames up to the end of a group. */
 export function endOf({ frames: { entry } }: StoredChunk): number {
   return entry.fields.first + entry.fields.count;
 }
@@ -51,7 +49,6 @@ function isWithin(group: StoredChunk, frame: number): boolean {
   return frame >= group.frames.entry.fields.first && frame < endOf(group);
 }
 
-/** Bytes and where they are in the container. */
 interface Piece {
   readonly offset: number;
   readonly bytes: Uint8Array;

@@ -13,7 +13,7 @@ import {
   rawPart,
   takeApart,
 } from '../../tests/support/containers';
-import { GroupFollower } from './groupFollower';
+import { GroupFollower } from './closedGroups';
 import { endOf, GroupStore } from './groupStore';
 import type { Session } from './messages';
 import { connect } from './runningContainer';

@@ -97,9 +97,7 @@ it('a server that is gone is said to be', async () => {
 
 it('a request can be given up', async () => {
   const url = await serve((request, response) => {
-    if (request.headers.range === 'bytes=200000-200009') {
-      return;
-    }
+    if (request.headers.range === 'bytes=200000-200009') return;
     answerRange(padded, '"a"', request, response);
   });
   const source = await httpSource(url);

@@ -44,9 +44,7 @@ export class LiveCapture implements SessionCapture {
   static: StaticPart;
   frames: number;
   complete = false;
-  private readonly service: Service;
   private readonly id: string;
-  private readonly openFinished: OpenFinished;
   private readonly store: FrameStore;
   private readonly measured = new GrowingErrors();
   private readonly follower: LiveFollower;
@@ -61,10 +59,13 @@ export class LiveCapture implements SessionCapture {
   private errorsFetched = { coded: -1, skipped: -1, at: -Infinity };
 
   /** @param openFinished opens the container, once there is one */
-  constructor(service: Service, session: Session, { part, connection }: RunningContainer, openFinished: OpenFinished) {
-    this.service = service;
+  constructor(
+    private readonly service: Service,
+    session: Session,
+    { part, connection }: RunningContainer,
+    private readonly openFinished: OpenFinished,
+  ) {
     this.id = session.id;
-    this.openFinished = openFinished;
     this.name = session.name ?? session.id;
     this.static = part;
     this.frames = solvedFromStart(session.frames);

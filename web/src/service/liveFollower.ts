@@ -27,11 +27,9 @@ export interface Following {
   /** Frames up to `end` are solved, and will not be sent unless they are asked for. */
   readonly skipped: (end: number) => void;
   readonly looked: (session: Session) => void;
-  /** The state or a measure changed. */
   readonly changed: () => void;
 }
 
-/** Follows one session from the end of what is solved. */
 export class LiveFollower {
   state: LiveStatus['state'] = 'following';
   retryAt: number | null = null;

@@ -1,6 +1,5 @@
 /** How a running session reaches this page: rates, delay, and what came late. */
 
-/** What arrived lately, as a rate. */
 export class RateMeter {
   private samples: { at: number; amount: number }[] = [];
   private began = performance.now();

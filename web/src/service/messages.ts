@@ -39,7 +39,6 @@ export interface CodedFrames {
   readonly problem?: ProblemDetails;
 }
 
-/** A page of sessions, newest first. */
 export interface SessionPage {
   readonly sessions: readonly Session[];
   /** Where the next page begins; null on the last. */
@@ -57,7 +56,6 @@ export interface FrameResult {
 export interface CageDesign {
   readonly id: string;
   readonly state: 'queued' | 'running' | 'completed' | 'failed';
-  /** What is being done, in a few words. */
   readonly stage?: string | null;
   /** How much of it is done, 0 to 1. */
   readonly fraction: number;
@@ -92,12 +90,10 @@ export interface Transfer {
   readonly name: string | null;
   readonly state: 'queued' | 'running' | 'completed' | 'failed';
   readonly frames: number;
-  /** Frames that are moved. */
   readonly moved: number;
   readonly problem?: ProblemDetails;
 }
 
-/** Choices for a new session; what is left out has the service's default. */
 export interface SessionOptions {
   name?: string;
   coordinates?: CoordinateSystem;

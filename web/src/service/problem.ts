@@ -71,9 +71,8 @@ export async function problemOf(response: Response): Promise<ServiceProblem> {
   const retryAfter = Number.isFinite(wait) && wait >= 0 ? wait : null;
   const type = response.headers.get('content-type') ?? '';
   let details: ProblemDetails = {};
-  if (type.startsWith('application/problem+json')) {
+  if (type.startsWith('application/problem+json'))
     details = await (response.json() as Promise<ProblemDetails>).catch(() => ({}));
-  }
   return problemFrom(details, response.status, retryAfter);
 }
 

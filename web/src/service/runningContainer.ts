@@ -9,9 +9,7 @@ import { type Service, sessionPath } from './service';
 
 /** A connection by which the container arrives, from its front on. */
 export interface ContainerConnection {
-  /** What came, taken apart. */
   readonly stream: ContainerStream;
-  /** What follows. */
   readonly pieces: AsyncGenerator<Uint8Array, void, undefined>;
   readonly stop: AbortController;
 }

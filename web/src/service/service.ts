@@ -6,7 +6,7 @@ import { persistently } from './backoff';
 import { httpSource } from './httpSource';
 import type { FrameResult, Session, SessionPage } from './messages';
 import { ServiceProblem, problemBehind, problemOf } from './problem';
-import { pageToken, type TokenStore } from './token';
+import { pageToken } from './token';
 
 export interface Coordinates {
   readonly rows: number;
@@ -22,14 +22,11 @@ const COORDINATES_ATTEMPTS = 6;
 
 /** A service below an address. All its requests carry the token, in a header. */
 export class Service {
-  private readonly base: URL;
-  private readonly token: TokenStore;
-
   /** @param base address that ends with `/v1/`; beside the page, whatever prefix that has, where it is left out */
-  constructor(base = new URL('v1/', document.baseURI), token = pageToken) {
-    this.base = base;
-    this.token = token;
-  }
+  constructor(
+    private readonly base = new URL('v1/', document.baseURI),
+    private readonly token = pageToken,
+  ) {}
 
   /**
    * A request; the answer's body is still to be read.
@@ -93,7 +90,6 @@ export class Service {
     }
   }
 
-  /** Says that a session has `frames` frames and no more are coming. */
   complete(id: string, frames: number, signal?: AbortSignal): Promise<Session> {
     const headers = { 'Content-Type': 'application/json' };
     return this.json(sessionPath(id, 'complete'), {

@@ -6,16 +6,21 @@ import { ServiceProblem, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
 import { controls, pageLayout } from '../style/controls';
-import { terms } from '../style/terms';
+import { terms } from '../style/parts';
 import { tokens } from '../style/tokens';
 import { cardsStyle } from './cardsStyle';
 import { download, type Format } from './download';
-import { deleteDialog } from './deleteDialog';
-import { emptyList } from './emptyList';
+import {
+  deleteDialog,
+  isFiltering,
+  matches,
+  type StateFilter,
+  filterBar,
+  listHeader,
+  listNotices,
+  emptyList,
+} from './listParts';
 import { FigureLoader } from './figures';
-import { isFiltering, matches, type StateFilter } from './filter';
-import { filterBar } from './filterBar';
-import { listHeader, listNotices } from './listHeader';
 import './recoveries';
 import { nameOf, row, tableHead } from './row';
 import { SessionList } from './sessionList';

@@ -55,7 +55,7 @@ export const cardsStyle = css`
       max-width: none;
       flex-basis: 100%;
     }
-    .states {
+    .bar .segments {
       flex: 1;
     }
     .ways li {

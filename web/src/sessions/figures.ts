@@ -24,7 +24,6 @@ const MIN_MS = 5000;
 const MS_PER_FRAME = 2;
 const RETRY_MS = 30_000;
 
-/** Fetches figures and keeps them. Fires `change`. */
 export class FigureLoader extends EventTarget {
   private readonly figures = new Map<string, Figures>();
   /** Of how many frames the figures of a session are, whether these are the last, and when to look again at the earliest. */
@@ -49,7 +48,6 @@ export class FigureLoader extends EventTarget {
     while (this.atWork < AT_ONCE && this.wanted.size > 0) void this.work();
   }
 
-  /** Forgets everything, for another token. */
   reset() {
     this.figures.clear();
     this.fetched.clear();
@@ -89,7 +87,6 @@ function isOver(session: Session): boolean {
   return session.state === 'completed' || session.state === 'failed';
 }
 
-/** Of the frames that are solved so far. */
 async function frameFigures(service: Service, session: Session): Promise<Figures> {
   const frames = await service.errors(session.id);
   let [sum, measured, worst] = [0, 0, 0];

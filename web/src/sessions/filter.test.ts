@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import type { Session } from '../service/messages';
-import { isFiltering, matches } from './filter';
+import { isFiltering, matches } from './listParts';
 
 const session = { name: 'Shot 042 hero', id: '01a2', state: 'ready', coordinates: 'harmonic' } as Session;
 

@@ -8,7 +8,6 @@ import type { Service } from '../service/service';
 
 const POLL_RUNNING_SECONDS = 2;
 const POLL_IDLE_SECONDS = 5;
-/** Seconds over which rates are taken. */
 const RATE_SECONDS = 15;
 
 /** The sessions of a token, newest first. Fires `change`. */
@@ -59,7 +58,6 @@ export class SessionList extends EventTarget {
     clearTimeout(this.timer);
   }
 
-  /** Asks at once. */
   refresh() {
     const wasRunning = this.running !== null;
     this.stop();

@@ -4,14 +4,16 @@ import { guarded } from '../service/token';
 
 const PREFIX = 'cager-thumbnail ';
 const MAX_PICTURES = 200;
+const [WIDTH, HEIGHT] = [112, 84];
 
 /** The address of a session's picture; null where it was not shown here. */
 export function thumbnailOf(session: string): string | null {
   return guarded(() => localStorage.getItem(PREFIX + session)?.replace(/^\d+ /, '') ?? null);
 }
 
-/** Keeps the picture of a session in place of the oldest one. */
-export function keepThumbnail(session: string, address: string) {
+export function keepThumbnail(session: string, picture: HTMLCanvasElement) {
+  const address = shrunk(picture);
+  if (address === null) return;
   guarded(() => {
     const names = Object.keys(localStorage).filter((name) => name.startsWith(PREFIX));
     if (names.length >= MAX_PICTURES) {
@@ -27,4 +29,17 @@ export function forgetThumbnails() {
   guarded(() => {
     for (const name of Object.keys(localStorage)) if (name.startsWith(PREFIX)) localStorage.removeItem(name);
   });
+}
+
+/** The middle of a picture, as the address of a small one; null where the browser cannot draw it. */
+function shrunk(picture: HTMLCanvasElement): string | null {
+  const canvas = document.createElement('canvas');
+  [canvas.width, canvas.height] = [WIDTH, HEIGHT];
+  const context = canvas.getContext('2d');
+  const height = Math.min(picture.height, (picture.width * HEIGHT) / WIDTH);
+  const width = (height * WIDTH) / HEIGHT;
+  if (!context || height === 0) return null;
+  const [left, top] = [(picture.width - width) / 2, (picture.height - height) / 2];
+  context.drawImage(picture, left, top, width, height, 0, 0, WIDTH, HEIGHT);
+  return canvas.toDataURL('image/webp', 0.75);
 }

@@ -11,7 +11,7 @@ import { tokens } from '../style/tokens';
 import { captureName, jobOf, newUpload } from './beginning';
 import { type Dropped, type Item, type Role, classify, reassigned } from '../files/classify';
 import { currentJob, setCurrentJob } from './currentJob';
-import { droppedFiles, pickFiles } from '../files/drop';
+import { droppedFiles } from '../files/drop';
 import { marksOf, withEarlierRoles } from './fileMarks';
 import {
   type Interrupted,
@@ -22,13 +22,13 @@ import {
   interruptedCard,
   interruptedUploads,
 } from './interrupted';
-import { type JobActions, jobView } from './jobView';
+import { jobView } from './jobView';
 import type { KeptUpload } from './keptUpload';
 import { extensionOf } from '../files/meshes';
 import { type Choices, DEFAULT_CHOICES, optionsForm } from './optionsForm';
 import { type Plan, planOf } from './plan';
 import type { Stage } from './uploadJob';
-import { type ChoosingFiles, dropZone, itemRow, planSummary } from './uploadParts';
+import { dropZone, itemRow, planSummary } from './uploadParts';
 import { uploadStyle } from './uploadStyle';
 
 /**
@@ -84,7 +84,7 @@ export class Upload extends LitElement {
           <a class="button back" href="#/" aria-label="All sessions" title="All sessions">${glyphs.back}</a>
           <h1>Upload a capture</h1>
         </header>
-        ${job ? jobView(job, this.furthest, this.actions) : html`${this.interruptedCards()}${dropZone(this.isOver, this.items.length === 0, this.choosing)}${this.chosen()}`}
+        ${job ? jobView(job, this.furthest, () => void this.discard(), this.startOver) : html`${this.interruptedCards()}${dropZone(this.isOver, this.items.length === 0, (files) => void this.take(files), this.startOver)}${this.chosen()}`}
       </main>
     `;
   }
@@ -130,20 +130,6 @@ export class Upload extends LitElement {
       ? html`<p class="note bad" role="alert">${glyphs.alert}<span>${this.finding}</span></p>`
       : nothing;
   }
-
-  private readonly choosing: ChoosingFiles = {
-    onFiles: () => pickFiles((files) => void this.take(files)),
-    onFolder: () => pickFiles((files) => void this.take(files), { isFolder: true }),
-    onStartOver: () => this.startOver(),
-  };
-
-  private readonly actions: JobActions = {
-    stop: () => currentJob()?.stop(),
-    takeBest: () => currentJob()?.takeBest(),
-    goOn: () => void currentJob()?.run(),
-    discard: () => void this.discard(),
-    another: () => this.startOver(),
-  };
 
   private async discard() {
     const job = currentJob();

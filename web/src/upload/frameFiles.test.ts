@@ -1,8 +1,6 @@
 import { expect, test } from 'vitest';
 import { ObjFrames, pointsOf } from '../files/meshes';
-import { mddFrames } from '../files/mdd';
-import { npyFrames } from '../files/npy';
-import { pc2Frames } from '../files/pc2';
+import { mddFrames, npyFrames, pc2Frames } from '../files/frameFiles';
 import { planOf } from './plan';
 import { classify } from '../files/classify';
 

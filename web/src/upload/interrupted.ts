@@ -8,7 +8,6 @@ import { type FileMark, type FileMarks, difference, shareNames } from './fileMar
 import { type KeptUpload, unfinishedUploads } from './keptUpload';
 import { readDesign, removeDesign } from './motionCage';
 
-/** An upload that was broken off when its page was closed. */
 export interface Interrupted {
   readonly kept: KeptUpload;
   /** Frames that the service has. */
@@ -48,7 +47,6 @@ export async function interruptedUploads(service: Service, onFreed: () => void):
   return found;
 }
 
-/** Forgets an upload, and deletes what the service has of it. */
 export async function deleteInterrupted(service: Service, { kept }: Interrupted) {
   const { session, design } = kept.present;
   if (session !== null) await service.remove(session);
@@ -87,7 +85,6 @@ export function interruptedCard(interrupted: Interrupted, why: string, onDelete:
   `;
 }
 
-/** Offers to go on, now that the files are there. */
 export function goOnCard(interrupted: Interrupted, onGoOn: () => void, onAnew: () => void) {
   return html`
     <section class="card" aria-label="Resume upload">

@@ -2,17 +2,10 @@ import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
 import type { Figures } from '../sessions/figures';
 import { count, counted, percent, perSecond, ratio as times, size, span } from '../text';
-import { errorChart } from './errorChart';
 import { sampledFrames } from './motionCage';
-import type { Stage, UploadJob } from './uploadJob';
-
-export interface JobActions {
-  readonly stop: () => void;
-  readonly takeBest: () => void;
-  readonly goOn: () => void;
-  readonly discard: () => void;
-  readonly another: () => void;
-}
+import type { Stage, UploadJob, Measured } from './uploadJob';
+import { axisOf } from '../charts/axis';
+import { plot, thinned, type Series } from '../charts/plot';
 
 const STEPS: readonly (readonly [Stage, string])[] = [
   ['designing', 'Design cage'],
@@ -33,8 +26,7 @@ const TITLES: Readonly<Record<Stage, string>> = {
   failed: 'Upload failed',
 };
 
-/** An upload: how far it is, what its errors are, and what can be done about it. */
-export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
+export function jobView(job: UploadJob, furthest: Stage, discard: () => void, startOver: () => void) {
   const { session, plan, stage } = job;
   const total = plan.frames.frames;
   const name = job.request.options.name ?? 'the capture';
@@ -82,19 +74,19 @@ export function jobView(job: UploadJob, furthest: Stage, actions: JobActions) {
         }
         ${
           stage === 'designing' && job.design?.vertices
-            ? html`<button type="button" @click=${actions.takeBest}>Use this cage</button>`
+            ? html`<button type="button" @click=${() => job.takeBest()}>Use this cage</button>`
             : nothing
         }
-        ${job.isActive ? html`<button type="button" @click=${actions.stop}>Stop</button>` : nothing}
+        ${job.isActive ? html`<button type="button" @click=${() => job.stop()}>Stop</button>` : nothing}
         ${
           stage === 'stopped' || stage === 'failed'
-            ? html`<button type="button" class="primary" @click=${actions.goOn}>
+            ? html`<button type="button" class="primary" @click=${() => void job.run()}>
                   ${job.isAnew ? 'Start again' : stage === 'stopped' ? 'Resume' : 'Try again'}
                 </button>
-                <button type="button" @click=${actions.discard}>${session ? 'Delete upload' : 'Dismiss'}</button>`
+                <button type="button" @click=${discard}>${session ? 'Delete upload' : 'Dismiss'}</button>`
             : nothing
         }
-        ${stage === 'completed' ? html`<button type="button" @click=${actions.another}>Upload another capture</button>` : nothing}
+        ${stage === 'completed' ? html`<button type="button" @click=${startOver}>Upload another capture</button>` : nothing}
       </div>
       ${stage === 'sending' ? html`<p class="muted">You can watch while it uploads. The upload continues while this tab is open, and can be resumed later.</p>` : nothing}
     </section>
@@ -123,5 +115,32 @@ function containerFacts(figures: Figures | null) {
     <span>file of <b>${size(bytes)}</b></span>
     ${ratio === null ? nothing : html`<span><b>${times(ratio)}</b> smaller than the frames</span>`}
     ${meanL2 === null ? nothing : html`<span>mean error <b>${percent(meanL2, 2)}</b></span>`}
+  `;
+}
+
+export function errorChart(measured: Measured) {
+  const top = measured.linf.reduce((most, value) => (value > most ? value : most), 0);
+  if (top === 0) return html``;
+  const series = (values: Float32Array, color: string): Series => ({
+    label: '',
+    color: `var(--cager-${color})`,
+    mark: 'line',
+    points: thinned(values, (frame) => (frame + 0.5) / values.length),
+  });
+  const lines = [series(measured.linf, 'cage'), series(measured.l2, 'accent')];
+  return html`
+    <figure class="errors">
+      <figcaption class="row fine">
+        <span class="key linf"></span>Worst point <span class="key"></span>RMS of all points
+        <span class="scale figures">up to ${percent(top, 2)} of the diagonal</span>
+      </figcaption>
+      <div
+        class="area"
+        role="img"
+        aria-label="Errors of the frames so far: worst point ${percent(top, 2)} of the diagonal"
+      >
+        ${plot({ x: axisOf([0, 1], 0), y: axisOf([0, 1.05 * top], 0), series: lines })}
+      </div>
+    </figure>
   `;
 }

@@ -19,7 +19,6 @@ const LOOK_SECONDS = 1;
 /** Repeats what fails and may be repeated. */
 type Retrying = <T>(work: () => Promise<T>) => Promise<T>;
 
-/** Numbers of the frames that a design sees: evenly spaced, the first and the last among them. */
 export function sampledFrames(frames: number, points: number): number[] {
   const room = Math.max(MIN_FRAMES, Math.floor(MAX_BYTES / (12 * points)));
   const sampled = Math.min(frames, MAX_FRAMES, room);
@@ -134,7 +133,6 @@ function answered(signal: AbortSignal): AbortSignal {
   return late.signal;
 }
 
-/** The best cage so far, as a file to send. */
 async function bestCage(service: Service, id: string, signal: AbortSignal): Promise<File> {
   const response = await service.request(`${pathOf(id)}/cage.obj`, { cache: 'no-store', signal });
   return new File([await response.blob()], 'cage.obj');

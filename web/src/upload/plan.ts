@@ -2,7 +2,7 @@
 
 import { counted } from '../text';
 import type { Item } from '../files/classify';
-import { framesOf } from '../files/frames';
+import { framesOf } from '../files/frameFiles';
 import type { FrameSource } from '../files/frameSource';
 import { pointsOf } from '../files/meshes';
 
@@ -30,9 +30,8 @@ export async function planOf(items: readonly Item[]): Promise<Plan> {
   }
   const frames = await framesOf(framesItem.files);
   const restItem = having('rest');
-  if (!restItem && framesItem.files.length < 2) {
+  if (!restItem && framesItem.files.length < 2)
     throw new Error('The rest pose is missing: add the undeformed mesh as .obj, .ply, .off, .stl or .glb.');
-  }
   const rest = (restItem ?? framesItem).files[0];
   const remarks = restItem ? [] : [`The first frame, ${rest.name}, is used as the rest pose.`];
   const points = await pointsOf(rest);

@@ -31,7 +31,6 @@ export interface UploadRequest {
 /** One upload. Fires `change`. */
 export class UploadJob extends EventTarget {
   stage: Stage;
-  /** The session, once the service made it. */
   session: Session | null = null;
   /** Why it stands still or failed, a sentence; empty while all is well. */
   trouble = '';

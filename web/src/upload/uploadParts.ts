@@ -1,15 +1,10 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
 import { counted, size } from '../text';
-import type { Item, Role } from '../files/classify';
+import type { Dropped, Item, Role } from '../files/classify';
+import { pickFiles } from '../files/drop';
 import type { Choices } from './optionsForm';
 import type { Plan } from './plan';
-
-export interface ChoosingFiles {
-  readonly onFiles: () => void;
-  readonly onFolder: () => void;
-  readonly onStartOver: () => void;
-}
 
 const ROLE_WORDS: Readonly<Record<Role, string>> = {
   rest: 'Rest pose',
@@ -19,7 +14,8 @@ const ROLE_WORDS: Readonly<Record<Role, string>> = {
 };
 
 /** Where files are dropped; large, with what they may be, until the first is there. */
-export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder, onStartOver }: ChoosingFiles) {
+export function dropZone(isOver: boolean, isFirst: boolean, take: (files: Dropped[]) => void, startOver: () => void) {
+  const pick = (isFolder: boolean) => () => pickFiles(take, { isFolder });
   return html`
     <div class="zone ${isOver ? 'over' : ''} ${isFirst ? '' : 'small'}">
       ${
@@ -30,11 +26,11 @@ export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder,
           : nothing
       }
       <div class="buttons">
-        <button type="button" class=${isFirst ? 'primary' : ''} @click=${onFiles}>
+        <button type="button" class=${isFirst ? 'primary' : ''} @click=${pick(false)}>
           ${isFirst ? 'Choose files' : 'Add files'}
         </button>
-        <button type="button" @click=${onFolder}>${isFirst ? 'Choose folder' : 'Add folder'}</button>
-        ${isFirst ? nothing : html`<button type="button" class="quiet" @click=${onStartOver}>Start over</button>`}
+        <button type="button" @click=${pick(true)}>${isFirst ? 'Choose folder' : 'Add folder'}</button>
+        ${isFirst ? nothing : html`<button type="button" class="quiet" @click=${startOver}>Start over</button>`}
       </div>
     </div>
     ${
@@ -57,7 +53,6 @@ export function dropZone(isOver: boolean, isFirst: boolean, { onFiles, onFolder,
   `;
 }
 
-/** A file, or a row of them, and what it is taken for. */
 export function itemRow(item: Item, onRole: (role: Role) => void) {
   const bytes = item.files.reduce((sum, file) => sum + file.size, 0);
   return html`

@@ -10,7 +10,6 @@ import type { Action } from './shortcuts';
 import { sentence } from '../text';
 import { ranged, REPEATS, sought, spedUp, started, stepped, worstFrame, type Transport } from './transport';
 
-/** Angle and factor of one press of a key. */
 const [TURN, ZOOM] = [Math.PI / 12, 1.15];
 
 export function perform(action: Action, viewer: CagerViewer) {

@@ -2,23 +2,14 @@ import { html, nothing } from 'lit';
 import type { Capture, FrameErrors } from '../capture';
 import type { Dropped } from '../files/classify';
 import { Beside } from './beside';
-import { paintCorrespondence } from './correspondence';
 import { numberAt, numberText } from './frameNumbers';
-import { glyphs } from '../style/glyphs';
+import { iconButton } from '../style/parts';
 import { openFile } from './opener';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
 import { percent, sentence } from '../text';
-
-export interface BesideHost extends HTMLElement {
-  readonly player: Player | null;
-  readonly renderRoot: ParentNode;
-  /** The second capture, where the page set one. */
-  beside: Capture | null;
-  requestUpdate(): void;
-  applyColors(): void;
-  report(problem: string): void;
-}
+import { boundsOf } from '../coordinates/topology';
+import type { ViewerHost } from './host';
 
 /** A second capture in the viewer, beside the first one: its picture, its name and its errors. */
 export class BesideMode {
@@ -30,7 +21,7 @@ export class BesideMode {
   private marks: PointMarks | null = null;
   private opening = new AbortController();
 
-  constructor(private readonly host: BesideHost) {}
+  constructor(private readonly host: ViewerHost) {}
 
   /** Shows a file beside the capture, in place of what is there. */
   async open(file: File) {
@@ -63,7 +54,6 @@ export class BesideMode {
     return this.pair?.player ?? null;
   }
 
-  /** Errors of the second capture at the frames of the first. */
   get errors(): FrameErrors | null {
     return this.pair?.errors ?? null;
   }
@@ -133,14 +123,7 @@ export class BesideMode {
       ${this.marks?.template ?? nothing}
       <section class="caption corner glass" aria-label="Second capture">
         <h2 class="heading clip" title=${this.host.beside.name}>${this.host.beside.name}</h2>
-        <button
-          class="quiet icon"
-          title="Close the second capture"
-          aria-label="Close the second capture"
-          @click=${() => this.leave()}
-        >
-          ${glyphs.close}
-        </button>
+        ${iconButton('close', 'Close the second capture', () => this.leave())}
         <p class="figures fine">
           <i class="dashes" title="Dashed line in the timeline"></i
           >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
@@ -192,4 +175,36 @@ function figures({ frame, player }: Beside, lead: Player): string {
   const { l2, linf } = player.capture.errors;
   const errors = Number.isFinite(linf[frame]) ? ` · L2 ${percent(l2[frame])} · L∞ ${percent(linf[frame])}` : '';
   return `frame ${number}${errors}`;
+}
+
+/** Darkest and brightest value of a colour's channels: light and shadow are seen on all. */
+const [DARK, BRIGHT] = [40, 245];
+
+/**
+ * Paints a source by the places of its points at rest, and a target with the colours of the points that correspond to its own. Either may be the source; of two
+ * with as many points it is the first.
+ *
+ * @param correspondence the source's point for each of the target's
+ * @throws Error with one sentence for a person where it is not of these two
+ */
+export function paintCorrespondence(correspondence: readonly number[], first: Player, second: Player) {
+  const pointsOf = ({ capture }: Player) => capture.static.rest.length / 3;
+  const [source, target] = pointsOf(second) === correspondence.length ? [first, second] : [second, first];
+  const count = pointsOf(source);
+  if (pointsOf(target) !== correspondence.length || correspondence.some((point) => point >= count))
+    throw new Error('This report is about other models: open the source and the transferred target.');
+  const colors = placeColors(source.capture.static);
+  const taken = new Uint8Array(3 * correspondence.length);
+  for (const [k, point] of correspondence.entries()) taken.set(colors.subarray(3 * point, 3 * point + 3), 3 * k);
+  source.stage.paint(colors);
+  target.stage.paint(taken);
+}
+
+/** Red, green and blue of each point by where it is between the ends of the model: along x, y and z. */
+export function placeColors({ rest }: Pick<Capture['static'], 'rest'>): Uint8Array {
+  const { low, high } = boundsOf(rest);
+  return Uint8Array.from(rest, (x, k) => {
+    const share = (x - low[k % 3]) / (high[k % 3] - low[k % 3] || 1);
+    return Math.round(DARK + (BRIGHT - DARK) * share);
+  });
 }

@@ -16,17 +16,15 @@ import { LiveBadge } from './liveBadge';
 import { emptyState, notice, progressBox } from './messages';
 import { overlayStyle } from './overlayStyle';
 import { helpSheet } from './helpSheet';
-import { deck, legend, titleBox } from './parts';
+import { deck, legend, titleBox, writeReadout } from './parts';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
 import { PoseMode } from './poseMode';
-import { writeReadout } from './readout';
 import { canRecord } from './recording';
 import { correspondenceOf, readReport, trackingOf } from './reports';
 import { actionOfKey, type Action } from './shortcuts';
 import { followLooks, stageColors } from './stageColors';
 import { sentence } from '../text';
-import { thumbnail } from './thumbnail';
 import type { Timeline } from './timeline';
 import { toolbar } from './toolbar';
 import { viewsPanel } from './viewsPanel';
@@ -56,9 +54,7 @@ const SAID_MILLISECONDS = 2000;
 export class CagerViewer extends CaptureElement {
   static override styles = [tokens, controls, viewerStyle, overlayStyle];
 
-  /** The panel that is open beside the tools. */
   @state() private panel: 'figures' | 'views' | null = null;
-  /** What was done, for a moment. */
   @state() private said = '';
   @state() recording: AbortController | null = null;
   @query('cager-timeline') private readonly timeline!: Timeline | null;
@@ -124,7 +120,6 @@ export class CagerViewer extends CaptureElement {
     }
   }
 
-  /** Plays a file without any server, beside the capture that is open. */
   openBeside(file: File): Promise<void> {
     return this.pair.open(file);
   }
@@ -154,7 +149,6 @@ export class CagerViewer extends CaptureElement {
     this.panel = this.panel === panel ? null : panel;
   }
 
-  /** Says for a moment what was done. */
   say(sentence: string) {
     this.said = sentence;
     setTimeout(() => (this.said = ''), SAID_MILLISECONDS);
@@ -163,12 +157,6 @@ export class CagerViewer extends CaptureElement {
   /** The view as `viewchange` tells it. */
   get viewText(): string {
     return this.player ? this.link.textOf(this.player) : '';
-  }
-
-  /** A small picture of what is shown, as an address; null while nothing is. */
-  thumbnail(): string | null {
-    const { player } = this;
-    return player && thumbnail(player.drawn());
   }
 
   openHelp() {

@@ -25,12 +25,10 @@ export abstract class CaptureElement extends LitElement {
   private wasReady = false;
   private shownFrame = -1;
 
-  /** Plays a file without any server. */
   open(file: File): Promise<void> {
     return this.opener.openFile(file);
   }
 
-  /** Goes to a view as `viewchange` tells it. */
   goTo(text: string) {
     if (this.player) this.link.goTo(text, this.player);
     this.view = this.player ? '' : text;
@@ -90,7 +88,6 @@ export abstract class CaptureElement extends LitElement {
     return this.opener.name !== null;
   }
 
-  /** Shows a capture in place of the present one. */
   show(capture: Capture) {
     this.unload();
     this.opener.forget();
@@ -107,7 +104,6 @@ export abstract class CaptureElement extends LitElement {
     }
   }
 
-  /** Shows nothing, and why. */
   fail(error: unknown) {
     this.unload();
     this.opener.name = null;
@@ -143,7 +139,6 @@ export abstract class CaptureElement extends LitElement {
     this.dispatchEvent(new CustomEvent(type, { detail, bubbles: true, composed: true }));
   }
 
-  /** Shows what `src`, `capture` and `view` say now. */
   private follow(changed: PropertyValues) {
     if (changed.has('src') && this.src !== null) this.openAddress(this.src);
     else if (changed.get('src')) this.empty();

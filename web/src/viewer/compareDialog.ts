@@ -8,6 +8,7 @@ import { nameOf } from '../sessions/row';
 import { controls } from '../style/controls';
 import { glyphs } from '../style/glyphs';
 import { count } from '../text';
+import { iconButton } from '../style/parts';
 
 /** What to show beside a capture: a session by its id, or a file. */
 export type CompareChoice = { readonly session: string } | { readonly file: File };
@@ -76,7 +77,7 @@ export class CompareDialog extends LitElement {
     return html`<dialog aria-labelledby="compare-title">
       <header>
         <h2 id="compare-title">Compare with</h2>
-        <button class="quiet icon" aria-label="Close" @click=${() => this.dialog.close()}>${glyphs.close}</button>
+        ${iconButton('close', 'Close', () => this.dialog.close())}
       </header>
       <input
         type="search"

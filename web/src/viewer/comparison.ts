@@ -10,7 +10,6 @@ const within = (share: number) => Math.min(0.95, Math.max(0.05, share || 0.5));
 
 /** The capture beside the frames that it was encoded from, or the surfaces that it was recovered from, where somebody has given them to the page. */
 export class Comparison {
-  /** Called when something else is to be shown. */
   onChange: () => void = () => undefined;
   original: Original | null = null;
   surfaces: ObservedSurfaces | null = null;

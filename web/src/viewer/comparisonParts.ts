@@ -7,6 +7,7 @@ import { glyphs } from '../style/glyphs';
 import type { HeatRange, MeasuredFrame } from './heatMap';
 import type { Player } from './player';
 import { count, percent, threeDigits } from '../text';
+import { iconButton, segments } from '../style/parts';
 
 export interface ComparisonActs {
   open(files: readonly Dropped[]): void;
@@ -42,40 +43,28 @@ export function comparisonPanel(player: Player, acts: ComparisonActs): TemplateR
   }
   const names = surfaces ? SURFACE_NAMES : SIDE_NAMES;
   const what = surfaces ? 'Distance from the surface' : 'Error against the original';
+  const sides = comparison.sides.map((side) => [side, names[side]] as const);
   const { measured } = heatMap;
   const showsErrors = heatMap.kind === 'error' && measured !== null;
   return html`
     <div class="source row">
       <span class="grow clip" title=${compared.name}>${showsErrors ? what : compared.name}</span>
-      <button class="quiet icon" aria-label="Close the original" title="Close the original" @click=${acts.close}>
-        ${glyphs.close}
-      </button>
+      ${iconButton('close', 'Close the original', acts.close)}
     </div>
     ${showsErrors ? [errorFigures(player, measured), surfaces ? nothing : rangeChoice(player)] : nothing}
-    <div class="segments" role="group" aria-label="Show">
-      ${comparison.sides.map(
-        (side) =>
-          html`<button aria-pressed=${String(comparison.side === side)} @click=${() => (comparison.side = side)}>
-            ${names[side]}
-          </button>`,
-      )}
-    </div>
+    ${segments('Show', sides, comparison.side, (side) => (comparison.side = side))}
   `;
 }
 
-const RANGE_NAMES: Readonly<Record<HeatRange, string>> = { clip: 'Whole clip', frame: 'This frame' };
+const RANGES: readonly (readonly [HeatRange, string])[] = [
+  ['clip', 'Whole clip'],
+  ['frame', 'This frame'],
+];
 
 /** Which points the warm end of the colours is of: 99 of 100 stay below it. */
 export function rangeChoice(player: Player) {
   const { kind, range } = player.heatMap;
-  return html`<div class="segments" role="group" aria-label="Colour range (99th percentile)">
-    ${(Object.keys(RANGE_NAMES) as HeatRange[]).map(
-      (each) =>
-        html`<button aria-pressed=${String(each === range)} @click=${() => player.setHeat(kind, each)}>
-          ${RANGE_NAMES[each]}
-        </button>`,
-    )}
-  </div>`;
+  return segments('Colour range (99th percentile)', RANGES, range, (each) => player.setHeat(kind, each));
 }
 
 function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {

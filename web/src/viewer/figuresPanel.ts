@@ -1,5 +1,5 @@
 import { html, nothing } from 'lit';
-import { glyphs } from '../style/glyphs';
+import { iconButton } from '../style/parts';
 import type { Player } from './player';
 import { bitrate, count, percent } from '../text';
 
@@ -26,7 +26,7 @@ export function figuresPanel(player: Player, close: () => void) {
   return html`<aside class="panel glass" aria-label="Statistics">
     <header class="spread">
       <h2>Capture</h2>
-      <button class="quiet icon" title="Close" aria-label="Close" @click=${close}>${glyphs.close}</button>
+      ${iconButton('close', 'Close', close)}
     </header>
     <dl class="pairs">
       ${row('Points', count(points))} ${row('Polygons', count(part.cornerCounts.length))}

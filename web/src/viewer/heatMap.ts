@@ -155,7 +155,6 @@ export class HeatMap {
   }
 }
 
-/** Some of many values, evenly spread. */
 function sampled(values: Float32Array): Float32Array {
   const stride = Math.max(1, Math.ceil(values.length / 4096));
   return values.filter((_, k) => k % stride === 0);

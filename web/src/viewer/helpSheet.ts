@@ -1,6 +1,5 @@
 import { html } from 'lit';
-import { glyphs } from '../style/glyphs';
-import { terms } from '../style/terms';
+import { iconButton, terms } from '../style/parts';
 import { keyLabel, SHORTCUTS } from './shortcuts';
 
 const GESTURES = [
@@ -10,7 +9,6 @@ const GESTURES = [
   ['Frame all', 'Double-click', 'Double-tap'],
 ] as const;
 
-/** Words of the page, gestures and keys. */
 export function helpSheet(close: () => void) {
   return html`<dialog
     class="sheet"
@@ -19,7 +17,7 @@ export function helpSheet(close: () => void) {
   >
     <header>
       <h2 id="help-title">CageR help</h2>
-      <button class="quiet icon" aria-label="Close" @click=${close}>${glyphs.close}</button>
+      ${iconButton('close', 'Close', close)}
     </header>
     ${terms}
     <h3 class="fine">Mouse and touch</h3>

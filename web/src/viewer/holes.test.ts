@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { Holes } from './holes';
+import { Holes } from './frameFeed';
 import { standing } from './transport';
 
 const playing = { ...standing(), playing: true, frames: 30 };

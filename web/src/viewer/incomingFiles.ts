@@ -4,24 +4,14 @@ import { droppedFiles, pickFiles } from '../files/drop';
 import { dropHint, dropQuestion } from './messages';
 import { checkContainer } from './opener';
 import { sentence } from '../text';
+import type { ViewerHost } from './host';
 
-export interface FilesHost extends HTMLElement {
-  readonly renderRoot: ParentNode;
-  readonly isShowing: boolean;
-  readonly isOpening: boolean;
-  openFiles(files: readonly Dropped[], beside?: boolean): Promise<void>;
-  fail(error: unknown): void;
-  report(problem: string): void;
-  requestUpdate(): void;
-}
-
-/** Files that somebody drops on the viewer or chooses, and what is done with them. */
 export class IncomingFiles {
   private isHeldAbove = false;
   /** A container that was dropped on an open capture, and what came with it. */
   private asked: readonly Dropped[] | null = null;
 
-  constructor(private readonly host: FilesHost) {}
+  constructor(private readonly host: ViewerHost) {}
 
   get isAsking(): boolean {
     return this.asked !== null;

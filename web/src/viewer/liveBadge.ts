@@ -19,9 +19,8 @@ export type LivePlace =
 /** The place of a transport in a session that is followed; `now` as `Date.now()` tells it. */
 export function livePlace(live: LiveStatus | null, transport: Transport, now: number): LivePlace {
   if (live?.state === 'signed-out') return { kind: 'signed-out' };
-  if (live?.state === 'reconnecting') {
+  if (live?.state === 'reconnecting')
     return { kind: 'reconnecting', retry: Math.max(0, Math.ceil(((live.retryAt ?? now) - now) / 1000)) };
-  }
   const frames = Math.max(0, transport.frames - 1 - transport.position) + (live?.behindFrames ?? 0);
   const behind = frames / transport.rate;
   return transport.playing && behind <= LIVE_SECONDS ? { kind: 'live' } : { kind: 'behind', behind };
@@ -33,7 +32,6 @@ export function liveFrame({ frames, rate }: Transport): number {
 }
 
 export class LiveBadge {
-  /** Kind of the place that the badge was rendered for last. */
   private shown = '';
   private timer = 0;
 

@@ -2,12 +2,12 @@ import { html, type TemplateResult } from 'lit';
 import type { Dropped } from '../files/classify';
 import { pickFiles } from '../files/drop';
 import { glyphs } from '../style/glyphs';
+import { iconButton } from '../style/parts';
 
-/** A sentence about something that went wrong, while the capture can still be looked at. */
 export function notice(problem: string, close: () => void): TemplateResult {
   return html`<div class="toast glass row" role="alert">
     <span>${problem}</span>
-    <button class="quiet icon" aria-label="Dismiss" @click=${close}>${glyphs.close}</button>
+    ${iconButton('close', 'Dismiss', close)}
   </div>`;
 }
 
@@ -32,14 +32,12 @@ export function dropQuestion(name: string, answer: (choice: 'instead' | 'beside'
   </dialog>`;
 }
 
-/** What happens to files that are held above the viewer. */
 export function dropHint(isShowing: boolean): TemplateResult {
   return html`<div class="drop">
     ${isShowing ? 'Drop a capture to open or compare, original frames, or a report' : 'Drop a capture to play it'}
   </div>`;
 }
 
-/** What is being done, and how much of it is done where somebody knows. */
 export function progressBox(doing: string, fraction: number | null): TemplateResult {
   return html`<div class="progress glass" role="status">
     <div class="spread figures">

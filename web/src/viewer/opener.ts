@@ -17,7 +17,6 @@ export interface OpenerHost {
 export class Opener {
   /** Name of the capture that is being opened; null otherwise. */
   name: string | null = null;
-  /** Why nothing can be shown. */
   failure: string | null = null;
   /** The file that is shown, unless the capture came from an address or a session. */
   private file: File | null = null;
@@ -26,7 +25,6 @@ export class Opener {
 
   constructor(private readonly host: OpenerHost) {}
 
-  /** Opens a file without any server. */
   async openFile(file: File): Promise<void> {
     await this.openFrom(file.name, (signal) => openFile(file, signal), file);
   }
@@ -53,7 +51,6 @@ export class Opener {
     this.opened = null;
   }
 
-  /** Forgets what was opened, and what went wrong. */
   forget() {
     this.file = this.name = this.failure = null;
   }

@@ -17,9 +17,7 @@ export interface Companion {
   show(): void;
 }
 
-/** Whom a playback tells what has happened. */
 export interface PlaybackListener {
-  /** Frames have come. */
   arrived(block: FrameBlock): void;
   /** Another picture is due. */
   wake(): void;
@@ -31,7 +29,6 @@ export interface PlaybackListener {
   problem(problem: string | null): void;
 }
 
-/** Frames of the original that are read ahead. */
 const ORIGINALS_AHEAD = 3;
 /** Frames that a live capture is entered before its end, so that playing does not wait for every one. */
 const LIVE_MARGIN = 15;
@@ -39,7 +36,6 @@ const LIVE_MARGIN = 15;
 /** The place of a capture that is shown: moves on when its frames are there, fetches them, and poses the stage. */
 export class Playback {
   readonly heatMap: HeatMap;
-  /** The original frames, where they are at hand. */
   readonly comparison: Comparison;
   companion: Companion | null = null;
   /** Rows of a cage, `rowsPerFrame × 3`, that are drawn in place of those of frames; residuals are left out then. */
@@ -93,12 +89,10 @@ export class Playback {
     this.feed.holes.clear();
   }
 
-  /** Shows frames with other rows than the capture has; null shows the capture itself. */
   setFrameEdit(edit: FrameEdit | null) {
     this.store.edit = edit;
   }
 
-  /** Rows of a frame and its points' offsets. */
   frame(frame: number): ReturnType<FrameStore['frame']> {
     return this.store.frame(frame);
   }
@@ -193,7 +187,6 @@ export class Playback {
     this.listener.wake();
   }
 
-  /** Stops where playing cannot go on. */
   private stopAt(next: Transport) {
     if (!this.state.playing || next.playing) return;
     this.state = next;
@@ -206,7 +199,6 @@ export class Playback {
     this.listener.refresh();
   }
 
-  /** Whether surfaces are shown, or distances from them. */
   private get isObserving(): boolean {
     const { surfaces, side } = this.comparison;
     return surfaces !== null && (side !== 'decoded' || this.heatMap.kind === 'error');

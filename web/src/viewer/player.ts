@@ -5,14 +5,12 @@ import { framed, HOME, nearlySame, shifted, zoomed, type CameraState } from '../
 import { CameraControls } from '../render/cameraControls';
 import type { Covered, Layers } from '../render/drawn';
 import type { FrameEdit } from '../render/frameStore';
-import { Motion } from '../render/motion';
+import { Motion, surveyMotion } from '../render/motion';
 import { Stage } from '../render/stage';
 import type { Comparison } from './comparison';
 import type { Heat, HeatMap, HeatRange } from './heatMap';
 import { Playback } from './playback';
-import { Quality } from './quality';
-import { Resolution } from './resolution';
-import { surveyMotion } from './survey';
+import { Quality, Resolution } from './quality';
 import { sentence } from '../text';
 import { advanced, type Transport } from './transport';
 import { USUAL_LAYERS } from './viewState';
@@ -107,7 +105,6 @@ export class Player {
     this.wake();
   }
 
-  /** Pictures per second while something moves. */
   get picturesPerSecond(): number {
     return this.quality.picturesPerSecond;
   }
@@ -174,7 +171,6 @@ export class Player {
     this.onState();
   }
 
-  /** Frames the motion from the usual side. */
   goHome(atOnce = false) {
     this.frameAll(HOME, atOnce);
     this.fitsFromHome = true;
@@ -185,7 +181,6 @@ export class Player {
     return this.fitsFromHome && this.controls.destination === this.fitted;
   }
 
-  /** Whether the camera goes along with the middle of the model. */
   get isFollowing(): boolean {
     return this.follows;
   }
@@ -215,7 +210,6 @@ export class Player {
     this.wake();
   }
 
-  /** Draws anew, whatever has changed. */
   refresh() {
     this.playback.poseIsOld = true;
     this.stage.renew();

@@ -1,21 +1,14 @@
 import { html, nothing } from 'lit';
 import type { PoseView } from '../poses';
-import type { Player } from './player';
-
-interface PoseHost {
-  readonly player: Player | null;
-  requestUpdate(): void;
-  report(problem: string): void;
-}
+import type { ViewerHost } from './host';
 
 /** Shapes between frames in a viewer: loads what shows them when it is first used. */
 export class PoseMode {
   isOn = false;
   private view: PoseView | null = null;
 
-  constructor(private readonly host: PoseHost) {}
+  constructor(private readonly host: ViewerHost) {}
 
-  /** Part of a narrow picture's height that the panel takes, as its style says. */
   get panelShare(): number {
     return this.isOn ? 0.38 : 0;
   }

@@ -1,3 +1,6 @@
+import type { Covered } from '../render/drawn';
+import type { Stage } from '../render/stage';
+
 /** Shares of the finest picture, in each direction, that are drawn while something moves. */
 const STEPS = [1, 0.75, 0.5, 0.36] as const;
 /** Pictures per second below which a coarser picture is drawn, and above which a finer one is tried. */
@@ -16,12 +19,10 @@ export class Quality {
     this.step = isSlow ? 2 : 0;
   }
 
-  /** Share of the finest picture while something moves. */
   get moving(): number {
     return STEPS[this.step];
   }
 
-  /** Pictures per second of late. */
   get picturesPerSecond(): number {
     return this.rate;
   }
@@ -40,5 +41,37 @@ export class Quality {
   private change(by: number) {
     this.step += by;
     this.waited = 0;
+  }
+}
+
+/** How fine the pictures of a stage are: coarser ones come faster while something moves. */
+export class Resolution {
+  /** Whether pictures stay as fine as they can be though something moves. */
+  keepsFinest = false;
+  covered: Covered = { top: 0, right: 0, bottom: 0 };
+  private size = { width: 1, height: 1, pixelRatio: 1 };
+  private shown = 1;
+
+  constructor(private readonly stage: Stage) {}
+
+  /** Share of the finest picture, in each direction, that is drawn. */
+  get share(): number {
+    return this.shown;
+  }
+
+  set share(share: number) {
+    const wanted = this.keepsFinest ? 1 : share;
+    if (wanted === this.shown) return;
+    this.shown = wanted;
+    const { width, height, pixelRatio } = this.size;
+    this.stage.resize(width, height, pixelRatio * wanted, this.covered);
+  }
+
+  /** Takes the size of the canvas in CSS pixels, and how much of it is covered. */
+  resize(width: number, height: number, pixelRatio: number, covered: Covered, share: number) {
+    this.covered = covered;
+    this.size = { width, height, pixelRatio: this.stage.isJagged ? Math.min(2, 2 * pixelRatio) : pixelRatio };
+    this.shown = 0;
+    this.share = share;
   }
 }

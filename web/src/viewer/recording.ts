@@ -1,7 +1,6 @@
 import { orbited } from '../render/camera';
 import type { Player } from './player';
 
-/** Seconds of one turn. */
 const TURN_SECONDS = 8;
 const PICTURES_PER_SECOND = 30;
 const TYPES = ['video/mp4;codecs=avc1.640028', 'video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm'];

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { placeColors } from './correspondence';
+import { placeColors } from './besideMode';
 import { correspondenceOf, isLost, lostRuns, readReport, trackingOf } from './reports';
 
 const frame = (outcome: string, score: number | null = 0.01) => ({ file: `/scans/${outcome}.ply`, outcome, score });

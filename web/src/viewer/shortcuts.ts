@@ -92,7 +92,6 @@ export function actionOfKey(event: KeyboardEvent): Action | null {
 
 const ENTRIES = new Map(SHORTCUTS.flatMap(({ entries }) => entries.map((entry) => [entry.action, entry] as const)));
 
-/** What an action does, for people. */
 export function labelOf(action: Action): string {
   return ENTRIES.get(action)!.label;
 }
@@ -105,7 +104,6 @@ const KEY_NAMES: Readonly<Record<string, string>> = {
   PageDown: 'Page ↓',
 };
 
-/** The key for an action as it is written on keyboards. */
 export function keyLabel(action: Action): string {
   const [key] = ENTRIES.get(action)!.keys;
   return KEY_NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key);

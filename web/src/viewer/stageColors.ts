@@ -1,5 +1,4 @@
 import type { StageColors } from '../render/drawn';
-import { resolvedColor } from '../style/resolvedColor';
 
 /** Colours of the picture from the custom properties that hold for a component. */
 export function stageColors(component: HTMLElement & { renderRoot: ParentNode & Node }): StageColors {
@@ -25,4 +24,14 @@ export function followLooks(onChange: () => void, signal: AbortSignal) {
   const themes = new MutationObserver(onChange);
   themes.observe(document.documentElement, { attributeFilter: ['data-theme'] });
   signal.addEventListener('abort', () => themes.disconnect());
+}
+
+/** What the browser makes of a colour that depends on the theme, for canvases, which know no custom properties. */
+export function resolvedColor(root: ParentNode & Node, color: string): string {
+  const probe = document.createElement('span');
+  probe.style.color = color;
+  root.appendChild(probe);
+  const resolved = getComputedStyle(probe).color;
+  probe.remove();
+  return resolved;
 }

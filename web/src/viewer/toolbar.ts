@@ -38,7 +38,6 @@ export function tool(action: Action, name: GlyphName, act: Act, pressed?: boolea
   </button>`;
 }
 
-/** What of the viewer is on, and what it can do. */
 export interface Tools {
   readonly colors: boolean;
   readonly figures: boolean;

@@ -4,7 +4,6 @@ import { numberAt, placeOf, type FrameNumbers } from './frameNumbers';
 export type Repeat = 'once' | 'loop' | 'ping-pong';
 export const REPEATS: readonly Repeat[] = ['once', 'loop', 'ping-pong'];
 
-/** What plays: where, how fast, and what happens at the end. */
 export interface Transport {
   readonly playing: boolean;
   readonly repeat: Repeat;
@@ -31,7 +30,6 @@ export const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2, 4] as const;
 /** Where nothing says how many frames a second were captured. */
 export const USUAL_RATE = 30;
 
-/** A transport that stands at the first frame. */
 export function standing(): Transport {
   return {
     playing: false,
@@ -48,7 +46,6 @@ export function standing(): Transport {
   };
 }
 
-/** The first and the last frame that are played. */
 export function playedFrames({ range, frames }: Transport): readonly [number, number] {
   const last = Math.max(0, frames - 1);
   return range ? [Math.min(range[0], last), Math.min(range[1], last)] : [0, last];
@@ -125,7 +122,6 @@ export function started(transport: Transport): Transport {
   return { ...transport, playing: true, position: atEnd || isOutside ? first : position };
 }
 
-/** The next slower or faster speed. */
 export function spedUp(transport: Transport, steps: number): Transport {
   const at = SPEEDS.findIndex((speed) => speed >= transport.speed);
   const next = SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, (at < 0 ? SPEEDS.length - 1 : at) + steps))];

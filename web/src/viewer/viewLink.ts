@@ -5,7 +5,6 @@ import { viewFromText, viewText, type ViewState } from './viewState';
 /** How long the view must rest before it is told to whoever keeps links. */
 const REST_MILLISECONDS = 300;
 
-/** The view of a player as text, for links. */
 export class ViewLink {
   up: 'y' | 'z' = 'y';
   private timer = 0;

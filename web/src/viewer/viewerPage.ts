@@ -13,8 +13,7 @@ import './cagerViewer';
 import type { CagerViewer } from './cagerViewer';
 import './compareDialog';
 import type { CompareChoice, CompareDialog } from './compareDialog';
-import { jobCapture, type JobKind } from './jobCapture';
-import { sessionCapture } from './sessionCapture';
+import { jobCapture, type JobKind, sessionCapture } from './serviceCapture';
 
 /** When a picture is taken for the list after the model can be seen: frames come then. */
 const THUMBNAIL_MILLISECONDS = 1000;
@@ -63,7 +62,6 @@ export class ViewerPage extends LitElement {
   @property() job: string | null = null;
   @property() kind: 'session' | JobKind = 'session';
   @property({ attribute: false }) files: readonly Dropped[] = [];
-  /** The view to begin with. */
   @property() view = '';
   @state() private capture: Capture | null = null;
   /** A session that is shown beside the capture. */
@@ -117,9 +115,8 @@ export class ViewerPage extends LitElement {
   }
 
   override render() {
-    if (this.job !== null && !this.capture) {
+    if (this.job !== null && !this.capture)
       return this.wantsToken ? html`<main><cager-sign-in></cager-sign-in></main>` : this.message();
-    }
     return html`<main>
       <cager-viewer
         autoplay
@@ -179,8 +176,8 @@ export class ViewerPage extends LitElement {
   private readonly keepThumbnail = () => {
     const { capture, viewer } = this;
     setTimeout(() => {
-      const picture = capture && capture === this.capture && capture.session && viewer?.thumbnail();
-      if (picture) keepThumbnail(capture.session!, picture);
+      const session = capture && capture === this.capture ? capture.session : undefined;
+      if (session !== undefined && viewer?.player) keepThumbnail(session, viewer.player.drawn());
     }, THUMBNAIL_MILLISECONDS);
   };
 

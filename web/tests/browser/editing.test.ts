@@ -271,7 +271,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     const page = await editing(12);
     await dragVertex(page, 60, -30);
     const edited = await readPositions(page, 12);
-    await page.waitForTimeout(600);
+    await kept(page);
     const reload = async () => {
       await page.reload();
       await whenShown(page);
@@ -287,7 +287,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     await page.keyboard.press('e');
     await page.getByRole('region', { name: 'Edit cage' }).waitFor();
     await dragVertex(page, -40, 10);
-    await page.waitForTimeout(600);
+    await kept(page);
     await reload();
     await page.getByText(/^2 edits kept in this browser, from/).waitFor();
     await page.getByRole('button', { name: 'Restore' }).click();
@@ -300,10 +300,10 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
       .nth(1)
       .uncheck();
     expect(await readPositions(page, 12)).toEqual(edited);
-    await page.waitForTimeout(600);
+    await kept(page);
     await reload();
     await page.getByRole('button', { name: 'Discard' }).click();
-    await page.waitForTimeout(300);
+    await kept(page);
     await reload();
     await page.waitForTimeout(500);
     expect(await page.locator('cager-kept-offer').count()).toBe(0);
@@ -314,7 +314,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
   it('of two tabs with the same capture one keeps edits, and the other one says so until it is closed', async () => {
     const first = await editing(12);
     await dragVertex(first, 60, -30);
-    await first.waitForTimeout(600);
+    await kept(first);
     const context = first.context();
     const open = async () => {
       const page = await context.newPage();
@@ -333,7 +333,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     // What the first tab kept is still there, and from now on the second one keeps its own beside it.
     await second.getByText(/^1 edit kept in this browser, from/).waitFor();
     await expect.poll(() => sentence.count()).toBe(0);
-    await second.waitForTimeout(600);
+    await kept(second);
     await second.close();
     await (await open()).getByText(/^2 edits kept in this browser, from/).waitFor();
     expect(watched?.errors).toEqual([]);
@@ -436,6 +436,13 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
 async function withViewer<T>(page: Page, of: (viewer: CagerViewer) => Promise<T>): Promise<T> {
   return page.evaluate(
     `(${of.toString()})(document.querySelector('cager-viewer-page').shadowRoot.querySelector('cager-viewer'))`,
+  );
+}
+
+/** Waits until the browser has kept the edits. */
+function kept(page: Page): Promise<void> {
+  return withViewer(page, ({ editing }) =>
+    (editing as unknown as { keeper: { write(): Promise<void> } }).keeper.write(),
   );
 }
 

@@ -4,7 +4,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { beforeAll, describe, expect, test } from 'vitest';
 import { diagonalOf } from '../../src/coordinates/topology';
-import { npyHeader } from '../../src/editing/decodedFrames';
+import { npyHeader } from '../../src/editing/exporter';
 import { pretendGraphics } from './harness/device';
 import { cager, missing } from './harness/programs';
 import { SphereCapture } from './harness/sphere';

@@ -157,15 +157,15 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     await slow(watched.page, { downloadThroughput: 10_000 });
     await opened(watched, id);
     // As from a farm that solves two hundred frames in a second: 100 kB/s.
-    for (let first = 0; first < 600; first += 50) {
+    for (let first = 0; first < 400; first += 50) {
       await client.post(id, capture, first, 50);
       await watched.page.waitForTimeout(250);
     }
-    await eventually(watched, 'frames', 600);
+    await eventually(watched, 'frames', 400);
     expect((await state(watched)).live!.droppedFrames).toBeGreaterThan(100);
     await slow(watched.page, {});
-    expect(await cage(watched, 500)).toEqual(await solvedCage(client, id, 500));
-    await expect.poll(async () => (await state(watched)).measured, { timeout: 15_000 }).toBe(600);
+    expect(await cage(watched, 350)).toEqual(await solvedCage(client, id, 350));
+    await expect.poll(async () => (await state(watched)).measured, { timeout: 15_000 }).toBe(400);
     expect(watched.errors).toEqual([]);
     await watched.close();
   });

@@ -2,7 +2,7 @@ import type { Page } from 'playwright-core';
 import { describe, expect, it } from 'vitest';
 import { openBytes } from '../support/containers';
 import { diagonalOf } from '../../src/coordinates/topology';
-import { npyHeader } from '../../src/editing/decodedFrames';
+import { npyHeader } from '../../src/editing/exporter';
 import { seriousFindings } from './harness/axe';
 import { chromium } from './harness/programs';
 import { dropOnViewer, FilePages, goldenBytes, inViewer } from './harness/viewing';

@@ -37,6 +37,9 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
   test('sessions_show_with_their_figures_and_go_on_by_themselves', async () => {
     const client = site.client();
     await client.encode(capture, { name: 'finished' }, 24);
+    // With one that is not finished the page asks every two seconds.
+    const { id } = await client.create(capture, { name: 'arriving' });
+    await client.whenReady(id);
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/`);
     await row(page, 'finished').getByText('Completed').waitFor();
     const text = await row(page, 'finished').innerText();
@@ -50,9 +53,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
       .getByText(`${bytes.ratio.toFixed(bytes.ratio < 10 ? 1 : 0)}× smaller`)
       .waitFor();
 
-    const { id } = await client.create(capture, { name: 'arriving' });
-    await client.whenReady(id);
-    await row(page, 'arriving').getByText('no frames yet').waitFor({ timeout: 15_000 });
+    await row(page, 'arriving').getByText('no frames yet').waitFor();
     await client.post(id, capture, 0, 12);
     await row(page, 'arriving').getByText('12 frames').waitFor();
     await row(page, 'arriving').getByText('Running').waitFor();
@@ -173,7 +174,6 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
   });
 
   test('a_page_that_nobody_sees_asks_for_nothing', async () => {
-    // With one that is not finished the page asks every two seconds.
     const name = `waiting ${Date.now()}`;
     await site.client().create(capture, { name });
     const { page, close } = await openPage(site.browser, `${site.page}#/`);

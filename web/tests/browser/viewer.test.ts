@@ -17,7 +17,7 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
     return page;
   };
 
-  it.each(['definition3-mvc', 'definition3-green', 'coded-mvc'])(
+  it.each(['definition3-mvc', 'coded-mvc'])(
     '%s is dropped on the page, plays, and decodes to the positions that the program decodes',
     async (name) => {
       const page = await opened(name);

@@ -74,7 +74,6 @@ function tracesOf({ swaps }: SystemFigures) {
   return [lu, drawn].flatMap(({ trace, ...of }) => (trace ? [{ ...of, trace }] : []));
 }
 
-/** Random handles against those of maximum volume. */
 export function random({ systems }: ComparisonReport, system: SystemReport) {
   const known = choicesOf(system.figures).filter(({ cond }) => cond !== null);
   return html`

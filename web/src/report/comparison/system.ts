@@ -10,7 +10,6 @@ export interface SystemReport {
   readonly geometry: SystemGeometry;
 }
 
-/** All that the sections of a comparison read. */
 export interface ComparisonReport {
   readonly figures: Comparison;
   readonly geometry: ComparisonGeometry;

@@ -16,7 +16,6 @@ const PAPER = [
 const TITLES =
   'input|points|cage #V / #T|frames|coordinates|maxvol + SVD|one frame|inverting all|mean L2 %|mean L∞ %'.split('|');
 
-/** Times, in the form of the paper's Table 1. */
 export function times({ figures: { capture }, systems }: ComparisonReport) {
   const ours = systems.map(({ name, figures }) => {
     const usual = methodOf(figures, 'maxvol', 'laplacian')?.totals;

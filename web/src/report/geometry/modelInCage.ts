@@ -57,7 +57,6 @@ export class RestPose {
   }
 }
 
-/** Numbers one list after another. */
 export function joined(all: readonly Float32Array[]): Float32Array {
   const found = new Float32Array(all.reduce((sum, { length }) => sum + length, 0));
   let at = 0;

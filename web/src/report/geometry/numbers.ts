@@ -8,7 +8,6 @@ export interface Quantised {
   readonly data: string;
 }
 
-/** Numbers in single precision. */
 export function floats(text: string): Float32Array {
   return new Float32Array(bytesOf(text).buffer);
 }

@@ -52,9 +52,8 @@ export class Painter {
     drawing.setView(new Vector3(0, 1, 0).transformDirection(camera.matrixWorldInverse), pixelsPerUnit, ratio);
     renderer.render(drawing.scene, camera);
     const source = renderer.domElement;
-    if (canvas.width !== source.width || canvas.height !== source.height) {
+    if (canvas.width !== source.width || canvas.height !== source.height)
       [canvas.width, canvas.height] = [source.width, source.height];
-    }
     const context = canvas.getContext('2d')!;
     context.clearRect(0, 0, canvas.width, canvas.height);
     context.drawImage(source, 0, 0);

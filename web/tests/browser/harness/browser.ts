@@ -54,11 +54,11 @@ export async function openPage(
   expected: readonly string[] = [],
   device: BrowserContextOptions = {},
 ): Promise<Watched> {
-  // Half as many pixels in each direction: drawing them is most of what tests would wait for.
+  // A quarter of the pixels in each direction: drawing them is most of what tests would wait for.
   const context = await browser.newContext({
     acceptDownloads: true,
     viewport: { width: 1280, height: 800 },
-    deviceScaleFactor: 0.5,
+    deviceScaleFactor: 0.25,
     ...device,
   });
   const page = await context.newPage();

@@ -1,11 +1,31 @@
 import type { Capture } from '../capture';
+import { openSession, type OpenSessionOptions, openStored } from '../service/live';
+import { type Service, sessionPath, patiently } from '../service/service';
 import { pause, persistently } from '../service/backoff';
-import { openStored, type OpenSessionOptions } from '../service/live';
 import type { Recovery, Transfer } from '../service/messages';
 import { problemFrom } from '../service/problem';
-import { patiently, type Service } from '../service/service';
 import { counted } from '../text';
 import { correspondenceOf, trackingOf } from './reports';
+
+/** Opens a session, with what the service does for it: coordinates, handles, its container and decoding. */
+export async function sessionCapture(
+  id: string,
+  options: OpenSessionOptions & { readonly service: Service },
+): Promise<Capture> {
+  const { service } = options;
+  const capture: Capture = await openSession(id, options);
+  const below = (path: string) => sessionPath(id, path);
+  capture.coordinates = async (onProgress, until) => (await service.coordinates(id, onProgress, until)).values;
+  capture.container ??= (until) => service.source(below('capture.cager'), until);
+  capture.decode = (cages, until) => {
+    const headers = { 'Content-Type': 'application/octet-stream' };
+    return service.request(below('decode'), { method: 'POST', headers, body: cages, signal: until ?? null });
+  };
+  capture.handles = (until) => service.handles(id, until);
+  capture.session = id;
+  capture.identity = `session ${service.address(sessionPath(id))}`;
+  return capture;
+}
 
 const LOOK_SECONDS = 2;
 /** How often in a row the service is asked while it does not answer. */
@@ -48,7 +68,6 @@ export async function jobCapture(
   }
 }
 
-/** How far a job is, in a sentence. */
 function progressOf(job: Recovery | Transfer): string {
   if ('moved' in job)
     return `Transferred ${job.moved} of ${counted(job.frames, 'frame')}. Playback starts when all are encoded.`;

@@ -1,9 +1,10 @@
 import { html, nothing } from 'lit';
 import type { CageEdit, FrameRange } from './cageEdit';
-import { glyphs } from '../style/glyphs';
+import { iconButton } from '../style/parts';
 import type { CageEditor } from './editor';
-import { angleOf, type Motion } from './motion';
-import { degrees, timesAs } from './text';
+import { angleOf, type Motion, degrees, timesAs } from './motion';
+import type { StaticPart } from '../capture';
+import type { Keeping } from './keptEdits';
 
 /** An edit in the list: whether it counts, its vertices and frames; of the one that is worked on, fields for its range. */
 export function editRow(editor: CageEditor, edit: CageEdit) {
@@ -25,9 +26,7 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
         <span>${name}<span class="muted">${amountOf(motion)}</span></span>
         <span class="muted figures">${range.first === range.last ? range.first : `${range.first}–${range.last}`}</span>
       </button>
-      <button class="quiet icon" aria-label=${`Remove edit of ${name}`} title="Remove" @click=${() => model.remove(id)}>
-        ${glyphs.trash}
-      </button>
+      ${iconButton('trash', `Remove edit of ${name}`, () => model.remove(id), 'Remove')}
     </div>
     ${isActive ? rangeFields(editor, edit) : nothing}
   </li>`;
@@ -62,3 +61,63 @@ function rangeFields({ model, player }: CageEditor, { id, range }: CageEdit) {
     ${field('first', 'First')} ${field('last', 'Last')} ${field('easeIn', 'Ease in')} ${field('easeOut', 'Ease out')}
   </div>`;
 }
+
+/** What somebody who edits a capture has to know: whether the edits are kept, and what they do not change. */
+export function editNotes(part: StaticPart, keeping: Keeping) {
+  const isCoded = (part.report?.coding as { residual_step?: number } | undefined)?.residual_step !== undefined;
+  return html`${
+    keeping === 'kept'
+      ? nothing
+      : html`<p class="muted">
+          ${
+            keeping === 'large'
+              ? 'These edits are too large to be kept in this browser'
+              : keeping === 'elsewhere'
+                ? 'Another tab keeps its edits of this capture, so these are not kept'
+                : 'This browser does not keep edits'
+          }:
+          export them before you leave it.
+        </p>`
+  }
+  ${
+    part.system === 'green-free'
+      ? html`<p class="muted">
+          Normals of this cage are stored beside its vertices and stay as they were captured: the model follows a moved
+          vertex, but does not turn or swell with the faces around it. Encode with
+          <code>--coordinates green</code> for that.
+        </p>`
+      : nothing
+  }
+  ${
+    isCoded
+      ? html`<p class="muted">
+          Fine detail cannot follow edits and is left out of an edited capture, here and in exports.
+        </p>`
+      : nothing
+  }`;
+}
+
+const KEYS = [
+  ['Enter', 'Select the vertex in the centre'],
+  ['Tab', 'Next vertex; Shift for the previous one'],
+  ['Alt ←', 'Vertex to the left; likewise with every arrow'],
+  ['Q R U', 'Move, rotate, scale'],
+  ['← ↑', 'Apply the tool; Shift for larger steps'],
+  ['Page ↑', 'Push away or turn clockwise; Page ↓ reverses'],
+  ['Esc', 'Deselect, then close'],
+] as const;
+
+export const mouseAndKeys = html`<details>
+  <summary>Mouse and keyboard</summary>
+  <p>
+    Drag a vertex, an arrow, a square or a ring. Shift-click adds a vertex, Shift-drag selects a box. Hold Shift while
+    dragging a ring or a block to snap to 15° or 0.1. Click beside the cage to deselect.
+  </p>
+  <dl class="keys">
+    ${KEYS.map(
+      ([key, text]) =>
+        html`<dt><kbd>${key}</kbd></dt>
+          <dd>${text}</dd>`,
+    )}
+  </dl>
+</details>`;
