@@ -20,6 +20,10 @@ const PATIENCE_SECONDS = 15;
 /** How often in a row fetching Φ breaks off before it is given up. */
 const COORDINATES_ATTEMPTS = 6;
 
+function sending(method: string, body: object): RequestInit {
+  return { method, headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body) };
+}
+
 /** A service below an address. All its requests carry the token, in a header. */
 export class Service {
   /** @param base address that ends with `/v1/`; beside the page, whatever prefix that has, where it is left out */
@@ -90,14 +94,12 @@ export class Service {
     }
   }
 
+  rename(id: string, name: string): Promise<Session> {
+    return this.json(sessionPath(id), sending('PATCH', { name }));
+  }
+
   complete(id: string, frames: number, signal?: AbortSignal): Promise<Session> {
-    const headers = { 'Content-Type': 'application/json' };
-    return this.json(sessionPath(id, 'complete'), {
-      method: 'POST',
-      headers,
-      body: JSON.stringify({ frames }),
-      signal: signal ?? null,
-    });
+    return this.json(sessionPath(id, 'complete'), { ...sending('POST', { frames }), signal: signal ?? null });
   }
 
   /** Errors of all solved frames, ascending. */

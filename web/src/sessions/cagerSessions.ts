@@ -12,6 +12,7 @@ import { cardsStyle } from './cardsStyle';
 import { download, type Format } from './download';
 import {
   deleteDialog,
+  renameDialog,
   isFiltering,
   matches,
   type StateFilter,
@@ -46,9 +47,10 @@ export class Sessions extends LitElement {
   @state() private states: StateFilter = 'all';
   @state() private page = 0;
   @state() private wantsToken = false;
-  @state() private removing: Session | null = null;
-  @state() private isRemoving = false;
-  @state() private removalFailure = '';
+  /** What is asked about which session. */
+  @state() private asked: { readonly session: Session; readonly what: 'rename' | 'delete' } | null = null;
+  @state() private isChanging = false;
+  @state() private changeFailure = '';
   /** Why something that was asked for did not happen. */
   @state() private failure = '';
   @state() private said = '';
@@ -98,7 +100,7 @@ export class Sessions extends LitElement {
           <summary>About CageR: cage, diagonal, L2 and L∞</summary>
           ${terms}
         </details>
-        ${this.confirmation()}
+        ${this.question()}
         <p class="visually-hidden" role="status">${this.said}</p>
       </main>
     `;
@@ -139,7 +141,8 @@ export class Sessions extends LitElement {
                 now,
                 downloaded: this.downloads.get(session.id) ?? null,
                 onDownload: (format) => void this.download(session, format),
-                onRemove: () => void this.askRemoval(session),
+                onRename: () => void this.ask(session, 'rename'),
+                onRemove: () => void this.ask(session, 'delete'),
               }),
           )}
         </table>
@@ -163,19 +166,21 @@ export class Sessions extends LitElement {
     `;
   }
 
-  private confirmation() {
-    const { removing } = this;
-    if (!removing) return nothing;
-    return deleteDialog(removing, {
-      isRunning: this.isRemoving,
-      failure: this.removalFailure,
+  private question() {
+    if (!this.asked) return nothing;
+    const { session, what } = this.asked;
+    const dialog = {
+      isRunning: this.isChanging,
+      failure: this.changeFailure,
       // The event comes late: the dialog may be another one by then, or open again.
-      onClose: (event) => {
-        if (event.target === this.dialog && !this.dialog.open) this.removing = null;
+      onClose: (event: Event) => {
+        if (event.target === this.dialog && !this.dialog.open) this.asked = null;
       },
-      onKeep: () => this.dialog.close(),
-      onDelete: () => void this.removeSession(removing),
-    });
+      onCancel: () => this.dialog.close(),
+    };
+    return what === 'delete'
+      ? deleteDialog(session, dialog, () => void this.change(() => this.removeSession(session)))
+      : renameDialog(session, dialog, (name) => void this.change(() => this.renameSession(session, name.trim())));
   }
 
   /** The rows of the present page; `matching` of the sessions here are those asked for, and `isWhole` says that there are no older ones. */
@@ -235,31 +240,43 @@ export class Sessions extends LitElement {
     }
   }
 
-  private async askRemoval(session: Session) {
-    this.removalFailure = '';
-    this.removing = session;
+  private async ask(session: Session, what: 'rename' | 'delete') {
+    this.changeFailure = '';
+    this.asked = { session, what };
     await this.updateComplete;
     this.dialog.showModal();
+    this.dialog.querySelector('input')?.select();
+  }
+
+  /** Does what was asked for; where that fails the question stays. */
+  private async change(work: () => Promise<void>) {
+    this.isChanging = true;
+    try {
+      await work();
+    } catch (error) {
+      this.changeFailure = sentenceOf(error);
+    } finally {
+      this.isChanging = false;
+    }
+  }
+
+  private async renameSession(session: Session, name: string) {
+    await this.list.rename(session.id, name);
+    this.said = `Renamed ${nameOf(session)}`;
+    this.dialog.close();
   }
 
   private async removeSession(session: Session) {
-    this.isRemoving = true;
-    try {
-      const ids = this.shown(this.list.sessions).rows.map(({ id }) => id);
-      await this.list.remove(session.id);
-      this.said = `Deleted ${nameOf(session)}`;
-      this.removing = null;
-      // The button that had the focus is gone; the row after it, or the last one, takes it.
-      const at = ids.indexOf(session.id);
-      const next = ids[at + 1] ?? ids[at - 1];
-      await this.updateComplete;
-      const selector = next ? `tbody[data-id="${CSS.escape(next)}"] a.name` : 'a.primary';
-      this.renderRoot.querySelector<HTMLElement>(selector)?.focus();
-    } catch (error) {
-      this.removalFailure = sentenceOf(error);
-    } finally {
-      this.isRemoving = false;
-    }
+    const ids = this.shown(this.list.sessions).rows.map(({ id }) => id);
+    await this.list.remove(session.id);
+    this.said = `Deleted ${nameOf(session)}`;
+    this.asked = null;
+    // The button that had the focus is gone; the row after it, or the last one, takes it.
+    const at = ids.indexOf(session.id);
+    const next = ids[at + 1] ?? ids[at - 1];
+    await this.updateComplete;
+    const selector = next ? `tbody[data-id="${CSS.escape(next)}"] a.name` : 'a.primary';
+    this.renderRoot.querySelector<HTMLElement>(selector)?.focus();
   }
 
   private readonly changed = () => {

@@ -117,31 +117,51 @@ export function listNotices(
   `;
 }
 
-export interface DeleteDialog {
+export interface Dialog {
   readonly isRunning: boolean;
-  /** Why it could not be deleted; empty while all is well. */
+  /** Why it could not be done; empty while all is well. */
   readonly failure: string;
   readonly onClose: (event: Event) => void;
-  readonly onKeep: () => void;
-  readonly onDelete: () => void;
+  readonly onCancel: () => void;
+}
+
+/** Asks for another name of a session. Whoever renders it opens it as a modal dialog. */
+export function renameDialog(session: Session, dialog: Dialog, onRename: (name: string) => void) {
+  const submit = (event: SubmitEvent) => {
+    event.preventDefault();
+    onRename(new FormData(event.target as HTMLFormElement).get('name') as string);
+  };
+  return html`
+    <dialog aria-labelledby="rename-title" @close=${dialog.onClose}>
+      <form @submit=${submit}>
+        <h2 id="rename-title">Rename “${nameOf(session)}”</h2>
+        <input name="name" aria-label="Name" maxlength="200" autofocus .value=${session.name ?? ''} />
+        ${failureOf(dialog)}
+        <div class="buttons">
+          <button type="button" @click=${dialog.onCancel}>Cancel</button>
+          <button class="primary" ?disabled=${dialog.isRunning}>Rename</button>
+        </div>
+      </form>
+    </dialog>
+  `;
+}
+
+function failureOf({ failure }: Dialog) {
+  return failure ? html`<p class="problem" role="alert">${glyphs.alert}<span>${failure}</span></p>` : nothing;
 }
 
 /** Asks whether a session is to be deleted. Whoever renders it opens it as a modal dialog. */
-export function deleteDialog(session: Session, dialog: DeleteDialog) {
+export function deleteDialog(session: Session, dialog: Dialog, onDelete: () => void) {
   const stops = isUnfinished(session) ? 'Encoding stops. ' : '';
   const what = session.state === 'completed' ? 'Its file and frames' : 'Its frames';
   return html`
     <dialog aria-labelledby="delete-title" aria-describedby="delete-what" @close=${dialog.onClose}>
       <h2 id="delete-title">Delete “${nameOf(session)}”?</h2>
       <p id="delete-what">${stops}${what} are permanently deleted.</p>
-      ${
-        dialog.failure
-          ? html`<p class="problem" role="alert">${glyphs.alert}<span>${dialog.failure}</span></p>`
-          : nothing
-      }
+      ${failureOf(dialog)}
       <div class="buttons">
-        <button type="button" autofocus @click=${dialog.onKeep}>Cancel</button>
-        <button type="button" class="danger" ?disabled=${dialog.isRunning} @click=${dialog.onDelete}>Delete</button>
+        <button type="button" autofocus @click=${dialog.onCancel}>Cancel</button>
+        <button type="button" class="danger" ?disabled=${dialog.isRunning} @click=${onDelete}>Delete</button>
       </div>
     </dialog>
   `;

@@ -17,6 +17,7 @@ export interface Row {
   /** Part of the container that has been downloaded; null while none is. */
   readonly downloaded: number | null;
   readonly onDownload: (format: Format) => void;
+  readonly onRename: () => void;
   readonly onRemove: () => void;
 }
 
@@ -82,7 +83,7 @@ export function row(row: Row): TemplateResult {
             >${text.age(session.created, now)}</time
           >
         </td>
-        <td class="tools" role="cell"><div class="actions row">${download(row, name)}${remove(row, name)}</div></td>
+        <td class="tools" role="cell"><div class="actions row">${download(row, name)}${change(row, name)}</div></td>
       </tr>
       ${remarks(session)}
     </tbody>
@@ -184,8 +185,9 @@ function download(row: Row, name: string) {
   `;
 }
 
-function remove(row: Row, name: string) {
+function change(row: Row, name: string) {
   return html`
+    <button type="button" title="Rename" aria-label="Rename ${name}" @click=${row.onRename}>${glyphs.edit}</button>
     <button type="button" class="remove" title="Delete" aria-label="Delete ${name}" @click=${row.onRemove}>
       ${glyphs.trash}
     </button>

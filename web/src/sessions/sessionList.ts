@@ -85,6 +85,11 @@ export class SessionList extends EventTarget {
     this.changed();
   }
 
+  async rename(id: string, name: string) {
+    this.take(await this.service.rename(id, name));
+    this.changed();
+  }
+
   async remove(id: string) {
     await this.service.remove(id);
     this.forget(id);

@@ -119,13 +119,24 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     await expect.poll(() => page.getByRole('dialog').count()).toBe(0);
     expect(await focused(page)).toBe('Delete doomed');
 
+    await tabTo(page, 'Rename doomed', true);
+    await page.keyboard.press('Enter');
+    await page.getByRole('dialog', { name: 'Rename “doomed”' }).waitFor();
+    expect(await focused(page)).toBe('Name');
+    await page.keyboard.type('do not keep');
+    await page.keyboard.press('Enter');
+    await row(page, 'do not keep').waitFor();
+    await expect.poll(() => page.getByRole('dialog').count()).toBe(0);
+    expect(await focused(page)).toBe('Rename do not keep');
+
+    await tabTo(page, 'Delete do not keep');
     await page.keyboard.press('Enter');
     await tabTo(page, 'Delete');
     await page.keyboard.press('Enter');
     await expect.poll(() => page.locator('cager-sessions tbody').count()).toBe(0);
     expect(
       ((await (await client.call('')).json()) as { sessions: { name: string }[] }).sessions.map(({ name }) => name),
-    ).not.toContain('doomed');
+    ).toEqual(['kept']);
 
     await tabTo(page, 'Search sessions by name, identifier or coordinates', true);
     await page.keyboard.press('Control+A');
