@@ -10,6 +10,16 @@ use cager_core::numbers::number_or_null;
 use cager_geometry::units::Units;
 use serde::{Deserialize, Deserializer, Serialize};
 
+/// The content of a file with a report of any kind: JSON that people read as well.
+///
+/// # Errors
+/// It cannot be written as JSON.
+pub fn json_file(report: &impl Serialize) -> serde_json::Result<Vec<u8>> {
+    let mut text = serde_json::to_vec_pretty(report)?;
+    text.push(b'\n');
+    Ok(text)
+}
+
 /// The report of one encoding. Keys that are missing read as zero or empty.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(default)]

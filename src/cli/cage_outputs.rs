@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use cager_compare::report_page::{Contents, NO_PAGE, ReportKind, ReportPage, ShownCage, ShownMesh};
 use cager_formats::{AtomicFile, Target, model_bytes, obj_bytes};
 use cager_geometry::mesh::{Model, TriMesh};
+use cager_proto::report::json_file;
 use serde::Serialize;
 use std::borrow::Cow;
 use std::io::Write;
@@ -45,9 +46,7 @@ impl Targets {
     ) -> Result<Vec<AtomicFile>> {
         let mut files = Vec::new();
         if let Some(target) = &self.report {
-            let mut text = serde_json::to_vec_pretty(report)?;
-            text.push(b'\n');
-            files.push(complete_file(target, &text)?);
+            files.push(complete_file(target, &json_file(report)?)?);
         }
         if let Some(target) = &self.picture {
             let geometry = CageGeometry {

@@ -12,6 +12,7 @@ use cager_compare::{CompareError, Figures, Job, Progress, compare, seconds};
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{AtomicFile, commit_together};
+use cager_proto::report::json_file;
 use indicatif::ProgressBar;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -72,8 +73,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         CompareError::Formats(error) => error.into(),
     })?;
 
-    let mut figures_text = serde_json::to_vec_pretty(&figures)?;
-    figures_text.push(b'\n');
+    let figures_text = json_file(&figures)?;
     match &page {
         Some(page) => {
             let (kind, program) = (ReportKind::Comparison, figures.program);

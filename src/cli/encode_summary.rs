@@ -3,14 +3,13 @@
 use super::{grouped, human_bytes, is_verbose};
 use anyhow::Result;
 use cager_formats::AtomicFile;
-use cager_proto::report::{Errors, Report};
+use cager_proto::report::{Errors, Report, json_file};
+use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 
-pub(super) fn write_report(mut file: AtomicFile, report: &Report) -> Result<AtomicFile> {
-    let mut text = serde_json::to_vec_pretty(report)?;
-    text.push(b'\n');
-    file.write_all(&text)?;
+pub(super) fn write_report(mut file: AtomicFile, report: &impl Serialize) -> Result<AtomicFile> {
+    file.write_all(&json_file(report)?)?;
     Ok(file)
 }
 

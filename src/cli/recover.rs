@@ -12,6 +12,8 @@ use anyhow::{Result, bail};
 use cager_capture::origin::{move_to, own_origin};
 use cager_formats::{AtomicFile, MeshSequence, Target, Units, commit_together, mesh_sequence};
 use cager_geometry::mesh::{Model, Point};
+use cager_motion::recover::placed_units;
+use cager_proto::report::json_file;
 use cager_recover::manifold::Manifold;
 use cager_recover::rig::Rig;
 use std::io::Write;
@@ -80,7 +82,7 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     }
     let mut written: Vec<AtomicFile> = done.iter_mut().flat_map(|done| std::mem::take(&mut done.files)).collect();
     if let Some(mut file) = list {
-        file.write_all(&StretchList::new(listed).json()?)?;
+        file.write_all(&json_file(&StretchList::new(listed))?)?;
         // The list last: it is there when what it names is.
         written.push(file);
     }
@@ -116,19 +118,12 @@ fn refuse_several(args: &RecoverArgs) -> Result<()> {
 
 /// A template, checked, its origin, and what its positions mean where it is not brought to those of the frames.
 fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Units)> {
-    let (mut template, mut units) = read_with_units(path, None)?;
-    if args.scale == Align::Auto {
-        units.metres_per_unit = None;
-    }
-    if args.align == Align::Auto || args.scale == Align::Auto {
-        // It may be turned in any way.
-        units.up = None;
-    }
-    units.up = args.up.or(units.up);
+    let (mut template, said) = read_with_units(path, None)?;
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", path.display());
     }
-    let units = units.or(args.coding.units());
+    let placing = [args.align, args.scale].map(|placing| placing == Align::Auto);
+    let units = placed_units(said, args.up, placing).or(args.coding.units());
     goal(&args.coding, units, true, &template, 1)?;
     let origin = own_origin(&template.points);
     if origin.is_some() && args.rig.is_some() {

@@ -15,6 +15,7 @@ use cager_motion::recover::{
     Encoding, JOINTS_RATE, Person, RecoverJob, RecoverOptions, RecoverProgress, Recovered, RecoveryReport, cage_around,
     gait_svg, recover,
 };
+use cager_proto::report::json_file;
 use cager_recover::manifold::Manifold;
 use cager_recover::people::{FitOptions, Method};
 use cager_recover::rig::Rig;
@@ -146,7 +147,7 @@ impl Stretching<'_> {
         let Encoded { report: encoded, container } = result?;
         let mut files = Vec::new();
         if let Some(mut file) = beside.report {
-            file.write_all(&report.json()?)?;
+            file.write_all(&json_file(&report)?)?;
             files.push(file);
         }
         if let Some(mut file) = beside.gait {

@@ -101,12 +101,6 @@ impl StretchList {
         Self { version: 1, stretches }
     }
 
-    pub(super) fn json(&self) -> Result<Vec<u8>> {
-        let mut text = serde_json::to_vec_pretty(self)?;
-        text.push(b'\n');
-        Ok(text)
-    }
-
     /// Opens the containers of a list that was read from this file, and compares them with what it says of them.
     pub(super) fn containers(&self, list: &Path) -> Result<Vec<(PathBuf, Container)>> {
         let mut found: Vec<(PathBuf, Container)> = Vec::with_capacity(self.stretches.len());

@@ -4,6 +4,7 @@ use super::checks::check_cage;
 use super::coding_args::goal;
 use super::design::{design, goal as design_goal};
 use super::dry_run::tell_dry_run;
+use super::encode_summary::write_report;
 use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
 use super::solver_options::read_cage;
@@ -11,22 +12,19 @@ use super::transfer_source::MotionSource;
 use super::{grouped, human_bytes, progress, read_with_units, tell, transfer_remote, warn};
 use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
-use cager_capture::coding::InversionChoices;
 use cager_capture::design::FRAMES;
-use cager_capture::encode::{self, EncodeProgress, Encoded, Job, sample_frames};
-use cager_capture::memory::Memory;
+use cager_capture::encode::{EncodeProgress, Encoded, sample_frames};
 use cager_capture::origin::{move_to, own_origin};
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::regularize::Regularizer;
+use cager_core::coordinates::MeanValue;
 use cager_explore::TransferError;
 use cager_explore::alignment::AlignBy;
 use cager_formats::{AtomicFile, ScratchDir, Target, Units, commit_together};
 use cager_geometry::mesh::{Model, Point};
+use cager_motion::recover::Encoding;
 use cager_motion::transfer::{
     MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer, words,
 };
-use std::io::Write;
 use std::path::Path;
 
 pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
@@ -159,33 +157,18 @@ fn write(
     let design = design((&args.target, target), (&args.target, &samples), None, options)?;
     warn(&design.warnings);
     let cage = Cage::new(design.cage).with_context(|| args.target.display().to_string())?;
-    let system: &'static dyn CoordinateSystem = &MeanValue;
-    let goal = goal(&args.coding, units, true, target, report.frames)?;
-    let choices = InversionChoices {
-        system,
-        handles: None,
-        regularizer: Regularizer::default(),
-        spectrum: None,
-        lambda: None,
-        is_coded: goal.is_some(),
-    };
-    let bar = progress::PreparationBar::new("encoding", report.frames);
-    let job = Job {
-        rest: target,
-        cage: &cage,
-        frames: &mut frames,
+    let encoding = Encoding {
         output,
-        system,
-        options: choices.options(system.values(&cage).unknowns()),
-        matrix: None,
-        choose: None,
-        memory: Memory::half_of_free(),
-        goal,
+        system: &MeanValue,
+        goal: goal(&args.coding, units, true, target, report.frames)?,
+        // The cage does not hold all of the motion.
+        offsets: true,
         origin,
         units,
         exact_rest: args.coding.exact_rest,
     };
-    let result = encode::encode(job, &|told| match told {
+    let bar = progress::PreparationBar::new("encoding", report.frames);
+    let result = encoding.write((target, &cage), &mut frames, &|told| match told {
         EncodeProgress::Preparing(step) => bar.preparing(step),
         EncodeProgress::Frames(done) => bar.done(done),
     });
@@ -196,13 +179,6 @@ fn write(
     warn(&warnings);
     warn(&encoded.warnings);
     tell(&summary(&report, &encoded, cage.vertices().len(), output.path()))
-}
-
-fn write_report(mut file: AtomicFile, report: &TransferReport) -> Result<AtomicFile> {
-    let mut text = serde_json::to_vec_pretty(report)?;
-    text.push(b'\n');
-    file.write_all(&text)?;
-    Ok(file)
 }
 
 fn summary(report: &TransferReport, encoded: &cager_proto::report::Report, cage: usize, output: &Path) -> String {

@@ -6,13 +6,16 @@
 mod alembic;
 pub mod atomic;
 pub mod biovision;
+mod colors;
 mod error;
+mod faces;
 pub mod frames;
 mod glb;
 mod listing;
 mod matrix;
 pub mod mesh;
 mod natural;
+mod normals;
 mod scene;
 mod signature;
 mod text;
@@ -25,7 +28,7 @@ pub use error::{Action, Error};
 pub use frames::{
     CacheFormat, CageMesh, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence,
     MorphOptions, create_frames, frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames,
-    open_frames_bytes, open_frames_in, open_selected_frames,
+    open_frames_bytes, open_frames_in, open_raw_frames, open_selected_frames,
 };
 pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};

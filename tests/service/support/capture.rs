@@ -1,9 +1,11 @@
 //! Small captures, as bytes.
 
 use cager_demo::Options;
-use cager_formats::{FrameOptions, create_frames, write_model};
+use cager_formats::{FrameOptions, Units, Up, create_frames, write_model};
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
+use cager_proto::container::ContainerReader;
 use cager_proto::record::{self, Kind};
+use std::io::Cursor;
 use std::ops::Range;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
@@ -35,6 +37,26 @@ impl Mesh {
         mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
         Self::new(Model { points: mesh.vertices.clone(), faces, ..Model::default() })
     }
+}
+
+/// What [`usd`] says of positions.
+pub(crate) const USD_UNITS: Units = Units::new(Up::Z, 0.01);
+
+/// A mesh as a USD file that says what its positions mean.
+pub(crate) fn usd(model: &Model) -> Vec<u8> {
+    let list = |all: &mut dyn Iterator<Item = String>| all.collect::<Vec<_>>().join(", ");
+    let points = list(&mut model.points.iter().map(|[x, y, z]| format!("({x}, {y}, {z})")));
+    let counts = list(&mut model.faces.iter().map(|face| face.len().to_string()));
+    let corners = list(&mut model.faces.iter().flatten().map(u32::to_string));
+    format!(
+        "#usda 1.0\n(\n    metersPerUnit = 0.01\n    upAxis = \"Z\"\n)\ndef Mesh \"mesh\"\n{{\n    point3f[] points = [{points}]\n    int[] faceVertexCounts = [{counts}]\n    int[] faceVertexIndices = [{corners}]\n}}\n"
+    )
+    .into_bytes()
+}
+
+/// What a container says of positions.
+pub(crate) fn units_of(container: &[u8]) -> Units {
+    ContainerReader::open(Cursor::new(container)).expect("a container").header().units
 }
 
 impl Capture {

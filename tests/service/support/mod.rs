@@ -11,7 +11,7 @@ mod raw;
 pub(crate) use api::{
     Api, OCTETS, RECORDS, Reply, cage_form, cage_form_of, cages_of, file, form, form_of, lines, piece, records, text,
 };
-pub(crate) use capture::{Capture, Mesh};
+pub(crate) use capture::{Capture, Mesh, USD_UNITS, units_of, usd};
 pub(crate) use database::Database;
 pub(crate) use elsewhere::{Elsewhere, Heard};
 pub(crate) use inside::{Inside, SlowDesigns};

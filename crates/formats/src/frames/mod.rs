@@ -41,7 +41,7 @@ pub use range::FrameRange;
 pub use selection::FrameSelection;
 pub use source::{
     MeshSequence, frame_files, frame_numbers, mesh_sequence, open_frames, open_frames_bytes, open_frames_in,
-    open_selected_frames,
+    open_raw_frames, open_selected_frames,
 };
 pub(crate) use times::Times;
 pub(crate) use widen::{Scalar, half_precision};

@@ -5,9 +5,11 @@ use std::fs;
 use std::io::{Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
+use super::layout::Layout;
 use super::names::{Sequence, is_one_of};
 use super::range::RangeReader;
 use super::sequence::SequenceReader;
+use super::widen::Scalar;
 use super::{CacheFormat, FrameReader, FrameSelection, cache, files, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, extensions};
@@ -126,6 +128,21 @@ pub fn open_frames_in<'a>(
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     cache::open(format, name, source, length, expected_points, &FrameSelection::default(), None)
+}
+
+/// Opens `length` bytes that are x y z of every point of every frame as little-endian `f32`, with nothing before; `name` is the path in error messages.
+///
+/// # Errors
+/// Another length; no points or frames.
+pub fn open_raw_frames<'a>(
+    name: &Path,
+    source: impl Read + Seek + Send + 'a,
+    length: u64,
+    points: usize,
+    frames: u32,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let layout = Layout::new(points as u64, frames.into(), 0, Scalar::F32Little);
+    cache::open_layout(name, source, layout, length, points)
 }
 
 fn open_file(path: &Path, expected_points: usize, selection: &FrameSelection) -> Result<Box<dyn FrameReader>, Error> {

@@ -13,8 +13,9 @@ use super::container;
 use super::faults::too_large;
 use super::scene::{Placement, Scene};
 use super::skin::{Joints, Skins};
+use crate::colors::{Colors, Scale, srgb};
 use crate::error::Fault;
-use crate::mesh::{Colors, Contents, Scale, check_face, srgb};
+use crate::faces::{Contents, check_face};
 
 /// Puts meshes together, one placement after another.
 pub(super) struct Builder<'a, 'b> {

@@ -14,8 +14,8 @@ use super::clip::Clip;
 use super::container;
 use super::scene::Scene;
 use crate::error::{Error, Fault};
+use crate::faces::Contents;
 use crate::frames::{FrameReader, FrameSelection, Times};
-use crate::mesh::Contents;
 use crate::scene::{self, Animation, Failure, check_held};
 
 /// Frames per second that programs have.

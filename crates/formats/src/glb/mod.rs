@@ -20,7 +20,7 @@ mod write;
 use cager_geometry::mesh::Model;
 
 use crate::error::Fault;
-use crate::mesh::Contents;
+use crate::faces::Contents;
 use crate::scene::Failure;
 use buffers::Buffers;
 pub(crate) use buffers::Source;

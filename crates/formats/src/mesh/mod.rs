@@ -1,7 +1,5 @@
 //! Models from and to mesh files.
 
-mod colors;
-mod normals;
 mod obj;
 mod off;
 mod parsed;
@@ -18,16 +16,13 @@ use cager_geometry::units::Units;
 
 use crate::alembic;
 use crate::error::{Error, Fault};
+use crate::faces::Contents;
 use crate::glb;
 use crate::signature::Signature;
 use crate::text::{Lines, quoted};
 use crate::usd;
 
-pub(crate) use colors::{Colors, Scale, srgb};
-pub(crate) use normals::{unit, vertex_normals};
-pub(crate) use parsed::Contents;
 use parsed::Parsed;
-pub(crate) use parsed::check_face;
 pub use write::{model_bytes, obj_bytes, write_model};
 pub(crate) use write::{write_obj_faces, write_off, write_ply, write_stl};
 

@@ -2,9 +2,10 @@
 
 use cager_geometry::mesh::Model;
 
-use super::colors::{Colors, Scale};
-use super::parsed::{Contents, Parsed, no_such_vertex};
+use super::parsed::Parsed;
+use crate::colors::{Colors, Scale};
 use crate::error::Fault;
+use crate::faces::{Contents, no_such_vertex};
 use crate::text::{self, Lines, integer, point, quoted, words};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {

@@ -2,8 +2,9 @@
 
 use cager_geometry::mesh::Model;
 
-use super::parsed::{Contents, Parsed, check_face};
+use super::parsed::Parsed;
 use crate::error::Fault;
+use crate::faces::{Contents, check_face};
 use crate::text::{Lines, integer, point, quoted, words};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {

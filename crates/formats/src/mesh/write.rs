@@ -5,10 +5,10 @@ use std::path::Path;
 
 use cager_geometry::mesh::Model;
 
-use super::parsed::check_face;
 use super::{MeshFormat, extensions};
 use crate::atomic::AtomicFile;
 use crate::error::{Error, Fault};
+use crate::faces::check_face;
 
 /// Writes a model to a `.obj`, `.ply` or `.off` file, which appears whole or not at all.
 ///

@@ -3,7 +3,7 @@
 use cager_geometry::mesh::Polygons;
 
 use crate::error::Fault;
-use crate::mesh::check_face;
+use crate::faces::check_face;
 
 /// Corners that a point has at the most, and those that a mesh may have however few its points are.
 const CORNERS_OF_POINT: u64 = 64;

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::Scene;
 use super::layout::Layout;
-use crate::mesh::vertex_normals;
+use crate::normals::vertex_normals;
 
 /// Writes positions, normals, texture coordinates and corners. Shaders take the second set of coordinates; the first one is the same, as glTF has no
 /// second one without.

@@ -12,7 +12,7 @@ use std::io::{self, Write};
 use cager_geometry::mesh::Point;
 
 use crate::error::Fault;
-use crate::mesh::vertex_normals;
+use crate::normals::vertex_normals;
 use layout::Layout;
 use png::Png;
 

@@ -19,7 +19,7 @@ pub use gait::GaitCurve;
 pub use gait::gait_svg;
 pub use people::{JOINTS_RATE, manifold_of, rig_of};
 pub use people::{Joints, Person};
-pub use placement::Placement;
+pub use placement::{Placement, placed_units};
 pub use positions::RecoveredFrames;
 pub use report::{FrameReport, RecoveryReport};
 pub use source::{Arrival, SurfaceSource};

@@ -3,7 +3,7 @@
 use super::{RecoverError, RecoverOptions};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, Point, TriMesh};
-use cager_geometry::units::Up;
+use cager_geometry::units::{Units, Up};
 use cager_geometry::vector::{cross, norm, sub};
 use cager_registration::{
     AlignOptions, Alignment, FitOptions, Observation, ObservationOptions, RegistrationError, Target, Template, align,
@@ -33,6 +33,12 @@ const CLEARLY_BETTER: f64 = 0.8;
 const MIN_TURN: f64 = 12.0;
 /// Sizes that differ by less are motion.
 const SAME_SIZE: f64 = 0.05;
+
+/// What positions of a template mean once it was brought to the frames, where its file says `said`: a template that is scaled has their unit, and one that
+/// is turned any axis up, unless `up` says which.
+pub fn placed_units(said: Units, up: Option<Up>, [align, scale]: [bool; 2]) -> Units {
+    Units { up: up.or(said.up.filter(|_| !align && !scale)), metres_per_unit: said.metres_per_unit.filter(|_| !scale) }
+}
 
 impl Placement {
     /// Brings a template and its cage to a surface.
@@ -117,4 +123,20 @@ pub(super) fn check_start(
 pub(super) fn area(vertices: &[Point], triangles: &[[u32; 3]]) -> f64 {
     let corner = |v: u32| vertices[v as usize];
     triangles.iter().map(|&[a, b, c]| 0.5 * norm(cross(sub(corner(b), corner(a)), sub(corner(c), corner(a))))).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_template_that_is_scaled_or_turned_means_what_the_frames_do() {
+        let said = Units::new(Up::Z, 0.01);
+        let units = |up, placed| placed_units(said, up, placed);
+        assert_eq!(units(None, [false, false]), said);
+        assert_eq!(units(Some(Up::Y), [false, false]), Units::new(Up::Y, 0.01));
+        assert_eq!(units(None, [true, false]), Units { up: None, ..said });
+        assert_eq!(units(Some(Up::Z), [true, true]), Units { metres_per_unit: None, ..said });
+        assert_eq!(units(None, [false, true]), Units::UNKNOWN);
+    }
 }

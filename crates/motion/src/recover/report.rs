@@ -173,16 +173,6 @@ impl RecoveryReport {
         self.changed_from = changed_for_good(&scores).map(|frame| self.frames[frame].number);
     }
 
-    /// As a file.
-    ///
-    /// # Errors
-    /// It cannot be written as JSON.
-    pub fn json(&self) -> serde_json::Result<Vec<u8>> {
-        let mut text = serde_json::to_vec_pretty(self)?;
-        text.push(b'\n');
-        Ok(text)
-    }
-
     /// What the user should know.
     pub(super) fn warnings(&self) -> Vec<String> {
         let list = |numbers: &[f64]| {

@@ -1,7 +1,7 @@
 //! One frame: rounds of matching and Gauss–Newton, stage after stage.
 
 use super::equations::NormalEquations;
-use super::limbs::limb_scores;
+use super::limbs::{limb_scores, pose_with_other_limbs};
 use super::matching::{Match, Matching, NORMAL_LENGTH, Pairs};
 use super::model::{CAGE_UNKNOWNS, PersonModel};
 use super::observed::Observed;
@@ -86,7 +86,8 @@ impl<'a> PersonFit<'a> {
         if self.options.method == Method::Paper || limbs.is_empty() {
             return fit;
         }
-        let Some(pose) = self.pose_with_other_limbs(observed, &fit, limbs) else { return fit };
+        let other = pose_with_other_limbs((self.model, self.manifold), observed, (&fit.placement, &fit.pose), limbs);
+        let Some(pose) = other else { return fit };
         let mut stage = self.latent_stage(fit.placement, fit.latent.clone());
         stage.offset = pose.iter().zip(stage.pose()).map(|(y, on)| y - on).collect();
         let [_, quads, vertices] = self.options.rounds;

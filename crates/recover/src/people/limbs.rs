@@ -2,9 +2,10 @@
 //!
 //! Gauss–Newton does not bring an arm back that lies on the trunk instead, since what it should lie on is out of reach there.
 
-use super::fit::{FrameFit, PersonFit};
 use super::matching::{MIN_COSINE, NORMAL_LENGTH, SCORE_CAP};
+use super::model::PersonModel;
 use super::observed::Observed;
+use crate::manifold::Manifold;
 use crate::rig::{Placement, QUADS, deform};
 use crate::rotation::{exp, log};
 use cager_geometry::mesh::Point;
@@ -27,37 +28,34 @@ pub(super) fn limb_scores(parts: &[f64; QUADS]) -> [f64; 4] {
     LIMBS.map(|(quads, _)| quads.iter().map(|&quad| parts[quad]).sum::<f64>() / 4.0)
 }
 
-impl PersonFit<'_> {
-    /// The pose of a fit with some limbs put where they explain more of what was observed; none where they are well where they are.
-    pub(super) fn pose_with_other_limbs(
-        &self,
-        observed: &Observed<'_>,
-        fit: &FrameFit,
-        limbs: &[usize],
-    ) -> Option<Vec<f64>> {
-        let count = self.manifold.examples().min(EXAMPLES);
-        let examples: Vec<Vec<f64>> = (0..count)
-            .map(|k| self.manifold.pose(self.manifold.latent(k * self.manifold.examples() / count)))
+/// A placed pose with some limbs put where they explain more of what was observed; none where they are well where they are.
+pub(super) fn pose_with_other_limbs(
+    (model, manifold): (&PersonModel, &Manifold),
+    observed: &Observed<'_>,
+    (placement, pose): (&Placement, &[f64]),
+    limbs: &[usize],
+) -> Option<Vec<f64>> {
+    let count = manifold.examples().min(EXAMPLES);
+    let examples: Vec<Vec<f64>> =
+        (0..count).map(|k| manifold.pose(manifold.latent(k * manifold.examples() / count))).collect();
+    let mut pose = pose.to_vec();
+    let mut changed = false;
+    for &limb in limbs {
+        let cost = LimbCost::new(model, observed, placement, &pose, limb);
+        let now = cost.of(&pose);
+        let costs: Vec<(f64, Vec<f64>)> = examples
+            .par_iter()
+            .map(|example| {
+                let tried = with_limb(&pose, example, limb);
+                (cost.of(&tried), tried)
+            })
             .collect();
-        let mut pose = fit.pose.clone();
-        let mut changed = false;
-        for &limb in limbs {
-            let cost = LimbCost::new(self, observed, &fit.placement, &pose, limb);
-            let now = cost.of(&pose);
-            let costs: Vec<(f64, Vec<f64>)> = examples
-                .par_iter()
-                .map(|example| {
-                    let tried = with_limb(&pose, example, limb);
-                    (cost.of(&tried), tried)
-                })
-                .collect();
-            let best = costs.into_iter().reduce(|best, other| if other.0 < best.0 { other } else { best });
-            if let Some((_, better)) = best.filter(|(least, _)| *least < BETTER * now) {
-                (pose, changed) = (better, true);
-            }
+        let best = costs.into_iter().reduce(|best, other| if other.0 < best.0 { other } else { best });
+        if let Some((_, better)) = best.filter(|(least, _)| *least < BETTER * now) {
+            (pose, changed) = (better, true);
         }
-        changed.then_some(pose)
     }
+    changed.then_some(pose)
 }
 
 /// A pose with a limb as it is in another one, relative to the trunk.
@@ -79,7 +77,7 @@ fn with_limb(pose: &[f64], other: &[f64], limb: usize) -> Vec<f64> {
 
 /// What is left unexplained by a limb in some pose, with the rest of the body where it is.
 struct LimbCost<'a> {
-    fit: &'a PersonFit<'a>,
+    model: &'a PersonModel,
     observed: &'a Observed<'a>,
     placement: &'a Placement,
     /// Samples of the limb.
@@ -90,13 +88,12 @@ struct LimbCost<'a> {
 
 impl<'a> LimbCost<'a> {
     fn new(
-        fit: &'a PersonFit<'a>,
+        model: &'a PersonModel,
         observed: &'a Observed<'a>,
         placement: &'a Placement,
         pose: &[f64],
         limb: usize,
     ) -> Self {
-        let model = fit.model;
         let (samples, others): (Vec<usize>, Vec<usize>) =
             (0..model.sample_count()).step_by(THIN).partition(|&s| LIMBS[limb].0.contains(&model.part(s)));
         let rest = model.sampled_at(&deform(model.rig(), pose, placement).vertices, &others);
@@ -113,11 +110,11 @@ impl<'a> LimbCost<'a> {
             };
             chosen.map(|&p| (p, distance(p))).collect()
         };
-        Self { fit, observed, placement, samples, seen }
+        Self { model, observed, placement, samples, seen }
     }
 
     fn of(&self, pose: &[f64]) -> f64 {
-        let model = self.fit.model;
+        let model = self.model;
         let cap = SCORE_CAP * model.height();
         let sampled = model.sampled_at(&deform(model.rig(), pose, self.placement).vertices, &self.samples);
         let Observation { points, normals } = self.observed.observation;

@@ -1,16 +1,16 @@
 //! Creating, resuming and deleting cage jobs.
 
-use super::{CageJob, Finished, options, samples};
+use super::{CageDesign, CageJob, Finished, options, samples};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::config::ServeConfig;
 use crate::idempotency::{extension, fingerprint};
-use crate::jobs::{Outcome, Phase, new_job};
+use crate::jobs::{Checked, Ended, Outcome, Phase, new_job};
 use crate::preparation::{check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::registry::Reserved;
-use crate::store::{CageJobMeta, ContentKey, Idempotency, Spool, Store, StoredPart};
+use crate::store::{CAGE, CageJobMeta, ContentKey, Idempotency, Spool, Store, StoreError, StoredPart, Workshop};
 use crate::tasks::blocking;
 use cager_capture::reach::Reach;
 use cager_geometry::mesh::diagonal;
@@ -31,13 +31,6 @@ pub(crate) struct NewCageJob {
     pub(crate) reserved: Reserved,
 }
 
-/// Results of validating the input.
-struct Checked {
-    key: ContentKey,
-    points: u32,
-    frame_count: u32,
-}
-
 impl Service {
     /// Creates a job, durably, and queues it. Its input is looked at only as long as the client waits; from then on it runs to the end even if
     /// the client disconnects.
@@ -49,74 +42,26 @@ impl Service {
         tenant: &Arc<Tenant>,
         new: NewCageJob,
     ) -> Result<Arc<CageJob>, ApiError> {
-        let (new, request, rest) = blocking(move || {
-            let (request, rest) = (request_of(&new), blake3::hash(&new.rest));
-            (new, request, rest)
+        let (new, rest) = blocking(move || {
+            let rest = StoredPart::of(&new.rest_name, &new.rest);
+            (new, rest)
         })
         .await?;
-        let (frames, options) = (new.frames.digest(), new.options.clone());
-        let may_be = |job: &CageJob| {
-            let meta = &job.meta;
-            let digests = [&meta.rest, &meta.frames].map(|part| part.blake3.as_str());
-            meta.options == options && digests == [rest.to_hex().as_str(), frames.to_hex().as_str()]
+        let frames = new.frames.digest().to_hex().to_string();
+        let frames = StoredPart { name: new.frames_name.clone(), bytes: new.frames.bytes(), blake3: frames };
+        let sent = (new.options.clone(), rest.blake3.clone(), frames.blake3.clone());
+        let may_be = move |job: &CageJob| {
+            let CageJobMeta { options, rest, frames, .. } = &job.meta;
+            (options, &rest.blake3, &frames.blake3) == (&sent.0, &sent.1, &sent.2)
         };
-        let (config, name) = (self.config.clone(), tenant.name.clone());
-        let check = move || {
-            let checked = check(&new, &name, config.max_design_seconds, config.max_design_bytes);
-            checked.map(|checked| (new, checked))
-        };
-        let make = async |service: Arc<Self>, tenant: Arc<Tenant>, (new, checked), request| {
-            service.create_new_cage_job(&tenant, new, checked, request).await
-        };
-        self.create_job(tenant, request, may_be, check, make).await
+        self.create_job(tenant, (new, [rest, frames]), |(new, _)| request_of(new), may_be, check).await
     }
 
-    async fn create_new_cage_job(
-        self: &Arc<Self>,
-        tenant: &Tenant,
-        new: NewCageJob,
-        checked: Checked,
-        idempotency: Option<Idempotency>,
-    ) -> Result<Arc<CageJob>, ApiError> {
-        let NewCageJob { rest_name, rest, frames_name, frames, options, room: _room, mut reserved, .. } = new;
-        let part = |name: String, bytes: u64, digest: blake3::Hash| StoredPart {
-            name,
-            bytes,
-            blake3: digest.to_hex().to_string(),
-        };
-        let (id, created_ms) = new_job();
-        let meta = CageJobMeta {
-            id,
-            tenant: tenant.name.clone(),
-            created_ms,
-            key: checked.key,
-            options,
-            points: checked.points,
-            frame_count: checked.frame_count,
-            rest: part(rest_name, rest.len() as u64, blake3::hash(&rest)),
-            frames: part(frames_name, frames.bytes(), frames.digest()),
-            idempotency,
-        };
-        if let Some(duplicate) = self.cage_jobs.duplicate(&tenant.name, &meta.key, None)
-            && let Some(job) = self.create_finished(&meta, &duplicate).await
-        {
-            return Ok(job);
-        }
-        let place = self.job_place(&tenant.name)?;
-        self.reserve_more(tenant, &mut reserved, meta.rest.bytes)?;
-        let bytes = meta.rest.bytes + meta.frames.bytes;
-        let (store, kept) = (self.store.clone(), meta.clone());
-        blocking(move || store.create_cage_job(&kept, &rest, frames)).await??;
-        let job = self.begin_job(place, meta, bytes);
-        drop(reserved);
-        Ok(job)
-    }
-
-    /// Creates a job with the outcome of a completed one of the same input; `None` if that cannot be read.
-    async fn create_finished(self: &Arc<Self>, meta: &CageJobMeta, duplicate: &Arc<CageJob>) -> Option<Arc<CageJob>> {
+    /// Creates a job with the outcome of a completed one of the same input, where there is one that can be read.
+    pub(super) async fn create_finished(&self, meta: &CageJobMeta) -> Option<Arc<CageJob>> {
+        let duplicate = self.cage_jobs.duplicate(&meta.tenant, &meta.key, None)?;
         let Phase::Completed(found) = duplicate.phase() else { return None };
-        let (store, duplicate, kept, finished) =
-            (self.store.clone(), Arc::clone(duplicate), meta.clone(), found.clone());
+        let (store, kept, finished) = (self.store.clone(), meta.clone(), found.clone());
         let stored = blocking(move || {
             let cage = duplicate.completed_cage(&store).ok()?;
             store.create_finished_cage_job(&kept, &Outcome::Completed(finished), &cage).ok()
@@ -128,13 +73,6 @@ impl Service {
         Some(job)
     }
 
-    /// Stores the outcome of a job and its cage, if any.
-    pub(super) async fn finish_cage_job(&self, job: &Arc<CageJob>, outcome: Outcome<Finished>, cage: Option<Vec<u8>>) {
-        let id = job.meta.id.clone();
-        let write = move |store: &Store, outcome: &_| store.finish_cage_job(&id, outcome, cage.as_deref());
-        self.finish_job(job, outcome, write).await;
-    }
-
     /// Copies the outcome of a job of the same input; false if it cannot be read.
     pub(super) async fn copy_outcome(
         &self,
@@ -143,10 +81,17 @@ impl Service {
         found: Box<Finished>,
     ) -> bool {
         let (store, duplicate) = (self.store.clone(), Arc::clone(duplicate));
-        let Ok(Ok(cage)) = blocking(move || duplicate.completed_cage(&store)).await else { return false };
-        self.finish_cage_job(job, Outcome::Completed(found), Some(cage.to_vec())).await;
-        true
+        let copied = blocking(move || duplicate.completed_cage(&store).map(|cage| workshop_with(&store, &cage)));
+        let Ok(Ok(copied)) = copied.await else { return false };
+        let ended = copied.map_or_else(|error| Ended::Failed(error.into()), |copy| Ended::Completed(found, copy));
+        self.end_job(job, ended).await
     }
+}
+
+/// A workshop with a cage, ready to be a job's result. Blocks.
+pub(super) fn workshop_with(store: &Store, cage: &[u8]) -> Result<Workshop, StoreError> {
+    let workshop = store.workshop()?;
+    workshop.write(CAGE, cage).map(|()| workshop)
 }
 
 /// The request with an idempotency key that this input is. Blocks.
@@ -166,7 +111,13 @@ pub(crate) fn check_options(options: &CageOptions, config: &ServeConfig) -> Resu
 }
 
 /// Validates rest pose and sampled frames, so that errors are reported in the response. Blocks.
-fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Result<Checked, ApiError> {
+fn check(
+    service: &Service,
+    tenant: &Tenant,
+    (new, [rest_part, frames_part]): (NewCageJob, [StoredPart; 2]),
+    idempotency: Option<Idempotency>,
+) -> Result<Checked<CageDesign>, ApiError> {
+    let (max_seconds, max_bytes) = (service.config.max_design_seconds, service.config.max_design_bytes);
     let design = options::design_options(&new.options, max_seconds)?;
     let rest = read_part("rest", &new.rest_name, &new.rest)?;
     check_extent("rest", &rest)?;
@@ -194,11 +145,28 @@ fn check(new: &NewCageJob, tenant: &str, max_seconds: u64, max_bytes: u64) -> Re
     }
     let key = ContentKey::of([
         format!("cage design {design:?} {points} {frame_count} {count}").as_bytes(),
-        tenant.as_bytes(),
+        tenant.name.as_bytes(),
         extension(&new.rest_name).as_bytes(),
         blake3::hash(&new.rest).as_bytes().as_slice(),
         extension(&new.frames_name).as_bytes(),
         frames.digest().as_bytes(),
     ]);
-    Ok(Checked { key, points: points as u32, frame_count })
+    drop(reader);
+    let NewCageJob { rest, frames, options, room, reserved, .. } = new;
+    let (id, created_ms) = new_job();
+    let meta = CageJobMeta {
+        id,
+        tenant: tenant.name.clone(),
+        created_ms,
+        key,
+        options,
+        points: points as u32,
+        frame_count,
+        rest: rest_part,
+        frames: frames_part,
+        idempotency,
+    };
+    let unreserved = meta.rest.bytes;
+    let store = Box::new(move |store: &Store, meta: &CageJobMeta| store.create_cage_job(meta, &rest, frames));
+    Ok(Checked { meta, store, room, reserved: Some(reserved), unreserved })
 }

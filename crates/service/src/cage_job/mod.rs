@@ -11,16 +11,15 @@ pub use run::Designer;
 pub(crate) use run::{DesignPool, local_designer};
 
 use crate::config::ServeConfig;
-use crate::jobs::{Job, Jobs, Phase, Work};
+use crate::jobs::{Job, Phase, Work};
 use crate::problem::{self, ApiError};
-use crate::service::Service;
-use crate::store::{CageJobMeta, Store};
+use crate::store::{CAGE, CageJobMeta, Store, StoredPart};
 use bytes::Bytes;
 use cager_cages::Progress as DesignProgress;
 use cager_geometry::mesh::TriMesh;
 use cager_proto::cage_messages::{CageError, CageJob as View, CageProgress, CageStage, CageState};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
+use std::borrow::Cow;
 use std::time::Instant;
 
 /// Cages designed by example.
@@ -41,16 +40,13 @@ impl Work for CageDesign {
     const UNFINISHED: &'static str = "wait until the cage is designed";
     const QUEUE: &'static str = "design_queue";
 
-    fn jobs(service: &Service) -> &Jobs<Self> {
-        &service.cage_jobs
-    }
-
     fn most_waiting(config: &ServeConfig) -> usize {
         config.max_design_queue
     }
 
-    fn begin(service: Arc<Service>, job: Arc<CageJob>) {
-        tokio::spawn(service.run_cage_job(job));
+    fn files(finished: &Finished) -> Cow<'_, [StoredPart]> {
+        let Finished { cage_bytes: bytes, cage_digest, .. } = finished;
+        vec![StoredPart { name: CAGE.to_owned(), bytes: *bytes, blake3: cage_digest.clone() }].into()
     }
 
     fn forget_input(store: &Store, id: &str) {

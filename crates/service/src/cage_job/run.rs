@@ -1,15 +1,15 @@
 //! Running designs: a limited number at a time, tenants in turn, on threads of the lowest priority.
 
-use super::{Best, CageJob, Finished, options, samples};
+use super::create::workshop_with;
+use super::{Best, CageDesign, CageJob, Finished, options, samples};
 use crate::admission::{Budget, Permit};
 use crate::config::ServeConfig;
 use crate::engine::threads;
-use crate::jobs::{MAX_ATTEMPTS, Outcome, Phase};
+use crate::jobs::{Ended, Jobs, MAX_ATTEMPTS, Phase, Run};
 use crate::preparation::read_part;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Kind, StoreError};
-use crate::tasks::blocking;
+use crate::store::{CageJobMeta, StoreError, Workshop};
 use cager_cages::{Design, DesignError, DesignOptions, Progress, design};
 use cager_geometry::mesh::Model;
 use cager_proto::cage_messages::{CageError, CageStage};
@@ -80,47 +80,27 @@ impl DesignPool {
     }
 }
 
-/// Result of a run.
-enum RunOutcome {
-    Designed(Box<Finished>, Vec<u8>),
-    Failed(ApiError),
-    /// The job was deleted or the service is stopping; nothing is stored.
-    Stopped,
+impl Run for CageDesign {
+    fn jobs(service: &Service) -> &Arc<Jobs<Self>> {
+        &service.cage_jobs
+    }
+
+    async fn known(service: &Arc<Service>, meta: &CageJobMeta) -> Option<Arc<CageJob>> {
+        service.create_finished(meta).await
+    }
+
+    fn begin(service: Arc<Service>, job: Arc<CageJob>) {
+        tokio::spawn(async move {
+            while !job.state().is_final() && !service.is_stopped(&job) {
+                if let Some(place) = service.wait_for_turn(&job).await {
+                    return service.run_job(job, place, Service::design).await;
+                }
+            }
+        });
+    }
 }
 
 impl Service {
-    /// Waits for the job's turn, designs its cage and stores the outcome.
-    pub(super) async fn run_cage_job(self: Arc<Self>, job: Arc<CageJob>) {
-        let place = loop {
-            if let Some(place) = self.wait_for_turn(&job).await {
-                break place;
-            }
-            if job.state().is_final() || job.deleted().is_cancelled() || self.stopping().is_cancelled() {
-                return;
-            }
-        };
-        job.set_phase(Phase::Running);
-        let (service, running) = (Arc::clone(&self), Arc::clone(&job));
-        let ended = blocking(move || service.design(&running, place)).await.unwrap_or_else(RunOutcome::Failed);
-        match ended {
-            // An orderly stop does not count as an attempt.
-            RunOutcome::Stopped => {
-                if let Err(error) = self.store.uncount_attempt(Kind::CageJob, &job.meta.id) {
-                    tracing::debug!(job = %job.meta.id, %error, "the count of its beginnings stays");
-                }
-            }
-            RunOutcome::Designed(found, cage) => {
-                self.finish_cage_job(&job, Outcome::Completed(found), Some(cage)).await;
-            }
-            RunOutcome::Failed(error) if error.status().is_client_error() => {
-                tracing::info!(job = %job.meta.id, detail = %error.problem.detail, "no cage can be designed");
-                self.finish_cage_job(&job, Outcome::Failed(error.problem), None).await;
-            }
-            // Errors that may be temporary are retried after a restart.
-            RunOutcome::Failed(error) => job.set_phase(Phase::Failed(error.problem)),
-        }
-    }
-
     /// A permit to run; `None` if a job of the same input has to be looked at again, or the job has ended.
     async fn wait_for_turn(&self, job: &Arc<CageJob>) -> Option<Permit> {
         let (tenant, id) = (&job.meta.tenant, Some(job.meta.id.as_str()));
@@ -144,37 +124,29 @@ impl Service {
                 }
             }
         }
-        let place = tokio::select! {
-            place = self.designs.places.take(tenant, 1) => place,
-            () = job.deleted().cancelled() => return None,
-            () = self.stopping().cancelled() => return None,
-        };
+        let place = self.turn(job, &self.designs.places).await?;
         // A job of the same input may have been completed meanwhile; one that could not be read is not tried again.
         let completed = |duplicate: &Arc<CageJob>| matches!(duplicate.phase(), Phase::Completed(_));
         if !unreadable && duplicate().as_ref().is_some_and(completed) { None } else { Some(place) }
     }
 
     /// Runs the design of a job. Blocks.
-    fn design(&self, job: &Arc<CageJob>, _place: Permit) -> RunOutcome {
+    fn design(&self, job: &CageJob) -> Ended<Finished> {
         let clock = Instant::now();
-        let ended = match self.design_with(job, clock) {
-            Ok(_) | Err(_) if job.deleted().is_cancelled() || self.stopping().is_cancelled() => RunOutcome::Stopped,
-            Ok((found, cage)) => RunOutcome::Designed(Box::new(found), cage),
-            Err(error) => RunOutcome::Failed(error),
+        let given_up = || {
+            let detail = format!(
+                "the service ended {MAX_ATTEMPTS} times while this cage was designed, so it is given up; try a lighter model, or fewer frames"
+            );
+            Ended::Failed(ApiError::new(problem::INVALID_GEOMETRY, detail))
         };
+        let ended = self.attempt(job, given_up, || self.designed(job, clock));
         metrics::histogram!("cager_design_seconds").record(clock.elapsed().as_secs_f64());
         ended
     }
 
-    fn design_with(&self, job: &Arc<CageJob>, clock: Instant) -> Result<(Finished, Vec<u8>), ApiError> {
+    fn designed(&self, job: &CageJob, clock: Instant) -> Result<(Finished, Workshop), ApiError> {
         let meta = &job.meta;
         let damaged = |error: StoreError| job.fail_if_damaged(&self.store, error);
-        if self.store.count_attempt(Kind::CageJob, &meta.id).map_err(damaged)? > MAX_ATTEMPTS {
-            let detail = format!(
-                "the service ended {MAX_ATTEMPTS} times while this cage was designed, so it is given up; try a lighter model, or fewer frames"
-            );
-            return Err(ApiError::new(problem::INVALID_GEOMETRY, detail));
-        }
         let options = options::design_options(&meta.options, self.config.max_design_seconds.max(1))?;
         let rest = read_part("rest", &meta.rest.name, &self.store.cage_job_rest(meta).map_err(damaged)?)?;
         let frames = self.store.cage_job_frames(meta).map_err(damaged)?;
@@ -190,15 +162,18 @@ impl Service {
         let latest = clock + options.time_limit.unwrap_or_default() + GRACE;
         let mut watch = |told: Progress<'_>| {
             job.designed(&told);
-            let over = Instant::now() > latest || job.deleted().is_cancelled() || self.stopping().is_cancelled();
-            if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if Instant::now() > latest || self.is_stopped(job) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         };
         let designed = self.designs.design(&rest, &frames, &options, &mut watch);
         drop((frames, taken));
         let designed = designed.map_err(|error| refused(&error))?;
         let best = Best::new(&designed.cage);
         let found = finished(&designed, &best, count, job.progress().error, clock);
-        Ok((found, best.obj.to_vec()))
+        Ok((found, workshop_with(&self.store, &best.obj)?))
     }
 }
 

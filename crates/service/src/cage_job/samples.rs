@@ -2,9 +2,9 @@
 
 use crate::file_bodies::{TELLING_BYTES, instead_of_numbers};
 use crate::problem::{self, ApiError};
-use cager_formats::{CacheFormat, Error, FrameReader, open_frames_in};
-use std::io::{Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use cager_formats::{CacheFormat, Error, FrameReader, open_frames_in, open_raw_frames};
+use std::io::{Read, Seek};
+use std::path::Path;
 
 /// Most frames that a design samples; more hardly improve it.
 const MAX_SAMPLED_FRAMES: usize = 160;
@@ -53,7 +53,7 @@ pub(crate) fn open<'a>(
             "frames: {frames} frames of {points} points are {expected} bytes, but {bytes} were sent; send x y z of every point as f32, frame after frame"
         )));
     }
-    Ok(Box::new(RawFrames { path: path.to_owned(), source, points, frames: frames as usize, next: 0 }))
+    open_raw_frames(path, source, bytes, points, frames).map_err(|error| unreadable(&error))
 }
 
 /// Refuses a file in place of raw numbers.
@@ -102,48 +102,6 @@ fn unreadable(error: &Error) -> ApiError {
         Error::NonFinite { frame, .. } => refused.frame(u32::try_from(*frame).unwrap_or(u32::MAX)),
         Error::Io { cause, .. } if cause.kind() != std::io::ErrorKind::UnexpectedEof => ApiError::internal(error),
         _ => refused,
-    }
-}
-
-/// Frames back to back, nothing else.
-struct RawFrames<R> {
-    path: PathBuf,
-    source: R,
-    points: usize,
-    frames: usize,
-    next: usize,
-}
-
-impl<R: Read + Seek + Send> FrameReader for RawFrames<R> {
-    fn points(&self) -> usize {
-        self.points
-    }
-
-    fn frames(&self) -> usize {
-        self.frames
-    }
-
-    fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {
-        out.clear();
-        if self.next == self.frames {
-            return Ok(false);
-        }
-        let failed = |cause| Error::Io { path: self.path.clone(), action: cager_formats::Action::Read, cause };
-        let mut bytes = vec![0; 12 * self.points];
-        self.source.seek(SeekFrom::Start((self.next * bytes.len()) as u64)).map_err(failed)?;
-        self.source.read_exact(&mut bytes).map_err(failed)?;
-        out.extend(bytes.as_chunks().0.iter().map(|&value| f64::from(f32::from_le_bytes(value))));
-        if let Some(at) = out.iter().position(|x| !x.is_finite()) {
-            return Err(Error::NonFinite { path: self.path.clone(), frame: self.next, point: at / 3 });
-        }
-        self.next += 1;
-        Ok(true)
-    }
-
-    fn skip(&mut self) -> Result<bool, Error> {
-        let more = self.next < self.frames;
-        self.next += usize::from(more);
-        Ok(more)
     }
 }
 

@@ -8,7 +8,7 @@ use super::extract::{Query, TokenName, granted};
 use super::origin;
 use super::respond::JsonResult;
 use super::router::finished;
-use super::sessions::{PAGE, PageQuery};
+use super::sessions::{PAGE, PageQuery, page_of};
 use crate::auth::Scope;
 use crate::problem::{self, ApiError};
 use crate::resources::{ResourceUse, Resources};
@@ -135,11 +135,9 @@ struct AllSessions {
 async fn sessions(State(operated): State<Operated>, Query(query): Query<PageQuery>) -> JsonResult<AllSessions> {
     let services = (operated.services)();
     let pages = services.iter().flat_map(|service| service.registry.page(None, query.after.as_deref(), PAGE + 1));
-    let mut page: Vec<_> = pages.collect();
-    page.sort_by(|a, b| b.meta.id.cmp(&a.meta.id));
-    let more = page.len() > PAGE;
-    page.truncate(PAGE);
-    let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
+    let mut found: Vec<_> = pages.collect();
+    found.sort_by(|a, b| b.meta.id.cmp(&a.meta.id));
+    let (page, next) = page_of(found, |session| session.meta.id.clone());
     let mut sessions = Vec::with_capacity(page.len());
     for session in page {
         // One whose frames cannot be read is listed without them.

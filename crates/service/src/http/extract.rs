@@ -3,7 +3,7 @@
 use super::guarded::revocable;
 use super::listen::ConnectionHandle;
 use crate::auth::{Denied, Grant, Scope, Tenant};
-use crate::jobs::{Job, Work, kind_of};
+use crate::jobs::{Job, Run, Work, kind_of};
 use crate::problem::{self, ApiError};
 use crate::resources::Resources;
 use crate::service::Service;
@@ -101,7 +101,7 @@ impl TenantResource for Session {
     }
 }
 
-impl<W: Work> TenantResource for Job<W> {
+impl<W: Run> TenantResource for Job<W> {
     const KIND: Kind = kind_of::<W>();
 
     fn find(service: &Service, tenant: &str, id: &str) -> Result<Arc<Self>, ApiError> {
@@ -151,7 +151,7 @@ pub(crate) struct RequestedJob<W: Work> {
     pub(crate) job: Arc<Job<W>>,
 }
 
-impl<W: Work> FromRequestParts<Arc<Service>> for RequestedJob<W> {
+impl<W: Run> FromRequestParts<Arc<Service>> for RequestedJob<W> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, ApiError> {

@@ -2,12 +2,13 @@
 
 use super::cage_jobs;
 use super::frame_parser::{BodyLayout, FrameReader};
-use super::multipart;
 use super::ranged::Immutable;
+use super::sessions;
 use crate::admission::{Budget, Permit};
 use crate::preparation::ValidOptions;
 use crate::problem::ApiError;
 use crate::service::Service;
+use crate::session::create::NewSession;
 use crate::session::facts::Facts;
 use axum::body::Body;
 use axum::extract::Request;
@@ -89,9 +90,8 @@ pub async fn new_session(
     let mut request = Request::new(body);
     request.headers_mut().insert(header::CONTENT_TYPE, content_type);
     let tenant = service.access.tenant("local");
-    let parts = multipart::read(service, &tenant, request).await?;
-    ValidOptions::of(&parts.options)?;
-    let uploaded = parts.uploaded;
+    let NewSession { uploaded, options, .. } = sessions::read(service, &tenant, request).await?;
+    ValidOptions::of(&options)?;
     Ok((uploaded.rest.bytes.len(), uploaded.cage.map_or(0, |cage| cage.bytes.len())))
 }
 
@@ -108,7 +108,7 @@ pub async fn new_cage(
     let mut request = Request::new(body);
     request.headers_mut().insert(header::CONTENT_TYPE, content_type);
     let tenant = service.access.tenant("local");
-    let new = cage_jobs::create::read(service, &tenant, request, None).await?;
+    let (new, _) = cage_jobs::create::read(service, &tenant, request).await?;
     Ok((new.rest.len(), new.frames.bytes()))
 }
 

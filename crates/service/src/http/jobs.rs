@@ -3,10 +3,10 @@
 use super::extract::Query;
 use super::progress::{self, ProgressEvent, ProgressSource};
 use super::ranged::Immutable;
-use super::sessions::PageQuery;
+use super::sessions::{PAGE, PageQuery, page_of};
 use crate::admission::Permit;
 use crate::auth::Tenant;
-use crate::jobs::{Job, Work};
+use crate::jobs::{Job, Run, Work, kind_of};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::tasks::blocking;
@@ -25,13 +25,14 @@ pub(super) fn accepted<W: Work>(job: &Job<W>, view: impl Serialize) -> Response 
 }
 
 /// A page of a tenant's jobs as `view` has them, and where the next one begins.
-pub(super) fn page<W: Work, V>(
+pub(super) fn page<W: Run, V>(
     service: &Service,
     tenant: &Tenant,
     Query(query): &Query<PageQuery>,
     view: impl Fn(&Job<W>) -> V,
 ) -> (Vec<V>, Option<String>) {
-    let (page, next) = query.page(W::jobs(service), tenant);
+    let found = W::jobs(service).page(&tenant.name, query.after.as_deref(), PAGE + 1);
+    let (page, next) = page_of(found, |job| job.id().to_owned());
     (page.iter().map(|job| view(job)).collect(), next)
 }
 
@@ -39,7 +40,7 @@ pub(super) fn page<W: Work, V>(
 ///
 /// # Errors
 /// Storage errors.
-pub(super) async fn delete<W: Work>(service: &Arc<Service>, job: &Arc<Job<W>>) -> Result<StatusCode, ApiError> {
+pub(super) async fn delete<W: Run>(service: &Arc<Service>, job: &Arc<Job<W>>) -> Result<StatusCode, ApiError> {
     service.delete_job(job).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -74,9 +75,10 @@ pub(super) async fn result<W: Work>(
     headers: &HeaderMap,
 ) -> Result<Response, ApiError> {
     let finished = job.finished()?;
-    let part = W::files(&finished).iter().find(|part| part.name == name);
+    let files = W::files(&finished);
+    let part = files.iter().find(|part| part.name == name);
     let part = part.ok_or_else(|| ApiError::new(problem::NOT_FOUND, W::MISSING))?;
-    let (store, path) = (service.store.clone(), service.store.job_file(crate::jobs::kind_of::<W>(), job.id(), name)?);
+    let (store, path) = (service.store.clone(), service.store.job_file(kind_of::<W>(), job.id(), name)?);
     let opened = blocking(move || store.open_file(&path)).await?;
     let opened = opened.map_err(|error| job.fail_if_damaged(&service.store, error))?;
     let room = Permit::empty(&service.download_memory, &tenant.name);

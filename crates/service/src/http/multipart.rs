@@ -2,35 +2,27 @@
 
 use super::extract::{content_type, idempotency_key};
 use super::metered::Metered;
-use super::waiting::{SLOWEST_BYTES_PER_SECOND, body_error};
+use super::waiting::{SLOWEST_BYTES_PER_SECOND, body_error, too_slow};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::session::cage_source::UploadedFiles;
 use crate::store::NamedFile;
 use axum::body::{Body, BodyDataStream};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
-use cager_proto::messages::SessionOptions;
 use futures_util::{StreamExt as _, stream};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::time::timeout;
 
 const OPTIONS_BYTES: usize = 64 << 10;
 pub(super) const NAME_CHARACTERS: usize = 200;
 /// Name of the part with the matrix of the regularizer `matrix`.
-const MATRIX: &str = "regularizer_matrix";
-
-/// Parsed parts, with the permit for their memory.
-pub(crate) struct Parts {
-    pub(crate) uploaded: UploadedFiles,
-    pub(crate) options: SessionOptions,
-    pub(crate) room: Permit,
-}
+pub(super) const MATRIX: &str = "regularizer_matrix";
 
 /// What the headers of a form say.
 pub(super) struct FormHeader {
@@ -68,6 +60,7 @@ pub(super) fn check_form_header(
 pub(super) struct Files<T> {
     pub(super) files: HashMap<&'static str, NamedFile>,
     pub(super) options: T,
+    pub(super) idempotency_key: Option<String>,
     /// Permit for their memory.
     pub(super) room: Permit,
 }
@@ -83,32 +76,25 @@ impl<T> Files<T> {
     }
 }
 
-/// Reads the parts that make a session.
+/// Reads files into memory, and options; `sent` names all parts, `what` are all the files together.
 ///
 /// # Errors
-/// Parts that are missing, twice there, unknown or too large; no room.
-pub(crate) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Request) -> Result<Parts, ApiError> {
-    let mut form = read_files(service, tenant, request, &["rest", "cage", MATRIX], "rest pose and cage").await?;
-    let rest = form.take("rest", "the rest pose")?;
-    let uploaded = UploadedFiles { rest, cage: form.files.remove("cage"), matrix: form.files.remove(MATRIX) };
-    Ok(Parts { uploaded, options: form.options, room: form.room })
-}
-
-/// Reads files into memory, and options; `what` are all the files together.
-///
-/// # Errors
-/// Parts that are twice there, unknown or too large; no room.
+/// As [`check_form_header`]; parts that are twice there, unknown or too large; no room; a body that comes too slowly.
 pub(super) async fn read_files<T: DeserializeOwned + Default>(
     service: &Arc<Service>,
     tenant: &Tenant,
     request: Request,
     parts: &[&'static str],
-    what: &str,
+    (sent, what): (&str, &str),
 ) -> Result<Files<T>, ApiError> {
-    let (metered, request) = Metered::new(service, tenant, request, format!("{what} have"));
-    let body = form(request).await?;
-    let ((files, options), room) = metered.finish(read_parts(service, body, parts, what).await)?;
-    Ok(Files { files, options, room })
+    let header = check_form_header(service, &request, sent, service.config.max_rest_bytes)?;
+    let reading = async {
+        let (metered, request) = Metered::new(service, tenant, request, format!("{what} have"));
+        let body = form(request).await?;
+        metered.finish(read_parts(service, body, parts, what).await)
+    };
+    let ((files, options), room) = timeout(header.patience, reading).await.map_err(|_| too_slow())??;
+    Ok(Files { files, options, idempotency_key: header.idempotency_key, room })
 }
 
 /// The form in a request's body.

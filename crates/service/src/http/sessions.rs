@@ -1,14 +1,13 @@
 //! `/v1/sessions`: creating, listing, reading, completing and deleting sessions.
 
 use super::extract::{Body, Caller, Query, Requested, RequestedSession};
-use super::multipart::FormHeader;
+use super::multipart::{self, MATRIX};
+use super::openapi;
 use super::respond::JsonResult;
-use super::waiting::too_slow;
-use super::{multipart, openapi};
 use crate::auth::Tenant;
-use crate::jobs::{Job, Jobs, Work};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
+use crate::session::cage_source::UploadedFiles;
 use crate::session::create::NewSession;
 use axum::Json;
 use axum::extract::{Request, State};
@@ -17,7 +16,6 @@ use cager_proto::messages::{Complete, Rename, Session, SessionList, SessionState
 use http::{StatusCode, header};
 use serde::Deserialize;
 use std::sync::Arc;
-use tokio::time::timeout;
 
 pub(super) const PAGE: usize = 100;
 /// Most missing ranges per session in a list.
@@ -38,16 +36,25 @@ pub(crate) async fn create(
     Caller(tenant): Caller,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let limit = service.config.max_rest_bytes;
-    let FormHeader { idempotency_key, patience } =
-        multipart::check_form_header(&service, &request, "rest, cage and options", limit)?;
-    let parts = timeout(patience, multipart::read(&service, &tenant, request)).await.map_err(|_| too_slow())??;
-    let new = NewSession { uploaded: parts.uploaded, options: parts.options, idempotency_key, room: parts.room };
+    let new = read(&service, &tenant, request).await?;
     let session = service.create(&tenant, new).await?;
     // One that was made before may have to be read again. What cannot be read is told by its own address.
     let _ = session.ensure_loaded().await;
     let location = format!("/v1/sessions/{}", session.meta.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(session.view())).into_response())
+}
+
+/// Reads the form that makes a session.
+///
+/// # Errors
+/// Parts that are missing, twice there, unknown or too large; no room.
+pub(super) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Request) -> Result<NewSession, ApiError> {
+    let words = ("rest, cage and options", "rest pose and cage");
+    let mut form = multipart::read_files(service, tenant, request, &["rest", "cage", MATRIX], words).await?;
+    let rest = form.take("rest", "the rest pose")?;
+    let uploaded = UploadedFiles { rest, cage: form.files.remove("cage"), matrix: form.files.remove(MATRIX) };
+    let multipart::Files { options, idempotency_key, room, .. } = form;
+    Ok(NewSession { uploaded, options, idempotency_key, room })
 }
 
 /// Where a page begins.
@@ -59,15 +66,12 @@ pub(crate) struct PageQuery {
     pub(super) after: Option<String>,
 }
 
-impl PageQuery {
-    /// A page of a tenant's jobs, and where the next one begins.
-    pub(super) fn page<W: Work>(&self, jobs: &Jobs<W>, tenant: &Tenant) -> (Vec<Arc<Job<W>>>, Option<String>) {
-        let mut page = jobs.page(&tenant.name, self.after.as_deref(), PAGE + 1);
-        let more = page.len() > PAGE;
-        page.truncate(PAGE);
-        let next = page.last().filter(|_| more).map(|job| job.id().to_owned());
-        (page, next)
-    }
+/// A page of what was found, one more where there is one, and where the next page begins.
+pub(super) fn page_of<T>(mut found: Vec<T>, id: impl FnOnce(&T) -> String) -> (Vec<T>, Option<String>) {
+    let more = found.len() > PAGE;
+    found.truncate(PAGE);
+    let next = found.last().filter(|_| more).map(id);
+    (found, next)
 }
 
 /// Lists the tenant's sessions, newest first, a hundred at a time; of missing frames the first ranges.
@@ -77,9 +81,8 @@ pub(crate) async fn list(
     Caller(tenant): Caller,
     Query(query): Query<PageQuery>,
 ) -> JsonResult<SessionList> {
-    let mut page = service.registry.page(Some(&tenant.name), query.after.as_deref(), PAGE + 1);
-    let more = page.len() > PAGE;
-    page.truncate(PAGE);
+    let found = service.registry.page(Some(&tenant.name), query.after.as_deref(), PAGE + 1);
+    let (page, next) = page_of(found, |session| session.meta.id.clone());
     let mut sessions = Vec::with_capacity(page.len());
     for session in &page {
         let loaded = session.ensure_loaded().await;
@@ -95,7 +98,6 @@ pub(crate) async fn list(
         }
         sessions.push(view);
     }
-    let next = page.last().filter(|_| more).map(|session| session.meta.id.clone());
     Ok(Json(SessionList { sessions, next }))
 }
 

@@ -2,10 +2,8 @@
 
 use super::extract::{Caller, Query};
 use super::job_frames::OCTETS;
-use super::multipart::{self, FormHeader};
 use super::openapi;
 use super::spooled::{self, FormParts, SpooledForm};
-use super::waiting::too_slow;
 use crate::auth::Tenant;
 use crate::idempotency::{create_once, fingerprint_of_files};
 use crate::problem::{self, ApiError};
@@ -21,7 +19,6 @@ use http::request::Parts;
 use http::{StatusCode, header};
 use serde::Deserialize;
 use std::sync::Arc;
-use tokio::time::timeout;
 
 /// The tenant's shape space named in the path. Rejects with 404 if it does not exist or belongs to another tenant.
 pub(crate) struct RequestedSpace(Arc<KeptSpace>);
@@ -51,11 +48,8 @@ pub(crate) async fn create(
     Caller(tenant): Caller,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
-    let parts = "pose, two or more, or source, cage and options";
-    let FormHeader { idempotency_key, patience } = multipart::check_form_header(&service, &request, parts, limit)?;
-    let _place = service.stream(&tenant)?;
     let parts = FormParts {
+        sent: "pose, two or more, or source, cage and options",
         files: &["cage"],
         many: Some("pose"),
         what: "poses and cage are",
@@ -63,10 +57,9 @@ pub(crate) async fn create(
         cure: "send the poses as meshes",
         check: &check_options,
     };
-    let reading = spooled::read(&service, &tenant, request, &parts);
-    let form = timeout(patience, reading).await.map_err(|_| too_slow())??;
+    let form = spooled::read(&service, &tenant, request, &parts).await?;
     let (form, request) = blocking(move || {
-        let request = request_of(idempotency_key, &form);
+        let request = request_of(&form);
         (form, request)
     })
     .await?;
@@ -80,11 +73,11 @@ pub(crate) async fn create(
 }
 
 /// The request with an idempotency key that this form is. Blocks.
-fn request_of(key: Option<String>, form: &SpooledForm<ShapeSpaceOptions>) -> Option<Idempotency> {
+fn request_of(form: &SpooledForm<ShapeSpaceOptions>) -> Option<Idempotency> {
     let files = form.many.iter().map(|file| ("pose", file)).chain(form.files.iter().map(|(part, file)| (*part, file)));
     let files = files.map(|(part, file)| (part, &file.name[..], blake3::hash(&file.bytes)));
     let large = form.large.iter().map(|large| (large.part, &large.name[..], large.spool.digest()));
-    fingerprint_of_files(key, files.chain(large), &form.options)
+    fingerprint_of_files(form.idempotency_key.clone(), files.chain(large), &form.options)
 }
 
 async fn make(

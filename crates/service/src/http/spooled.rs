@@ -1,7 +1,8 @@
 //! Forms with one large part, which is written to disk as it arrives, beside files that are kept in memory.
 
-use super::multipart::{NAME_CHARACTERS, bad, broken, file_name, form, read_options};
+use super::multipart::{FormHeader, NAME_CHARACTERS, bad, broken, check_form_header, file_name, form, read_options};
 use super::paced::Paced;
+use super::waiting::too_slow;
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
@@ -15,6 +16,7 @@ use bytes::BytesMut;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use tokio::time::timeout;
 
 /// Bytes written to disk at a time; quota is reserved in the same steps.
 const SPOOL_CHUNK_BYTES: usize = 1 << 20;
@@ -39,10 +41,15 @@ pub(crate) struct SpooledForm<T> {
     pub(crate) room: Permit,
     /// Quota reserved for the large part.
     pub(crate) reserved: Reserved,
+    pub(crate) idempotency_key: Option<String>,
+    /// Among the tenant's streams, until the request is answered.
+    pub(crate) place: Permit,
 }
 
 /// The parts that such a form may have beside `options`.
 pub(super) struct FormParts<'a, T> {
+    /// All of them, in words.
+    pub(super) sent: &'a str,
     pub(super) files: &'a [&'static str],
     /// A part that may be there several times.
     pub(super) many: Option<&'static str>,
@@ -59,21 +66,28 @@ pub(super) struct FormParts<'a, T> {
 /// Reads all parts.
 ///
 /// # Errors
-/// Parts that are twice there, unknown or too large; no room; storage errors.
+/// Those of the form's headers; too many streams; parts that are twice there, unknown or too large; no room; a body that comes too slowly; storage errors.
 pub(super) async fn read<T: DeserializeOwned + Default>(
     service: &Arc<Service>,
     tenant: &Arc<Tenant>,
     request: Request,
     parts: &FormParts<'_, T>,
 ) -> Result<SpooledForm<T>, ApiError> {
-    let (pace, request) = Paced::new(request);
-    let body = form(request).await?;
-    let room = Permit::empty(&service.upload_memory, &tenant.name);
-    let reserved = service.reserve(tenant, 0)?;
-    let mut receiver = Receiver { service, tenant, pace: pace.clone(), taken: 0, room, reserved };
-    let read = receiver.read(body, parts).await;
-    let Parts { files, many, large, options } = pace.finish(read)?;
-    Ok(SpooledForm { files, many, large, options, room: receiver.room, reserved: receiver.reserved })
+    let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
+    let FormHeader { idempotency_key, patience } = check_form_header(service, &request, parts.sent, limit)?;
+    let place = service.stream(tenant)?;
+    let reading = async {
+        let (pace, request) = Paced::new(request);
+        let body = form(request).await?;
+        let room = Permit::empty(&service.upload_memory, &tenant.name);
+        let reserved = service.reserve(tenant, 0)?;
+        let mut receiver = Receiver { service, tenant, pace: pace.clone(), taken: 0, room, reserved };
+        let read = receiver.read(body, parts).await;
+        Ok::<_, ApiError>((pace.finish(read)?, receiver.room, receiver.reserved))
+    };
+    let (read, room, reserved) = timeout(patience, reading).await.map_err(|_| too_slow())??;
+    let Parts { files, many, large, options } = read;
+    Ok(SpooledForm { files, many, large, options, room, reserved, idempotency_key, place })
 }
 
 struct Receiver<'a> {

@@ -1,10 +1,11 @@
 //! Jobs found on disk, ended and deleted.
 
-use super::{Job, Outcome, Phase, Work, kind_of};
+use super::{Job, Outcome, Phase, Run, Work, kind_of};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{JobMeta as _, RecordMeta as _, Store, StoreError, Workshop};
+use crate::store::{JobMeta as _, RecordMeta as _, StoreError, Workshop};
 use crate::tasks::{blocking, to_the_end};
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
 
@@ -23,7 +24,7 @@ impl Service {
     ///
     /// # Errors
     /// Those of the catalogue.
-    pub(crate) fn resume_job<W: Work>(self: &Arc<Self>, meta: W::Meta) -> Result<(), StoreError> {
+    pub(crate) fn resume_job<W: Run>(self: &Arc<Self>, meta: W::Meta) -> Result<(), StoreError> {
         let (id, kind) = (meta.id().to_owned(), kind_of::<W>());
         let is_damaged = self.store.damage(kind, &id)?.is_some();
         let phase = match self.store.outcome(kind, &id) {
@@ -66,7 +67,6 @@ impl Service {
 
     /// Keeps how work on a job ended. Whether the job is over.
     pub(crate) async fn end_job<W: Work>(&self, job: &Arc<Job<W>>, ended: Ended<W::Finished>) -> bool {
-        let (id, kind) = (job.id().to_owned(), kind_of::<W>());
         let (outcome, workshop) = match ended {
             Ended::Paused => return false,
             Ended::Completed(finished, workshop) => (Outcome::Completed(finished), Some(workshop)),
@@ -80,28 +80,23 @@ impl Service {
                 return true;
             }
         };
-        let write = move |store: &Store, outcome: &Outcome<W::Finished>| {
-            let results = match (outcome, &workshop) {
-                (Outcome::Completed(finished), Some(workshop)) => Some((workshop, W::files(finished))),
-                _ => None,
-            };
-            store.finish_job(kind, &id, outcome, results)?;
-            W::forget_input(store, &id);
-            Ok(())
-        };
-        self.finish_job(job, outcome, write).await;
+        self.finish_job(job, outcome, workshop).await;
         true
     }
 
-    /// Stores the outcome of a job by `write`, then notifies its followers.
-    pub(crate) async fn finish_job<W: Work>(
-        &self,
-        job: &Arc<Job<W>>,
-        outcome: Outcome<W::Finished>,
-        write: impl FnOnce(&Store, &Outcome<W::Finished>) -> Result<(), StoreError> + Send + 'static,
-    ) {
+    /// Stores the outcome of a job with the results in a workshop, then notifies its followers.
+    async fn finish_job<W: Work>(&self, job: &Arc<Job<W>>, outcome: Outcome<W::Finished>, workshop: Option<Workshop>) {
         let (store, id, kept) = (self.store.clone(), job.id().to_owned(), outcome.clone());
-        let stored = blocking(move || write(&store, &kept).map(|()| store.bytes(kind_of::<W>(), &id).ok()));
+        let stored = blocking(move || {
+            let files = match &kept {
+                Outcome::Completed(finished) => W::files(finished),
+                Outcome::Failed(_) => Cow::default(),
+            };
+            let results = workshop.as_ref().map(|workshop| (workshop, &files[..]));
+            store.finish_job(kind_of::<W>(), &id, &kept, results)?;
+            W::forget_input(&store, &id);
+            Ok::<_, StoreError>(store.bytes(kind_of::<W>(), &id).ok())
+        });
         let stored = stored.await;
         let mut changes = job.changes();
         // One that cannot be deleted is over all the same.
@@ -138,7 +133,7 @@ impl Service {
     ///
     /// # Errors
     /// Storage errors.
-    pub(crate) async fn delete_job<W: Work>(self: &Arc<Self>, job: &Arc<Job<W>>) -> Result<(), ApiError> {
+    pub(crate) async fn delete_job<W: Run>(self: &Arc<Self>, job: &Arc<Job<W>>) -> Result<(), ApiError> {
         let (service, job) = (Arc::clone(self), Arc::clone(job));
         to_the_end(async move {
             let (store, id, kind) = (service.store.clone(), job.id().to_owned(), kind_of::<W>());

@@ -1,31 +1,30 @@
 //! Long jobs, whatever they do: created durably, worked on in the background, followed, completed or failed once, kept over restarts, deleted.
-//! What the work is lies with each kind of job ([`Work`]); nothing here knows HTTP.
+//! What a kind of job is and what is known of one lies with it ([`Work`]), as how the service works on it ([`Run`]); nothing here knows HTTP.
 
 mod create;
 mod life;
 mod registry;
 mod results;
+mod run;
 
-pub(crate) use create::new_job;
+pub(crate) use create::{Checked, new_job};
 pub(crate) use life::Ended;
 pub(crate) use registry::Jobs;
 pub(crate) use results::{Frames, Piece, ResultsError, Stoppable};
+pub(crate) use run::{MAX_ATTEMPTS, Run};
 
 use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
-use crate::service::Service;
 use crate::store::{JobMeta, Kind, RecordMeta as _, Store, StoreError, StoredPart};
 use crate::sync::lock;
 use cager_proto::messages::Problem;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard};
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
-
-/// Number of attempts after which a job is given up, since it may be what crashes the process.
-pub(crate) const MAX_ATTEMPTS: u32 = 5;
 
 /// A kind of job.
 pub(crate) trait Work: Send + Sync + Sized + 'static {
@@ -50,8 +49,6 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
     /// The reason that is counted where too many wait.
     const QUEUE: &'static str;
 
-    fn jobs(service: &Service) -> &Jobs<Self>;
-
     /// How many of a tenant's may wait for their turn.
     fn most_waiting(config: &ServeConfig) -> usize;
 
@@ -61,9 +58,7 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
     }
 
     /// Files of the results.
-    fn files(_finished: &Self::Finished) -> &[StoredPart] {
-        &[]
-    }
+    fn files(finished: &Self::Finished) -> Cow<'_, [StoredPart]>;
 
     /// Reads what is on disk of a job that is not over. Blocks.
     ///
@@ -72,9 +67,6 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
     fn load(_store: &Store, _job: &Job<Self>) -> Result<(), StoreError> {
         Ok(())
     }
-
-    /// Works on a job to its end, in the background.
-    fn begin(service: Arc<Service>, job: Arc<Job<Self>>);
 
     /// Removes what a job that is over needs no longer, best effort.
     fn forget_input(store: &Store, id: &str);

@@ -3,11 +3,9 @@
 use super::{Job, Work};
 use crate::idempotency::{Keyed, KnownKeys};
 use crate::problem::{self, ApiError};
-use crate::service::Service;
 use crate::store::JobMeta as _;
 use crate::sync::lock;
 use std::collections::BTreeMap;
-use std::marker::PhantomData;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
@@ -25,16 +23,15 @@ struct Inner<W: Work> {
 
 /// A place among a tenant's jobs that wait, for one that is being stored; free again when it is dropped.
 pub(crate) struct Place<W: Work> {
-    service: Arc<Service>,
+    jobs: Arc<Jobs<W>>,
     /// None once the job is there.
     tenant: Option<String>,
-    kind: PhantomData<W>,
 }
 
 impl<W: Work> Drop for Place<W> {
     fn drop(&mut self) {
         if let Some(tenant) = self.tenant.take() {
-            lock(&W::jobs(&self.service).inner).came(&tenant);
+            lock(&self.jobs.inner).came(&tenant);
         }
     }
 }
@@ -76,7 +73,7 @@ impl<W: Work> Jobs<W> {
     }
 
     /// A place among a tenant's jobs that wait, of which there are so many; none where they are taken.
-    pub(super) fn place(&self, service: Arc<Service>, tenant: &str, most: usize) -> Option<Place<W>> {
+    pub(super) fn place(self: &Arc<Self>, tenant: &str, most: usize) -> Option<Place<W>> {
         let mut inner = lock(&self.inner);
         let mine = inner.jobs.values().filter(|job| job.meta.tenant() == tenant);
         let waiting = mine.filter(|job| W::waits(&job.status())).count();
@@ -84,7 +81,7 @@ impl<W: Work> Jobs<W> {
             return None;
         }
         inner.coming.push(tenant.to_owned());
-        Some(Place { service, tenant: Some(tenant.to_owned()), kind: PhantomData })
+        Some(Place { jobs: Arc::clone(self), tenant: Some(tenant.to_owned()) })
     }
 
     pub(crate) fn remove(&self, id: &str) {

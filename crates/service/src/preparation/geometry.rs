@@ -110,7 +110,11 @@ pub(crate) fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, A
     read_part_with_units(part, name, bytes).map(|(model, _)| model)
 }
 
-fn read_part_with_units(part: &str, name: &str, bytes: &[u8]) -> Result<(Model, Units), ApiError> {
+/// As [`read_part`], with what the file says of its positions.
+///
+/// # Errors
+/// As [`read_part`].
+pub(crate) fn read_part_with_units(part: &str, name: &str, bytes: &[u8]) -> Result<(Model, Units), ApiError> {
     let path = Path::new(name);
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
     read_model_bytes_with_units(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))

@@ -11,7 +11,7 @@ pub(crate) use cage_maker::{
     CAGE_NAME, CageMaker, Enclosed, VERTICES, check_extent, obj_of, refuse_cage, vertices_detail,
 };
 pub(crate) use checks::{cannot_be_coded, check, check_model};
-pub(crate) use geometry::{Geometry, cage_of, read, read_cage, read_part};
+pub(crate) use geometry::{Geometry, cage_of, read, read_cage, read_part, read_part_with_units};
 pub(crate) use solvers::{KeptSolvers, SolverRequest, SolverResponse, Solvers, kept_solvers};
 pub(crate) use valid_options::{ValidOptions, check_told, content_key, goal};
 

@@ -5,12 +5,11 @@ use super::{Recovery, RecoveryJob};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::idempotency::{extension, fingerprint};
-use crate::jobs::new_job;
+use crate::jobs::{Checked, new_job};
 use crate::preparation::{cage_of, check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Idempotency, NamedFile, RecoveryMeta, RecoveryParts, StoredPart};
-use crate::tasks::blocking;
+use crate::store::{Idempotency, JobMeta as _, NamedFile, RecoveryMeta, RecoveryParts, Store, StoredPart};
 use cager_capture::origin::own_origin;
 use cager_core::cage::Cage;
 use cager_geometry::mesh::Point;
@@ -28,12 +27,6 @@ pub(crate) struct NewRecovery {
     pub(crate) room: Permit,
 }
 
-/// Results of validating the input.
-struct Checked {
-    points: u32,
-    origin: Option<Point>,
-}
-
 impl Service {
     /// Creates a recovery, durably. Its files are looked at only as long as the client waits.
     ///
@@ -44,41 +37,27 @@ impl Service {
         tenant: &Arc<Tenant>,
         new: NewRecovery,
     ) -> Result<Arc<RecoveryJob>, ApiError> {
-        let (new, request) = blocking(move || {
-            let request = request_of(&new);
-            (new, request)
-        })
-        .await?;
-        let check = move || check(&new).map(|checked| (new, checked));
-        let make = async |service: Arc<Self>, tenant: Arc<Tenant>, (new, checked), request| {
-            service.create_new_recovery(&tenant, new, checked, request).await
-        };
         // Fingerprints of recoveries have been the same in all versions.
-        self.create_job::<Recovery, _, _>(tenant, request, |_| false, check, make).await
+        self.create_job(tenant, new, request_of, |_| false, checked).await
     }
+}
 
-    async fn create_new_recovery(
-        self: &Arc<Self>,
-        tenant: &Tenant,
-        new: NewRecovery,
-        checked: Checked,
-        idempotency: Option<Idempotency>,
-    ) -> Result<Arc<RecoveryJob>, ApiError> {
-        let place = self.job_place(&tenant.name)?;
-        let NewRecovery { parts, options, room, .. } = new;
-        let bytes = parts.named().map(|(_, part)| part.bytes.len() as u64).sum();
-        let _reserved = self.reserve(tenant, bytes)?;
-        let (store, tenant) = (self.store.clone(), tenant.name.clone());
-        let meta = blocking(move || {
-            let _room = room;
-            let Ok(stored) = parts.map(|_, part| Ok::<_, Infallible>(StoredPart::of(&part.name, &part.bytes)));
-            let (id, created_ms) = new_job();
-            let Checked { points, origin } = checked;
-            let meta = RecoveryMeta { id, tenant, created_ms, options, points, origin, parts: stored, idempotency };
-            store.create_recovery(&meta, &parts).map(|()| meta)
-        });
-        Ok(self.begin_job(place, meta.await??, bytes))
-    }
+/// A recovery whose input can be used. Blocks.
+fn checked(
+    _: &Service,
+    tenant: &Tenant,
+    new: NewRecovery,
+    idempotency: Option<Idempotency>,
+) -> Result<Checked<Recovery>, ApiError> {
+    let (points, origin) = check(&new)?;
+    let NewRecovery { parts: files, options, room, .. } = new;
+    let Ok(parts) = files.map(|_, part| Ok::<_, Infallible>(StoredPart::of(&part.name, &part.bytes)));
+    let (id, created_ms) = new_job();
+    let tenant = tenant.name.clone();
+    let meta = RecoveryMeta { id, tenant, created_ms, options, points, origin, parts, idempotency };
+    let unreserved = meta.sent_bytes();
+    let store = Box::new(move |store: &Store, meta: &RecoveryMeta| store.create_recovery(meta, &files));
+    Ok(Checked { meta, store, room, reserved: None, unreserved })
 }
 
 /// The request with an idempotency key that this input is. Blocks.
@@ -88,8 +67,8 @@ fn request_of(new: &NewRecovery) -> Option<Idempotency> {
     fingerprint(new.idempotency_key.clone(), sent, &new.options)
 }
 
-/// Validates options and files, so that errors are reported in the response. Blocks.
-fn check(new: &NewRecovery) -> Result<Checked, ApiError> {
+/// Validates options and files, so that errors are reported in the response; the template's number of points, and its origin. Blocks.
+fn check(new: &NewRecovery) -> Result<(u32, Option<Point>), ApiError> {
     let refuse = |detail: String| Err(ApiError::new(problem::INVALID_GEOMETRY, detail));
     let RecoveryParts { template: file, cage, rig, manifold } = &new.parts;
     ValidOptions::of(&new.options, rig.is_some())?;
@@ -128,5 +107,5 @@ fn check(new: &NewRecovery) -> Result<Checked, ApiError> {
     if let Some(cage) = cage {
         cage_of(cage, origin)?;
     }
-    Ok(Checked { points: template.points.len() as u32, origin })
+    Ok((template.points.len() as u32, origin))
 }

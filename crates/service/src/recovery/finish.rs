@@ -11,6 +11,7 @@ use cager_capture::encode::Encoded;
 use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{Error, Target, Units};
 use cager_motion::recover::{Encoding, JOINTS_RATE, RecoverError, Recovered};
+use cager_proto::report::json_file;
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 
@@ -18,7 +19,7 @@ use std::io::{self, BufWriter, Write as _};
 pub(super) fn results(
     job: &RecoveryJob,
     recovered: Recovered,
-    (system, goal): (&'static dyn CoordinateSystem, Option<Goal>),
+    (system, goal, units): (&'static dyn CoordinateSystem, Option<Goal>, Units),
     pool: &rayon::ThreadPool,
     workshop: &Workshop,
     source: &StoredSurfaces,
@@ -32,7 +33,7 @@ pub(super) fn results(
         goal,
         offsets: options.offsets,
         origin: job.meta.origin,
-        units: Units::UNKNOWN,
+        units,
         exact_rest: options.exact_rest,
     };
     let stopped = || source.is_stopped();
@@ -47,7 +48,7 @@ pub(super) fn results(
         files.push(StoredPart::of(name, bytes));
         workshop.write(name, bytes)
     };
-    write("report.json", &report.json()?)?;
+    write("report.json", &json_file(&report)?)?;
     if let Some(joints) = joints {
         write("joints.csv", joints.csv(&numbers).as_bytes())?;
         write("joints.bvh", &joints.bvh(options.frame_rate.unwrap_or(JOINTS_RATE)))?;

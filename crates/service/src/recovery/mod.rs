@@ -13,11 +13,11 @@ mod view;
 pub(crate) use create::NewRecovery;
 
 use crate::config::ServeConfig;
-use crate::jobs::{Job, Jobs, Phase, Status, Work};
+use crate::jobs::{Job, Phase, Status, Work};
 use crate::problem::{self, ApiError};
-use crate::service::Service;
 use crate::store::{RecoveryMeta, Store, StoreError, StoredPart};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -42,10 +42,6 @@ impl Work for Recovery {
         "there are joints where a rig and a manifold were sent; make the recovery anew with them";
     const QUEUE: &'static str = "recovery_queue";
 
-    fn jobs(service: &Service) -> &Jobs<Self> {
-        &service.recoveries
-    }
-
     fn most_waiting(config: &ServeConfig) -> usize {
         config.max_recovery_queue
     }
@@ -54,8 +50,8 @@ impl Work for Recovery {
         !status.phase.is_final() && status.progress.has_work()
     }
 
-    fn files(finished: &Finished) -> &[StoredPart] {
-        &finished.files
+    fn files(finished: &Finished) -> Cow<'_, [StoredPart]> {
+        (&finished.files).into()
     }
 
     fn load(store: &Store, job: &RecoveryJob) -> Result<(), StoreError> {
@@ -69,10 +65,6 @@ impl Work for Recovery {
             progress.count();
         });
         Ok(())
-    }
-
-    fn begin(service: Arc<Service>, job: Arc<RecoveryJob>) {
-        tokio::spawn(service.run_recovery(job));
     }
 
     fn forget_input(store: &Store, id: &str) {

@@ -3,10 +3,10 @@
 use super::finish::{refused, results};
 use super::source::StoredSurfaces;
 use super::valid_options::ValidOptions;
-use super::{Finished, FollowedCage, RecoveryJob};
+use super::{Finished, FollowedCage, Recovery, RecoveryJob};
 use crate::admission::Permit;
-use crate::jobs::{Ended, MAX_ATTEMPTS, Phase};
-use crate::preparation::{cage_of, read_part};
+use crate::jobs::{Ended, Jobs, MAX_ATTEMPTS, Phase, Run};
+use crate::preparation::{cage_of, read_part_with_units};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{RecoveryParts, StoreError, Workshop};
@@ -16,18 +16,28 @@ use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_motion::recover::{
-    FirstLook, Person, RecoverError, RecoverJob, RecoverProgress, cage_around, manifold_of, recover, rig_of,
+    FirstLook, Person, RecoverError, RecoverJob, RecoverProgress, cage_around, manifold_of, placed_units, recover,
+    rig_of,
 };
 use std::sync::Arc;
 
+impl Run for Recovery {
+    fn jobs(service: &Service) -> &Arc<Jobs<Self>> {
+        &service.recoveries
+    }
+
+    fn begin(service: Arc<Service>, job: Arc<RecoveryJob>) {
+        tokio::spawn(service.run_recovery(job));
+    }
+}
+
 impl Service {
     /// Follows frames whenever there are any, to the end.
-    pub(super) async fn run_recovery(self: Arc<Self>, job: Arc<RecoveryJob>) {
+    async fn run_recovery(self: Arc<Self>, job: Arc<RecoveryJob>) {
         let mut changes = job.changes();
         loop {
             changes.mark_unchanged();
-            let is_over = job.deleted().is_cancelled() || self.stopping().is_cancelled();
-            if is_over || job.status().phase.is_final() {
+            if self.is_stopped(&job) || job.status().phase.is_final() {
                 return;
             }
             // Where it could not be deleted it goes on.
@@ -82,7 +92,7 @@ impl Service {
         let ValidOptions { recover: options, person, goal } =
             ValidOptions::of(&meta.options, meta.parts.rig.is_some())?;
         let RecoveryParts { template, cage, rig, manifold } = self.store.recovery_parts(meta).map_err(damaged)?;
-        let mut model = read_part("template", &template.name, &template.bytes)?;
+        let (mut model, said) = read_part_with_units("template", &template.name, &template.bytes)?;
         move_to(meta.origin, &mut model.points);
         let unusable = |detail: String| ApiError::new(problem::INVALID_GEOMETRY, detail);
         let known = match rig.zip(manifold) {
@@ -122,7 +132,8 @@ impl Service {
             Err(RecoverError::Stopped) => return Ok(None),
             Err(error) => return Err(refused(&error)),
         };
-        let encoded = results(job, recovered, (system, goal), pool, &workshop, source);
+        let units = placed_units(said, options.up, [options.align, options.scale]);
+        let encoded = results(job, recovered, (system, goal, units), pool, &workshop, source);
         encoded.map(|finished| Some((finished, workshop))).map_err(|error| ApiError::from(&error))
     }
 }

@@ -10,7 +10,7 @@ use crate::service::Service;
 use crate::store::{Completion, SessionMeta, StoreError, StoredPart};
 use crate::tasks::{blocking, to_the_end};
 use crate::telemetry::traces::TraceSpan;
-use crate::webhooks::{Event, PendingMessage, Webhooks};
+use crate::webhooks::{Event, PendingMessage};
 use cager_capture::coding::{CodingError, Goal};
 use cager_core::cage::Cage;
 use cager_proto::messages::{Complete, SessionOptions};
@@ -92,7 +92,7 @@ impl Service {
         blocking(move || cleaned.remove_uncoded(frames)).await?;
         session.forget_coder();
         if let Some(due) = due {
-            self.webhooks.send(session, due);
+            session.announce(due);
         }
         Ok(())
     }
@@ -103,9 +103,8 @@ impl Service {
     async fn write_completely(self: &Arc<Self>, session: &Arc<Session>, frames: u32) -> Result<Written, ApiError> {
         self.code_rest(session, frames).await?;
         let prepared = self.solver(session).await?;
-        let (writing, webhooks) = (Arc::clone(session), Arc::clone(&self.webhooks));
-        let writers = Arc::clone(&self.container_writers);
-        blocking(move || writers.install(|| write(&writing, &prepared, frames, &webhooks))).await?
+        let (writing, writers) = (Arc::clone(session), Arc::clone(&self.container_writers));
+        blocking(move || writers.install(|| write(&writing, &prepared, frames))).await?
     }
 }
 
@@ -191,7 +190,7 @@ impl Session {
                 let frames = completion.frames;
                 self.completed(completion);
                 self.remove_uncoded(frames);
-                self.webhooks.resend_undelivered(self);
+                self.resend_undelivered();
                 self.completion_unknown.store(false, Release);
             }
             None => {
@@ -285,7 +284,7 @@ struct Written {
     due: Option<PendingMessage>,
 }
 
-fn write(session: &Session, prepared: &Prepared, frames: u32, webhooks: &Webhooks) -> Result<Written, ApiError> {
+fn write(session: &Session, prepared: &Prepared, frames: u32) -> Result<Written, ApiError> {
     let stored = |error: StoreError| session.storage_error(error);
     let geometry = session.geometry()?;
     let mut write = |out: &mut dyn Write| -> io::Result<()> {
@@ -306,7 +305,7 @@ fn write(session: &Session, prepared: &Prepared, frames: u32, webhooks: &Webhook
         return Err(cannot_be_coded(Goal::Size(asked), &CodingError::TooSmall { asked, least: written.bytes }));
     }
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
-    let due = webhooks.store_pending(session, Event::Completed).map_err(stored)?;
+    let due = session.webhooks.store_pending(&session.meta, Event::Completed).map_err(stored)?;
     session.mark(&completion).map_err(stored)?;
     Ok(Written { completion, due })
 }

@@ -222,8 +222,7 @@ impl Service {
                 }
                 let phase = mark.phase(&mut session.frames());
                 session.set_status(Status { phase, facts: Some(facts) });
-                let webhooks = Arc::clone(&self.webhooks);
-                let _ = blocking(move || webhooks.resend_undelivered(&session)).await;
+                let _ = blocking(move || session.resend_undelivered()).await;
             }
             Err(error) => {
                 let error = session.explain_missing_content(error);
@@ -232,13 +231,13 @@ impl Service {
                 if error.status() == StatusCode::UNPROCESSABLE_ENTITY {
                     self.keep_outcome(&session, Outcome::Failed(error.problem.clone())).await;
                 }
-                let (webhooks, ended) = (Arc::clone(&self.webhooks), Arc::clone(&session));
-                let due = blocking(move || webhooks.store_pending(&ended, Event::Failed)).await;
+                let ended = Arc::clone(&session);
+                let due = blocking(move || ended.webhooks.store_pending(&ended.meta, Event::Failed)).await;
                 session.set_phase(Phase::Failed(error.problem));
                 match due {
                     Ok(Ok(None)) => {}
-                    Ok(Ok(Some(due))) => self.webhooks.send(&session, due),
-                    Ok(Err(_)) | Err(_) => self.webhooks.send_unrecorded(&session),
+                    Ok(Ok(Some(due))) => session.announce(due),
+                    Ok(Err(_)) | Err(_) => session.announce_unrecorded_failure(),
                 }
             }
         }

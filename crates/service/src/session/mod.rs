@@ -1,5 +1,6 @@
 //! Sessions, independent of HTTP: a rest pose with its cage that is being prepared, ready for frames, completed or failed.
 
+mod announce;
 pub(crate) mod cage_source;
 pub(crate) mod commit;
 pub(crate) mod complete;
@@ -319,7 +320,7 @@ impl Session {
         if let Err(error) = self.store.mark_damaged(Kind::Session, &self.meta.id, what) {
             tracing::error!(session = %self.meta.id, %error, "the damage could not be noted");
         }
-        self.webhooks.send_unrecorded(self);
+        self.announce_unrecorded_failure();
         error
     }
 

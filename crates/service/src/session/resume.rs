@@ -169,7 +169,7 @@ impl Service {
         }
         self.registry.insert(Arc::clone(&session));
         self.code_in_background(&session);
-        self.webhooks.resend_undelivered(&session);
+        session.resend_undelivered();
     }
 
     fn found(&self, meta: SessionMeta, status: Status, bytes: SessionBytes) -> Arc<Session> {

@@ -5,7 +5,7 @@ use super::registry::Reserved;
 use crate::audit::Change;
 use crate::auth::Tenant;
 use crate::cage_job::CageDesign;
-use crate::jobs::{Jobs, Work};
+use crate::jobs::{Jobs, Run, Work};
 use crate::problem::{self, ApiError};
 use crate::recovery::Recovery;
 use crate::service::Service;
@@ -148,7 +148,7 @@ impl Service {
     }
 
     /// Deletes the jobs of a kind that have expired.
-    async fn delete_jobs<W: Work>(self: &Arc<Self>, expired: &(dyn Fn(&str, u64) -> bool + Sync)) {
+    async fn delete_jobs<W: Run>(self: &Arc<Self>, expired: &(dyn Fn(&str, u64) -> bool + Sync)) {
         for job in W::jobs(self).all() {
             if expired(job.meta.tenant(), job.meta.created_ms()) {
                 tracing::info!(job = job.id(), "deleted, because its time is over");

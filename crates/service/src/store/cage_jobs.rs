@@ -36,7 +36,8 @@ job_meta!(CageJobMeta, Kind::CageJob, |meta| meta.rest.bytes + meta.frames.bytes
 
 const REST: &str = "rest";
 const FRAMES: &str = "frames";
-const CAGE: &str = "cage.obj";
+/// The file of the result.
+pub const CAGE: &str = "cage.obj";
 /// Upper bound of a cage's size, in bytes.
 const CAGE_BYTES: u64 = 64 << 20;
 
@@ -72,20 +73,6 @@ impl Store {
     /// [`StoreError::Damaged`] where the length differs.
     pub fn cage_job_frames(&self, meta: &CageJobMeta) -> Result<StoredFile, StoreError> {
         self.open_job_part(Kind::CageJob, &meta.id, FRAMES, &meta.frames)
-    }
-
-    /// Stores the outcome of a job and its cage, if any, and removes its input; durable on `Ok`.
-    ///
-    /// # Errors
-    /// Not found where the job was deleted.
-    pub fn finish_cage_job<T: Serialize>(&self, id: &str, outcome: &T, cage: Option<&[u8]>) -> Result<(), StoreError> {
-        let (files, folder) = (self.files(), self.folder(Kind::CageJob, id)?);
-        if let Some(cage) = cage {
-            files.replace(&folder.join(CAGE), cage)?;
-        }
-        self.set_outcome(Kind::CageJob, id, outcome)?;
-        self.forget_cage_job_input(id);
-        Ok(())
     }
 
     /// The cage of a completed job, an OBJ file of this length and digest.

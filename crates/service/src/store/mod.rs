@@ -65,7 +65,7 @@ mod workshop;
 #[cfg(test)]
 mod tests;
 
-pub use cage_jobs::CageJobMeta;
+pub use cage_jobs::{CAGE, CageJobMeta};
 pub use cager_store::{CagePlace, FrameEntry, Kind, NewFrame};
 pub use content::{Content, NamedFile, StoredPart};
 pub use disk::{Disk, LocalDisk};

@@ -6,17 +6,15 @@ use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::cage_job::samples;
 use crate::idempotency::fingerprint_of_files;
-use crate::jobs::new_job;
+use crate::jobs::{Checked, new_job};
 use crate::preparation::{cage_of, check_extent, read_part};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::registry::Reserved;
-use crate::store::{Idempotency, NamedFile, PAIRS, SOURCE, SOURCE_FRAMES, Spool, StoredPart, TransferMeta};
-use crate::tasks::blocking;
+use crate::store::{Idempotency, NamedFile, PAIRS, SOURCE, SOURCE_FRAMES, Spool, Store, StoredPart, TransferMeta};
 use cager_capture::origin::own_origin;
 use cager_core::inversion::reject_far_points;
 use cager_explore::transfer::VertexPair;
-use cager_geometry::mesh::Point;
 use cager_motion::transfer::{MethodChoice, TransferFailed, read_pairs};
 use cager_proto::container::ContainerReader;
 use cager_proto::transfer_messages::TransferOptions;
@@ -43,15 +41,6 @@ pub(crate) struct NewTransfer {
     pub(crate) reserved: Reserved,
 }
 
-/// A request whose input can be used.
-struct Checked {
-    new: NewTransfer,
-    large: (&'static str, String, Spool),
-    points: u32,
-    frames: u32,
-    origin: Option<Point>,
-}
-
 impl Service {
     /// Creates a transfer, durably, and queues it.
     ///
@@ -62,51 +51,12 @@ impl Service {
         tenant: &Arc<Tenant>,
         new: NewTransfer,
     ) -> Result<Arc<TransferJob>, ApiError> {
-        let (new, request) = blocking(move || {
-            let request = request_of(&new);
-            (new, request)
-        })
-        .await?;
         // A request that is repeated may name a session that is gone by now.
         let session = match new.options.source_session.clone() {
             Some(id) => Some(self.completed_container(&tenant.name, &id).await),
             None => None,
         };
-        let (service, owner) = (Arc::clone(self), Arc::clone(tenant));
-        let check = move || check(&service, &owner, new, session);
-        let make = async |service: Arc<Self>, tenant: Arc<Tenant>, checked, request| {
-            service.create_new_transfer(&tenant, checked, request).await
-        };
-        self.create_job::<Transfer, _, _>(tenant, request, |_| false, check, make).await
-    }
-
-    async fn create_new_transfer(
-        self: &Arc<Self>,
-        tenant: &Tenant,
-        checked: Checked,
-        idempotency: Option<Idempotency>,
-    ) -> Result<Arc<TransferJob>, ApiError> {
-        let place = self.job_place(&tenant.name)?;
-        let Checked { new, large: (part, file, spool), points, frames, origin } = checked;
-        let NewTransfer { files, options, room, mut reserved, .. } = new;
-        self.reserve_more(tenant, &mut reserved, files.values().map(|file| file.bytes.len() as u64).sum())?;
-        let (store, tenant) = (self.store.clone(), tenant.name.clone());
-        let meta = blocking(move || {
-            let _room = room;
-            let described =
-                |(name, file): (&&str, &NamedFile)| (String::from(*name), StoredPart::of(&file.name, &file.bytes));
-            let mut parts: BTreeMap<String, StoredPart> = files.iter().map(described).collect();
-            let blake3 = spool.digest().to_hex().to_string();
-            parts.insert(part.to_owned(), StoredPart { name: file, bytes: spool.bytes(), blake3 });
-            let (id, created_ms) = new_job();
-            let meta = TransferMeta { id, tenant, created_ms, options, points, frames, origin, parts, idempotency };
-            store.create_transfer(&meta, &files, (part, spool)).map(|()| meta)
-        });
-        let meta = meta.await??;
-        let bytes = meta.parts.values().map(|part| part.bytes).sum();
-        let job = self.begin_job(place, meta, bytes);
-        drop(reserved);
-        Ok(job)
+        self.create_job(tenant, (new, session), |(new, _)| request_of(new), |_| false, check).await
     }
 }
 
@@ -121,13 +71,16 @@ fn geometry(detail: String) -> ApiError {
     ApiError::new(problem::INVALID_GEOMETRY, detail)
 }
 
+/// The container of a session that was asked for.
+type Session = Option<Result<PathBuf, ApiError>>;
+
 /// Validates options and files, so that errors are reported in the response, and takes a session's container over. Blocks.
 fn check(
     service: &Service,
     tenant: &Tenant,
-    mut new: NewTransfer,
-    session: Option<Result<PathBuf, ApiError>>,
-) -> Result<Checked, ApiError> {
+    (mut new, session): (NewTransfer, Session),
+    idempotency: Option<Idempotency>,
+) -> Result<Checked<Transfer>, ApiError> {
     let bad = |detail: &str| Err(ApiError::new(problem::BAD_REQUEST, detail));
     let large = match (new.large.take(), session) {
         (Some(_), Some(session)) => {
@@ -166,8 +119,18 @@ fn check(
     if let Some(cage) = cage {
         cage_of(cage, origin.filter(|_| !is_fitted))?;
     }
-    let points = target.points.len() as u32;
-    Ok(Checked { new, large, points, frames, origin })
+    let NewTransfer { files, options, room, reserved, .. } = new;
+    let described = |(name, file): (&&str, &NamedFile)| (String::from(*name), StoredPart::of(&file.name, &file.bytes));
+    let mut parts: BTreeMap<String, StoredPart> = files.iter().map(described).collect();
+    let (part, name, spool) = large;
+    let blake3 = spool.digest().to_hex().to_string();
+    parts.insert(part.to_owned(), StoredPart { name, bytes: spool.bytes(), blake3 });
+    let (id, created_ms) = new_job();
+    let (tenant, points) = (tenant.name.clone(), target.points.len() as u32);
+    let meta = TransferMeta { id, tenant, created_ms, options, points, frames, origin, parts, idempotency };
+    let unreserved = files.values().map(|file| file.bytes.len() as u64).sum();
+    let store = Box::new(move |store: &Store, meta: &TransferMeta| store.create_transfer(meta, &files, (part, spool)));
+    Ok(Checked { meta, store, room, reserved: Some(reserved), unreserved })
 }
 
 /// Refuses a motion whose positions on their way would fill the disk: four numbers of them at the most are kept, in double precision. Later it is too late, and

@@ -12,12 +12,12 @@ pub(crate) use valid_options::check_options;
 pub(crate) use view::TransferFrames;
 
 use crate::config::ServeConfig;
-use crate::jobs::{Job, Jobs, Phase, Work};
+use crate::jobs::{Job, Phase, Work};
 use crate::problem;
-use crate::service::Service;
 use crate::store::{Store, StoredPart, TransferMeta};
 use cager_proto::transfer_messages::TransferStage;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::fs::File;
 use std::sync::Arc;
 
@@ -40,20 +40,12 @@ impl Work for Transfer {
         "results are written when the transfer is completed; wait until its state is completed";
     const QUEUE: &'static str = "transfer_queue";
 
-    fn jobs(service: &Service) -> &Jobs<Self> {
-        &service.transfers
-    }
-
     fn most_waiting(config: &ServeConfig) -> usize {
         config.max_transfer_queue
     }
 
-    fn files(finished: &Finished) -> &[StoredPart] {
-        &finished.files
-    }
-
-    fn begin(service: Arc<Service>, job: Arc<TransferJob>) {
-        tokio::spawn(service.run_transfer(job));
+    fn files(finished: &Finished) -> Cow<'_, [StoredPart]> {
+        (&finished.files).into()
     }
 
     fn forget_input(store: &Store, id: &str) {

@@ -1,15 +1,13 @@
 //! Moving motions: a limited number of transfers at a time, tenants in turn, on the threads of the lowest priority.
 
 use super::valid_options::{ValidOptions, design_of};
-use super::{Finished, TransferJob, pairs_of};
-use crate::admission::Permit;
+use super::{Finished, Transfer, TransferJob, pairs_of};
 use crate::cage_job::samples;
-use crate::jobs::{Ended, MAX_ATTEMPTS, Phase, ResultsError, Stoppable};
-use crate::preparation::{cage_of, read_part};
+use crate::jobs::{Ended, Jobs, MAX_ATTEMPTS, ResultsError, Run, Stoppable};
+use crate::preparation::{cage_of, read_part, read_part_with_units};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
-use crate::store::{Kind, PAIRS, SOURCE, SOURCE_FRAMES, StoreError, TransferMeta, Workshop};
-use crate::tasks::blocking;
+use crate::store::{PAIRS, SOURCE, SOURCE_FRAMES, StoreError, TransferMeta, Workshop};
 use cager_cages::{DesignError, Progress as DesignProgress};
 use cager_capture::decode::DecodeError;
 use cager_capture::design::FRAMES;
@@ -23,54 +21,37 @@ use cager_formats::{FrameReader, Target, Units};
 use cager_geometry::mesh::Model;
 use cager_motion::recover::Encoding;
 use cager_motion::transfer::{self, MethodChoice, MotionFile, TransferFailed, Transferred, about_origin, decoded};
+use cager_proto::report::json_file;
 use cager_proto::transfer_messages::TransferStage;
 use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
-impl Service {
-    /// Waits for the job's turn, moves its motion and stores the outcome.
-    pub(super) async fn run_transfer(self: Arc<Self>, job: Arc<TransferJob>) {
-        let place = tokio::select! {
-            place = self.transferring.take(&job.meta.tenant, 1) => place,
-            () = job.deleted().cancelled() => return,
-            () = self.stopping().cancelled() => return,
-        };
-        job.set_phase(Phase::Running);
-        let (service, running) = (Arc::clone(&self), Arc::clone(&job));
-        let ended = blocking(move || service.transfer(&running, place)).await.unwrap_or_else(Ended::Failed);
-        self.end_job(&job, ended).await;
+impl Run for Transfer {
+    fn jobs(service: &Service) -> &Arc<Jobs<Self>> {
+        &service.transfers
     }
 
-    /// Whether the work on a job is to stop.
-    fn is_stopped(&self, job: &TransferJob) -> bool {
-        job.deleted().is_cancelled() || self.stopping().is_cancelled()
-    }
-
-    /// Moves the motion of a job. Blocks.
-    fn transfer(&self, job: &TransferJob, _place: Permit) -> Ended<Finished> {
-        match self.store.count_attempt(Kind::Transfer, job.id()) {
-            Ok(attempts) if attempts > MAX_ATTEMPTS => {
-                let detail = format!(
-                    "the service ended {MAX_ATTEMPTS} times while this transfer ran, so it is given up; restart the service with more memory, or make the transfer anew with a lighter model"
-                );
-                return Ended::GivenUp(ApiError::new(problem::TRANSFER_FAILED, detail));
+    fn begin(service: Arc<Service>, job: Arc<TransferJob>) {
+        tokio::spawn(async move {
+            if let Some(place) = service.turn(&job, &service.transferring).await {
+                service.run_job(job, place, Service::transfer).await;
             }
-            Ok(_) => {}
-            Err(_) if self.is_stopped(job) => return Ended::Paused,
-            Err(error) => return Ended::Failed(job.fail_if_damaged(&self.store, error)),
-        }
-        let ended = self.designs.threads().install(|| self.transferred(job));
-        if !self.is_stopped(job) {
-            return ended
-                .map_or_else(Ended::Failed, |(finished, workshop)| Ended::Completed(Box::new(finished), workshop));
-        }
-        // An orderly stop does not count as an attempt.
-        if let Err(error) = self.store.uncount_attempt(Kind::Transfer, job.id()) {
-            tracing::debug!(job = job.id(), %error, "the count of its beginnings stays");
-        }
-        Ended::Paused
+        });
+    }
+}
+
+impl Service {
+    /// Moves the motion of a job. Blocks.
+    fn transfer(&self, job: &TransferJob) -> Ended<Finished> {
+        let given_up = || {
+            let detail = format!(
+                "the service ended {MAX_ATTEMPTS} times while this transfer ran, so it is given up; restart the service with more memory, or make the transfer anew with a lighter model"
+            );
+            Ended::GivenUp(ApiError::new(problem::TRANSFER_FAILED, detail))
+        };
+        self.attempt(job, given_up, || self.designs.threads().install(|| self.transferred(job)))
     }
 
     fn transferred(&self, job: &TransferJob) -> Result<(Finished, Workshop), ApiError> {
@@ -79,7 +60,7 @@ impl Service {
         let part = |name: &str| self.store.transfer_part(meta, name).map_err(damaged);
         let valid = ValidOptions::of(&meta.options, meta.parts.contains_key("cage"))?;
         let file = part("target")?.ok_or_else(|| ApiError::internal(&"a transfer has no target"))?;
-        let mut target = read_part("target", &file.name, &file.bytes)?;
+        let (mut target, units) = read_part_with_units("target", &file.name, &file.bytes)?;
         move_to(meta.origin, &mut target.points);
         let is_fitted = valid.method == MethodChoice::Fitted;
         let cage = part("cage")?.map(|file| cage_of(&file, meta.origin.filter(|_| !is_fitted))).transpose()?;
@@ -130,7 +111,7 @@ impl Service {
             });
         });
         let moved = moved.map_err(|error| refused(&error, &job.meta))?;
-        let finished = self.results(job, &valid, (&target, moved), &workshop)?;
+        let finished = self.results(job, &valid, (&target, units), moved, &workshop)?;
         Ok((finished, workshop))
     }
 
@@ -139,7 +120,8 @@ impl Service {
         &self,
         job: &TransferJob,
         valid: &ValidOptions,
-        (target, moved): (&Model, Transferred),
+        (target, units): (&Model, Units),
+        moved: Transferred,
         workshop: &Workshop,
     ) -> Result<Finished, ApiError> {
         let enter = |stage| job.progressed(|progress| progress.stage = Some(stage));
@@ -170,7 +152,7 @@ impl Service {
             // The cage does not hold all of the motion.
             offsets: true,
             origin: job.meta.origin,
-            units: Units::UNKNOWN,
+            units,
             exact_rest: options.exact_rest,
         };
         let stopped = || self.is_stopped(job);
@@ -179,9 +161,7 @@ impl Service {
             let Encoded { report: encoded, container } =
                 encoding.write((target, &cage), &mut frames, &|_: EncodeProgress| ())?;
             container.commit()?;
-            let mut json = serde_json::to_vec_pretty(&report)?;
-            json.push(b'\n');
-            workshop.write("report.json", &json)?;
+            workshop.write("report.json", &json_file(&report)?)?;
             let files = vec![workshop.described("capture.cager")?, workshop.described("report.json")?];
             Ok::<_, ResultsError>((files, encoded.warnings))
         };

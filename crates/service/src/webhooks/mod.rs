@@ -10,8 +10,8 @@ mod file;
 pub use file::WebhooksError;
 
 use crate::http_client::Client;
-use crate::session::{Phase, Session};
-use crate::store::{Store, StoreError};
+use crate::store::{SessionMeta, Store, StoreError};
+use cager_proto::messages::Session as View;
 use deliver::Message;
 use file::Hook;
 use serde::{Deserialize, Serialize};
@@ -69,8 +69,8 @@ impl Webhooks {
     }
 
     /// The message about a session that ends now; `None` if no receiver wants it.
-    fn message_for(&self, session: &Session, event: Event) -> Option<PendingMessage> {
-        let wanted = |hook: &&Arc<Hook>| hook.wants(&session.meta.tenant, event);
+    pub(crate) fn message_for(&self, session: &SessionMeta, event: Event) -> Option<PendingMessage> {
+        let wanted = |hook: &&Arc<Hook>| hook.wants(&session.tenant, event);
         let left: Vec<String> = self.hooks.iter().filter(wanted).map(|hook| hook.id.clone()).collect();
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let at_ms = now.as_millis().try_into().unwrap_or(u64::MAX);
@@ -81,64 +81,52 @@ impl Webhooks {
     ///
     /// # Errors
     /// Storage errors.
-    pub(crate) fn store_pending(&self, session: &Session, event: Event) -> Result<Option<PendingMessage>, StoreError> {
+    pub(crate) fn store_pending(
+        &self,
+        session: &SessionMeta,
+        event: Event,
+    ) -> Result<Option<PendingMessage>, StoreError> {
         let due = self.message_for(session, event);
-        due.as_ref().map_or(Ok(()), |due| self.store.set_announcement(&session.meta.id, due))?;
+        due.as_ref().map_or(Ok(()), |due| self.store.set_announcement(&session.id, due))?;
         Ok(due)
     }
 
-    /// Sends the stored message of a session that has ended, if some receiver has not acknowledged it. Blocks.
-    pub(crate) fn resend_undelivered(&self, session: &Session) {
+    /// The stored message of a session, if some receiver has not acknowledged it. Blocks.
+    pub(crate) fn pending(&self, session: &SessionMeta) -> Option<PendingMessage> {
         if self.hooks.is_empty() {
-            return;
+            return None;
         }
-        let due = self.store.announcement(&session.meta.id).unwrap_or_else(|error| {
-            tracing::warn!(session = %session.meta.id, %error, "the pending webhook message of this session cannot be read");
+        self.store.announcement(&session.id).unwrap_or_else(|error| {
+            tracing::warn!(session = %session.id, %error, "the pending webhook message of this session cannot be read");
             None
-        });
-        let ended = |due: &PendingMessage| match due.event {
-            Event::Completed => matches!(session.status().phase, Phase::Completed(_)),
-            Event::Failed => session.has_failed(),
-        };
-        if let Some(due) = due.filter(ended) {
-            // The message contains frame counts; if frames cannot be read, that is logged.
-            let _ = session.load();
-            self.send(session, due);
-        }
+        })
     }
 
-    /// Reports a failed session whose message cannot be stored, because its files are damaged or the disk refuses writes.
-    pub(crate) fn send_unrecorded(&self, session: &Session) {
-        if let Some(due) = self.message_for(session, Event::Failed) {
-            self.send(session, due);
-        }
-    }
-
-    /// Sends a message to its receivers, in the background.
-    pub(crate) fn send(&self, session: &Session, due: PendingMessage) {
+    /// Sends a message about a session, which is as `view` says, to its receivers, in the background and until the session is deleted.
+    pub(crate) fn send(&self, session: &SessionMeta, view: View, deleted: &CancellationToken, due: PendingMessage) {
         let at = SystemTime::UNIX_EPOCH + Duration::from_millis(due.at_ms);
         let body = Body {
             kind: due.event,
             timestamp: humantime::format_rfc3339_millis(at).to_string(),
-            data: Data { tenant: &session.meta.tenant, session: session.view_with(0) },
+            data: Data { tenant: &session.tenant, session: view },
         };
         let body: bytes::Bytes = match serde_json::to_vec(&body) {
             Ok(body) => body.into(),
             Err(error) => {
-                return tracing::error!(session = %session.meta.id, %error, "a webhook message cannot be serialised");
+                return tracing::error!(session = %session.id, %error, "a webhook message cannot be serialised");
             }
         };
-        let told = |hook: &&Arc<Hook>| due.left.contains(&hook.id) && hook.wants(&session.meta.tenant, due.event);
+        let told = |hook: &&Arc<Hook>| due.left.contains(&hook.id) && hook.wants(&session.tenant, due.event);
         let wanted: Vec<Arc<Hook>> = self.hooks.iter().filter(told).cloned().collect();
         let left = Arc::new(Mutex::new(due));
         for hook in wanted {
             let message = Message {
-                session: session.meta.id.clone(),
+                session: session.id.clone(),
                 body: body.clone(),
                 store: self.store.clone(),
                 left: Arc::clone(&left),
             };
-            let (client, stop, deleted) = (self.client.clone(), self.stop.clone(), session.deleted().clone());
+            let (client, stop, deleted) = (self.client.clone(), self.stop.clone(), deleted.clone());
             self.runtime.spawn(async move {
                 // Deletion of the session ends delivery.
                 let delivered = deleted.run_until_cancelled(message.deliver(&hook, &client));
@@ -159,5 +147,5 @@ struct Body<'a> {
 #[derive(Serialize)]
 struct Data<'a> {
     tenant: &'a str,
-    session: cager_proto::messages::Session,
+    session: View,
 }

@@ -1,7 +1,7 @@
 //! One process has the database for itself: a lock that ends with its connection, and a number that the next process raises, so that the one before
 //! changes nothing any more even where it does not know of it.
 
-use super::link::Link;
+use super::link::{Fence, Link};
 use super::place::Place;
 use super::rows::only;
 use super::schema::{hash, schema};
@@ -21,14 +21,6 @@ const PAUSE: Duration = Duration::from_secs(1);
 /// How long such a call may take. Taking waits for the changes that are under way.
 const LIMIT: Duration = Duration::from_secs(5);
 const TAKING: Duration = Duration::from_secs(60);
-
-/// Begins changes of the process that has the database.
-pub(super) struct Fence {
-    /// Begins a transaction that the next owner waits for, and asks how often the database was taken.
-    pub(super) begin: String,
-    /// How often it was taken, this process included.
-    pub(super) taken: i64,
-}
 
 /// Keeps the lock while it lives.
 pub(super) struct Claim {

@@ -1,6 +1,5 @@
 //! One connection, and what is done by it: on the thread that asks for it.
 
-use super::claim::Fence;
 use super::place::Place;
 use super::trouble::Trouble;
 use crate::CatalogError;
@@ -17,6 +16,14 @@ use tokio_postgres::{Client, NoTls, Row, SimpleQueryMessage, Statement};
 
 /// Parameters of a statement.
 pub(super) type Parameters<'a> = &'a [&'a (dyn ToSql + Sync)];
+
+/// Begins changes of the process that has the database.
+pub(super) struct Fence {
+    /// Begins a transaction that the next owner waits for, and asks how often the database was taken.
+    pub(super) begin: String,
+    /// How often it was taken, this process included.
+    pub(super) taken: i64,
+}
 
 pub(super) struct Link {
     client: Client,

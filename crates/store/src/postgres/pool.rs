@@ -1,7 +1,6 @@
 //! The connections of one process to a database.
 
-use super::claim::Fence;
-use super::link::Link;
+use super::link::{Fence, Link};
 use super::place::Place;
 use super::trouble::Trouble;
 use crate::CatalogError;

@@ -75,14 +75,19 @@ impl Scans {
 
     /// What the command line makes of the first frames, with these arguments.
     fn recovered(&self, more: &str) -> Vec<u8> {
+        self.recovered_from(("rest.obj", &self.template), more)
+    }
+
+    /// As [`Self::recovered`], from another template.
+    fn recovered_from(&self, (name, template): (&str, &[u8]), more: &str) -> Vec<u8> {
         let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(folder.path().join("rest.obj"), &self.template).expect("a file");
+        std::fs::write(folder.path().join(name), template).expect("a file");
         std::fs::write(folder.path().join("cage.obj"), &self.cage).expect("a file");
         for (name, bytes) in &self.frames {
             std::fs::write(folder.path().join(name), bytes).expect("a file");
         }
         let done = Command::new(env!("CARGO_BIN_EXE_cager"))
-            .args("recover --template rest.obj --frames scan_*.ply -o out.cager".split(' '))
+            .args(format!("recover --template {name} --frames scan_*.ply -o out.cager").split(' '))
             .args(more.split_whitespace())
             .current_dir(folder.path())
             .stdin(Stdio::null())

@@ -1,9 +1,14 @@
 //! From a template and frames to an animation.
 
-use super::{FRAMES, complete, completed, container, created, post, recovery, scans, until};
-use crate::support::TestApp;
-use cager_proto::recovery_messages::{FollowedFrame, PostedFrames, RecoveryList, RecoveryProgress, RecoveryState};
+use super::{FRAMES, complete, completed, container, create, created, post, recovery, scans, until};
+use crate::support::{TestApp, USD_UNITS, file, text, units_of, usd};
+use cager_formats::{MeshFormat, read_model_bytes};
+use cager_proto::recovery_messages::{
+    FollowedFrame, PostedFrames, Recovery, RecoveryList, RecoveryProgress, RecoveryState,
+};
+use reqwest::multipart::Form;
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// The data of all events in a whole stream.
 fn progress(text: &str) -> Vec<RecoveryProgress> {
@@ -98,6 +103,23 @@ async fn offsets_and_a_guaranteed_error_are_those_of_the_command_line() {
     completed(&app, &job.id).await;
     let expected = scans().recovered("--points 800 --offsets --max-error 1e-3 --start 7");
     assert!(container(&app, &job.id).await == expected, "another file than that of the command line");
+}
+
+#[tokio::test]
+async fn a_template_keeps_its_unit_and_the_axis_that_points_up() {
+    let app = TestApp::start();
+    let model = read_model_bytes(MeshFormat::Obj, Path::new("rest.obj"), &scans().template).expect("a model");
+    let template = usd(&model);
+    let form =
+        Form::new().part("template", file("rest.usda", &template)).part("options", text(&json!({"points": 800})));
+    let job: Recovery = create(&app, form, None).await.is(202);
+    post(&app, &job.id, 0, scans().parts(0..FRAMES)).await.expect(200);
+    complete(&app, &job.id, FRAMES).await.expect(202);
+    completed(&app, &job.id).await;
+    let made = container(&app, &job.id).await;
+    assert_eq!(units_of(&made), USD_UNITS);
+    let expected = scans().recovered_from(("rest.usda", &template), "--points 800");
+    assert!(made == expected, "another file than that of the command line");
 }
 
 #[tokio::test]

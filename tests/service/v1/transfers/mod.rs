@@ -5,7 +5,7 @@ mod refused;
 mod restart;
 mod whole;
 
-use crate::support::{Api, Capture, Mesh, Reply, eventually, file, text};
+use crate::support::{Api, Capture, Mesh, Reply, eventually, file, text, usd};
 use cager_geometry::mesh::{Model, Polygons};
 use cager_proto::messages::JobState;
 use cager_proto::transfer_messages::Transfer;
@@ -29,6 +29,8 @@ struct Motion {
     capture: Capture,
     frames: Vec<u8>,
     target: Vec<u8>,
+    /// The same in a file that says what its positions mean.
+    usd_target: Vec<u8>,
     target_points: u32,
 }
 
@@ -48,9 +50,10 @@ fn motion() -> &'static Motion {
             (0..face.len()).for_each(|k| faces.push(&[face[k], face[(k + 1) % face.len()], middle]));
         }
         target.faces = faces;
+        let usd_target = usd(&target);
         let (target_points, target) = (target.points.len() as u32, Mesh::new(target).obj);
         let frames = capture.npy(0..FRAMES);
-        Motion { capture, frames, target, target_points }
+        Motion { capture, frames, target, usd_target, target_points }
     })
 }
 
@@ -80,12 +83,14 @@ impl Motion {
             ("copy.obj", &self.target),
             ("in.cager", container),
             ("pairs.txt", PAIRS.as_bytes()),
+            ("copy.usda", &self.usd_target),
         ];
         files.iter().for_each(|(name, bytes)| std::fs::write(folder.path().join(name), bytes).expect("a file"));
         let size =
             if more.contains("--cage-vertices") { String::new() } else { format!("--cage-vertices {CAGE_VERTICES}") };
+        let target = if more.contains("--target ") { "" } else { "--target copy.obj" };
         let done = Command::new(env!("CARGO_BIN_EXE_cager"))
-            .args(format!("transfer {source} --target copy.obj -o out.cager {more} {size}").split_whitespace())
+            .args(format!("transfer {source} {target} -o out.cager {more} {size}").split_whitespace())
             .current_dir(folder.path())
             .stdin(Stdio::null())
             .output()

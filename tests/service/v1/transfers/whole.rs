@@ -1,7 +1,7 @@
 //! From a motion and another model to an animation of that.
 
 use super::{CAGE_VERTICES, FRAMES, PAIRS, completed, create, created, ended, motion, transfer};
-use crate::support::{TestApp, file, text};
+use crate::support::{TestApp, USD_UNITS, file, text, units_of};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
 use cager_proto::messages::JobState;
 use cager_proto::transfer_messages::{SourceAlignment, Transfer, TransferList, TransferProgress};
@@ -94,6 +94,20 @@ async fn methods_cages_and_errors_are_those_of_the_command_line() {
     assert!(completed(&app, &job.id).await == expected, "another file than that of the command line");
     let report: Value = app.get(&format!("/v1/transfers/{}/report", job.id)).await.is(200);
     assert_eq!(report["detail"], true);
+}
+
+#[tokio::test]
+async fn a_target_keeps_its_unit_and_the_axis_that_points_up() {
+    let app = TestApp::start();
+    let form = Form::new()
+        .part("options", text(&json!({"align": "none", "cage_vertices": CAGE_VERTICES})))
+        .part("source_rest", file("rest.obj", &motion().capture.rest.obj))
+        .part("source_frames", file("frames.npy", &motion().frames))
+        .part("target", file("copy.usda", &motion().usd_target));
+    let job: Transfer = create(&app, form, None).await.is(202);
+    let made = completed(&app, &job.id).await;
+    assert_eq!(units_of(&made), USD_UNITS);
+    assert!(made == motion().moved("--align none --target copy.usda"), "another file than that of the command line");
 }
 
 #[tokio::test]

@@ -10,8 +10,8 @@ use super::output::{Announced, FrameOptions, FrameWriter, check_precision, exten
 use super::scene::name;
 use crate::atomic::{AtomicFile, Target, commit_together};
 use crate::error::{Error, Fault};
+use crate::faces::check_face;
 use crate::glb::{LARGEST_SIDE, MorphScene, Morphs, Wanted};
-use crate::mesh::check_face;
 
 /// Bytes that frames may have, which are all in memory.
 const MOST_BYTES: usize = 1 << 30;

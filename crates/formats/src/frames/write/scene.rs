@@ -9,7 +9,7 @@ use super::output::{Announced, CageMesh, FrameOptions, FrameWriter, no_cage};
 use crate::alembic::{self, Numbers, Schedule};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
-use crate::mesh::check_face;
+use crate::faces::check_face;
 use crate::usd::{self, Scene};
 
 /// Bytes that a package may have.

@@ -9,7 +9,7 @@ use super::output::{Announced, FrameOptions, FrameWriter, check_precision, exten
 use super::scene::name;
 use crate::atomic::{AtomicDir, Target};
 use crate::error::{Error, Fault};
-use crate::mesh::check_face;
+use crate::faces::check_face;
 use crate::vat::{self, Scene, Textures};
 
 /// Bytes that frames may have, which are all in memory.

@@ -8,6 +8,7 @@ use cager_geometry::mesh::diagonal;
 use faer::Mat;
 use rayon::prelude::*;
 
+use super::frames::Frames;
 use super::stored::Stored;
 use crate::error::Fault;
 
@@ -16,8 +17,6 @@ const MOST: usize = 255;
 const USUAL: usize = 64;
 /// Frames or coordinates, whichever are fewer, of which eigenvectors are computed.
 pub(crate) const LARGEST_SIDE: usize = 4096;
-/// Numbers of a block.
-const BLOCK: usize = 1 << 21;
 
 /// How many targets are wanted.
 #[derive(Clone, Debug, Default)]
@@ -52,58 +51,6 @@ impl Deviation {
     /// Of the diagonal.
     pub(crate) fn share(&self, distance: f64) -> f64 {
         if distance == 0.0 { 0.0 } else { distance / self.diagonal }
-    }
-}
-
-/// Coordinates of all points, frame after frame.
-pub(super) struct Frames<'a> {
-    values: &'a [f32],
-    /// Of each frame.
-    length: usize,
-    count: usize,
-}
-
-impl<'a> Frames<'a> {
-    pub(super) fn new(values: &'a [f32], points: usize) -> Self {
-        Self { values, length: 3 * points, count: values.len() / (3 * points) }
-    }
-
-    pub(super) fn mean(&self) -> Vec<f64> {
-        let mut mean = vec![0.0; self.length];
-        for frame in self.values.chunks_exact(self.length) {
-            mean.iter_mut().zip(frame).for_each(|(mean, &x)| *mean += f64::from(x));
-        }
-        mean.iter_mut().for_each(|mean| *mean /= self.count as f64);
-        mean
-    }
-
-    /// The largest difference of a coordinate from a shape.
-    pub(super) fn farthest(&self, shape: &[f64]) -> f64 {
-        let frames = self.values.chunks_exact(self.length);
-        frames.flat_map(|frame| frame.iter().zip(shape)).map(|(&x, y)| (f64::from(x) - y).abs()).fold(0.0, f64::max)
-    }
-
-    /// Differences of coordinates from a shape: a row each, a column for each frame.
-    fn rows(&self, rows: Range<usize>, shape: &[f64]) -> Mat<f64> {
-        let at = |frame: usize, row: usize| f64::from(self.values[frame * self.length + row]) - shape[row];
-        Mat::from_fn(rows.len(), self.count, |i, frame| at(frame, rows.start + i))
-    }
-
-    /// The same of some frames: a row each, a column for each coordinate.
-    fn columns(&self, frames: Range<usize>, shape: &[f64]) -> Mat<f64> {
-        let at = |frame: usize, row: usize| f64::from(self.values[frame * self.length + row]) - shape[row];
-        Mat::from_fn(frames.len(), self.length, |i, row| at(frames.start + i, row))
-    }
-
-    fn frame_blocks(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (count, frames) = (self.count, (BLOCK / self.length).clamp(1, BLOCK_ROWS));
-        (0..count).step_by(frames).map(move |first| first..(first + frames).min(count))
-    }
-
-    /// Ranges of whole points whose rows fill a block.
-    fn row_blocks(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (length, rows) = (self.length, 3 * (BLOCK / self.count / 3).clamp(1, BLOCK_ROWS));
-        (0..length).step_by(rows).map(move |first| first..(first + rows).min(length))
     }
 }
 

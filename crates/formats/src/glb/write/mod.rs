@@ -2,6 +2,7 @@
 
 mod components;
 mod document;
+mod frames;
 mod normals;
 mod stored;
 
@@ -10,9 +11,10 @@ use std::io::{self, Write};
 use cager_geometry::mesh::Point;
 
 use crate::error::Fault;
-use components::{Components, Frames};
+use components::Components;
 pub(crate) use components::{Deviation, LARGEST_SIDE, Wanted};
 use document::Document;
+use frames::Frames;
 use normals::Normals;
 use stored::Stored;
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::mesh::{unit, vertex_normals};
+use crate::normals::{unit, vertex_normals};
 
 /// Normals of the base and each target, one after another.
 pub(super) struct Normals(pub(super) Vec<[f32; 3]>);

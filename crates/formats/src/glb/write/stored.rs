@@ -1,6 +1,6 @@
 //! Positions as they are stored: floats, or whole numbers of 16 bits that the node scales.
 
-use super::components::Frames;
+use super::frames::Frames;
 
 /// The largest whole number that is stored.
 const LARGEST: f64 = 32767.0;

@@ -1,7 +1,7 @@
 //! The header: which elements follow, and what each is made of.
 
+use crate::colors::Scale;
 use crate::error::Fault;
-use crate::mesh::colors::Scale;
 use crate::text::{Lines, integer, quoted, words};
 
 pub(super) struct Header<'a> {

@@ -5,9 +5,10 @@ mod values;
 
 use cager_geometry::mesh::Model;
 
-use super::colors::Colors;
-use super::parsed::{Contents, Parsed, no_such_vertex};
+use super::parsed::Parsed;
+use crate::colors::Colors;
 use crate::error::Fault;
+use crate::faces::{Contents, no_such_vertex};
 use header::{Element, Encoding, Header, Kind};
 use values::{Ascii, Binary, Values};
 

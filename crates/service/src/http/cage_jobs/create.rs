@@ -1,20 +1,19 @@
 //! `POST /v1/cages`: a cage is to be designed.
 
+use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::cage_job::create::{NewCageJob, check_options};
 use crate::http::extract::Caller;
 use crate::http::jobs::accepted;
-use crate::http::multipart::{self, FormHeader, bad};
+use crate::http::multipart::bad;
 use crate::http::openapi;
 use crate::http::spooled::{self, FormParts};
-use crate::http::waiting::too_slow;
 use crate::problem::ApiError;
 use crate::service::Service;
 use axum::extract::{Request, State};
 use axum::response::Response;
 use cager_proto::cage_messages::CageJob;
 use std::sync::Arc;
-use tokio::time::timeout;
 
 /// Designs a cage by example: part `rest` is the rest pose, part `frames` frames of its motion, part `options` JSON. The design runs in the
 /// background, below all frames of sessions; a session takes its cage by `options.cage.id`. The same files and options again are
@@ -31,23 +30,19 @@ pub(crate) async fn create(
     Caller(tenant): Caller,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
-    let form = multipart::check_form_header(&service, &request, "rest, frames and options", limit)?;
-    let FormHeader { idempotency_key, patience } = form;
-    let _place = service.stream(&tenant)?;
-    let new = timeout(patience, read(&service, &tenant, request, idempotency_key)).await.map_err(|_| too_slow())??;
+    let (new, _place) = read(&service, &tenant, request).await?;
     let job = service.create_cage_job(&tenant, new).await?;
     Ok(accepted(&job, job.view()))
 }
 
-/// Reads the parts of the form.
+/// Reads the form that asks for a cage; with a place among the tenant's streams.
 pub(crate) async fn read(
     service: &Arc<Service>,
     tenant: &Arc<Tenant>,
     request: Request,
-    idempotency_key: Option<String>,
-) -> Result<NewCageJob, ApiError> {
+) -> Result<(NewCageJob, Permit), ApiError> {
     let parts = FormParts {
+        sent: "rest, frames and options",
         files: &["rest"],
         many: None,
         what: "the rest pose is",
@@ -61,14 +56,15 @@ pub(crate) async fn read(
     let frames = form.large.ok_or_else(|| {
         bad("part frames is missing; send frames as .npy or raw f32, or make a cage from the rest pose alone by POST /v1/sessions".to_owned())
     })?;
-    Ok(NewCageJob {
+    let new = NewCageJob {
         rest_name: rest.name,
         rest: rest.bytes,
         frames_name: frames.name,
         frames: frames.spool,
         options: form.options,
-        idempotency_key,
+        idempotency_key: form.idempotency_key,
         room: form.room,
         reserved: form.reserved,
-    })
+    };
+    Ok((new, form.place))
 }

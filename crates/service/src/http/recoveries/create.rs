@@ -2,9 +2,8 @@
 
 use crate::http::extract::Caller;
 use crate::http::jobs::accepted;
-use crate::http::multipart::{self, FormHeader};
+use crate::http::multipart::{self, Files};
 use crate::http::openapi;
-use crate::http::waiting::too_slow;
 use crate::problem::ApiError;
 use crate::recovery::NewRecovery;
 use crate::service::Service;
@@ -13,7 +12,6 @@ use axum::extract::{Request, State};
 use axum::response::Response;
 use cager_proto::recovery_messages::Recovery;
 use std::sync::Arc;
-use tokio::time::timeout;
 
 /// Recovers one animation of a template from surfaces without correspondence: part `template` is a mesh, part `cage` a cage around it, or parts
 /// `rig` and `manifold` what is known of a person; part `options` is JSON. Frames are then posted one by one or several at a time, and are followed in
@@ -30,16 +28,14 @@ pub(crate) async fn create(
     Caller(tenant): Caller,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let limit = service.config.max_rest_bytes;
-    let parts = "template, cage or rig and manifold, and options";
-    let FormHeader { idempotency_key, patience } = multipart::check_form_header(&service, &request, parts, limit)?;
+    let words = ("template, cage or rig and manifold, and options", "template, cage, rig and manifold");
     let parts = ["template", "cage", "rig", "manifold"];
-    let reading = multipart::read_files(&service, &tenant, request, &parts, "template, cage, rig and manifold");
-    let mut form = timeout(patience, reading).await.map_err(|_| too_slow())??;
+    let mut form = multipart::read_files(&service, &tenant, request, &parts, words).await?;
     let template = form.take("template", "the mesh that is to move")?;
     let [cage, rig, manifold] = ["cage", "rig", "manifold"].map(|part| form.files.remove(part));
     let parts = RecoveryParts { template, cage, rig, manifold };
-    let new = NewRecovery { parts, options: form.options, idempotency_key, room: form.room };
+    let Files { options, idempotency_key, room, .. } = form;
+    let new = NewRecovery { parts, options, idempotency_key, room };
     let job = service.create_recovery(&tenant, new).await?;
     Ok(accepted(&job, job.view()))
 }

@@ -2,10 +2,8 @@
 
 use crate::http::extract::Caller;
 use crate::http::jobs::accepted;
-use crate::http::multipart::{self, FormHeader};
 use crate::http::openapi;
 use crate::http::spooled::{self, FormParts};
-use crate::http::waiting::too_slow;
 use crate::problem::ApiError;
 use crate::service::Service;
 use crate::store::{PAIRS, SOURCE, SOURCE_FRAMES};
@@ -14,7 +12,6 @@ use axum::extract::{Request, State};
 use axum::response::Response;
 use cager_proto::transfer_messages::Transfer;
 use std::sync::Arc;
-use tokio::time::timeout;
 
 /// Moves the motion of one model onto another that shares nothing with it: parts `source_rest` and `source_frames` are the source, or part `source` a
 /// container, or `options.source_session` a completed session; part `target` is the model that is to move, part `cage` a cage of yours, part
@@ -31,11 +28,8 @@ pub(crate) async fn create(
     Caller(tenant): Caller,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let limit = service.config.max_frames_bytes.saturating_add(service.config.max_rest_bytes);
-    let parts = "source_rest and source_frames or source, target, cage, pairs and options";
-    let FormHeader { idempotency_key, patience } = multipart::check_form_header(&service, &request, parts, limit)?;
-    let _place = service.stream(&tenant)?;
     let parts = FormParts {
+        sent: "source_rest and source_frames or source, target, cage, pairs and options",
         files: &["source_rest", "target", "cage", PAIRS],
         many: None,
         what: "source, target and cage at rest, and pairs, are",
@@ -43,13 +37,12 @@ pub(crate) async fn create(
         cure: "make a transfer for each part of the motion",
         check: &check_options,
     };
-    let reading = spooled::read(&service, &tenant, request, &parts);
-    let form = timeout(patience, reading).await.map_err(|_| too_slow())??;
+    let form = spooled::read(&service, &tenant, request, &parts).await?;
     let new = NewTransfer {
         files: form.files,
         large: form.large.map(|large| (large.part, large.name, large.spool)),
         options: form.options,
-        idempotency_key,
+        idempotency_key: form.idempotency_key,
         room: form.room,
         reserved: form.reserved,
     };
