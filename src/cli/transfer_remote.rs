@@ -11,9 +11,12 @@ use cager_capture::coding::Goal;
 use cager_client::messages::SessionOptions;
 use cager_client::transfer_messages::{TransferOptions, TransferStage};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
-use cager_formats::{AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_prim_with_note};
+use cager_formats::{
+    AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_prim_with_note, read_prim_with_units,
+};
 use cager_geometry::mesh::Model;
 use cager_geometry::units::Units;
+use cager_motion::transfer::MethodChoice;
 use std::path::{Path, PathBuf};
 
 /// Has a service move what the arguments say. Frames are read into memory, in double precision.
@@ -40,10 +43,12 @@ pub(super) fn run(
         }
         _ => args.source.as_ref().map(file).transpose()?.map_or(TransferSource::Session, TransferSource::Container),
     };
-    let [cage, pairs] = [&args.cage, &args.pairs].map(|path| path.as_ref().map(file).transpose());
+    // Around the source, it is as the source.
+    let units = if args.method()? == MethodChoice::Fitted { Units::UNKNOWN } else { units };
+    let cage = args.cage.as_ref().map(|path| cage_file(path, units)).transpose()?;
     // Whatever it is called here.
-    let pairs = pairs?.map(|pairs| MeshFile::new("pairs.txt", pairs.bytes));
-    let new = NewTransfer { cage: cage?, pairs, options, ..NewTransfer::new(sent, model_file(&args.target, None)?) };
+    let pairs = args.pairs.as_ref().map(file).transpose()?.map(|pairs| MeshFile::new("pairs.txt", pairs.bytes));
+    let new = NewTransfer { cage, pairs, options, ..NewTransfer::new(sent, model_file(&args.target, None)?) };
     let mut outputs = vec![("capture.cager", &mut container)];
     outputs.extend(report.as_mut().map(|file| ("report", file)));
     let token = args.service.token();
@@ -83,6 +88,17 @@ fn model_file(path: &Path, prim: Option<&str>) -> Result<MeshFile> {
     let (model, _) = read_prim_with_note(path, prim)?;
     let name = path.with_extension("obj");
     Ok(MeshFile::new(name.file_name().unwrap_or_default().to_string_lossy(), obj_bytes(&model)))
+}
+
+/// A cage for a service, in the units of its model.
+fn cage_file(path: &Path, units: Units) -> Result<MeshFile> {
+    let (mut model, _, said) = read_prim_with_units(path, None)?;
+    let change = said.change_to(units);
+    if change.is_none() {
+        return Ok(mesh_file(path)?);
+    }
+    change.apply_to(&mut model.points);
+    Ok(MeshFile::new("cage.obj", obj_bytes(&model)))
 }
 
 fn options(args: &TransferMotionArgs, goal: Option<Goal>) -> Result<TransferOptions> {

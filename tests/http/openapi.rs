@@ -102,5 +102,5 @@ fn headers_that_clients_rely_on_are_described() {
     assert_eq!([giving("201", "Location"), giving("202", "Location")], [2, 3]);
     assert_eq!([giving("200", "ETag"), giving("206", "Content-Range"), giving("304", "ETag")], [12, 12, 12]);
     assert_eq!(giving("503", "Retry-After"), operations.len());
-    assert!(giving("401", "WWW-Authenticate") == 48 && giving("429", "Retry-After") > 0);
+    assert!(giving("401", "WWW-Authenticate") == 49 && giving("429", "Retry-After") > 0);
 }

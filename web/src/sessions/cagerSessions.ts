@@ -250,11 +250,14 @@ export class Sessions extends LitElement {
 
   /** Does what was asked for; where that fails the question stays. */
   private async change(work: () => Promise<void>) {
+    const { asked } = this;
     this.isChanging = true;
     try {
       await work();
+      if (this.asked === asked) this.dialog.close();
     } catch (error) {
-      this.changeFailure = sentenceOf(error);
+      if (this.asked === asked) this.changeFailure = sentenceOf(error);
+      else this.failure = sentenceOf(error);
     } finally {
       this.isChanging = false;
     }
@@ -263,7 +266,6 @@ export class Sessions extends LitElement {
   private async renameSession(session: Session, name: string) {
     await this.list.rename(session.id, name);
     this.said = `Renamed ${nameOf(session)}`;
-    this.dialog.close();
   }
 
   private async removeSession(session: Session) {

@@ -88,6 +88,8 @@ export class SessionList extends EventTarget {
   async rename(id: string, name: string) {
     this.take(await this.service.rename(id, name));
     this.changed();
+    // What was asked for before may come after this.
+    this.refresh();
   }
 
   async remove(id: string) {

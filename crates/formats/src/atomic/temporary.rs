@@ -68,6 +68,9 @@ impl Drop for Temporary {
     }
 }
 
+/// How often the removal of a folder is tried.
+const REMOVALS: usize = 5;
+
 /// Removes a file, or a folder that other threads may still write into: under another name they do not find it any
 /// more. Nobody is left to be told of what cannot be removed.
 fn remove(path: &Path) {
@@ -75,8 +78,10 @@ fn remove(path: &Path) {
     while fs::symlink_metadata(path).is_ok_and(|found| found.is_dir()) {
         // Not all systems rename folders with open files in them.
         let renamed = fs::rename(path, &gone);
-        let removed = fs::remove_dir_all(if renamed.is_ok() { &gone } else { path });
-        if renamed.is_err() || removed.is_err() {
+        let place = if renamed.is_ok() { &gone } else { path };
+        // A file that was just being made may come after its folder was looked through.
+        let is_removed = (0..REMOVALS).any(|_| fs::remove_dir_all(place).is_ok());
+        if renamed.is_err() || !is_removed {
             return;
         }
         // Again, where someone was just about to make what was missing.

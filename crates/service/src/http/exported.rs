@@ -102,7 +102,8 @@ pub(crate) async fn get(
     if is_known(&headers, &format!("\"{etag}\"")) {
         return Ok((StatusCode::NOT_MODIFIED, [(ETAG, format!("\"{etag}\""))]).into_response());
     }
-    let name = file_name(session.name().as_deref(), format.extension());
+    // What it contains is called as at first, so that its bytes stay the same.
+    let name = file_name(session.meta.options.name.as_deref(), format.extension());
     let (file, length, space) = made(&service, &session, &tenant.name, &completion, (format, &name)).await?;
     let read = move |range: Range<u64>| {
         // Its disk space is held while it is sent.
@@ -120,6 +121,7 @@ pub(crate) async fn get(
         read: Arc::new(read),
     }
     .respond(&headers);
+    let name = file_name(session.name().as_deref(), format.extension());
     let name = HeaderValue::try_from(format!("attachment; filename=\"{name}\"")).map_err(|e| ApiError::internal(&e))?;
     response.headers_mut().insert(CONTENT_DISPOSITION, name);
     Ok(response)

@@ -44,6 +44,7 @@ mod transfers;
 mod waiting;
 
 pub use admin::{Operated, admin};
+pub(crate) use extract::only_reads;
 pub(crate) use guarded::until;
 pub(crate) use health::{health, may_see_metrics, rendered_metrics};
 pub(crate) use router::finished;

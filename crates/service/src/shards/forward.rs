@@ -1,7 +1,7 @@
 //! Requests that another process answers.
 
 use crate::admission::{Budget, Exhausted, Permit};
-use crate::http::until;
+use crate::http::{only_reads, until};
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
 use axum::body::Body;
@@ -11,7 +11,7 @@ use cager_store::Membership;
 use futures_util::future::{BoxFuture, FutureExt, Shared};
 use futures_util::stream;
 use http::header::{
-    CONNECTION, CONTENT_LENGTH, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER,
+    CONNECTION, CONTENT_LENGTH, CONTENT_TYPE, HOST, HeaderName, PROXY_AUTHENTICATE, PROXY_AUTHORIZATION, TE, TRAILER,
     TRANSFER_ENCODING, UPGRADE,
 };
 use http::{HeaderMap, HeaderValue};
@@ -32,6 +32,8 @@ const CONNECT: Duration = Duration::from_secs(2);
 const AFTER_END: Duration = Duration::from_secs(2);
 /// Memory of a response that passes through and that nobody reads: the connections' buffers on both sides.
 const PASSING_BYTES: u64 = 512 << 10;
+/// That of one whose length is not known, most of which are read as they come; the tenant's streams bound their number.
+const STREAM_BYTES: u64 = 256 << 10;
 /// Smaller responses are in the connection's buffers at once.
 const SMALL_BYTES: u64 = 16 << 10;
 /// Headers of one connection.
@@ -90,9 +92,11 @@ impl Going {
     }
 
     /// Memory for a response: the process that works has none of it any more where it was sent.
-    fn room_for(&self, body: &impl http_body::Body) -> Result<Option<Permit>, Exhausted> {
-        let bytes = body.size_hint().exact().unwrap_or(PASSING_BYTES).min(PASSING_BYTES);
-        if bytes <= SMALL_BYTES {
+    fn room_for(&self, response: &http::Response<reqwest::Body>) -> Result<Option<Permit>, Exhausted> {
+        let told = |name| response.headers().get(name).and_then(|value: &HeaderValue| value.to_str().ok());
+        let is_quiet = told(CONTENT_TYPE).is_some_and(|kind| kind.starts_with("text/event-stream"));
+        let bytes = http_body::Body::size_hint(response.body()).exact().unwrap_or(STREAM_BYTES).min(PASSING_BYTES);
+        if is_quiet || bytes <= SMALL_BYTES {
             return Ok(None);
         }
         let (memory, tenant) = &self.room;
@@ -126,6 +130,7 @@ impl Forwarder {
 
     /// Sends a request to the process at `address`.
     pub(super) async fn send(&self, request: Request, address: &str, going: Going) -> Sent {
+        let only_reads = only_reads(&request);
         let (parts, body) = request.into_parts();
         let hops = parts.headers.get(HOPS).and_then(|hops| hops.to_str().ok()?.parse().ok()).unwrap_or(0u32);
         if hops >= MOST_HOPS {
@@ -155,12 +160,17 @@ impl Forwarder {
         match answered {
             Ok(response) => {
                 metrics::counter!("cager_forwarded_total").increment(1);
-                let (mut head, body) = http::Response::<reqwest::Body>::from(response).into_parts();
+                let response = http::Response::<reqwest::Body>::from(response);
+                let room = match going.room_for(&response) {
+                    // What has been done is not refused.
+                    Err(full) if only_reads => {
+                        return Sent::Refused(full.refusal("memory for downloads"), "download_memory");
+                    }
+                    room => room.unwrap_or_default(),
+                };
+                let (mut head, body) = response.into_parts();
                 head.headers = end_to_end(&head.headers);
-                match going.room_for(&body) {
-                    Ok(room) => Sent::Answered(Response::from_parts(head, until(Body::new(body), over, room))),
-                    Err(full) => Sent::Refused(full.refusal("memory for downloads"), "download_memory"),
-                }
+                Sent::Answered(Response::from_parts(head, until(Body::new(body), over, room)))
             }
             Err(error) => {
                 tracing::warn!(address, %error, "another process does not answer");

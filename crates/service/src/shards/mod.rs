@@ -23,6 +23,7 @@ use axum::extract::Request;
 use axum::response::{IntoResponse, Response};
 use cager_store::{Members, Membership};
 use forward::{Forwarder, Going, Sent, given_up};
+use futures_util::FutureExt as _;
 use http::request::Parts;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex};
@@ -140,7 +141,7 @@ impl Shards {
                     Sent::NotTaken(again) => request = again,
                 }
             }
-            if self.stop.is_cancelled() && (self.is_alone() || given_up.peek().is_some()) {
+            if self.stop.is_cancelled() && (self.is_alone() || given_up.clone().now_or_never().is_some()) {
                 let stopping = ApiError::new(problem::STOPPING, "the service is stopping").retry_after(5);
                 return self.refuse(stopping, &path, "stopping");
             }
