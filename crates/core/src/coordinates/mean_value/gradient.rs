@@ -295,7 +295,10 @@ fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
     for face in cage.faces() {
         let seen = FaceTerms::new(face, scratch);
         let vertices = face.vertices.map(|v| v as usize);
-        let by_face @ [a0, a1, a2] = vertices.map(|v| weights[v] * seen.inverse);
+        // Written out: the closure of an array's `map` stays a call, compiled for another instruction set.
+        let [v0, v1, v2] = vertices;
+        let by_face @ [a0, a1, a2] =
+            [weights[v0] * seen.inverse, weights[v1] * seen.inverse, weights[v2] * seen.inverse];
         let [g0, g1, g2] = &seen.g;
         // ∂E/∂m, and −∂E/∂det.
         let by_mean = [
