@@ -138,17 +138,22 @@ impl PatchMesh {
         let boxes: Vec<Aabb> = new.iter().map(|&t| Aabb::around(t)).collect();
         let around = boxes.iter().fold(Aabb::EMPTY, |b, t| b.union(t));
         let clear = self.tree.visit(&around, |other| {
-            if self.is_removed(other) || replacement.old.contains(&other) {
+            if self.is_removed(other) {
                 return true;
             }
-            let corners = self.corners(other);
-            let other_box = Aabb::around(corners);
+            let corners @ [a, b, c] = self.corners(other);
+            let other_box = Aabb { low: a.min(b).min(c), high: a.max(b).max(c) };
+            if !around.overlaps(&other_box) || replacement.old.contains(&other) {
+                return true;
+            }
             (0..new.len()).all(|i| {
                 let ids = [replacement.new[i], self.faces[other as usize]];
-                !boxes[i].overlaps(&other_box) || !triangles_intersect(ids, [new[i], corners])
+                !boxes[i].overlaps(&other_box) || !cut_each_other(ids, [new[i], corners], [&boxes[i], &other_box])
             })
         });
-        let cut = |i: usize, j: usize| triangles_intersect([replacement.new[i], replacement.new[j]], [new[i], new[j]]);
+        let cut = |i: usize, j: usize| {
+            cut_each_other([replacement.new[i], replacement.new[j]], [new[i], new[j]], [&boxes[i], &boxes[j]])
+        };
         if !clear || (0..new.len()).any(|i| (0..i).any(|j| cut(i, j))) {
             return Err(Violation::Intersecting);
         }
@@ -200,6 +205,22 @@ pub(super) fn quality([a, b, c]: [DVec3; 3]) -> f64 {
 /// Unit normal, or zero for a triangle without area.
 pub(super) fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// Whether two faces in these boxes cut each other. Around a vertex that they share, most do not: the edges across from it lie outside the
+/// other's box.
+fn cut_each_other(ids: [[u32; 3]; 2], corners: [[DVec3; 3]; 2], boxes: [&Aabb; 2]) -> bool {
+    let is_apart = |k: usize| {
+        let (mut own, mut edge) = (0, Aabb::EMPTY);
+        for (id, p) in ids[k].iter().zip(corners[k]) {
+            if !ids[1 - k].contains(id) {
+                own += 1;
+                edge = Aabb { low: edge.low.min(p), high: edge.high.max(p) };
+            }
+        }
+        own == 2 && !edge.overlaps(boxes[1 - k])
+    };
+    !(is_apart(0) && is_apart(1)) && triangles_intersect(ids, corners)
 }
 
 /// A face with what tells soon that a point is far from it.
