@@ -68,22 +68,29 @@ pub fn design(
     if vertices > MAX_VERTICES {
         return Err(DesignError::TooManyVertices { vertices, most: MAX_VERTICES });
     }
-    let mesh = match start {
-        Some(mesh) => mesh.clone(),
-        None => {
-            let options = EncloseOptions { vertices, ..EncloseOptions::default() };
-            enclose_watched(rest, &options, &mut || watch(enclosing)).map_err(|e| match e {
-                EncloseError::Stopped => DesignError::Stopped,
-                other => other.into(),
-            })?
+    let sampled = || Samples::new(rest, frames, &mut fastrand::Rng::with_seed(options.seed));
+    let mut samples = None;
+    let mesh = rayon::in_place_scope(|scope| {
+        // Meanwhile, as enclosing keeps one thread busy most of the time.
+        scope.spawn(|_| samples = Some(sampled()));
+        match start {
+            Some(mesh) => Ok(mesh.clone()),
+            None => {
+                let options = EncloseOptions { vertices, ..EncloseOptions::default() };
+                enclose_watched(rest, &options, &mut || watch(enclosing))
+            }
         }
-    };
+    });
+    let mesh = mesh.map_err(|e| match e {
+        EncloseError::Stopped => DesignError::Stopped,
+        other => other.into(),
+    })?;
+    let samples = samples.unwrap_or_else(sampled);
     let symmetry = match options.symmetry {
         Some(axis) => Some(Symmetry::new(&mesh, axis).map_err(|vertex| DesignError::NotSymmetric { vertex, axis })?),
         None => None,
     };
     let cage = Cage::new(mesh)?;
-    let samples = Samples::new(rest, frames, &mut fastrand::Rng::with_seed(options.seed));
     let obstacles = obstacles(rest, &cage, options.style, symmetry);
     let defects = Defects::of(cage.mesh(), &rest.points);
     let best = Best { mesh: cage.mesh().clone(), evaluation: samples.evaluate(&cage) };

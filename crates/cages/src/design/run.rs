@@ -76,14 +76,16 @@ impl Run<'_> {
         let mut descent = Descent::new(cage, self.samples, self.obstacles, self.options);
         let mut warnings = Vec::new();
         let evaluation = self.best.evaluation;
-        self.note("start", &descent.cage, evaluation);
         let begun = Progress {
             stage: "moving the vertices",
             fraction: 0.0,
             error: Some(evaluation.validation_error),
             better: Some(descent.cage.mesh()),
         };
-        let ended = match (self.watch)(begun) {
+        // The first usable cage does not wait for its condition number.
+        let told = (self.watch)(begun);
+        self.note("start", &descent.cage, evaluation);
+        let ended = match told {
             ControlFlow::Break(()) => ControlFlow::Break(()),
             ControlFlow::Continue(()) => self.descend(&mut descent, frames, &mut warnings),
         };

@@ -3,7 +3,7 @@
 
 use cager_geometry::spatial::Aabb;
 use glam::DVec3;
-use std::collections::{HashMap, HashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A cube is halved so many times at most.
 pub(super) const LEVELS: u32 = 3;
@@ -114,7 +114,7 @@ pub(super) struct Octree {
     unit: f64,
     /// Number of largest cubes along each axis.
     cells: [u32; 3],
-    halved: HashSet<Cube>,
+    halved: FxHashSet<Cube>,
 }
 
 impl Octree {
@@ -122,7 +122,7 @@ impl Octree {
     pub(super) fn uniform(bounds: &Aabb, spacing: f64) -> Self {
         let cells = (bounds.size() / spacing).ceil().max(DVec3::splat(2.0)).to_array().map(|c| c as u32);
         let origin = bounds.center() - 0.5 * spacing * DVec3::from_array(cells.map(f64::from));
-        Self { origin, unit: spacing / f64::from(MAX_SIDE), cells, halved: HashSet::new() }
+        Self { origin, unit: spacing / f64::from(MAX_SIDE), cells, halved: FxHashSet::default() }
     }
 
     /// Halves all cubes that are too large, by their centre and side; false where it gave up because more than `most` were.
@@ -256,7 +256,7 @@ impl Octree {
 /// Corners of the cubes, then their centres, each in the order of their places.
 struct Nodes {
     places: Vec<Place>,
-    indices: HashMap<Place, u32>,
+    indices: FxHashMap<Place, u32>,
 }
 
 impl Nodes {

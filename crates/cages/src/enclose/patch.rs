@@ -116,15 +116,17 @@ impl PatchMesh {
         enclosed: &EnclosedPoints,
     ) -> Result<(), Violation> {
         let old: Vec<[DVec3; 3]> = replacement.old.iter().map(|&f| self.corners(f)).collect();
-        let grown = |&t: &[DVec3; 3]| Aabb::around(t).grown(enclosed.largest_clearance);
-        let boxes: Vec<Aabb> = new.iter().map(grown).collect();
-        let around = boxes.iter().fold(Aabb::around(old.iter().flatten().copied()), |b, t| b.union(t));
+        let old: Vec<BoxedFace> = old.into_iter().map(BoxedFace::new).collect();
+        let new: Vec<BoxedFace> = new.iter().copied().map(BoxedFace::new).collect();
+        let margin = enclosed.largest_clearance;
+        let around = old.iter().fold(Aabb::EMPTY, |b, face| b.union(&face.around));
+        let around = new.iter().fold(around, |b, face| b.union(&face.around.grown(margin)));
         let some = enclosed.points.len().div_ceil(STRIDE);
         let (first, others) = enclosed.points.split_at(some);
         let (first_clearances, other_clearances) = enclosed.clearances.split_at(some);
         let halves = [(first, first_clearances), (others, other_clearances)];
         for (tree, points) in enclosed.trees.iter().zip(halves) {
-            let worst = uncovered(tree, points, [&old, new], &boxes, &around);
+            let worst = uncovered(tree, points, [&old, &new], margin, &around);
             if worst > 0.0 {
                 return Err(Violation::Uncovered(worst));
             }
@@ -136,17 +138,22 @@ impl PatchMesh {
         let boxes: Vec<Aabb> = new.iter().map(|&t| Aabb::around(t)).collect();
         let around = boxes.iter().fold(Aabb::EMPTY, |b, t| b.union(t));
         let clear = self.tree.visit(&around, |other| {
-            if self.is_removed(other) || replacement.old.contains(&other) {
+            if self.is_removed(other) {
                 return true;
             }
-            let corners = self.corners(other);
-            let other_box = Aabb::around(corners);
+            let corners @ [a, b, c] = self.corners(other);
+            let other_box = Aabb { low: a.min(b).min(c), high: a.max(b).max(c) };
+            if !around.overlaps(&other_box) || replacement.old.contains(&other) {
+                return true;
+            }
             (0..new.len()).all(|i| {
                 let ids = [replacement.new[i], self.faces[other as usize]];
-                !boxes[i].overlaps(&other_box) || !triangles_intersect(ids, [new[i], corners])
+                !boxes[i].overlaps(&other_box) || !cut_each_other(ids, [new[i], corners], [&boxes[i], &other_box])
             })
         });
-        let cut = |i: usize, j: usize| triangles_intersect([replacement.new[i], replacement.new[j]], [new[i], new[j]]);
+        let cut = |i: usize, j: usize| {
+            cut_each_other([replacement.new[i], replacement.new[j]], [new[i], new[j]], [&boxes[i], &boxes[j]])
+        };
         if !clear || (0..new.len()).any(|i| (0..i).any(|j| cut(i, j))) {
             return Err(Violation::Intersecting);
         }
@@ -200,32 +207,84 @@ pub(super) fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize_or_zero()
 }
 
-/// How far the worst of some points is outside or too close once `old` faces have become `new`; `boxes` are those of the new, grown by
-/// the largest clearance, and `around` is around all.
+/// Whether two faces in these boxes cut each other. Around a vertex that they share, most do not: the edges across from it lie outside the
+/// other's box.
+fn cut_each_other(ids: [[u32; 3]; 2], corners: [[DVec3; 3]; 2], boxes: [&Aabb; 2]) -> bool {
+    let is_apart = |k: usize| {
+        let (mut own, mut edge) = (0, Aabb::EMPTY);
+        for (id, p) in ids[k].iter().zip(corners[k]) {
+            if !ids[1 - k].contains(id) {
+                own += 1;
+                edge = Aabb { low: edge.low.min(p), high: edge.high.max(p) };
+            }
+        }
+        own == 2 && !edge.overlaps(boxes[1 - k])
+    };
+    !(is_apart(0) && is_apart(1)) && triangles_intersect(ids, corners)
+}
+
+/// A face with what tells soon that a point is far from it.
+struct BoxedFace {
+    corners: [DVec3; 3],
+    around: Aabb,
+    /// Normal of length twice the area, and its square; that is infinite for a sliver, whose plane rounding turns.
+    normal: DVec3,
+    normal2: f64,
+}
+
+impl BoxedFace {
+    fn new(corners: [DVec3; 3]) -> Self {
+        let [ab, ac] = [corners[1] - corners[0], corners[2] - corners[0]];
+        let normal = ab.cross(ac);
+        let longest2 = ab.length_squared().max(ac.length_squared());
+        let (area2, least) = (normal.length_squared(), 1e-12 * longest2 * longest2);
+        let normal2 = if area2 > least { area2 } else { f64::INFINITY };
+        Self { corners, around: Aabb::around(corners), normal, normal2 }
+    }
+
+    /// Whether a point lies so far from the face's plane that it is certainly not within a distance of the face.
+    fn is_plane_farther(&self, p: DVec3, distance: f64) -> bool {
+        let away = self.normal.dot(p - self.corners[0]);
+        away * away > 1.002 * distance * distance * self.normal2
+    }
+
+    /// [`crossing`], at once 0 for points that the face's box does not lie ahead of.
+    fn crossing(&self, p: DVec3) -> i32 {
+        let Aabb { low, high } = self.around;
+        let misses = (p.y < low.y) | (p.y > high.y) | (p.z < low.z) | (p.z > high.z) | (p.x > high.x);
+        if misses { 0 } else { crossing(p, self.corners) }
+    }
+}
+
+/// How far the worst of some points is outside or too close once `old` faces have become `new`; `margin` is the largest clearance, and
+/// `around` is around all, and so far around the new.
 fn uncovered(
     tree: &Bvh,
     (points, clearances): (&[DVec3], &[f64]),
-    [old, new]: [&[[DVec3; 3]]; 2],
-    boxes: &[Aabb],
+    [old, new]: [&[BoxedFace]; 2],
+    margin: f64,
     around: &Aabb,
 ) -> f64 {
+    let boxes: Vec<Aabb> = new.iter().map(|face| face.around.grown(margin)).collect();
     let mut worst = 0.0_f64;
     tree.visit(around, |i| {
         let (p, clearance) = (points[i as usize], clearances[i as usize]);
         if around.distance2(p) > 0.0 {
             return true;
         }
+        let leaves = |faces: &[BoxedFace]| faces.iter().map(|face| face.crossing(p)).sum::<i32>();
+        if leaves(new) < leaves(old) {
+            let depth2 = new.iter().map(|face| point_triangle2(p, face.corners)).fold(f64::INFINITY, f64::min);
+            worst = worst.max(clearance + depth2.sqrt());
+            return true;
+        }
         let mut near2 = f64::INFINITY;
-        for (t, b) in new.iter().zip(boxes) {
-            if b.distance2(p) == 0.0 {
-                near2 = near2.min(point_triangle2(p, *t));
+        for (face, b) in new.iter().zip(&boxes) {
+            if b.distance2(p) == 0.0 && !face.is_plane_farther(p, clearance) {
+                near2 = near2.min(point_triangle2(p, face.corners));
             }
         }
-        let leaves = |faces: &[[DVec3; 3]]| faces.iter().map(|&t| crossing(p, t)).sum::<i32>();
-        if leaves(new) < leaves(old) {
-            let depth2 = new.iter().map(|&t| point_triangle2(p, t)).fold(f64::INFINITY, f64::min);
-            worst = worst.max(clearance + depth2.sqrt());
-        } else if near2 < clearance * clearance {
+        if near2 < clearance * clearance {
             worst = worst.max(clearance - near2.sqrt());
         }
         true

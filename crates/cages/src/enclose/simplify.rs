@@ -43,11 +43,13 @@ struct Candidate {
     edge: [u32; 2],
     /// Versions of the end vertices when it was proposed; it is stale once they change.
     versions: [u32; 2],
-    /// Where the vertex was found valid, if that cost more than expected.
-    position: Option<DVec3>,
+    /// Which of the places found valid is the vertex's, if one cost more than expected; else [`NONE`].
+    place: u32,
     /// Which limits hold.
-    stage: usize,
+    stage: u8,
 }
+
+const NONE: u32 = u32::MAX;
 
 impl PartialEq for Candidate {
     fn eq(&self, other: &Self) -> bool {
@@ -117,6 +119,8 @@ impl<'a> Simplifier<'a> {
     /// Collapses edges until `goal` vertices are left or none can be collapsed; false where it was stopped.
     fn collapse_cheapest(&mut self, goal: usize, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         let mut heap = BinaryHeap::new();
+        // Apart from the candidates, so that these are small and soon moved about in the heap.
+        let mut places: Vec<DVec3> = Vec::new();
         for v in 0..self.mesh.positions.len() as u32 {
             self.propose_around(v, |w| v < w, &mut heap);
         }
@@ -131,9 +135,9 @@ impl<'a> Simplifier<'a> {
             if [u, v].map(|w| self.versions[w as usize]) != candidate.versions {
                 continue;
             }
-            let (replacement, cost) = match self.admissible(&candidate) {
+            let (replacement, cost) = match self.admissible(&candidate, places.get(candidate.place as usize).copied()) {
                 Ok(found) => found,
-                Err(Rejection::Shape) if candidate.stage + 1 < LIMITS.len() => {
+                Err(Rejection::Shape) if usize::from(candidate.stage) + 1 < LIMITS.len() => {
                     heap.push(Candidate { cost: PRICE * candidate.cost, stage: candidate.stage + 1, ..candidate });
                     continue;
                 }
@@ -142,9 +146,12 @@ impl<'a> Simplifier<'a> {
                     continue;
                 }
             };
-            let position = replacement.moved.map(|m| m.1);
-            if candidate.position.is_none() && cost > 1.5 * candidate.cost {
-                heap.push(Candidate { cost, position, ..candidate });
+            if let Some((_, place)) = replacement.moved
+                && candidate.place == NONE
+                && cost > 1.5 * candidate.cost
+            {
+                heap.push(Candidate { cost, place: places.len() as u32, ..candidate });
+                places.push(place);
                 continue;
             }
             self.mesh.apply(&replacement);
@@ -176,7 +183,7 @@ impl<'a> Simplifier<'a> {
     fn propose(&self, edge: [u32; 2], heap: &mut BinaryHeap<Candidate>) {
         let (position, quadric) = self.optimum(edge);
         let versions = edge.map(|x| self.versions[x as usize]);
-        heap.push(Candidate { cost: quadric.at(position), edge, versions, position: None, stage: 0 });
+        heap.push(Candidate { cost: quadric.at(position), edge, versions, place: NONE, stage: 0 });
     }
 
     fn optimum(&self, edge: [u32; 2]) -> (DVec3, Quadric) {
@@ -189,9 +196,9 @@ impl<'a> Simplifier<'a> {
         (if far { middle } else { best }, quadric)
     }
 
-    /// The collapse with a valid position for its vertex, and its cost there.
-    fn admissible(&self, candidate: &Candidate) -> Result<(FaceReplacement, f64), Rejection> {
-        let limits = LIMITS[candidate.stage];
+    /// The collapse with a valid position for its vertex, found from `first` on if given, and its cost there.
+    fn admissible(&self, candidate: &Candidate, first: Option<DVec3>) -> Result<(FaceReplacement, f64), Rejection> {
+        let limits = LIMITS[usize::from(candidate.stage)];
         let [u, v] = candidate.edge;
         let mesh = &self.mesh;
         let (ring_u, ring_v) = (mesh.ring(u), mesh.ring(v));
@@ -211,7 +218,7 @@ impl<'a> Simplifier<'a> {
             kept.iter().map(|&f| mesh.faces[f as usize].map(|w| if w == v { u } else { w })).collect();
         let outwards = kept.iter().chain(&removed).map(|&f| normal(mesh.corners(f))).sum::<DVec3>().normalize_or_zero();
         let old: Vec<u32> = kept.iter().chain(&removed).copied().collect();
-        let mut at = candidate.position.unwrap_or(best);
+        let mut at = first.unwrap_or(best);
         let mut replacement = FaceReplacement { old, new, moved: Some((u, at)) };
         let size = mesh.positions[u as usize].distance(mesh.positions[v as usize]);
         let mut pushed = 0.0;
@@ -220,7 +227,7 @@ impl<'a> Simplifier<'a> {
                 return Err(Rejection::Shape);
             }
             match mesh.check(&replacement, self.enclosed) {
-                Ok(()) => return Ok((replacement, quadric.at(at) * PRICE.powi(candidate.stage as i32))),
+                Ok(()) => return Ok((replacement, quadric.at(at) * PRICE.powi(i32::from(candidate.stage)))),
                 Err(Violation::Uncovered(depth)) if attempt < 4 => {
                     let step = depth * (1.2 + 0.5 * f64::from(attempt)) + 1e-4 * size;
                     pushed += step;

@@ -114,6 +114,10 @@ pub fn crossing(p: DVec3, [a, b, c]: [DVec3; 3]) -> i32 {
     if turns[0] == 0 || turns[0] != turns[1] || turns[1] != turns[2] {
         return 0;
     }
+    // All of the triangle lies ahead.
+    if p.x < a.x.min(b.x).min(c.x) {
+        return turns[0];
+    }
     // The ray leaves where p lies behind the plane, as seen along the normal's x.
     let side = orient3d(a, b, c, p);
     match turns[0] {
