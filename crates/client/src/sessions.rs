@@ -83,7 +83,7 @@ impl Client {
         }
     }
 
-    /// Gives a session another name; an empty one is none.
+    /// Gives a session another name; an empty name removes it.
     ///
     /// # Errors
     /// [`ClientError::Refused`] with status 404 for an unknown id and 422 for a name that is too long, and those of the connection.

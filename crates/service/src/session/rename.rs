@@ -19,7 +19,7 @@ impl Session {
         lock(&self.name).clone()
     }
 
-    /// Gives it another name, for good; an empty one is none. Options stay as they were sent.
+    /// Gives it another name, for good; an empty name removes it. Options stay as they were sent.
     ///
     /// # Errors
     /// A name that is too long, a session that was deleted, and those of the store.
