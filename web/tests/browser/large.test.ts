@@ -12,10 +12,10 @@ import { dropOnViewer, FilePages, inViewer, whenShown } from './harness/viewing'
 import { type NpyArray, parseNpy } from './npy';
 
 /** Points around the model, and from its one end to the other. */
-const [AROUND, ALONG] = [250, 200];
+const [AROUND, ALONG] = [160, 125];
 const FRAMES = 3;
 
-describe.skipIf(missing)('a capture of 50,000 points', { timeout: 90_000 }, () => {
+describe.skipIf(missing)('a capture of 20,000 points', { timeout: 90_000 }, () => {
   const pages = FilePages.ofSuite();
   let container: Uint8Array;
   let decoded: NpyArray;

@@ -13,13 +13,13 @@ import { inViewer, whenShown } from './harness/viewing';
 import { parseNpy } from './npy';
 
 /** Most that a point may be off, in diagonals. */
-const MAX_ERROR = 2e-4;
+const MAX_ERROR = 5e-5;
 /** Frames of a group of this capture, as the service says. */
 const GROUP = 256;
 /** What opening a completed session's container reads of its ends. */
 const ENDS_BYTES = (1 << 16) + (1 << 13);
 
-const capture = new NoisyCapture();
+const capture = new NoisyCapture(2);
 
 describe.skipIf(missing)('layers of a running session', { timeout: 120_000 }, () => {
   let site: Site;
@@ -66,8 +66,8 @@ describe.skipIf(missing)('layers of a running session', { timeout: 120_000 }, ()
       expect(off(here, decoded(frame))).toBeLessThan(1e-5);
       expect(off(here, capture.frames(frame, 1))).toBeLessThan(MAX_ERROR);
     }
-    // What came while the session ran is not fetched again.
-    expect(file).toBeGreaterThan(2 * ENDS_BYTES);
+    // What came while the session ran is not fetched again: that would be more than the ends are.
+    expect(file).toBeGreaterThan(ENDS_BYTES);
     expect(received()).toBeLessThanOrEqual(file + ENDS_BYTES);
     expect(errors).toEqual([]);
     await close();

@@ -82,7 +82,7 @@ describe.skipIf(chromium === undefined)('a recovery in files', { timeout: 90_000
 
 describe.skipIf(missing)('a recovery in the service', { timeout: 240_000 }, () => {
   let site: Site;
-  const sphere = new SphereCapture();
+  const sphere = new SphereCapture(2);
 
   beforeAll(async () => {
     site = await Site.start();
@@ -99,7 +99,7 @@ describe.skipIf(missing)('a recovery in the service', { timeout: 240_000 }, () =
     const body = new FormData();
     body.append('template', new Blob([sphere.rest]), 'rest.obj');
     body.append('cage', new Blob([sphere.cage]), 'cage.obj');
-    body.append('options', JSON.stringify({ name: 'scanned dance', points: 1000 }));
+    body.append('options', JSON.stringify({ name: 'scanned dance', points: 300 }));
     const { id } = await call('', { method: 'POST', body });
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/recovery/${id}`);
     await page.getByText('Recovered 0 of 0 frames').waitFor();
