@@ -8,7 +8,7 @@ export const editPanelStyle = css`
   output {
     font-weight: 400;
   }
-  p {
+  :is(p, ul) {
     margin-bottom: var(--cager-space-2);
   }
   .row strong {

@@ -30,7 +30,7 @@ export const cardsStyle = css`
     }
     .session td.title {
       order: 0;
-      flex: 1 1 calc(100% - 158px);
+      flex: 1 1 100%;
       min-width: 0;
       font-size: var(--cager-size);
     }
@@ -38,8 +38,8 @@ export const cardsStyle = css`
       max-width: none;
     }
     .session td.tools {
-      order: 0;
-      margin: -4px -8px 0 0;
+      order: 2;
+      margin: -6px -8px -6px auto;
     }
     .session td:empty {
       display: none;

@@ -187,7 +187,7 @@ function download(row: Row, name: string) {
 
 function change(row: Row, name: string) {
   return html`
-    <button type="button" title="Rename" aria-label="Rename ${name}" @click=${row.onRename}>${glyphs.edit}</button>
+    <button type="button" title="Rename" aria-label="Rename ${name}" @click=${row.onRename}>${glyphs.pencil}</button>
     <button type="button" class="remove" title="Delete" aria-label="Delete ${name}" @click=${row.onRemove}>
       ${glyphs.trash}
     </button>

@@ -92,7 +92,7 @@ export const sessionsStyle = css`
     font-weight: 650;
   }
   .about {
-    max-width: 62ch;
+    max-width: min(62ch, 100%);
     margin-top: var(--cager-space-5);
   }
   .about > summary {
@@ -171,7 +171,7 @@ export const sessionsStyle = css`
     gap: 2px;
   }
   .actions select {
-    width: 5em;
+    width: 6.4em;
     padding: 0.2em;
     border-color: transparent;
     background: none;

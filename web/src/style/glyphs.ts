@@ -36,6 +36,7 @@ const DRAWINGS = {
   search: svg`<circle cx="11" cy="11" r="6.5"/><path d="m16 16 4.5 4.5"/>`,
   upload: svg`<path d="M12 16V4m0 0L7 9m5-5 5 5M4 16v4h16v-4"/>`,
   download: svg`<path d="M12 4v12m0 0 5-5m-5 5-5-5M4 17v3h16v-3"/>`,
+  pencil: svg`<path d="m4 20 1-5L16 4l4 4L9 19zM13.500 6.500l4 4"/>`,
   trash: svg`<path d="M4 7h16M9 7V4h6v3M6 7l1 13h10l1-13M10 11v5M14 11v5"/>`,
   alert: svg`<circle cx="12" cy="12" r="8.5"/><path d="M12 7.5v5.5M12 16.2v.3"/>`,
   copy: svg`<rect x="9" y="9" width="11" height="11" rx="2"/><path d="M15 9V4H4v11h5"/>`,

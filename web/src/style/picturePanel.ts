@@ -8,7 +8,7 @@ export const picturePanelStyle = css`
     left: var(--cager-space-3);
     top: calc(var(--cager-space-3) + 62px);
     bottom: calc(var(--deck-height, 120px) + var(--cager-space-3));
-    width: 292px;
+    width: 328px;
     display: flex;
     pointer-events: none;
   }

@@ -63,7 +63,7 @@ export function jobView(job: UploadJob, furthest: Stage, discard: () => void, st
             </p>`
           : nothing
       }
-      ${errorChart(job.measured)}
+      ${errorChart(job.measured, session?.coding && stage !== 'completed' ? ' before fine detail is added' : '')}
       <div class="buttons">
         ${
           canWatch
@@ -118,7 +118,8 @@ function containerFacts(figures: Figures | null) {
   `;
 }
 
-export function errorChart(measured: Measured) {
+/** @param when which errors these are, where it is not all that is to be known */
+export function errorChart(measured: Measured, when = '') {
   const top = measured.linf.reduce((most, value) => (value > most ? value : most), 0);
   if (top === 0) return html``;
   const series = (values: Float32Array, color: string): Series => ({
@@ -132,7 +133,7 @@ export function errorChart(measured: Measured) {
     <figure class="errors">
       <figcaption class="row fine">
         <span class="key linf"></span>Worst point <span class="key"></span>RMS of all points
-        <span class="scale figures">up to ${percent(top, 2)} of the diagonal</span>
+        <span class="scale figures">up to ${percent(top, 2)} of the diagonal${when}</span>
       </figcaption>
       <div
         class="area"

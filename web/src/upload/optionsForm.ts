@@ -65,6 +65,14 @@ export function designOf(choices: Choices, hasCage: boolean): DesignOptions | nu
   return options;
 }
 
+const ACCURACY_HINTS: Readonly<Record<Choices['accuracy'], string>> = {
+  standard: 'No point of any frame is off by more than 0.1 % of the model’s diagonal.',
+  master: 'No point of any frame is off by more than 0.01 % of the model’s diagonal; files are larger.',
+  bound: 'No point of any frame is off by more than you allow.',
+  preview: 'The smallest files; detail that the cages cannot follow is lost.',
+  cages: 'Cages are kept exactly; detail that they cannot follow is lost.',
+};
+
 interface NumberField {
   readonly min: number;
   readonly max?: number;
@@ -82,9 +90,9 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
     label: string,
     words: Readonly<Record<string, string>>,
     hint = '',
-    isFixed = false,
+    { isFixed = false, isWide = false } = {},
   ) =>
-    html`<div class="field">
+    html`<div class="field ${isWide ? 'wide' : ''}">
       <label for=${key}>${label}</label>
       <select id=${key} aria-describedby=${hint ? `${key}-hint` : nothing} ?disabled=${isFixed} @change=${set(key)}>
         ${Object.entries(words).map(([value, word]) => html`<option value=${value} ?selected=${choices[key] === value}>${word}</option>`)}
@@ -141,15 +149,14 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
         'accuracy',
         'Accuracy',
         {
-          standard: 'Standard: visually lossless, 0.1 % at most',
-          master: 'Master: 0.01 % at most',
+          standard: 'Standard: visually lossless, 0.1 %',
+          master: 'Master: 0.01 %',
           bound: 'Custom limit',
           preview: 'Preview: small, cages only',
           cages: 'Cages only, no error limit',
         },
-        choices.accuracy === 'cages'
-          ? 'Cages are kept exactly; detail that they cannot follow is lost.'
-          : 'Frames are compressed in groups; files are small.',
+        ACCURACY_HINTS[choices.accuracy],
+        { isWide: true },
       )}
       ${choices.accuracy === 'bound' ? number('bound', 'Maximum error, in % of the diagonal', percent) : nothing}
       ${hasCage ? nothing : cageFields()}
@@ -163,7 +170,7 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
           'Coordinates',
           { mvc: 'Mean value', harmonic: 'Harmonic', green: 'Green', 'green-free': 'Green, free normals' },
           isDesigned ? 'Cages are designed for mean value coordinates.' : 'How points follow the cage.',
-          isDesigned,
+          { isFixed: isDesigned },
         )}
       </div>
     </details>

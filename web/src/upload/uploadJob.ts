@@ -127,6 +127,8 @@ export class UploadJob extends EventTarget {
       this.session = await this.retry(() => this.service.complete(id, this.plan.frames.frames, signal), signal);
       this.kept.forget();
       this.figures = await containerFigures(this.service, this.session).catch(() => null);
+      // Those of coded frames were told before their fine detail was added.
+      if (this.session.coding) await this.recall(id, signal).catch(() => undefined);
       this.enter('completed');
     } catch (error) {
       const isSignedOut = error instanceof ServiceProblem && error.status === 401;
@@ -190,7 +192,7 @@ export class UploadJob extends EventTarget {
     const { frames } = this.plan;
     const sender = this.sender(id);
     const backoff = new Backoff();
-    await this.recall(id, signal);
+    if (this.session && this.session.frames.solved > 0 && this.done === 0) await this.recall(id, signal);
     // Whatever broke off, what is missing then is what the service says.
     for (;;) {
       const session = await this.retry(() => this.service.session(id, signal), signal);
@@ -212,9 +214,8 @@ export class UploadJob extends EventTarget {
     }
   }
 
-  /** Errors of the frames that were sent before, where they are not known here. */
+  /** Takes the errors of all frames as the service knows them. */
   private async recall(id: string, signal: AbortSignal) {
-    if (!this.session || this.session.frames.solved === 0 || this.done > 0) return;
     for (const { frame, l2, linf } of await this.retry(() => this.service.errors(id, signal), signal)) {
       if (frame >= this.plan.frames.frames) continue;
       this.measured.l2[frame] = l2 ?? Number.NaN;

@@ -69,11 +69,11 @@ export function rangeChoice(player: Player) {
 
 function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {
   const { diagonal, precision } = stage.decoder;
-  const more = heatMap.largest < largest ? ' and above' : '';
+  const more = heatMap.largest < largest ? '≥ ' : '';
   return html`<div class="bar" .style=${`background: ${HEAT.gradient}`}></div>
     <div class="spread muted figures">
       <span>0</span
-      ><span>${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})${more}</span>
+      ><span>${more}${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})</span>
     </div>
     <dl class="pairs">
       <dt>Worst point, ${count(worst)}</dt>

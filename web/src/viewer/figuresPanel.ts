@@ -4,10 +4,10 @@ import type { Player } from './player';
 import { bitrate, count, percent } from '../text';
 
 const SYSTEM_NAMES = {
-  mvc: 'mean value coordinates',
-  harmonic: 'harmonic coordinates',
-  green: 'Green coordinates',
-  'green-free': 'Green coordinates, free normals',
+  mvc: 'mean value',
+  harmonic: 'harmonic',
+  green: 'Green',
+  'green-free': 'Green, free normals',
 } as const;
 
 export function figuresPanel(player: Player, close: () => void) {
@@ -36,10 +36,9 @@ export function figuresPanel(player: Player, close: () => void) {
     <h2>Cage</h2>
     <dl class="pairs">
       ${row('Vertices', count(part.cage.positions.length / 3))}
-      ${row('Triangles', count(part.cage.triangles.length / 3))}
+      ${row('Triangles', count(part.cage.triangles.length / 3))} ${row('Coordinates', SYSTEM_NAMES[part.system])}
       ${isGreen ? row('Vertices and normals', count(part.rowsPerFrame)) : nothing}
     </dl>
-    <p class="muted">${SYSTEM_NAMES[part.system]}</p>
     <h2>Bandwidth</h2>
     <dl class="pairs">
       ${fileRate === null ? nothing : row('This file', bitrate(fileRate))}

@@ -131,7 +131,7 @@ export const overlayStyle = css`
     z-index: 1;
   }
   .legend.beside {
-    left: calc(283px + 2 * var(--cager-space-3));
+    left: calc(319px + 2 * var(--cager-space-3));
   }
   .legend .pairs {
     margin: 6px 0;

@@ -21,10 +21,10 @@ export function titleBox(heading: string, { capture }: Player, isEdited: boolean
   return html`<div class="title glass">
     <h1 class="heading clip" title=${heading}>${heading}</h1>
     <p class="figures fine clip">
-      ${count(part.rest.length / 3)} points, ${count(frames)} frames${frames > 1 ? ` (${first}–${last})` : nothing}<span
-        class="more"
+      ${isEdited ? 'Edited · ' : ''}${count(part.rest.length / 3)} points, ${count(frames)}
+      frames${frames > 1 ? ` (${first}–${last})` : nothing}<span class="more"
         >, cage of ${count(part.cage.positions.length / 3)} vertices</span
-      >${lost > 0 ? html`, <span class="lost">${count(lost)} lost</span>` : nothing}${isEdited ? ', edited' : nothing}
+      >${lost > 0 ? html`, <span class="lost">${count(lost)} lost</span>` : nothing}
     </p>
   </div>`;
 }
@@ -83,7 +83,7 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
       ${SPEEDS.map(
         (speed) =>
           html`<option value=${speed} .selected=${speed === transport.speed}>
-            ${speed}× · ${threeDigits(speed * transport.rate)} fps
+            ${speed}×&emsp;${threeDigits(speed * transport.rate)} fps
           </option>`,
       )}
     </select>
@@ -125,7 +125,7 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
         ? html`Motion between frames
             <div class="bar" .style=${`background: ${HEAT.gradient}`}></div>
             <div class="spread muted figures">
-              <span>0</span><span>${percent(heatMap.largest)} of the diagonal and above</span>
+              <span>0</span><span>≥ ${percent(heatMap.largest)} of the diagonal</span>
             </div>
             ${rangeChoice(player)}`
         : nothing

@@ -256,7 +256,7 @@ export class Player {
     try {
       // What the page cannot compute comes from the service.
       const isFetched = !canCompute(capture.static.system) && capture.coordinates !== undefined;
-      const doing = isFetched ? 'Loading coordinates' : 'Computing coordinates';
+      const doing = isFetched ? 'Loading model' : 'Preparing model';
       const onProgress = (fraction: number) => this.report({ doing, fraction });
       onProgress(0);
       const phi = isFetched

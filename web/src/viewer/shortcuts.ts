@@ -50,7 +50,7 @@ const TABLE = [
       { action: 'wireframe', keys: ['2'], label: 'Wireframe' },
       { action: 'points', keys: ['3'], label: 'Points' },
       { action: 'cage', keys: ['4', 'c'], label: 'Cage' },
-      { action: 'handles', keys: ['5'], label: 'Handles' },
+      { action: 'handles', keys: ['5'], label: 'Handles: points that place the cage' },
       { action: 'ground', keys: ['6', 'g'], label: 'Ground' },
       { action: 'colors', keys: ['7'], label: 'Colours' },
       { action: 'heat', keys: ['h'], label: 'Heat map' },

@@ -15,6 +15,7 @@ const HEAT_NAMES: Readonly<Record<Heat, string>> = {
 
 /** What is written below a drawing where there is room, of actions with longer labels. */
 const CAPTIONS: Partial<Record<Action, string>> = {
+  handles: 'Handles',
   heat: 'Heat map',
   follow: 'Follow',
   beside: 'Compare',

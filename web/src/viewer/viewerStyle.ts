@@ -280,7 +280,7 @@ export const viewerStyle = css`
     }
   }
   @media (pointer: coarse) {
-    .keyboard {
+    .sheet .keyboard {
       display: none;
     }
   }

@@ -69,6 +69,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/`, [], PHONE);
     const button = page.getByRole('button', { name: /^Delete a name that is longer/ });
     await button.waitFor();
+    await page.getByText('About CageR').tap();
     const width = await page.evaluate(() => document.querySelector('cager-sessions')!.scrollWidth);
     expect(width).toBeLessThanOrEqual(390);
     const { x, width: wide } = (await button.boundingBox())!;

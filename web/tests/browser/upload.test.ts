@@ -41,6 +41,9 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     expect(await seriousFindings(page)).toEqual([]);
     await page.getByRole('button', { name: 'Encode' }).click();
     const id = await encoded(page);
+    // The errors of the file, not those of its cages alone.
+    const chart = page.getByRole('img', { name: /^Errors of the frames/ });
+    expect(await chart.getAttribute('aria-label')).toMatch(/worst point 0\.(0\d+|1) % of the diagonal$/);
     expect(await seriousFindings(page)).toEqual([]);
     expect(errors).toEqual([]);
     await close();
@@ -166,10 +169,10 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
   test('a_design_goes_on_after_a_reload_and_its_best_cage_so_far_can_be_taken', async () => {
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['404']);
     page.on('dialog', (dialog) => void dialog.accept());
-    const files = { 'rest.obj': large.rest, 'wave.npy': large.npy(24) };
+    const files = { 'rest.obj': capture.rest, 'wave.npy': capture.npy(24) };
     await drop(page, files);
     await page.getByLabel('Cage', { exact: true }).selectOption('motion');
-    await page.getByLabel('Maximum cage vertices').fill('300');
+    await page.getByLabel('Maximum cage vertices').fill('200');
     await encodeCages(page);
     await expect.poll(() => designs(site), { timeout: 20_000 }).toBe(1);
     await page.reload();
