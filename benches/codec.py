@@ -19,8 +19,10 @@ import time
 import DracoPy
 import meshoptimizer
 import numpy as np
+import py_dem_bones
 import zstandard
 from pxr import Usd, UsdGeom, Vt
+from scipy.spatial.transform import Rotation
 
 from bjontegaard import bd_rate, frontier
 from cages import CAGER, DATA, ROOT, table, write
@@ -187,6 +189,50 @@ def pca(capture):
         (file, (mean, basis, weights)), seconds = timed(encode)
         decoded, back = timed(lambda: (weights @ basis + mean).reshape(capture.frames.shape))
         yield capture.row("quantised PCA, xz", f"{components} components", len(file) + connectivity, decoded, seconds, back)
+
+
+def skinning(capture):
+    """Smooth skinning decomposition (Le and Deng 2012): rigid bones in every frame, eight of them for each point."""
+    count, points, _ = capture.frames.shape
+    most, unit = 8, 2e-5 * capture.diagonal
+    connectivity = len(lzma.compress(np.diff(capture.faces.ravel().astype(np.int32)).astype(np.int32).tobytes(), preset=9))
+    homogeneous = np.c_[np.round(capture.rest / unit) * unit, np.ones(points)]
+    for bones in (10, 20, 40, 80):
+
+        def encode():
+            solver = py_dem_bones.DemBones()
+            solver.nV, solver.nF, solver.nS, solver.nB = points, count, 1, bones
+            solver.nIters, solver.nnz = 30, most
+            solver.fStart, solver.subjectID = np.array([0, count]), np.zeros(count, dtype=np.int32)
+            solver.u, solver.fv = capture.rest.T.copy(), capture.faces.tolist()
+            solver.v = capture.frames.transpose(0, 2, 1).reshape(3 * count, points).copy()
+            solver.init()
+            solver.compute()
+            weights = np.asarray(solver.get_weights())
+            chosen = np.argsort(-weights, axis=0)[:most]
+            weights = np.round(np.take_along_axis(weights, chosen, axis=0) * 1023).astype(np.int16)
+            moved = np.asarray(solver.m).reshape(count, 4, solver.nB, 4)[:, :3].transpose(0, 2, 1, 3)
+            turned = np.round(Rotation.from_matrix(moved[..., :3].reshape(-1, 3, 3)).as_quat(canonical=True)[:, :3].reshape(moved.shape[:-1]) * 2**14).astype(np.int32)
+            shifted = np.round(moved[..., 3] / unit).astype(np.int32)
+            # Frames as differences to the one before.
+            parts = [np.diff(np.round(capture.rest / unit).astype(np.int32), axis=0, prepend=0), chosen.astype(np.uint8), weights]
+            parts += [np.diff(of, axis=0, prepend=np.zeros((1, *of.shape[1:]), np.int32)) for of in (turned, shifted)]
+            bytes_of = [np.ascontiguousarray(part.ravel().view(np.uint8).reshape(-1, part.itemsize).T).tobytes() for part in map(np.ascontiguousarray, parts)]
+            return sum(len(lzma.compress(part, preset=9)) for part in bytes_of), (chosen, weights, turned, shifted)
+
+        def decode():
+            shares = np.zeros((kept[2].shape[1], points))
+            np.put_along_axis(shares, kept[0], kept[1] / np.maximum(kept[1].sum(0), 1), axis=0)
+            weighted = np.einsum("bn,nk->bkn", shares, homogeneous).reshape(-1, points)
+            vectors = kept[2].reshape(-1, 3) / 2**14
+            real = np.sqrt(np.maximum(0, 1 - np.square(vectors).sum(1, keepdims=True)))
+            turned = Rotation.from_quat(np.c_[vectors, real]).as_matrix().reshape(*kept[2].shape, 3)
+            moved = np.concatenate([turned, unit * kept[3][..., None]], axis=3)
+            return (moved.transpose(0, 2, 1, 3).reshape(3 * count, -1) @ weighted).reshape(count, 3, points).transpose(0, 2, 1)
+
+        (size, kept), seconds = timed(encode)
+        decoded, back = timed(decode)
+        yield capture.row("skinning by py-dem-bones, xz", f"{bones} bones", size + connectivity, decoded, seconds, back)
 
 
 def plain(capture):

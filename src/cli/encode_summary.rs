@@ -38,6 +38,11 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
             significant(report.diagonal)
         )
     });
+    let alone = if report.coding.is_none() {
+        "  cages   alone, so points lie where cages can bring them; --max-error 0.001 keeps every point within 0.1 % of the diagonal, mostly in a smaller file\n"
+    } else {
+        ""
+    };
     let s = &report.seconds;
     let designed = if s.design > 0.0 { format!(", {:.3} s of it for the cage", s.design) } else { String::new() };
     let steps = if is_verbose() {
@@ -51,7 +56,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     format!(
         "{}: {} frames of {} points as cages of {} vertices\n\
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
-         \x20 error   {}\n{worst}\
+         \x20 error   {}\n{worst}{alone}\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
          {refined}{chosen}\x20 time    {:.3} s{designed}\n{steps}",
         output.display(),
