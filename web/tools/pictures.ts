@@ -38,11 +38,15 @@ const site = await DemoSite.start();
 const comparison = await DemoComparison.of(site.demo);
 const browser = await launch();
 try {
+  await mkdir(FOLDER, { recursive: true });
+  const empty = (page: Page) => page.getByRole('heading', { name: 'No sessions yet' }).waitFor();
+  const begin = { url: `${site.page}#/`, shown: empty };
+  await take(browser, { name: 'empty-light', ...begin, viewport: DESKTOP, colorScheme: 'light' });
   const id = await site.session('walk_v012');
   await site.session('jump_v003', 48, false);
-  await site.session('turn_v007', 24);
-  await mkdir(FOLDER, { recursive: true });
+  const other = await site.session('turn_v007', 24);
   const viewer = { url: `${site.page}#/session/${id}?frame=${FRAME}`, shown: modelShown };
+  const both = { url: `${site.page}#/session/${other}?frame=12&beside=${id}`, shown: bothShown };
   const list = { url: `${site.page}#/`, shown: (page: Page) => page.getByText('smaller').first().waitFor() };
   const upload = { url: `${site.page}#/upload`, shown: (page: Page) => page.getByRole('heading').first().waitFor() };
   const report = { url: comparison.url, shown: cagesShown };
@@ -51,6 +55,9 @@ try {
     { name: 'viewer-dark', ...viewer, viewport: DESKTOP, colorScheme: 'dark', keys: ['i'] },
     { name: 'viewer-phone', ...viewer, viewport: PHONE, colorScheme: 'dark' },
     { name: 'editing-light', ...viewer, viewport: DESKTOP, colorScheme: 'light', keys: EDITING },
+    { name: 'editing-phone', ...viewer, viewport: PHONE, colorScheme: 'dark', keys: EDITING },
+    { name: 'heat-light', ...viewer, viewport: DESKTOP, colorScheme: 'light', keys: ['h'] },
+    { name: 'beside-dark', ...both, viewport: DESKTOP, colorScheme: 'dark' },
     { name: 'list-light', ...list, viewport: DESKTOP, colorScheme: 'light' },
     { name: 'list-phone', ...list, viewport: PHONE, colorScheme: 'dark' },
     { name: 'upload-dark', ...upload, viewport: DESKTOP, colorScheme: 'dark' },
@@ -92,6 +99,15 @@ async function modelShown(page: Page) {
     const viewer = document.querySelector<ViewerPage>('cager-viewer-page')?.renderRoot.querySelector('cager-viewer');
     const player = viewer?.player;
     return player?.stage.decoder.ready === true && player.progress === null && !player.playback.buffering;
+  };
+  await page.waitForFunction(isShown, undefined, { timeout: READY_MS });
+}
+
+async function bothShown(page: Page) {
+  await modelShown(page);
+  const isShown = () => {
+    const viewer = document.querySelector<ViewerPage>('cager-viewer-page')?.renderRoot.querySelector('cager-viewer');
+    return viewer?.pair.player?.stage.decoder.ready === true && viewer.pair.player.progress === null;
   };
   await page.waitForFunction(isShown, undefined, { timeout: READY_MS });
 }

@@ -52,6 +52,7 @@ export const sessionsStyle = css`
     padding: 10px var(--cager-space-3);
   }
   :is(th, td):first-child {
+    width: 26%;
     padding-left: var(--cager-space-4);
   }
   .number {

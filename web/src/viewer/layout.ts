@@ -33,14 +33,14 @@ export class Layout {
     this.deckHeight = this.measureDeck();
     this.panelShare = panelShare;
     this.beside = beside;
-    // In a wide picture tools and title stand beside the model anyway.
+    // In a wide picture tools and title stand beside the model anyway, but not in half of one.
     const isNarrow = clientWidth < NARROW;
     const [tools, lead] = ['.tools', '.lead'].map((part) => this.host.renderRoot.querySelector(part));
-    const right = isNarrow ? (tools?.clientWidth ?? 0) + GAP : 0;
     const top = isNarrow ? (lead?.clientHeight ?? 0) + GAP : 0;
     const bottom = this.deckHeight + (isNarrow ? Math.round(panelShare * clientHeight) : 0);
     this.host.style.setProperty('--covered-height', `${bottom}px`);
     const isWide = clientWidth > WIDE * clientHeight;
+    const right = isNarrow || (beside !== null && isWide) ? (tools?.clientWidth ?? 0) + GAP : 0;
     this.host.setAttribute('pictures', beside === null ? 'one' : isWide ? 'columns' : 'rows');
     if (beside === null) player?.resize(clientWidth, clientHeight, ratio, { top, right, bottom });
     else {

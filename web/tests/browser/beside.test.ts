@@ -79,6 +79,24 @@ describe.skipIf(missing)('two captures in step', { timeout: 90_000 }, () => {
     );
     expect(measured).toEqual({ same: true, known: 8 });
 
+    // The tools cover none of the second model.
+    const free = await inViewer(
+      page,
+      ({ pair, renderRoot }) => {
+        const { stage } = pair.player!;
+        const points = stage.decoder.readPositions();
+        stage.decoder.place(points);
+        const { elements: e } = stage.clipMatrix;
+        const { left, width } = stage.canvas.getBoundingClientRect();
+        const along = (row: number, at: number) =>
+          e[row] * points[at] + e[row + 4] * points[at + 1] + e[row + 8] * points[at + 2] + e[row + 12];
+        const rights = Array.from({ length: points.length / 3 }, (_, p) => along(0, 3 * p) / along(3, 3 * p));
+        const right = left + ((1 + Math.max(...rights)) / 2) * width;
+        return renderRoot.querySelector('.tools')!.getBoundingClientRect().left - right;
+      },
+      null,
+    );
+    expect(free).toBeGreaterThan(0);
     await page.keyboard.press('d');
     await page.keyboard.press('4');
     await page.keyboard.press('End');
