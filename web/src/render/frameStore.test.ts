@@ -132,3 +132,21 @@ test('preliminary frames are shown until their final ones can be', async () => {
   expect(onReplaced).toHaveBeenCalledOnce();
   expect((await store.frame(0)).rows[0]).toBe(2);
 });
+
+test('a block that was read is not asked for again by whoever plays', async () => {
+  const asked: number[] = [];
+  const store = new FrameStore(
+    captureOf(1, 4, (frame) => {
+      asked.push(frame);
+      return Promise.resolve({ first: frame - (frame % 2), count: 2, cages: new Float32Array(6), residual: null });
+    }),
+  );
+  const heard: number[] = [];
+  store.onBlock = ({ first }) => heard.push(first);
+  await store.read(2);
+  await store.load(3);
+  store.prefetch([2, 3]);
+  expect([asked, heard]).toEqual([[2], [2]]);
+  expect(store.peek(3)).not.toBeNull();
+  store.close();
+});

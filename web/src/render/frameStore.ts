@@ -65,13 +65,18 @@ export class FrameStore {
     return preliminary && this.dataOf(preliminary, frame);
   }
 
+  /** The block of a frame, which is kept. */
+  async read(frame: number): Promise<FrameBlock> {
+    const kept = this.blockOf(frame);
+    if (kept) return kept;
+    const block = await this.request(frame);
+    this.arrived();
+    return block;
+  }
+
   /** Sees to it that a frame comes; resolves when its block has. */
   async load(frame: number): Promise<void> {
-    let block = this.blockOf(frame);
-    if (!block) {
-      block = await this.request(frame);
-      this.arrived();
-    }
+    const block = await this.read(frame);
     if (frame < block.first || frame >= block.first + block.count)
       throw new Error(`Frame ${frame} is not where the capture says; load it again.`);
     if (block.residual && !this.offsets.has(frame)) this.requestOffsets(block, block.residual, frame);

@@ -201,14 +201,16 @@ const FRAMES = 32;
 const WAIT_MILLISECONDS = 200;
 
 /**
- * Reads frames of a finished capture for what they say of its motion, one block after another, as long as the connection has time for them. Those that do not
- * come are left to whoever plays them.
+ * Has frames of a finished capture read for what they say of its motion, one block after another, as long as the connection has time for them. Those that do
+ * not come are left to whoever plays them.
  *
+ * @param read keeps what it reads for whoever plays, so that nothing is fetched twice, and includes it in the motion
  * @param isBusy whether something waits for frames that are to be shown
  */
 export async function surveyMotion(
   capture: Capture,
   motion: Motion,
+  read: (frame: number) => Promise<unknown>,
   isBusy: () => boolean,
   signal: AbortSignal,
 ): Promise<void> {
@@ -219,10 +221,6 @@ export async function surveyMotion(
     while (isBusy() && !signal.aborted) await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
     if (signal.aborted) return;
     if (motion.knows(frame)) continue;
-    try {
-      motion.include(await capture.block(frame, signal));
-    } catch {
-      continue;
-    }
+    await read(frame).catch(() => undefined);
   }
 }

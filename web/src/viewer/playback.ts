@@ -112,6 +112,11 @@ export class Playback {
     return this.feed.prepare(transport);
   }
 
+  /** Has the block of a frame read and kept, without playing it. */
+  read(frame: number): Promise<unknown> {
+    return this.store.read(frame);
+  }
+
   /** Goes to a place that somebody else has moved on to, whether or not its frames are there. */
   follow(transport: Transport) {
     this.state = transport;

@@ -352,7 +352,9 @@ export class Player {
     this.motion.include(block);
     if (this.isSurveyed) return;
     this.isSurveyed = true;
-    void surveyMotion(this.capture, this.motion, () => this.playback.buffering, this.stop.signal);
+    const { playback } = this;
+    const read = (frame: number) => playback.read(frame);
+    void surveyMotion(this.capture, this.motion, read, () => playback.buffering, this.stop.signal);
   }
 
   /** Frames the motion as it is known by now, unless somebody has moved the camera. */
