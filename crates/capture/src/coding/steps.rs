@@ -112,7 +112,8 @@ impl GroupCoder {
         estimated.map(|(bytes, _)| bytes)
     }
 
-    /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not above; the figure is about this power of the step. Begins at the step of the group before. `None` where no step does it.
+    /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not above; the figure is about the power `usual` of the step.
+    /// Begins at the step of the group before. `None` where no step does it.
     fn for_step<T>(
         &mut self,
         usual: f64,
@@ -168,7 +169,7 @@ impl GroupCoder {
         }))
     }
 
-    /// In the larger steps that meet a mean error; in the first group where there is little residual, of two ratios in that which takes fewer bytes.
+    /// In the larger steps that meet a mean error; where there is little residual in the first group, of two ratios in that which takes fewer bytes.
     pub(super) fn code_to_mean(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
         let usual = self.code_in_ratio(goal)?;
         let Some((step, ratio)) = self.carried.chosen else { return Ok(usual) };
