@@ -37,7 +37,7 @@ fn coded() -> (Vec<u8>, Vec<Vec<f32>>) {
         let captured: Vec<&[f64]> = captured.iter().map(Vec::as_slice).collect();
         let residual =
             ResidualGroup { captured: &captured, of_cages: group, step: 0.02, bound: Some(0.01), most_numbers: 1000 };
-        let residual = encode_residual(&hierarchy, &residual).unwrap();
+        let (residual, _) = encode_residual(&hierarchy, &residual).unwrap();
         writer.write_group(&bytes, Some(&residual), &vec![(0.5, 1.5); group.len()]).unwrap();
     }
     (writer.finish(None).unwrap(), decoded)

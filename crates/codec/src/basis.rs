@@ -139,7 +139,7 @@ impl CageBasis {
 /// `ΦᵀΦ/n + εI`.
 fn gram(phi: MatRef<'_, f64>) -> Mat<f64> {
     let (n, m) = phi.shape();
-    let mut gram = linalg::product(phi.transpose(), phi);
+    let mut gram = linalg::mirrored(linalg::lower_product(phi.transpose(), phi));
     let scale = 1.0 / n.max(1) as f64;
     let trace: f64 = (0..m).map(|k| gram[(k, k)]).sum::<f64>() * scale;
     let floor = FLOOR * (trace / m as f64).max(f64::MIN_POSITIVE);

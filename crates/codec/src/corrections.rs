@@ -12,6 +12,11 @@ pub(crate) struct Corrections {
 }
 
 impl Corrections {
+    /// None in any of so many frames.
+    pub(crate) fn none(frames: usize, step: f64) -> Self {
+        Self { step, frames: vec![Vec::new(); frames] }
+    }
+
     /// Those that take every decoded position, points × 3, to within `bound` of the captured one. `None` where steps of this bound cannot be told
     /// apart in single precision, or do not count the distance.
     pub(crate) fn find(captured: &[&[f64]], decoded: &[Vec<f32>], bound: f64) -> Option<Self> {
@@ -85,7 +90,7 @@ impl Corrections {
 
     pub(crate) fn decode(bytes: &[u8], frames: usize, points: usize, step: f64) -> Result<Self> {
         if bytes.is_empty() {
-            return Ok(Self { step, frames: vec![Vec::new(); frames] });
+            return Ok(Self::none(frames, step));
         }
         let mut coder = Decoder::new(bytes)?;
         let mut models = Models::new();

@@ -43,46 +43,45 @@ pub struct ResidualGroup<'a> {
     pub most_numbers: usize,
 }
 
-/// Encodes what is left of a group. `None` where numbers are not finite, or too far apart to be counted in these steps.
+/// Encodes what is left of a group; and what the bytes say. `None` where numbers are not finite, or too far apart to be counted in these steps.
 ///
 /// # Panics
 /// Where frames have another number of points, or there are too many of them.
-pub fn encode_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Option<Vec<u8>> {
-    let Contents { count, is_parted, coders, corrections, .. } = Contents::<Integers>::new(hierarchy, group)?;
+pub fn encode_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Option<(Vec<u8>, Residual)> {
+    let Contents { is_parted, coders, decoded, .. } = Contents::<Integers>::new(hierarchy, group)?;
+    let count = decoded.values.ncols();
     let [coarse, fine] = coders.map(Encoder::into_bytes);
     let mut bytes = group.step.to_le_bytes().to_vec();
     bytes.extend((count as u16 | if is_parted { PARTED } else { 0 }).to_le_bytes());
-    bytes.extend(corrections.step().to_le_bytes());
+    bytes.extend(decoded.corrections.step().to_le_bytes());
     bytes.extend((coarse.len() as u32).to_le_bytes());
     if is_parted {
         bytes.extend((fine.len() as u32).to_le_bytes());
     }
     bytes.extend(coarse);
     bytes.extend(fine);
-    bytes.extend(corrections.encode());
-    Some(bytes)
+    bytes.extend(decoded.corrections.encode());
+    Some((bytes, decoded))
 }
 
-/// About how many bytes [`encode_residual`] would give, in less time.
+/// As [`encode_residual`], but only about how many bytes, in less time.
 ///
 /// # Panics
 /// As there.
-pub fn estimate_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Option<f64> {
-    let Contents { coders: [coder, _], components, corrections, .. } = Contents::<Histograms>::new(hierarchy, group)?;
+pub fn estimate_residual(hierarchy: &Hierarchy, group: &ResidualGroup<'_>) -> Option<(f64, Residual)> {
+    let Contents { coders: [coder, _], components, decoded, .. } = Contents::<Histograms>::new(hierarchy, group)?;
     let bits: f64 = components.models().map(Histograms::bits).sum();
-    Some((HEAD + coder.into_bytes().len() + corrections.encode().len()) as f64 + bits / 8.0)
+    Some(((HEAD + coder.into_bytes().len() + decoded.corrections.encode().len()) as f64 + bits / 8.0, decoded))
 }
 
 /// A residual, coded or estimated.
 struct Contents<'a, M> {
-    /// Number of components.
-    count: usize,
     /// Whether the vertices are in two parts.
     is_parted: bool,
     /// Trajectories, and what models of type M write.
     coders: [Encoder; 2],
     components: Components<'a, M>,
-    corrections: Corrections,
+    decoded: Residual,
 }
 
 impl<'a, M: Models> Contents<'a, M> {
@@ -123,20 +122,20 @@ impl<'a, M: Models> Contents<'a, M> {
         components.code(&mut coders, next, |component| {
             done.next().into_iter().for_each(|k| decoded.set(k, hierarchy, &component.found, group.step));
         })?;
-        let corrections = match group.bound {
-            None => Corrections::default(),
+        decoded.corrections = match group.bound {
+            None => Corrections::none(frames, 0.0),
             Some(bound) => {
                 let mut positions: Vec<Vec<f32>> = group.of_cages.to_vec();
                 decoded.add(0, &mut positions);
                 Corrections::find(group.captured, &positions, bound - decoded.rounding())?
             }
         };
-        Some(Self { count, is_parted, coders, components, corrections })
+        Some(Self { is_parted, coders, components, decoded })
     }
 }
 
 /// What is added to the positions of a group's cages.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
     trajectories: Mat<f32>,
     /// Values × components.
@@ -311,8 +310,9 @@ mod tests {
                         bound: Some(bound),
                         most_numbers: usize::MAX,
                     };
-                    let bytes = encode_residual(&hierarchy, &group).unwrap();
+                    let (bytes, coded) = encode_residual(&hierarchy, &group).unwrap();
                     let residual = Residual::decode(&hierarchy, frames.len(), &bytes, usize::MAX).unwrap();
+                    assert_eq!(residual, coded, "{name}");
                     let mut decoded = of_cages.clone();
                     residual.add(0, &mut decoded);
                     let found = largest(&captured, &decoded);
@@ -336,15 +336,16 @@ mod tests {
         let of_cages = vec![vec![0.0f32; 24_300]; frames.len()];
         let (step, bound, most_numbers) = (0.006, Some(0.01), usize::MAX);
         let group = ResidualGroup { captured: &captured, of_cages: &of_cages, step, bound, most_numbers };
-        let bytes = encode_residual(&hierarchy, &group).unwrap();
+        let (bytes, coded) = encode_residual(&hierarchy, &group).unwrap();
         assert_eq!(bytes[9] >> 7, 1, "in two parts");
         let mut decoded = of_cages.clone();
         let residual = Residual::decode(&hierarchy, 12, &bytes, usize::MAX).unwrap();
+        assert!(residual == coded);
         residual.add(0, &mut decoded);
         assert!(largest(&captured, &decoded) <= 0.01);
         // Components alone are as near as their steps: few vertices are left to correct.
         assert!(residual.corrected() < 12 * 8_100 / 20, "{}", residual.corrected());
-        let about = estimate_residual(&hierarchy, &group).unwrap() / bytes.len() as f64;
+        let about = estimate_residual(&hierarchy, &group).unwrap().0 / bytes.len() as f64;
         assert!((about - 1.0).abs() < 0.05, "{about}");
         for cut in [20, 24, 25, 30, 1_000, bytes.len() / 2, bytes.len() - 8] {
             assert!(Residual::decode(&hierarchy, 12, &bytes[..cut], usize::MAX).is_err(), "{cut}");
@@ -369,7 +370,7 @@ mod tests {
         let most_numbers = usize::MAX;
         let group =
             ResidualGroup { captured: &captured, of_cages: &of_cages, step: 0.3, bound: Some(bound), most_numbers };
-        let bytes = encode_residual(&hierarchy, &group).unwrap();
+        let (bytes, _) = encode_residual(&hierarchy, &group).unwrap();
         let mut decoded = of_cages.clone();
         Residual::decode(&hierarchy, 6, &bytes, usize::MAX).unwrap().add(0, &mut decoded);
         assert!(largest(&captured, &decoded) <= bound);
@@ -391,7 +392,7 @@ mod tests {
             bound: Some(0.02),
             most_numbers: usize::MAX,
         };
-        let bytes = encode_residual(&hierarchy, &group).unwrap();
+        let (bytes, _) = encode_residual(&hierarchy, &group).unwrap();
         let mut refused = 0;
         let mut check = |bytes: &[u8]| match Residual::decode(&hierarchy, 6, bytes, usize::MAX) {
             Err(_) => refused += 1,

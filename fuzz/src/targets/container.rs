@@ -105,7 +105,7 @@ fn coded(header: &Header, rest: &Model, cage: &TriMesh) -> Vec<u8> {
     let group =
         ResidualGroup { captured: &captured, of_cages: &frames, step: 0.02, bound: Some(0.005), most_numbers: 1000 };
     let hierarchy = Hierarchy::new(&coded_rest.mesh.faces, coded_rest.mesh.points.len());
-    let residual = encode_residual(&hierarchy, &group).expect("a residual");
+    let (residual, _) = encode_residual(&hierarchy, &group).expect("a residual");
     let mut writer = ContainerWriter::with_meshes(
         vec![1],
         header,

@@ -23,22 +23,35 @@ pub struct CodedGroup {
     pub farthest: (usize, f64),
 }
 
-/// A group's bytes, and where its cages take the points.
+/// A group's bytes and what they say.
 pub(super) struct Encoded {
     cages: Vec<u8>,
-    residual: Option<Vec<u8>>,
+    /// The coded residual, where it is not only estimated, and what it says.
+    coded: Option<Vec<u8>>,
+    residual: Option<Residual>,
+    /// Where the cages take the points; when these are measured, with the residual.
     positions: Vec<Vec<f32>>,
+    /// Empty until they are measured.
+    errors: Vec<FrameError>,
     farthest: (usize, f64),
 }
 
 impl Encoded {
     pub(super) fn bytes(&self) -> u64 {
-        bytes_of(&self.cages, self.residual.as_ref())
+        bytes_of(&self.cages, self.coded.as_ref())
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        mean(&self.errors)
     }
 }
 
 fn bytes_of(cages: &[u8], residual: Option<&Vec<u8>>) -> u64 {
     (cages.len() + SECTION + residual.map_or(0, |residual| residual.len() + SECTION)) as u64
+}
+
+fn mean(errors: &[FrameError]) -> f64 {
+    errors.iter().map(|error| error.l2).sum::<f64>() / errors.len().max(1) as f64
 }
 
 impl CodedGroup {
@@ -47,7 +60,7 @@ impl CodedGroup {
     }
 
     pub(super) fn mean(&self) -> f64 {
-        self.errors.iter().map(|error| error.l2).sum::<f64>() / self.errors.len().max(1) as f64
+        mean(&self.errors)
     }
 }
 
@@ -154,17 +167,29 @@ impl GroupCoder {
         let steps = self.goal.steps((residual, ratio), self.model.points());
         let mut encoded = self.encode_cages(count, steps.cage)?;
         if let Some(step) = steps.residual {
-            encoded.residual = Some(self.residual_of(&encoded.positions, step, encode_residual)?);
+            let (coded, residual) = self.residual_of(&encoded.positions, step, encode_residual)?;
+            (encoded.coded, encoded.residual) = (Some(coded), Some(residual));
         }
         Ok(encoded)
     }
 
-    /// About the bytes of the first frames with all points, where this has a `part` of them.
-    pub(super) fn estimate(&self, count: usize, residual: f64, ratio: f64, part: f64) -> Result<f64, CodingError> {
+    /// About the bytes of the first frames with all points, where this has a `part` of them; and what they would say.
+    pub(super) fn estimate(
+        &self,
+        count: usize,
+        residual: f64,
+        ratio: f64,
+        part: f64,
+    ) -> Result<(f64, Encoded), CodingError> {
         let steps = self.goal.steps((residual, ratio), self.model.points());
-        let encoded = self.encode_cages(count, steps.cage)?;
-        let bytes = steps.residual.map(|step| self.residual_of(&encoded.positions, step, estimate_residual));
-        Ok(encoded.cages.len() as f64 + bytes.transpose()?.unwrap_or(0.0) / part)
+        let mut encoded = self.encode_cages(count, steps.cage)?;
+        let mut bytes = encoded.cages.len() as f64;
+        if let Some(step) = steps.residual {
+            let (of_residual, residual) = self.residual_of(&encoded.positions, step, estimate_residual)?;
+            bytes += of_residual / part;
+            encoded.residual = Some(residual);
+        }
+        Ok((bytes, encoded))
     }
 
     /// The first frames without a residual.
@@ -180,7 +205,7 @@ impl GroupCoder {
         let positions = self.model.positions(&decoded);
         let extents = decoded.iter().map(|cage| f64::from(cage.iter().fold(0.0f32, |far, x| far.max(x.abs()))));
         let farthest = extents.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-        Ok(Encoded { cages: coded, residual: None, positions, farthest })
+        Ok(Encoded { cages: coded, coded: None, residual: None, positions, errors: Vec::new(), farthest })
     }
 
     /// What `code` makes of that which the positions of cages leave of the first frames.
@@ -196,19 +221,31 @@ impl GroupCoder {
         code(&self.model.hierarchy, &group).ok_or_else(|| self.uncountable())
     }
 
-    /// Reads the bytes of a group back and measures what they decode to.
-    pub(super) fn finish(&self, encoded: Encoded) -> Result<CodedGroup, CodingError> {
-        let Encoded { cages, residual, mut positions, farthest } = encoded;
-        let count = positions.len();
-        let read = |bytes: &Vec<u8>| Residual::decode(&self.model.hierarchy, count, bytes, usize::MAX);
-        let read = residual.as_ref().map(read).transpose().map_err(|_| self.uncountable())?;
-        let needed = read.as_ref().filter(|read| read.is_needed());
-        let residual = residual.filter(|_| needed.is_some());
-        if let Some(read) = needed {
-            read.add(0, &mut positions);
+    /// Measures what a group says.
+    pub(super) fn measure(&self, encoded: &mut Encoded) {
+        if let Some(residual) = encoded.residual.as_ref().filter(|residual| residual.is_needed()) {
+            residual.add(0, &mut encoded.positions);
         }
-        let measured = positions.par_iter().zip(&self.frames);
-        let errors = measured.map(|(decoded, captured)| FrameError::of_positions(decoded, captured)).collect();
+        let measured = encoded.positions.par_iter().zip(&self.frames);
+        encoded.errors = measured.map(|(decoded, captured)| FrameError::of_positions(decoded, captured)).collect();
+    }
+
+    /// Reads the bytes of a group back, which say what was or is measured.
+    pub(super) fn finish(&self, mut encoded: Encoded) -> Result<CodedGroup, CodingError> {
+        let (count, coded) = (encoded.positions.len(), encoded.coded.take());
+        let read = |bytes: &Vec<u8>| Residual::decode(&self.model.hierarchy, count, bytes, usize::MAX);
+        let read = || coded.as_ref().map(read).transpose().map_err(|_| self.uncountable());
+        let measure = || {
+            if encoded.errors.is_empty() {
+                self.measure(&mut encoded);
+            }
+        };
+        let (read, ()) = rayon::join(read, measure);
+        if read? != encoded.residual {
+            return Err(self.uncountable());
+        }
+        let Encoded { cages, residual, errors, farthest, .. } = encoded;
+        let residual = coded.filter(|_| residual.is_some_and(|residual| residual.is_needed()));
         let group = CodedGroup { cages, residual, errors, farthest };
         if let Goal::MaxError(error) = self.goal
             && group.errors.iter().any(|found| found.linf.is_nan() || found.linf > error * self.diagonal)

@@ -9,10 +9,15 @@ use std::sync::Arc;
 /// Frames that steps are chosen by, at most, and points of them where there are more than twice as many: fewer points had larger files in the end.
 const TRIAL_FRAMES: usize = 32;
 const TRIAL_POINTS: usize = 10_000;
+/// Points of all frames that the first steps for a mean error are found by.
+const MEAN_POINTS: usize = 1_500;
 /// Step of the cage over that of the residual, both as what they move the points, where nothing was measured.
 const USUAL_RATIO: f64 = 1.6;
-/// The other ratio that is tried for a mean error: cages cost more beside little residual.
+/// The other ratio that is tried for a mean error where the residual's bytes are fewer than so many times the cages': cages cost more beside little residual.
 const FINER_CAGES: f64 = 1.1;
+const LITTLE_RESIDUAL: f64 = 0.1;
+/// Power of the step that a mean error is about: less than 1, since larger steps leave more of the residual out.
+const USUAL_POWER: f64 = 0.7;
 /// Step of the residual over the largest error allowed, likewise.
 const USUAL_STEP: f64 = 1.8;
 
@@ -20,6 +25,17 @@ const USUAL_STEP: f64 = 1.8;
 const NEAR: f64 = 1.02;
 /// Most steps that are tried for a group.
 const MAX_TRIALS: usize = 20;
+
+/// The power of the step that figures are about, from those of two steps where these say it.
+fn power_between(before: Option<(f64, f64)>, (step, figure): (f64, f64), usual: f64) -> f64 {
+    let power = before.map_or(usual, |(s, f)| (figure / f).ln() / (step / s).ln());
+    if (0.2..5.0).contains(&(power / usual)) { power } else { usual }
+}
+
+/// The step whose figure is a little below 1, by that of another.
+fn next_step(step: f64, figure: f64, power: f64) -> f64 {
+    step * (NEAR.sqrt() * figure).powf(-1.0 / power).clamp(0.125, 8.0)
+}
 
 /// Of so many frames those that steps are chosen by: a run in either half, since a capture may begin more calmly than it goes on.
 fn trial_frames(count: usize) -> [Range<usize>; 2] {
@@ -39,11 +55,11 @@ impl GroupCoder {
             Goal::Standard => Ok((3e-3 * self.diagonal, USUAL_RATIO)),
             Goal::MaxError(error) => {
                 let unit = error * self.diagonal;
-                let trial = self.trial();
+                let trial = self.part(TRIAL_POINTS, &trial_frames(self.frames.len()));
                 let part = trial.model.points() as f64 / self.model.points() as f64;
                 let size = |(step, ratio): (f64, f64)| {
                     let bytes = trial.estimate(trial.frames.len(), step * unit, ratio * part.sqrt(), part);
-                    bytes.map(|bytes| (bytes, (step, ratio)))
+                    bytes.map(|(bytes, _)| (bytes, (step, ratio)))
                 };
                 let mut best = size((USUAL_STEP, USUAL_RATIO))?;
                 for (step, ratio) in [(1.4, 1.0), (1.0, 1.6)] {
@@ -63,9 +79,9 @@ impl GroupCoder {
         }
     }
 
-    /// A coder with the frames that steps are chosen by, and of a large model with some patches.
-    fn trial(&self) -> Self {
-        let every = self.model.points() / TRIAL_POINTS;
+    /// A coder of some frames, with about so many points in patches where the model has at least twice as many.
+    fn part(&self, points: usize, frames: &[Range<usize>]) -> Self {
+        let every = self.model.points() / points;
         let (model, points) = if every < 2 {
             (Arc::clone(&self.model), None)
         } else {
@@ -76,12 +92,12 @@ impl GroupCoder {
             Some(points) => points.iter().flat_map(|&i| frame[3 * i as usize..][..3].iter().copied()).collect(),
             None => frame.clone(),
         };
-        let mut trial = Self::new(self.goal, model, self.diagonal, self.most, self.carried);
-        for range in trial_frames(self.frames.len()) {
-            trial.frames.extend(self.frames[range.clone()].iter().map(of_points));
-            trial.cages.extend_from_slice(&self.cages[range]);
+        let mut part = Self::new(self.goal, model, self.diagonal, self.most, self.carried);
+        for range in frames {
+            part.frames.extend(self.frames[range.clone()].iter().map(of_points));
+            part.cages.extend_from_slice(&self.cages[range.clone()]);
         }
-        trial
+        part
     }
 
     /// Root of points over rows of a cage: a step of this times the unit moves the points by about the unit.
@@ -92,14 +108,15 @@ impl GroupCoder {
     /// About the bytes of the frames that wait, in the steps where [`Self::choose`] begins for a bound.
     pub(super) fn usual_bytes(&self) -> Result<f64, CodingError> {
         let Goal::MaxError(error) = self.goal else { return Ok(0.0) };
-        self.estimate(self.frames.len(), USUAL_STEP * error * self.diagonal, USUAL_RATIO, 1.0)
+        let estimated = self.estimate(self.frames.len(), USUAL_STEP * error * self.diagonal, USUAL_RATIO, 1.0);
+        estimated.map(|(bytes, _)| bytes)
     }
 
-    /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not above; the figure grows with the step, or falls where
-    /// `grows` is false. Begins at the step of the group before. `None` where no step does it.
+    /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not above; the figure is about the power `usual` of the step.
+    /// Begins at the step of the group before. `None` where no step does it.
     fn for_step<T>(
         &mut self,
-        grows: bool,
+        usual: f64,
         tried: impl Fn(&Self, f64, f64) -> Result<(T, f64), CodingError>,
     ) -> Result<Option<T>, CodingError> {
         let (start, ratio) = self.carried.chosen.unwrap_or((1e-3 * self.diagonal, USUAL_RATIO));
@@ -123,7 +140,7 @@ impl GroupCoder {
                 // Steps that are too small to count.
                 Err(CodingError::Uncountable { .. }) => {
                     refused = Some(step);
-                    if grows { 1e-6 } else { 1e6 }
+                    if usual > 0.0 { 1e-6 } else { 1e6 }
                 }
                 Err(error) => return Err(error),
             };
@@ -132,11 +149,8 @@ impl GroupCoder {
             if (1.0 / NEAR..=1.0).contains(&figure) || fine.zip(refused).is_some_and(near) {
                 break;
             }
-            // Figures are about powers of the step.
-            let usual = if grows { 1.0 } else { -1.0 };
-            let power = before.map_or(usual, |(s, f): (f64, f64)| (figure / f).ln() / (step / s).ln());
-            let power = if (0.2..5.0).contains(&(usual * power)) { power } else { usual };
-            let mut next = step * (NEAR.sqrt() * figure).powf(-1.0 / power).clamp(0.125, 8.0);
+            let power = power_between(before, (step, figure), usual);
+            let mut next = next_step(step, figure, power);
             if let Some((fine, refused)) = fine.zip(refused)
                 && !(fine.min(refused)..=fine.max(refused)).contains(&next)
             {
@@ -155,30 +169,51 @@ impl GroupCoder {
         }))
     }
 
-    /// In the larger steps that meet a mean error; in the first group, of two ratios that which takes fewer bytes.
+    /// In the larger steps that meet a mean error; where there is little residual in the first group, of two ratios in that which takes fewer bytes.
     pub(super) fn code_to_mean(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
         let usual = self.code_in_ratio(goal)?;
-        let is_usual = |&(_, ratio): &(f64, f64)| self.carried.frames == 0 && ratio == USUAL_RATIO;
-        let Some((step, _)) = self.carried.chosen.filter(is_usual) else { return Ok(usual) };
-        self.carried.chosen = Some((step * (USUAL_RATIO / FINER_CAGES).sqrt(), FINER_CAGES));
-        // It only may save bytes: what cannot be coded in it is coded in the usual one.
-        if let Ok(finer) = self.code_in_ratio(goal)
-            && finer.bytes() < usual.bytes()
-        {
-            return Ok(finer);
+        let Some((step, ratio)) = self.carried.chosen else { return Ok(usual) };
+        let residual = usual.residual.as_ref().map_or(0, Vec::len);
+        if self.carried.frames == 0 && LITTLE_RESIDUAL * usual.cages.len() as f64 > residual as f64 {
+            self.carried.chosen = Some((step * (USUAL_RATIO / FINER_CAGES).sqrt(), FINER_CAGES));
+            // It only may save bytes: what cannot be coded in it is coded in the usual one.
+            if let Ok(finer) = self.code_in_ratio(goal)
+                && finer.bytes() < usual.bytes()
+            {
+                return Ok(finer);
+            }
+            self.carried.chosen = Some((step, ratio));
         }
-        self.carried.chosen = Some((step, USUAL_RATIO));
         Ok(usual)
     }
 
+    /// Some of the points say about in which steps.
     fn code_in_ratio(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
-        let found = self.for_step(true, |coder, step, ratio| {
-            let group = coder.code(coder.frames.len(), step, ratio)?;
+        let mut power = USUAL_POWER;
+        let is_large = self.model.points() >= 2 * MEAN_POINTS;
+        if let Some((mut step, ratio)) = self.carried.chosen.filter(|_| is_large) {
+            let part = self.part(MEAN_POINTS, &[0..self.frames.len()]);
+            let share = part.model.points() as f64 / self.model.points() as f64;
+            let mut before = None;
+            for _ in 0..2 {
+                let tried = part.estimate(part.frames.len(), step, ratio * share.sqrt(), share);
+                let Ok((_, mut group)) = tried else { break };
+                part.measure(&mut group);
+                let figure = (group.mean() / goal).max(1e-6);
+                power = power_between(before, (step, figure), USUAL_POWER);
+                before = Some((step, figure));
+                step = next_step(step, figure, power);
+            }
+            self.carried.chosen = Some((step, ratio));
+        }
+        let found = self.for_step(power, |coder, step, ratio| {
+            let mut group = coder.encode(coder.frames.len(), step, ratio)?;
+            coder.measure(&mut group);
             let mean = group.mean();
             Ok((group, mean / goal))
         })?;
         let asked = goal / self.diagonal;
-        found.ok_or(CodingError::BelowPrecision { asked, least: 2.0 * asked })
+        self.finish(found.ok_or(CodingError::BelowPrecision { asked, least: 2.0 * asked })?)
     }
 
     /// In the bytes that belong to these of the frames that are left.
@@ -187,7 +222,7 @@ impl GroupCoder {
         // Frames may come that were not expected.
         let part = self.frames.len() as f64 / room.frames.max(self.frames.len()) as f64;
         let share = (room.bytes as f64 * part) as u64;
-        let found = self.for_step(false, |coder, step, ratio| {
+        let found = self.for_step(-1.0, |coder, step, ratio| {
             let group = coder.encode(coder.frames.len(), step, ratio)?;
             let bytes = group.bytes();
             Ok((group, bytes as f64 / share.max(1) as f64))

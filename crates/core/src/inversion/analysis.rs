@@ -115,8 +115,9 @@ impl Analysis {
 
         context.begin(Step::SingularValues)?;
         // Built only now, since memory use peaks in maxvol.
-        let decoder = decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
-        let mut spectra = Spectra::of(phi.as_ref(), &basis, required)?;
+        let decoder = || decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
+        let (decoder, spectra) = rayon::join(decoder, || Spectra::of(phi.as_ref(), &basis, required));
+        let mut spectra = spectra?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
             basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
             spectra = Spectra::of(phi.as_ref(), &basis, required)?;

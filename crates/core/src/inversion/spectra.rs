@@ -102,7 +102,11 @@ impl Spectra {
             None => None,
         };
         let gram_factor = if ends_of_all.is_some() { None } else { basis.gram_factor(phi) };
-        let vectors_of_handles = !large || last.is_none() && matches!(required.handles(), None | Some(Handles::MaxVol));
+        let vectors_of_handles = match required.handles() {
+            None | Some(Handles::MaxVol) => last.is_none(),
+            Some(Handles::All) => !large,
+            Some(Handles::Spread { .. } | Handles::Rectangular { .. }) => false,
+        };
         let values_of_all = !large || required == RequiredDecompositions::Everything;
         let vectors_of_all = whole_frames && last.is_none();
         let whole = || {
