@@ -55,7 +55,7 @@ impl GroupCoder {
             Goal::Standard => Ok((3e-3 * self.diagonal, USUAL_RATIO)),
             Goal::MaxError(error) => {
                 let unit = error * self.diagonal;
-                let trial = self.part(TRIAL_POINTS, &trial_frames(self.frames.len()));
+                let trial = self.part(TRIAL_POINTS, trial_frames(self.frames.len()).into_iter().flatten());
                 let part = trial.model.points() as f64 / self.model.points() as f64;
                 let size = |(step, ratio): (f64, f64)| {
                     let bytes = trial.estimate(trial.frames.len(), step * unit, ratio * part.sqrt(), part);
@@ -80,7 +80,7 @@ impl GroupCoder {
     }
 
     /// A coder of some frames, with about so many points in patches where the model has at least twice as many.
-    fn part(&self, points: usize, frames: &[Range<usize>]) -> Self {
+    fn part(&self, points: usize, frames: impl IntoIterator<Item = usize>) -> Self {
         let every = self.model.points() / points;
         let (model, points) = if every < 2 {
             (Arc::clone(&self.model), None)
@@ -93,9 +93,9 @@ impl GroupCoder {
             None => frame.clone(),
         };
         let mut part = Self::new(self.goal, model, self.diagonal, self.most, self.carried);
-        for range in frames {
-            part.frames.extend(self.frames[range.clone()].iter().map(of_points));
-            part.cages.extend_from_slice(&self.cages[range.clone()]);
+        for frame in frames {
+            part.frames.push(of_points(&self.frames[frame]));
+            part.cages.push(self.cages[frame].clone());
         }
         part
     }
@@ -192,7 +192,7 @@ impl GroupCoder {
         let mut power = USUAL_POWER;
         let is_large = self.model.points() >= 2 * MEAN_POINTS;
         if let Some((mut step, ratio)) = self.carried.chosen.filter(|_| is_large) {
-            let part = self.part(MEAN_POINTS, &[0..self.frames.len()]);
+            let part = self.part(MEAN_POINTS, 0..self.frames.len());
             let share = part.model.points() as f64 / self.model.points() as f64;
             let mut before = None;
             for _ in 0..2 {
