@@ -11,6 +11,8 @@ const NEAR: f64 = 1e-4;
 
 /// How near two frame rates are to be the same.
 const EQUAL: f64 = 1e-9;
+/// The least frame rate, a sample in eleven days.
+const SLOWEST: f64 = 1e-6;
 
 /// Of so many samples; `told` is the frame rate of the program that wrote the archive.
 pub(super) fn timing(sampling: &Sampling, samples: usize, told: Option<f64>, is_default: bool) -> Result<Times, Fault> {
@@ -24,7 +26,7 @@ pub(super) fn timing(sampling: &Sampling, samples: usize, told: Option<f64>, is_
     };
     let own = 1.0 / step;
     let sane = |number: f64| number.is_finite() && number.abs() < 1e9;
-    if !(sane(own) && own > 0.0 && sane(start * own)) {
+    if !(sane(own) && own >= SLOWEST && sane(start * own)) {
         if samples == 1 {
             return Ok(Times { frame_rate: told, ..Times::default() });
         }
@@ -46,4 +48,17 @@ pub(super) fn timing(sampling: &Sampling, samples: usize, told: Option<f64>, is_
 fn rounded(number: f64, digits: f64, near: f64) -> f64 {
     let scaled = number * digits;
     if (scaled - scaled.round()).abs() < near { scaled.round() / digits } else { number }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_are_years_apart_give_no_rate() {
+        let bytes = [&[1, 0, 0, 0][..], &1e10_f64.to_le_bytes(), &[1, 0, 0, 0], &0.0_f64.to_le_bytes()].concat();
+        let [sampling] = &Sampling::table(&bytes).unwrap()[..] else { panic!("one sampling") };
+        assert_eq!(timing(sampling, 1, None, false).unwrap().frame_rate, None);
+        assert!(timing(sampling, 2, None, false).is_err());
+    }
 }
