@@ -299,7 +299,7 @@ def plot(name, rows):
     high = [math.log10(max(row[key] for row in lossy)) + 0.1 for key in ("kg", "bpvf")]
     x = lambda kg: left + (math.log10(kg) - low[0]) / (high[0] - low[0]) * (width - left - right)
     y = lambda bpvf: height - bottom - (math.log10(bpvf) - low[1]) / (high[1] - low[1]) * (height - bottom - top)
-    colours = ["#1a6fb5", "#6aa9dc", "#123a5e", "#c0504d", "#d98b2b", "#6b8e23"]
+    colours = ["#1a6fb5", "#6aa9dc", "#123a5e", "#c0504d", "#d98b2b", "#6b8e23", "#7a5299"]
     out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12">', f'<rect width="{width}" height="{height}" fill="#fff"/>']
     for axis, place, label in ((0, x, lambda v: f"{v:g}"), (1, y, lambda v: f"{v:g}")):
         for power in range(math.floor(low[axis]), math.ceil(high[axis]) + 1):
@@ -392,7 +392,7 @@ def main():
     captures = {}
     for name in CAPTURES:
         capture = Capture(name)
-        rows = [row for part in (ours(capture, folder), draco(capture), meshopt(capture), pca(capture), plain(capture), alembic(capture)) for row in part]
+        rows = [row for part in (ours(capture, folder), draco(capture), meshopt(capture), pca(capture), skinning(capture), plain(capture), alembic(capture)) for row in part]
         plot(name, rows)
         captures[name] = rows
         count, points, _ = capture.frames.shape

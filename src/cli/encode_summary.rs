@@ -39,7 +39,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
         )
     });
     let alone = if report.coding.is_none() {
-        "  cages   alone, so points lie where cages can bring them; --max-error 0.001 keeps every point within 0.1 % of the diagonal, mostly in a smaller file\n"
+        "  cages   only, no error limit; --max-error 0.001 keeps every point within 0.1 % of the diagonal, usually in a smaller file\n"
     } else {
         ""
     };

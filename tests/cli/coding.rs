@@ -92,6 +92,15 @@ fn sizes_and_mean_errors_are_met() {
 }
 
 #[test]
+fn mean_errors_are_met_where_a_part_of_the_points_gives_the_first_step() {
+    let (dir, capture) = Dir::with(Small::of(3_200));
+    for error in [1e-3, 5e-5] {
+        let (errors, _) = coded(&dir, &capture, &format!("--mean-error {error}"));
+        assert!(mean(&errors.l2) <= error && mean(&errors.l2) > 0.9 * error, "{} of {error}", mean(&errors.l2));
+    }
+}
+
+#[test]
 fn without_a_cage_its_size_is_chosen_for_the_bound() {
     let (dir, _) = Dir::with_capture();
     let encode = ENCODE.replace(" --cage cage.obj", "");

@@ -31,7 +31,12 @@ impl Dir {
 
     /// With the small capture as `rest.obj`, `cage.obj` and `frames.npy`.
     pub(crate) fn with_capture() -> (Self, Small) {
-        let (dir, small) = (Self::new(), Small::new());
+        Self::with(Small::new())
+    }
+
+    /// With another capture.
+    pub(crate) fn with(small: Small) -> (Self, Small) {
+        let dir = Self::new();
         dir.model("rest.obj", &small.rest);
         dir.model("cage.obj", &as_model(&small.cage));
         dir.frames("frames.npy", &small.frames);
@@ -220,7 +225,12 @@ pub(crate) struct Small {
 
 impl Small {
     pub(crate) fn new() -> Self {
-        let capture = Capture::new(&Options { points: 600, frames: 20, cage_vertices: 60 });
+        Self::of(600)
+    }
+
+    /// With so many points.
+    pub(crate) fn of(points: usize) -> Self {
+        let capture = Capture::new(&Options { points, frames: 20, cage_vertices: 60 });
         let frames = (0..capture.frames())
             .map(|t| {
                 let mut frame = Vec::new();

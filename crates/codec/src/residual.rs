@@ -95,7 +95,8 @@ impl<'a, M: Models> Contents<'a, M> {
             column.iter_mut().zip(pairs).for_each(|(x, (&captured, &of_cage))| *x = captured - f64::from(of_cage));
         });
         let gram = trajectories::gram(motion.as_ref());
-        let most = frames.min(group.most_numbers / (3 * points).max(1));
+        // More than three for each point say nothing, and are refused when they are read.
+        let most = frames.min(3 * points).min(group.most_numbers / (3 * points).max(1));
         let chosen = Trajectories::choose(gram.as_ref(), 3 * points, group.step, most)?;
         let count = chosen.count();
         let values = fit(chosen.values().as_ref(), motion.as_ref())?;

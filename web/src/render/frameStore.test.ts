@@ -150,3 +150,17 @@ test('a block that was read is not asked for again by whoever plays', async () =
   expect(store.peek(3)).not.toBeNull();
   store.close();
 });
+
+test('frames are loaded ahead also while others read some', async () => {
+  const asked: number[] = [];
+  const capture = captureOf(1, 4, (frame) => {
+    asked.push(frame);
+    return new Promise(() => undefined);
+  });
+  const store = new FrameStore(capture);
+  store.read(2).catch(() => undefined);
+  store.prefetch([0, 1]);
+  store.prefetch([0, 1]);
+  await settled();
+  expect(asked).toEqual([2, 0]);
+});

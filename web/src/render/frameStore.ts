@@ -38,6 +38,8 @@ export class FrameStore {
   private readonly offsets = new Map<number, Float32Array>();
   private readonly asked = new Set<number>();
   private readonly loading = new Map<number, Promise<FrameBlock>>();
+  /** Loads the next block ahead, whatever else is on its way. */
+  private ahead: Promise<void> | null = null;
   /** Loads the final block of a frame that is there from a preliminary one. */
   private finishing: Promise<void> | null = null;
   private readonly atWorker = new Set<number>();
@@ -115,8 +117,7 @@ export class FrameStore {
       } else if (this.find(frame, true)) {
         this.finish(frame);
       } else {
-        if (this.loading.size === (this.finishing ? 1 : 0))
-          this.load(frame).catch((error: unknown) => this.onFailure(frame, error));
+        this.loadAhead(frame);
         return;
       }
     }
@@ -142,6 +143,7 @@ export class FrameStore {
     }
     const { blocks, offsets, asked, loading, atWorker, shownFinal } = this;
     for (const kept of [blocks, offsets, asked, loading, atWorker, shownFinal]) kept.clear();
+    this.ahead = null;
     this.finishing = null;
   }
 
@@ -169,6 +171,16 @@ export class FrameStore {
     if (!residual) return { rows, offsets: null };
     const offsets = this.offsets.get(frame);
     return offsets ? { rows, offsets } : null;
+  }
+
+  private loadAhead(frame: number) {
+    if (this.ahead) return;
+    const ahead = this.load(frame)
+      .catch((error: unknown) => this.onFailure(frame, error))
+      .finally(() => {
+        if (this.ahead === ahead) this.ahead = null;
+      });
+    this.ahead = ahead;
   }
 
   /** Loads the final block of a frame, one at a time; the preliminary one is shown meanwhile. */

@@ -204,7 +204,7 @@ const WAIT_MILLISECONDS = 200;
  * Has frames of a finished capture read for what they say of its motion, one block after another, as long as the connection has time for them. Those that do
  * not come are left to whoever plays them.
  *
- * @param read keeps what it reads for whoever plays, so that nothing is fetched twice, and includes it in the motion
+ * @param read keeps what it reads for whoever plays, so that what fits is fetched once, and includes it in the motion
  * @param isBusy whether something waits for frames that are to be shown
  */
 export async function surveyMotion(

@@ -63,7 +63,7 @@ export function jobView(job: UploadJob, furthest: Stage, discard: () => void, st
             </p>`
           : nothing
       }
-      ${errorChart(job.measured, session?.coding && stage !== 'completed' ? ' before fine detail is added' : '')}
+      ${errorChart(job.measured, session?.coding && !job.isMeasuredAsCoded ? ' before fine detail is added' : '')}
       <div class="buttons">
         ${
           canWatch
@@ -138,7 +138,7 @@ export function errorChart(measured: Measured, when = '') {
       <div
         class="area"
         role="img"
-        aria-label="Errors of the frames so far: worst point ${percent(top, 2)} of the diagonal"
+        aria-label="Errors of the frames: worst point ${percent(top, 2)} of the diagonal${when}"
       >
         ${plot({ x: axisOf([0, 1], 0), y: axisOf([0, 1.05 * top], 0), series: lines })}
       </div>

@@ -58,6 +58,9 @@ export class UploadJob extends EventTarget {
     this.measured = { l2: unknown(), linf: unknown() };
   }
 
+  /** Whether the errors of a coded capture are those of its file. */
+  isMeasuredAsCoded = false;
+
   get isActive(): boolean {
     return this.stage !== 'completed' && this.stage !== 'stopped' && this.stage !== 'failed';
   }
@@ -128,7 +131,13 @@ export class UploadJob extends EventTarget {
       this.kept.forget();
       this.figures = await containerFigures(this.service, this.session).catch(() => null);
       // Those of coded frames were told before their fine detail was added.
-      if (this.session.coding) await this.recall(id, signal).catch(() => undefined);
+      if (this.session.coding) {
+        this.isMeasuredAsCoded = await this.recall(id, signal).then(
+          () => true,
+          () => false,
+        );
+        this.trouble = '';
+      }
       this.enter('completed');
     } catch (error) {
       const isSignedOut = error instanceof ServiceProblem && error.status === 401;

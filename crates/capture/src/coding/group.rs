@@ -226,13 +226,15 @@ impl GroupCoder {
         if let Some(residual) = encoded.residual.as_ref().filter(|residual| residual.is_needed()) {
             residual.add(0, &mut encoded.positions);
         }
-        let measured = encoded.positions.par_iter().zip(&self.frames);
+        // They are needed no more, and another step may be tried beside.
+        let positions = std::mem::take(&mut encoded.positions);
+        let measured = positions.par_iter().zip(&self.frames);
         encoded.errors = measured.map(|(decoded, captured)| FrameError::of_positions(decoded, captured)).collect();
     }
 
-    /// Reads the bytes of a group back, which say what was or is measured.
+    /// Reads the bytes of a group back, and checks that they say what was measured.
     pub(super) fn finish(&self, mut encoded: Encoded) -> Result<CodedGroup, CodingError> {
-        let (count, coded) = (encoded.positions.len(), encoded.coded.take());
+        let (count, coded) = (encoded.positions.len().max(encoded.errors.len()), encoded.coded.take());
         let read = |bytes: &Vec<u8>| Residual::decode(&self.model.hierarchy, count, bytes, usize::MAX);
         let read = || coded.as_ref().map(read).transpose().map_err(|_| self.uncountable());
         let measure = || {

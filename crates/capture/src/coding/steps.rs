@@ -169,7 +169,7 @@ impl GroupCoder {
         }))
     }
 
-    /// In the larger steps that meet a mean error; where there is little residual in the first group, of two ratios in that which takes fewer bytes.
+    /// In the largest steps that meet a mean error. Where the first group has little residual, two ratios of the steps are tried, and the one of fewer bytes stays.
     pub(super) fn code_to_mean(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
         let usual = self.code_in_ratio(goal)?;
         let Some((step, ratio)) = self.carried.chosen else { return Ok(usual) };
@@ -187,7 +187,7 @@ impl GroupCoder {
         Ok(usual)
     }
 
-    /// Some of the points say about in which steps.
+    /// Begins at the step that some of the points suggest.
     fn code_in_ratio(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
         let mut power = USUAL_POWER;
         let is_large = self.model.points() >= 2 * MEAN_POINTS;

@@ -16,7 +16,7 @@ pub struct PreparationReport {
     pub affine_reproduction_error: f64,
     /// Condition number of `Φ`, over its rank.
     pub condition_full: f64,
-    /// Condition number of the rows read, over their rank; of `Φ□` where every point is read.
+    /// Condition number of the rows read, over their rank; of `Φ□` where every point is read. NaN in an analysis for rows that are given later.
     pub condition_handles: f64,
     /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read. Of
     /// 1,024 unknowns or more, of which few are regularised, only the first one and the last are computed; the others are NaN.
@@ -40,7 +40,7 @@ pub enum Step {
     Coordinates,
     /// Which rows of it are read.
     Handles,
-    /// The spectrum of those rows, after the decoder where the first step left none.
+    /// The spectrum of what is inverted, beside the decoder where the first step left none.
     SingularValues,
     /// The regularisation, and what turns frames into cages; not of an analysis.
     Operator,

@@ -56,6 +56,8 @@ async fn frames_are_answered_promptly_while_a_cage_is_designed() {
     let capture = Capture::small();
     let session = app.ready(capture).await;
     let job = app.design(&Capture::new(6000, 32, 60), &json!({"time_limit_s": 30.0})).await;
+    eventually("it is designed", async || (app.cage_job(&job.id).await.state == CageState::Running).then_some(()))
+        .await;
     let mut slowest = Duration::ZERO;
     for frame in 0..40 {
         let clock = Instant::now();
