@@ -160,6 +160,7 @@ soak: ## kill the service a hundred times under load; KILLS and SEED change how 
 
 lint: ## formatting, clippy and documentation, all warnings denied; and whether the command line builds without the service
 	$(CARGO) fmt --all --check
+	cd python && $(CARGO) metadata --format-version 1 --locked >/dev/null
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
 	$(CARGO) check --workspace --no-default-features --locked
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
