@@ -1,10 +1,14 @@
-/** Takes the pictures of the page and of a report in docs/pictures, of the built-in demo; and of a recovery, where `CAGER_CAPTURES` names the captures. */
+/**
+ * Takes the pictures of the page and of a report in docs/pictures, of the built-in demo; and of a walk and a recovery, where `CAGER_CAPTURES` names the captures.
+ * `ONLY=walk,viewer-dark` takes those alone whose names begin so.
+ */
 
 import { execFileSync } from 'node:child_process';
 import { mkdir, mkdtemp, readdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
+import type { CagerViewer } from '../src/viewer/cagerViewer';
 import type { ViewerPage } from '../src/viewer/viewerPage';
 import { launch } from '../tests/browser/harness/browser';
 import { cager } from '../tests/browser/harness/programs';
@@ -20,6 +24,8 @@ const PHONE = { width: 390, height: 844 };
 /** Where the demo is well bent. */
 const FRAME = 40;
 const READY_MS = 90_000;
+/** What names of the pictures to take begin with; all where nothing is said. */
+const ONLY = (process.env.ONLY ?? '').split(',');
 /** Edits the cage: chooses a vertex and moves it. */
 const EDITING = ['e', 'Enter', 'Shift+ArrowUp', 'Shift+ArrowUp', 'Shift+ArrowUp'];
 
@@ -58,6 +64,7 @@ try {
     { name: 'editing-phone', ...viewer, viewport: PHONE, colorScheme: 'dark', keys: EDITING },
     { name: 'heat-light', ...viewer, viewport: DESKTOP, colorScheme: 'light', keys: ['h'] },
     { name: 'beside-dark', ...both, viewport: DESKTOP, colorScheme: 'dark' },
+    { name: 'beside-phone', ...both, viewport: PHONE, colorScheme: 'light' },
     { name: 'list-light', ...list, viewport: DESKTOP, colorScheme: 'light' },
     { name: 'list-phone', ...list, viewport: PHONE, colorScheme: 'dark' },
     { name: 'upload-dark', ...upload, viewport: DESKTOP, colorScheme: 'dark' },
@@ -67,11 +74,21 @@ try {
   for (const picture of pictures) await take(browser, picture);
   const captures = process.env.CAGER_CAPTURES;
   if (captures) {
-    const recovery = await recovered(captures);
-    const shown = (page: Page) => recoveryShown(page, recovery);
-    const file = { url: `${site.page}#/file`, shown };
-    await take(browser, { name: 'recovery-light', ...file, viewport: DESKTOP, colorScheme: 'light' });
-    await take(browser, { name: 'recovery-phone', ...file, viewport: PHONE, colorScheme: 'dark' });
+    const walk = lazily(() => walkOf(captures));
+    const recovery = lazily(() => recovered(captures));
+    const url = `${site.page}#/file`;
+    const ofWalk = (place: number) => ({
+      url,
+      shown: async (page: Page) => walkShown(page, await walk(), place),
+    });
+    const ofRecovery = { url, shown: async (page: Page) => recoveryShown(page, await recovery()) };
+    const places = { first: 0, middle: 0.5, last: 1 };
+    for (const [name, place] of Object.entries(places)) {
+      await take(browser, { name: `walk-${name}-light`, ...ofWalk(place), viewport: DESKTOP, colorScheme: 'light' });
+      await take(browser, { name: `walk-${name}-phone`, ...ofWalk(place), viewport: PHONE, colorScheme: 'dark' });
+    }
+    await take(browser, { name: 'recovery-light', ...ofRecovery, viewport: DESKTOP, colorScheme: 'light' });
+    await take(browser, { name: 'recovery-phone', ...ofRecovery, viewport: PHONE, colorScheme: 'dark' });
   }
 } finally {
   await browser.close();
@@ -80,6 +97,7 @@ try {
 }
 
 async function take(browser: Browser, { name, url, viewport, colorScheme, shown, keys = [] }: Picture) {
+  if (!ONLY.some((beginning) => name.startsWith(beginning))) return;
   const context = await browser.newContext({ viewport, colorScheme, reducedMotion: 'reduce' });
   const page = await context.newPage();
   await page.goto(url);
@@ -110,6 +128,37 @@ async function bothShown(page: Page) {
     return viewer?.pair.player?.stage.decoder.ready === true && viewer.pair.player.progress === null;
   };
   await page.waitForFunction(isShown, undefined, { timeout: READY_MS });
+}
+
+/** What is made when it is first asked for, and then again and again. */
+function lazily<T>(make: () => Promise<T>): () => Promise<T> {
+  let made: Promise<T> | undefined;
+  return () => (made ??= make());
+}
+
+/** The container of `anny-man-02_02`. */
+async function walkOf(captures: string): Promise<Uint8Array> {
+  const made = await mkdtemp(join(tmpdir(), 'cager-walk-'));
+  try {
+    const output = join(made, 'walk.cager');
+    const [rest, frames] = ['rest.obj', 'frames.npy'].map((name) => join(captures, 'anny-man-02_02', name));
+    const inputs = ['--rest', rest, '--frames', frames, '--fps', '30', '--max-error', '0.001'];
+    execFileSync(cager!, ['encode', ...inputs, '-o', output, '--quiet'], { stdio: 'inherit' });
+    return await readFile(output);
+  } finally {
+    await rm(made, { recursive: true });
+  }
+}
+
+/** Shows the walk as somebody sees it who opens the file, in the frame at a place between 0, the first one, and 1. */
+async function walkShown(page: Page, container: Uint8Array, place: number) {
+  await dropOnViewer(page, { 'walk.cager': container });
+  await modelShown(page);
+  await inViewer(page, (viewer) => void (viewer.up = 'z'), null);
+  const show = (viewer: CagerViewer, at: number) => {
+    viewer.frame = Math.round(at * (viewer.player!.capture.frames - 1));
+  };
+  await inViewer(page, show, place);
 }
 
 /** What a recovery of the first frame of `anny-man-02_02` makes of the surfaces of `observed-example`, and these themselves. */
