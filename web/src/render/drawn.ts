@@ -31,6 +31,7 @@ export interface Covered {
   readonly top: number;
   readonly right: number;
   readonly bottom: number;
+  readonly left: number;
 }
 
 export function drawSide(

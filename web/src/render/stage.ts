@@ -239,7 +239,14 @@ export class Stage {
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
     this.pictureIsOld = true;
     for (const camera of [this.perspective, this.parallel])
-      camera.setViewOffset(width, height, covered.right / 2, (covered.bottom - covered.top) / 2, width, height);
+      camera.setViewOffset(
+        width,
+        height,
+        (covered.right - covered.left) / 2,
+        (covered.bottom - covered.top) / 2,
+        width,
+        height,
+      );
     const size = `${width} ${height} ${pixelRatio}`;
     // Even an unchanged size would empty the canvas and make all its buffers anew.
     if (size === this.size) return;

@@ -173,8 +173,7 @@ function figures({ frame, player }: Beside, lead: Player): string {
   const number = numberText(numberAt(numbers, Math.floor(position)));
   if (frame === null) return `No frame ${number} here`;
   const { l2, linf } = player.capture.errors;
-  const errors = Number.isFinite(linf[frame]) ? ` · L2 ${percent(l2[frame])} · L∞ ${percent(linf[frame])}` : '';
-  return `frame ${number}${errors}`;
+  return Number.isFinite(linf[frame]) ? `L2 ${percent(l2[frame])} · L∞ ${percent(linf[frame])}` : `frame ${number}`;
 }
 
 /** Darkest and brightest value of a colour's channels: light and shadow are seen on all. */

@@ -322,7 +322,7 @@ export class CagerViewer extends CaptureElement {
 
   private resize() {
     this.layout.apply(this.player, this.pair.player, this.coveredShare);
-    if (this.player?.isHome) this.player.goHome(true);
+    this.player?.refit(true);
   }
 
   /** Does what a key asks for; a page that shows nothing else can hand it all key presses. */

@@ -13,13 +13,21 @@ const GAP = 12;
 export class Layout {
   private deckHeight = 0;
   private panelShare = 0;
+  private sides = { left: 0, right: 0 };
   private beside: Player | null = null;
 
   constructor(private readonly host: HTMLElement & { readonly renderRoot: ParentNode }) {}
 
   /** Whether there is another picture than before, or what floats above takes another part of it; parameters as of {@link apply}. */
   hasChanged(beside: Player | null, panelShare: number): boolean {
-    return this.measureDeck() !== this.deckHeight || panelShare !== this.panelShare || beside !== this.beside;
+    const { left, right } = this.measureSides();
+    return (
+      this.measureDeck() !== this.deckHeight ||
+      panelShare !== this.panelShare ||
+      beside !== this.beside ||
+      left !== this.sides.left ||
+      right !== this.sides.right
+    );
   }
 
   /**
@@ -31,24 +39,50 @@ export class Layout {
     if (clientWidth === 0 || clientHeight === 0) return;
     const ratio = Math.min(FINEST_PIXEL_RATIO, devicePixelRatio);
     this.deckHeight = this.measureDeck();
+    this.sides = this.measureSides();
     this.panelShare = panelShare;
     this.beside = beside;
-    // In a wide picture tools and title stand beside the model anyway, but not in half of one.
-    const isNarrow = clientWidth < NARROW;
-    const [tools, lead] = ['.tools', '.lead'].map((part) => this.host.renderRoot.querySelector(part));
+    const { left, right } = this.sides;
+    const lead = this.host.renderRoot.querySelector('.lead');
+    const isNarrow = this.isNarrow;
     const top = isNarrow ? (lead?.clientHeight ?? 0) + GAP : 0;
     const bottom = this.deckHeight + (isNarrow ? Math.round(panelShare * clientHeight) : 0);
     this.host.style.setProperty('--covered-height', `${bottom}px`);
     const isWide = clientWidth > WIDE * clientHeight;
-    const right = isNarrow || (beside !== null && isWide) ? (tools?.clientWidth ?? 0) + GAP : 0;
     this.host.setAttribute('pictures', beside === null ? 'one' : isWide ? 'columns' : 'rows');
-    if (beside === null) player?.resize(clientWidth, clientHeight, ratio, { top, right, bottom });
-    else {
-      const width = isWide ? Math.floor(clientWidth / 2) : clientWidth;
-      const height = isWide ? clientHeight : Math.floor((clientHeight - bottom) / 2);
-      const covered = { top, right, bottom: isWide ? bottom : 0 };
-      for (const each of [player, beside]) each?.resize(width, height, ratio, covered);
+    if (beside === null || !isWide) {
+      const height = beside === null ? clientHeight : Math.floor((clientHeight - bottom) / 2);
+      const covered = { top, right, bottom: beside === null ? bottom : 0, left };
+      for (const each of [player, beside]) each?.resize(clientWidth, height, ratio, covered);
+      return;
     }
+    // What panels leave free is as wide in both pictures, which have one camera; the tools cover both as they do without panels.
+    const tools = isNarrow ? right : this.toolsWidth;
+    const first = Math.floor((clientWidth + left - Math.max(0, right - tools)) / 2);
+    this.host.style.setProperty('--first-width', `${first}px`);
+    player?.resize(first, clientHeight, ratio, { top, right: tools, bottom, left });
+    beside.resize(clientWidth - first, clientHeight, ratio, { top, right: Math.max(tools, right), bottom, left: 0 });
+  }
+
+  private get isNarrow(): boolean {
+    return this.host.clientWidth < NARROW;
+  }
+
+  private get toolsWidth(): number {
+    return (this.host.renderRoot.querySelector('.tools')?.clientWidth ?? 0) + GAP;
+  }
+
+  /**
+   * How far tools and panels reach into the picture. In a wide one without panels tools and title stand beside the model anyway; in a narrow one panels lie
+   * below it.
+   */
+  private measureSides() {
+    if (this.isNarrow) return { left: 0, right: this.toolsWidth };
+    const { left, right } = this.host.getBoundingClientRect();
+    const boxOf = (part: string) => this.host.renderRoot.querySelector(part)?.getBoundingClientRect();
+    const editor = boxOf('cager-edit-panel, cager-pose-panel');
+    const inner = (boxOf('.panel') ?? (editor && boxOf('.tools')))?.left;
+    return { left: Math.round((editor?.right ?? left) - left), right: Math.round(right - (inner ?? right)) };
   }
 
   private measureDeck(): number {

@@ -152,12 +152,12 @@ export class Player {
   /** Frames the model in all frames that are known, from the side the camera is on; relative to its middle where the camera follows it. */
   frameAll(from: CameraState = this.controls.destination, atOnce = false) {
     const { clientWidth, clientHeight } = this.stage.canvas;
-    const { top, right, bottom } = this.resolution.covered;
+    const { top, right, bottom, left } = this.resolution.covered;
     const free = Math.max(1, clientHeight - top - bottom);
     const corners = this.motion.isEmpty
       ? this.stage.restCorners()
       : this.stage.inScene(this.motion.corners(this.follows ? this.followReach : null));
-    const fitting = framed(from, corners, Math.max(1, clientWidth - right) / free);
+    const fitting = framed(from, corners, Math.max(1, clientWidth - right - left) / free);
     const camera = zoomed(fitting, clientHeight / free);
     this.fitsFromHome = false;
     if (this.fitted && this.controls.destination === this.fitted && nearlySame(camera, this.fitted)) return;
@@ -357,11 +357,11 @@ export class Player {
     void surveyMotion(this.capture, this.motion, read, () => playback.buffering, this.stop.signal);
   }
 
-  /** Frames the motion as it is known by now, unless somebody has moved the camera. */
-  private refit() {
+  /** Frames the motion as it is known by now in the picture as it is now, unless somebody has moved the camera. */
+  refit(atOnce = !this.isPrepared) {
     if (this.controls.destination !== this.fitted) return;
-    if (this.fitsFromHome) this.goHome(!this.isPrepared);
-    else this.frameAll(undefined, !this.isPrepared);
+    if (this.fitsFromHome) this.goHome(atOnce);
+    else this.frameAll(undefined, atOnce);
   }
 
   private regainContext() {

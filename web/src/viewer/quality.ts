@@ -48,7 +48,7 @@ export class Quality {
 export class Resolution {
   /** Whether pictures stay as fine as they can be though something moves. */
   keepsFinest = false;
-  covered: Covered = { top: 0, right: 0, bottom: 0 };
+  covered: Covered = { top: 0, right: 0, bottom: 0, left: 0 };
   private size = { width: 1, height: 1, pixelRatio: 1 };
   private shown = 1;
 

@@ -19,10 +19,10 @@ export const viewerStyle = css`
     overflow: hidden;
   }
   :host([pictures='columns']) .pane {
-    right: 50%;
+    right: calc(100% - var(--first-width));
   }
   :host([pictures='columns']) .pane.second {
-    inset: 0 0 0 50%;
+    inset: 0 0 0 var(--first-width);
     box-shadow: -1px 0 var(--cager-line-strong);
   }
   :host([pictures='rows']) .pane {

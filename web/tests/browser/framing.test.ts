@@ -48,6 +48,26 @@ describe.skipIf(chromium === undefined)('a capture that travels', { timeout: 90_
     expect(pages.errors).toEqual([]);
   });
 
+  test.each([
+    [1280, 800],
+    [1440, 900],
+  ])('stays_between_the_panels_of_a_desktop_of_%d_by_%d', async (width, height) => {
+    const device = { viewport: { width, height } };
+    const page = await pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') }, undefined, device);
+    await travel(page);
+    await page.keyboard.press('i');
+    await page.getByRole('complementary', { name: 'Statistics' }).waitFor();
+    expect((await places(page)).outside).toBeLessThan(0);
+    await page.keyboard.press('e');
+    await page.getByRole('region', { name: 'Edit cage' }).waitFor();
+    expect((await places(page)).outside).toBeLessThan(0);
+    await page.keyboard.press('e');
+    await page.keyboard.press('i');
+    await page.getByRole('complementary', { name: 'Statistics' }).waitFor({ state: 'detached' });
+    expect((await places(page)).outside).toBeLessThan(0);
+    expect(pages.errors).toEqual([]);
+  });
+
   test('stays_where_somebody_has_put_the_camera', async () => {
     const page = await pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') });
     await inViewer(page, (viewer) => viewer.pause(), null);
@@ -99,7 +119,7 @@ async function travel(page: Page): Promise<void> {
 
 /**
  * By how many CSS pixels points of any frame are outside of what nothing covers, negative where all are within it, and how high the first frame is. On a phone
- * title, tools and transport cover some; on a desktop the transport alone, as the others stand beside the model.
+ * title, tools and transport cover some; on a desktop transport and panels alone, as the others stand beside the model.
  */
 function places(page: Page): Promise<{ outside: number; height: number }> {
   return inViewer(
@@ -113,7 +133,9 @@ function places(page: Page): Promise<{ outside: number; height: number }> {
       const boxOf = (part: string) => viewer.renderRoot.querySelector(part)!.getBoundingClientRect();
       const isPhone = clientWidth < 600;
       const top = isPhone ? boxOf('.lead').bottom : 0;
-      const right = isPhone ? boxOf('.tools').left : clientWidth;
+      const has = (part: string) => viewer.renderRoot.querySelector(part) !== null;
+      const right = isPhone ? boxOf('.tools').left : has('.panel') ? boxOf('.panel').left : clientWidth;
+      const left = !isPhone && has('cager-edit-panel') ? boxOf('cager-edit-panel').right : 0;
       const bottom = boxOf('.deck').top;
       let [outside, low, high] = [-Infinity, Infinity, -Infinity];
       for (let frame = 0; frame < capture.frames; frame++) {
@@ -130,7 +152,7 @@ function places(page: Page): Promise<{ outside: number; height: number }> {
             elements[row + 12];
           const x = ((along(0) / along(3) + 1) / 2) * clientWidth;
           const y = ((1 - along(1) / along(3)) / 2) * clientHeight;
-          outside = Math.max(outside, along(3) > 0 ? Math.max(-x, x - right, top - y, y - bottom) : Infinity);
+          outside = Math.max(outside, along(3) > 0 ? Math.max(left - x, x - right, top - y, y - bottom) : Infinity);
           if (frame === 0) [low, high] = [Math.min(low, y), Math.max(high, y)];
         }
       }
