@@ -38,6 +38,10 @@ export class BlockCache {
     }
   }
 
+  has(first: number): boolean {
+    return this.done.has(first);
+  }
+
   /** Begins to load a block that will be wanted, instead of others that were. */
   prefetch(first: number): void {
     for (const [other, pending] of this.pending) {

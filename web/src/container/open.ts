@@ -140,9 +140,10 @@ class FileCapture implements ContainerCapture {
       throw new RangeError(`The capture has ${this.frames} frames, so there is no frame ${frame}.`);
     const { first, count } = chunk.frames.fields;
     const block = await this.cache.get(first, signal);
-    // After the last comes the first one, as in a loop.
+    // After the last comes the first one, as in a loop. Who reads here and there has no use for it.
     const next = first + count < this.frames ? first + count : 0;
-    if (next !== first) this.cache.prefetch(next);
+    const before = this.layout.chunkOf(first > 0 ? first - 1 : this.frames - 1);
+    if (next !== first && before && this.cache.has(before.frames.fields.first)) this.cache.prefetch(next);
     return block;
   }
 

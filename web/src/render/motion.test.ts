@@ -1,10 +1,11 @@
 import { existsSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { describe, expect, it } from 'vitest';
+import type { Capture } from '../capture';
 import { parseNpy } from '../../tests/browser/npy';
 import { diagonalOf, middleOf } from '../coordinates/topology';
 import { axesOf, eyeOf, FIELD_OF_VIEW, framed, HOME, shifted, type CameraState } from './camera';
-import { farthestPoints, Motion } from './motion';
+import { farthestPoints, Motion, surveyMotion } from './motion';
 
 /** Pictures as wide and as high as those of desktops and a phone. */
 const SIZES = [
@@ -92,6 +93,26 @@ function motionOf(frames: readonly ArrayLike<number>[], place: (positions: Float
   motion.include({ first: 0, count: frames.length, cages, residual: null });
   return motion;
 }
+
+describe('surveyMotion', () => {
+  it('reads the ends and the middle before there is a picture, and what lies between after it', async () => {
+    const capture = { complete: true, frames: 9 } as Capture;
+    const known = new Set([0]);
+    let state: 'buffering' | 'preparing' | 'ready' = 'preparing';
+    const survey = surveyMotion(
+      capture,
+      { knows: (frame) => known.has(frame) },
+      (frame) => Promise.resolve(known.add(frame)),
+      () => state,
+      new AbortController().signal,
+    );
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    expect([...known]).toEqual([0, 8, 4]);
+    state = 'ready';
+    await survey;
+    expect([...known]).toEqual([0, 8, 4, 2, 6, 1, 3, 5, 7]);
+  });
+});
 
 /** How far out the outermost point is: 1 is the border of the picture. */
 function outermost(points: Float64Array, camera: CameraState, aspect: number): number {

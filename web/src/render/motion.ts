@@ -195,32 +195,43 @@ function extentOf(positions: Float32Array): Extent {
   return { box: [...low, ...high], mean: meanOf(positions, positions.length / 3), positions };
 }
 
-/** Frames that are looked at, evenly spread: the blocks around them are all there is of most captures. */
-const FRAMES = 32;
+/** The finest parts of a capture that are looked at both ends of: the blocks around them are all there is of most captures. */
+const PARTS = 32;
+/** How many frames are read before the first picture of the capture: its ends and its middle tell most of where it goes, and the rest takes as much as all of it. */
+const EARLY_READS = 2;
 /** How long to wait for what is played. */
 const WAIT_MILLISECONDS = 200;
+
+/** Frames evenly spread, from coarse to fine: both ends, the middle, the quarters, and so on. */
+function spreadFrames(last: number): Set<number> {
+  const spread = new Set([0, last]);
+  for (let parts = 2; parts <= PARTS; parts *= 2)
+    for (let k = 1; k < parts; k += 2) spread.add(Math.round((k * last) / parts));
+  return spread;
+}
 
 /**
  * Has frames of a finished capture read for what they say of its motion, one block after another, as long as the connection has time for them. Those that do
  * not come are left to whoever plays them.
  *
  * @param read keeps what it reads for whoever plays, so that what fits is fetched once, and includes it in the motion
- * @param isBusy whether something waits for frames that are to be shown
+ * @param player `buffering` while it waits for frames that are to be shown, `preparing` before it can show any
  */
 export async function surveyMotion(
   capture: Capture,
-  motion: Motion,
+  motion: Pick<Motion, 'knows'>,
   read: (frame: number) => Promise<unknown>,
-  isBusy: () => boolean,
+  player: () => 'buffering' | 'preparing' | 'ready',
   signal: AbortSignal,
 ): Promise<void> {
   if (!capture.complete) return;
-  const last = capture.frames - 1;
-  const wanted = new Set(Array.from({ length: FRAMES }, (_, k) => Math.round((k * last) / (FRAMES - 1))));
-  for (const frame of wanted) {
-    while (isBusy() && !signal.aborted) await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
+  let reads = 0;
+  const mustWait = () => player() === 'buffering' || (player() === 'preparing' && reads >= EARLY_READS);
+  for (const frame of spreadFrames(capture.frames - 1)) {
+    while (mustWait() && !signal.aborted) await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
     if (signal.aborted) return;
     if (motion.knows(frame)) continue;
+    reads++;
     await read(frame).catch(() => undefined);
   }
 }

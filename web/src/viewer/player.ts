@@ -42,9 +42,10 @@ export class Player {
   readonly heatMap: HeatMap;
   readonly comparison: Comparison;
   private readonly motion: Motion;
-  /** The camera that frames the motion as it was known last, and whether it does so from the usual side. */
+  /** The camera that frames the motion as it was known last, whether it does so from the usual side, and whether no more was known than the rest pose. */
   private fitted: CameraState | null = null;
   private fitsFromHome = false;
+  private fitsRest = true;
   private follows = false;
   private isSurveyed = false;
   private readonly stop = new AbortController();
@@ -154,7 +155,8 @@ export class Player {
     const { clientWidth, clientHeight } = this.stage.canvas;
     const { top, right, bottom, left } = this.resolution.covered;
     const free = Math.max(1, clientHeight - top - bottom);
-    const corners = this.motion.isEmpty
+    this.fitsRest = this.motion.isEmpty;
+    const corners = this.fitsRest
       ? this.stage.restCorners()
       : this.stage.inScene(this.motion.corners(this.follows ? this.followReach : null));
     const fitting = framed(from, corners, Math.max(1, clientWidth - right - left) / free);
@@ -354,11 +356,12 @@ export class Player {
     this.isSurveyed = true;
     const { playback } = this;
     const read = (frame: number) => playback.read(frame);
-    void surveyMotion(this.capture, this.motion, read, () => playback.buffering, this.stop.signal);
+    const state = () => (playback.buffering ? 'buffering' : this.isPrepared ? 'ready' : 'preparing');
+    void surveyMotion(this.capture, this.motion, read, state, this.stop.signal);
   }
 
   /** Frames the motion as it is known by now in the picture as it is now, unless somebody has moved the camera. */
-  refit(atOnce = !this.isPrepared) {
+  refit(atOnce = !this.isPrepared || this.fitsRest) {
     if (this.controls.destination !== this.fitted) return;
     if (this.fitsFromHome) this.goHome(atOnce);
     else this.frameAll(undefined, atOnce);
