@@ -186,8 +186,6 @@ export interface CageFigures {
   readonly design?: {
     readonly style: string;
     readonly frames: number;
-    readonly designed_error: Figure;
-    readonly held_back_error: Figure;
     readonly stages: readonly {
       readonly name: string;
       readonly vertices: number;

@@ -68,7 +68,6 @@ export interface CageDesign {
 
 /** What a cage is to be; what is left out has the service's default. */
 export interface DesignOptions {
-  frames?: number;
   name?: string;
   vertices?: number;
   mean_error?: number;
@@ -80,7 +79,6 @@ export interface Recovery {
   readonly id: string;
   readonly name: string | null;
   readonly state: 'ready' | 'following' | 'finishing' | 'completed' | 'failed';
-  readonly created: number;
   readonly frames: { readonly received: number; readonly followed: number; readonly lost: number };
   readonly problem?: ProblemDetails;
 }

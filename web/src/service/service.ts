@@ -24,13 +24,9 @@ function sending(method: string, body: object): RequestInit {
   return { method, headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body) };
 }
 
-/** A service below an address. All its requests carry the token, in a header. */
+/** The service beside the page, whatever prefix that has. All its requests carry the token, in a header. */
 export class Service {
-  /** @param base address that ends with `/v1/`; beside the page, whatever prefix that has, where it is left out */
-  constructor(
-    private readonly base = new URL('v1/', document.baseURI),
-    private readonly token = pageToken,
-  ) {}
+  private readonly base = new URL('v1/', document.baseURI);
 
   /**
    * A request; the answer's body is still to be read.
@@ -39,14 +35,14 @@ export class Service {
    * @throws ServiceProblem for any status that is no success, and where there is no answer
    */
   async request(path: string, init: RequestInit = {}): Promise<Response> {
-    const sent = this.token.token;
+    const sent = pageToken.token;
     const headers = new Headers(init.headers);
     new Headers(this.authorization()).forEach((value, name) => headers.set(name, value));
     const response = await fetched(this.address(path), { ...init, headers });
     if (response.ok) return response;
     const problem = await problemOf(response);
     // An answer to a token that was replaced meanwhile says nothing about the present one.
-    if (problem.status === 401 && sent === this.token.token) this.token.refused();
+    if (problem.status === 401 && sent === pageToken.token) pageToken.refused();
     throw problem;
   }
 
@@ -56,7 +52,7 @@ export class Service {
 
   /** The headers that requests made elsewhere need. */
   authorization(): HeadersInit {
-    return this.token.token === null ? {} : { Authorization: `Bearer ${this.token.token}` };
+    return pageToken.token === null ? {} : { Authorization: `Bearer ${pageToken.token}` };
   }
 
   /** The container at `path`, to be read at random; `signal` ends opening it. */

@@ -30,7 +30,7 @@ export const controls = css`
     font-size: var(--cager-size-large);
     overflow-wrap: anywhere;
   }
-  :is(button, input, select, textarea) {
+  :is(button, input, select) {
     font: inherit;
     color: inherit;
   }
@@ -97,8 +97,7 @@ export const controls = css`
     color: var(--cager-text);
   }
   input:not([type='checkbox'], [type='radio'], [type='range'], [type='file']),
-  select,
-  textarea {
+  select {
     min-height: var(--cager-control);
     padding: 0 var(--cager-space-3);
     border: 1px solid var(--cager-line-strong);

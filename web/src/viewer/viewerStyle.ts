@@ -236,8 +236,6 @@ export const viewerStyle = css`
     .deck {
       inset: auto var(--cager-space-2) max(var(--cager-space-2), env(safe-area-inset-bottom));
     }
-  }
-  @container (max-width: 680px) {
     .tools button {
       min-height: 38px;
     }
