@@ -56,7 +56,7 @@ struct Block {
 impl Block {
     fn new(points: &[Point], ids: &[u32]) -> Self {
         let own: Vec<Point> = ids.iter().map(|&i| points[i as usize]).collect();
-        let around = Aabb::around(own.iter().map(|&p| p.into()));
+        let around = Aabb::around_all(&own);
         let mut squared = vec![Lanes::splat(-1.0); own.len().div_ceil(LANES)];
         (0..own.len()).for_each(|i| squared[i / LANES].0[i % LANES] = f64::INFINITY);
         let (ids, places) = (ids.to_vec(), grouped(&own, [0.0; 3]));

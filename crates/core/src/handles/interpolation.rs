@@ -144,7 +144,7 @@ fn with_all_points(covariance: Covariance, points: &[Point], samples: &[Point], 
 impl Covariance {
     /// Indices of the samples that may have a nonzero covariance with one of the points.
     fn within_support(self, points: &[Point], samples: &[Point]) -> Vec<usize> {
-        let around = Aabb::around(points.iter().map(|&p| p.into()));
+        let around = Aabb::around_all(points);
         // Rounding may make a box seem as far as the points in it.
         let most = (1.0 + 1e-9) / (self.inverse_support * self.inverse_support);
         (0..samples.len()).filter(|&j| around.distance2(samples[j].into()) <= most).collect()

@@ -108,7 +108,7 @@ impl<'a> HandleSystem<'a> {
     /// What brings cages back to their frames.
     fn nearness(&self) -> Option<Nearness> {
         let analysis = self.analysis;
-        let rest = Aabb::around(analysis.points.iter().map(|&p| p.into()));
+        let rest = Aabb::around_all(&analysis.points);
         Nearness::from_parts(NearnessParts {
             factor: self.scaled_factor(),
             rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),

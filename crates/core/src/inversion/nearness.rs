@@ -74,6 +74,11 @@ impl Nearness {
     pub(super) fn keep(&self, cage: &mut [Point], frame: &Aabb, diagonal: f64) -> bool {
         let unit = diagonal.max(frame.size().length());
         let vertices = self.cage.vertices().len();
+        // Seldom is even a corner of the box around the cage far, and boxes are found faster than distances of all vertices.
+        let around = Aabb::around_all(&cage[..vertices]);
+        if frame.max_distance2(&around).sqrt() <= self.data.margin + NEAR * unit {
+            return false;
+        }
         let beyond = |cage: &[Point]| (max_distance(frame, &cage[..vertices]) - self.data.margin) / unit;
         let share = ((beyond(cage) - NEAR) / (FAR - NEAR)).min(1.0);
         let is_far = share > 0.0;

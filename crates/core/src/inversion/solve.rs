@@ -106,16 +106,16 @@ impl Solver {
         let is_given = rows == Rows::Handles || self.reads_all;
         let point_of_row = |row: usize| if is_given { row } else { self.handles[row] as usize };
         assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
-        let mut cages = self.linear(frames, point_of_row);
+        let (mut cages, boxes) = self.linear(frames, point_of_row);
         let position = |frame: usize, row: usize| {
             let point = point_of_row(row);
             [0, 1, 2].map(|k| frames[frame][3 * point + k].into())
         };
         if let (Some(consistent), false) = (&self.consistent, self.follows_previous()) {
             let mut held = Vec::with_capacity(frames.len());
-            for (f, cage) in cages.iter_mut().enumerate() {
+            for (cage, around) in cages.iter_mut().zip(&boxes) {
                 self.target.add(cage, None, self.decoder.positions());
-                held.push(self.keep_near(cage, |row| position(f, row)));
+                held.push(self.keep_near(cage, around));
             }
             let found = consistent.refine(&self.decoder, &mut cages, position, self.diagonal);
             let inverted = |((cage, found), held): ((&Vec<Point>, _), bool)| InvertedFrame {
@@ -126,10 +126,10 @@ impl Solver {
             return cages.iter().zip(found).zip(held).map(inverted).collect();
         }
         let mut solved: Vec<InvertedFrame> = Vec::with_capacity(frames.len());
-        for (f, mut cage) in cages.into_iter().enumerate() {
+        for (f, (mut cage, around)) in cages.into_iter().zip(&boxes).enumerate() {
             let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
             self.target.add(&mut cage, before, self.decoder.positions());
-            let held = self.keep_near(&mut cage, |row| position(f, row));
+            let held = self.keep_near(&mut cage, around);
             let mut cage = [cage];
             let refine = |consistent: &Arc<Consistent>| {
                 consistent.refine(&self.decoder, &mut cage, |_, row| position(f, row), self.diagonal).pop()
@@ -140,30 +140,35 @@ impl Solver {
         solved
     }
 
-    fn keep_near(&self, cage: &mut [Point], position: impl Fn(usize) -> Point) -> bool {
-        let rows = 0..self.operator.nrows();
-        let around = || Aabb::around(rows.map(|row| position(row).into()));
-        let keep = |nearness: &Arc<Nearness>| nearness.keep(cage, &around(), self.diagonal);
-        self.nearness.as_ref().is_some_and(keep)
+    fn keep_near(&self, cage: &mut [Point], around: &Aabb) -> bool {
+        self.nearness.as_ref().is_some_and(|nearness| nearness.keep(cage, around, self.diagonal))
     }
 
-    /// `R · H`.
-    fn linear<T: Copy + Into<f64>>(&self, frames: &[&[T]], point_of_row: impl Fn(usize) -> usize) -> Vec<Vec<Point>> {
+    /// `R · H`, and the box around the points that are read of each frame.
+    fn linear<T: Copy + Into<f64>>(
+        &self,
+        frames: &[&[T]],
+        point_of_row: impl Fn(usize) -> usize,
+    ) -> (Vec<Vec<Point>>, Vec<Aabb>) {
         let (columns, padded) = self.operator.shape();
         let m = self.decoder.unknowns();
         let width = product_columns(frames.len());
         let mut cages = Mat::<f64>::zeros(padded, width);
         let mut block = Mat::<f64>::zeros(BLOCK_ROWS.min(columns), width);
+        let mut read = vec![[0.0; 3]; block.nrows()];
+        let mut boxes = vec![Aabb::EMPTY; frames.len()];
         let mut first = 0;
         while first < columns {
             let rows = BLOCK_ROWS.min(columns - first);
-            for (f, frame) in frames.iter().enumerate() {
-                for i in 0..rows {
+            for (f, (frame, around)) in frames.iter().zip(&mut boxes).enumerate() {
+                for (i, place) in read[..rows].iter_mut().enumerate() {
                     let point = point_of_row(first + i);
+                    *place = [0, 1, 2].map(|k| frame[3 * point + k].into());
                     for k in 0..3 {
-                        block[(i, 3 * f + k)] = frame[3 * point + k].into();
+                        block[(i, 3 * f + k)] = place[k];
                     }
                 }
+                *around = around.union(&Aabb::around_all(&read[..rows]));
             }
             faer::linalg::matmul::matmul(
                 cages.as_mut(),
@@ -175,7 +180,8 @@ impl Solver {
             );
             first += rows;
         }
-        (0..frames.len()).map(|f| (0..m).map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)])).collect()).collect()
+        let cage = |f: usize| (0..m).map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)])).collect();
+        ((0..frames.len()).map(cage).collect(), boxes)
     }
 }
 
