@@ -21,8 +21,10 @@ pub(super) struct Fit {
 impl Fit {
     /// Fits the motion X, n × c, with the ridge `ρ` as a fraction of the mean diagonal entry of `ΦᵀΦ`.
     pub(super) fn new(phi: MatRef<'_, f32>, motion: MatRef<'_, f32>, ridge: f64) -> Option<Self> {
-        let factor = ridge_factor(to_double(gram(phi, BLOCK_ROWS).as_ref()), ridge)?;
-        let mut cages = to_double(transposed_product(phi, motion, BLOCK_ROWS).as_ref());
+        let factor = || ridge_factor(to_double(gram(phi, BLOCK_ROWS).as_ref()), ridge);
+        let product = || to_double(transposed_product(phi, motion, BLOCK_ROWS).as_ref());
+        let (factor, mut cages) = rayon::join(factor, product);
+        let factor = factor?;
         solve_cholesky(factor.as_ref(), &mut cages);
         let cages = to_single(cages.as_ref(), cages.nrows());
         let mut residual = motion.to_owned();

@@ -75,7 +75,7 @@ impl Run<'_> {
     pub(super) fn optimise(mut self, cage: Cage, frames: &[Vec<f64>]) -> Design {
         let mut descent = Descent::new(cage, self.samples, self.obstacles, self.options);
         let mut warnings = Vec::new();
-        let evaluation = self.best.evaluation;
+        let evaluation = self.best.evaluation.clone();
         let begun = Progress {
             stage: "moving the vertices",
             fraction: 0.0,
@@ -84,7 +84,7 @@ impl Run<'_> {
         };
         // The first usable cage does not wait for its condition number.
         let told = (self.watch)(begun);
-        self.note("start", &descent.cage, evaluation);
+        self.note("start", &descent.cage, &evaluation);
         let ended = match told {
             ControlFlow::Break(()) => ControlFlow::Break(()),
             ControlFlow::Continue(()) => self.descend(&mut descent, frames, &mut warnings),
@@ -104,7 +104,7 @@ impl Run<'_> {
         let timed_out = ended.is_break() && self.is_late();
         let Best { mesh, evaluation } = self.best;
         if let Ok(cage) = Cage::new(mesh.clone()) {
-            self.stages.push(stage("the best", &cage, evaluation, self.samples, self.clock));
+            self.stages.push(stage("the best", &cage, &evaluation, self.clock));
         }
         Design { cage: mesh, stages: self.stages, timed_out, warnings }
     }
@@ -137,11 +137,11 @@ impl Run<'_> {
             if done == FIRST_EVALUATION || done % EVALUATE_EVERY == 0 || done == phase.steps {
                 let evaluation = self.samples.evaluate(&descent.cage);
                 // A smaller cage than asked for may do; a larger one may not.
+                if done % EVALUATE_EVERY == 0 {
+                    self.note(&format!("{done} steps"), &descent.cage, &evaluation);
+                }
                 if descent.cage.vertices().len() <= phase.goal && self.keep(&descent.cage, evaluation) {
                     better = Some(descent.cage.mesh());
-                }
-                if done % EVALUATE_EVERY == 0 {
-                    self.note(&format!("{done} steps"), &descent.cage, evaluation);
                 }
             }
             let fraction =
@@ -188,8 +188,8 @@ impl Run<'_> {
         }
     }
 
-    fn note(&mut self, name: &str, cage: &Cage, evaluation: Evaluation) {
-        self.stages.push(stage(name, cage, evaluation, self.samples, self.clock));
+    fn note(&mut self, name: &str, cage: &Cage, evaluation: &Evaluation) {
+        self.stages.push(stage(name, cage, evaluation, self.clock));
     }
 }
 
@@ -199,13 +199,13 @@ fn step_scale(done: f64) -> f64 {
     0.5 * fade * (1.0 + (PI * done / COSINE_STEPS).cos()) + 0.02
 }
 
-fn stage(name: &str, cage: &Cage, evaluation: Evaluation, samples: &Samples, clock: Instant) -> Stage {
+fn stage(name: &str, cage: &Cage, evaluation: &Evaluation, clock: Instant) -> Stage {
     Stage {
         name: name.to_owned(),
         vertices: cage.vertices().len(),
         training_error: evaluation.training_error,
         validation_error: evaluation.validation_error,
-        condition_number: samples.condition_number(cage),
+        condition_number: evaluation.condition_number(),
         seconds: clock.elapsed().as_secs_f64(),
     }
 }

@@ -41,11 +41,31 @@ pub(super) struct Batch {
     pub(super) motion: Mat<f32>,
 }
 
-/// Least-squares errors of a cage over points and frames, as fractions of the diagonal.
-#[derive(Clone, Copy, Debug)]
+/// Least-squares errors of a cage over points and frames, as fractions of the diagonal; infinite where it has none.
+#[derive(Clone, Debug)]
 pub(super) struct Evaluation {
     pub(super) training_error: f64,
     pub(super) validation_error: f64,
+    /// `ΦᵀΦ` of the points.
+    gram: Mat<f64>,
+}
+
+impl Evaluation {
+    /// Of no cage, worse than any other.
+    pub(super) fn worst() -> Self {
+        Self { training_error: f64::INFINITY, validation_error: f64::INFINITY, gram: Mat::new() }
+    }
+
+    /// Condition number of the coordinates, infinite where they are singular; `None` for large cages, where it would take too long, and where it does
+    /// not converge.
+    pub(super) fn condition_number(&self) -> Option<f64> {
+        if self.gram.nrows() > LARGE {
+            return None;
+        }
+        let squares = self.gram.self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
+        let (first, last) = (squares.first()?, squares.last()?);
+        Some(if *first > 0.0 { (last / first).sqrt() } else { f64::INFINITY })
+    }
 }
 
 impl Samples {
@@ -82,10 +102,11 @@ impl Samples {
         Batch { points: rows.iter().map(|&i| self.points[i]).collect(), motion }
     }
 
-    /// Root mean square errors of a cage, as fractions of the diagonal; infinite where it has none.
+    /// Root mean square errors of a cage.
     pub(super) fn evaluate(&self, cage: &Cage) -> Evaluation {
         let phi = to_double(MeanValue.smooth_coordinates(cage, &self.validation_points).as_ref());
-        let residual = least_squares_residual(phi.as_ref(), &self.validation_motion, 1e-6);
+        let gram = gram(phi.as_ref(), BLOCK_ROWS);
+        let residual = least_squares_residual(phi.as_ref(), gram.clone(), &self.validation_motion, 1e-6);
         let error = |first: usize, last: usize| {
             let Some(residual) = &residual else { return f64::INFINITY };
             let left = residual.as_ref().subcols(first, last - first);
@@ -94,19 +115,8 @@ impl Samples {
         Evaluation {
             training_error: error(0, self.held_back_from),
             validation_error: error(self.held_back_from, self.validation_motion.ncols()),
+            gram,
         }
-    }
-
-    /// Condition number of the coordinates of the validation points, infinite where they are singular; `None` for large cages, where it would take too
-    /// long, and where it does not converge.
-    pub(super) fn condition_number(&self, cage: &Cage) -> Option<f64> {
-        if cage.vertices().len() > LARGE {
-            return None;
-        }
-        let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
-        let squares =
-            gram(to_double(phi.as_ref()).as_ref(), BLOCK_ROWS).self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
-        Some(if squares[0] > 0.0 { (squares[squares.len() - 1] / squares[0]).sqrt() } else { f64::INFINITY })
     }
 }
 
@@ -141,12 +151,12 @@ fn without_affine(rest: &[Point], rows: &[usize], frames: &[&[f64]]) -> Mat<f64>
     let motion = Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| frames[c / 3][3 * rows[i] + c % 3] / scale);
     let center: Point = std::array::from_fn(|k| rest.iter().map(|p| p[k]).sum::<f64>() / rest.len() as f64);
     let basis = Mat::from_fn(rows.len(), 4, |i, k| if k < 3 { (rest[rows[i]][k] - center[k]) / scale } else { 1.0 });
-    least_squares_residual(basis.as_ref(), &motion, 1e-12).unwrap_or(motion)
+    least_squares_residual(basis.as_ref(), gram(basis.as_ref(), BLOCK_ROWS), &motion, 1e-12).unwrap_or(motion)
 }
 
-/// `X − A C` with the C that minimises `‖X − A C‖² + ρ ‖C‖²`, `ρ` as in [`ridge_factor`].
-fn least_squares_residual(a: MatRef<'_, f64>, motion: &Mat<f64>, ridge: f64) -> Option<Mat<f64>> {
-    let factor = ridge_factor(gram(a, BLOCK_ROWS), ridge)?;
+/// `X − A C` with the C that minimises `‖X − A C‖² + ρ ‖C‖²`, `ρ` as in [`ridge_factor`]; `gram` is `AᵀA`.
+fn least_squares_residual(a: MatRef<'_, f64>, gram: Mat<f64>, motion: &Mat<f64>, ridge: f64) -> Option<Mat<f64>> {
+    let factor = ridge_factor(gram, ridge)?;
     let mut solution = transposed_product(a, motion.as_ref(), BLOCK_ROWS);
     solve_cholesky(factor.as_ref(), &mut solution);
     let mut residual = motion.clone();

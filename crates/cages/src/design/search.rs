@@ -45,8 +45,7 @@ impl Run<'_> {
         for round in 0..MAX_ROUNDS {
             let fraction = [round as f64 / MAX_ROUNDS as f64, (round + 1) as f64 / MAX_ROUNDS as f64];
             // Results with another number of vertices do not count.
-            let evaluation = Evaluation { training_error: f64::INFINITY, validation_error: f64::INFINITY };
-            self.best = Best { mesh: descent.cage.mesh().clone(), evaluation };
+            self.best = Best { mesh: descent.cage.mesh().clone(), evaluation: Evaluation::worst() };
             ended = self.phase(descent, &Phase { stage: "searching the smallest cage", steps: STEPS, goal, fraction });
             if !self.best.evaluation.validation_error.is_finite() {
                 self.best =
