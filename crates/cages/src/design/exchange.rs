@@ -5,7 +5,7 @@ use super::fit::{BLOCK_ROWS, Fit};
 use super::topology::{self, Collapse, OneRings};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_geometry::linalg::{solve_cholesky, solve_definite, to_double, transposed_product};
+use cager_geometry::linalg::{solve_cholesky, solve_definite, solve_lower, to_double, transposed_product};
 use cager_geometry::mesh::{Point, TriMesh};
 use faer::Mat;
 use glam::DVec3;
@@ -95,13 +95,13 @@ fn split_gains(cage: &Cage, points: &[Point], phi: &Mat<f32>, fit: &Fit) -> Vec<
     let columns = MeanValue.smooth_coordinates(&fine, points);
     let b = columns.as_ref().subcols(m, cage.edges().len());
     let along = transposed_product(b, fit.residual.as_ref(), BLOCK_ROWS);
-    let overlap = to_double(transposed_product(phi.as_ref(), b, BLOCK_ROWS).as_ref());
-    let mut solved = overlap.clone();
-    solve_cholesky(fit.factor.as_ref(), &mut solved);
+    // `‖Π b‖² = ‖L⁻¹ Φᵀ b‖²`.
+    let mut projected = to_double(transposed_product(phi.as_ref(), b, BLOCK_ROWS).as_ref());
+    solve_lower(fit.factor.as_ref(), &mut projected);
     let square = |x: &mut dyn Iterator<Item = &f32>| x.map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
     let gains = (0..cage.edges().len()).map(|e| {
         let own = square(&mut b.col(e).iter());
-        let explained: f64 = (0..m).map(|j| overlap[(j, e)] * solved[(j, e)]).sum();
+        let explained = projected.col(e).squared_norm_l2();
         let gain = square(&mut along.row(e).iter());
         gain / (own - explained).max(0.02 * own).max(f64::MIN_POSITIVE)
     });

@@ -5,8 +5,8 @@ use cager_geometry::linalg::{
 };
 use faer::{Accum, Mat, MatRef};
 
-/// Rows of one parallel task.
-pub(super) const BLOCK_ROWS: usize = 512;
+/// Rows of one parallel task: a quarter of a step's.
+pub(super) const BLOCK_ROWS: usize = 550;
 
 /// Least-squares cages of a motion, `min ‖X − Φ C‖² + ρ ‖C‖²`, by products in single precision: `ρ` is far above their rounding.
 pub(super) struct Fit {
@@ -21,7 +21,15 @@ pub(super) struct Fit {
 impl Fit {
     /// Fits the motion X, n × c, with the ridge `ρ` as a fraction of the mean diagonal entry of `ΦᵀΦ`.
     pub(super) fn new(phi: MatRef<'_, f32>, motion: MatRef<'_, f32>, ridge: f64) -> Option<Self> {
-        let factor = || ridge_factor(to_double(gram(phi, BLOCK_ROWS).as_ref()), ridge);
+        Self::of_factor(phi, motion, || ridge_factor(to_double(gram(phi, BLOCK_ROWS).as_ref()), ridge))
+    }
+
+    /// As [`Self::new`], with the factor from elsewhere.
+    pub(super) fn of_factor(
+        phi: MatRef<'_, f32>,
+        motion: MatRef<'_, f32>,
+        factor: impl FnOnce() -> Option<Mat<f64>> + Send,
+    ) -> Option<Self> {
         let product = || to_double(transposed_product(phi, motion, BLOCK_ROWS).as_ref());
         let (factor, mut cages) = rayon::join(factor, product);
         let factor = factor?;

@@ -12,14 +12,14 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Steps of a design with a given number of vertices.
-const STEPS: usize = 140;
+const STEPS: usize = 134;
 /// Step lengths fall along a cosine over so many times the steps of a phase; from this share of the steps on, linearly to zero as well: slow steps to the end
 /// bring little, and a cosine over fewer steps leaves larger errors.
-const COSINE_STEPS: f64 = 190.0 / 140.0;
+const COSINE_STEPS: f64 = 1.36;
 const FADE_FROM: f64 = 0.75;
 /// Vertices are exchanged after so many steps each, up to this share of them at a time, until this share of the steps is done.
-const REMESH_EVERY: usize = 10;
-const REMESH_SHARE: f64 = 0.08;
+const REMESH_EVERY: usize = 12;
+const REMESH_SHARE: f64 = 0.1;
 const REMESH_UNTIL: f64 = 0.75;
 /// Steps before the first evaluation of the cage, and between later ones.
 const FIRST_EVALUATION: usize = 10;

@@ -1,11 +1,11 @@
 //! Training and validation data of a design: sampled points with the non-affine part of their motion, and points and frames held back for evaluation.
 
-use super::fit::{BLOCK_ROWS, ridge_factor};
+use super::fit::{BLOCK_ROWS, Fit, ridge_factor};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_geometry::linalg::{accumulate_product, gram, solve_cholesky, to_double, to_single, transposed_product};
 use cager_geometry::mesh::{Model, Point, diagonal};
-use faer::{Accum, Mat, MatRef};
+use faer::{Accum, Mat, MatRef, concat};
 
 /// Maximum number of points sampled from a model.
 const MAX_POINTS: usize = 20_000;
@@ -16,6 +16,8 @@ const LEFT_OUT: f64 = 1e-5;
 /// Numbers of points and frames on which a cage is evaluated.
 const VALIDATION_POINTS: usize = 8_000;
 const VALIDATION_FRAMES: usize = 40;
+/// Ridge of the fits that judge a cage, as a fraction of the mean diagonal entry of `ΦᵀΦ`.
+const RIDGE: f64 = 1e-6;
 /// Number of vertices above which the condition number is not computed.
 const LARGE: usize = 1_000;
 
@@ -26,10 +28,12 @@ pub(super) struct Samples {
     /// Training motion, n × c, as fractions of the diagonal: every frame minus its best affine image of the rest pose, which coordinates reproduce exactly, projected to the
     /// principal components of all frames. A fit to these has the same sum of squared residuals as one to the frames, up to the truncation.
     training: Mat<f32>,
-    /// Validation points and their motion: in training frames and, from column `held_back_from` on, in held-back frames.
+    /// Validation points and the principal components of their motion: in training frames and, from column `held_back_from` on, in held-back frames; and
+    /// the numbers of both.
     validation_points: Vec<Point>,
-    validation_motion: Mat<f64>,
+    validation_motion: Mat<f32>,
     held_back_from: usize,
+    validation_frames: [usize; 2],
     /// Diagonal of the rest pose.
     pub(super) diagonal: f64,
 }
@@ -83,13 +87,16 @@ impl Samples {
         };
         let (used, validation_points) = (some(MAX_POINTS), some(VALIDATION_POINTS));
         let (seen, unseen) = (evenly(&designed, VALIDATION_FRAMES), evenly(&held_back, VALIDATION_FRAMES));
+        let [seen_motion, unseen_motion] =
+            [&seen, &unseen].map(|frames| principal(&without_affine(&rest.points, &validation_points, frames)));
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {
             points: at(&used),
             training: to_single(principal(&without_affine(&rest.points, &used, &designed)).as_ref(), used.len()),
             validation_points: at(&validation_points),
-            validation_motion: without_affine(&rest.points, &validation_points, &[seen.as_slice(), &unseen].concat()),
-            held_back_from: 3 * seen.len(),
+            validation_motion: to_single(concat![[seen_motion, unseen_motion]].as_ref(), validation_points.len()),
+            held_back_from: seen_motion.ncols(),
+            validation_frames: [seen.len(), unseen.len()],
             diagonal: diagonal(&rest.points),
         }
     }
@@ -104,17 +111,19 @@ impl Samples {
 
     /// Root mean square errors of a cage.
     pub(super) fn evaluate(&self, cage: &Cage) -> Evaluation {
-        let phi = to_double(MeanValue.smooth_coordinates(cage, &self.validation_points).as_ref());
-        let gram = gram(phi.as_ref(), BLOCK_ROWS);
-        let residual = least_squares_residual(phi.as_ref(), gram.clone(), &self.validation_motion, 1e-6);
-        let error = |first: usize, last: usize| {
-            let Some(residual) = &residual else { return f64::INFINITY };
-            let left = residual.as_ref().subcols(first, last - first);
-            (left.squared_norm_l2() / (left.nrows() * left.ncols()) as f64 * 3.0).sqrt()
+        let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
+        // In single precision it would be off by more than the ridge.
+        let gram = gram(to_double(phi.as_ref()).as_ref(), BLOCK_ROWS);
+        let fit = Fit::of_factor(phi.as_ref(), self.validation_motion.as_ref(), || ridge_factor(gram.clone(), RIDGE));
+        let error = |first: usize, last: usize, frames: usize| {
+            let Some(fit) = &fit else { return f64::INFINITY };
+            let left = fit.residual.as_ref().subcols(first, last - first);
+            (f64::from(left.squared_norm_l2()) / (left.nrows() * frames) as f64).sqrt()
         };
+        let [seen, held_back] = self.validation_frames;
         Evaluation {
-            training_error: error(0, self.held_back_from),
-            validation_error: error(self.held_back_from, self.validation_motion.ncols()),
+            training_error: error(0, self.held_back_from, seen),
+            validation_error: error(self.held_back_from, self.validation_motion.ncols(), held_back),
             gram,
         }
     }
@@ -151,12 +160,12 @@ fn without_affine(rest: &[Point], rows: &[usize], frames: &[&[f64]]) -> Mat<f64>
     let motion = Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| frames[c / 3][3 * rows[i] + c % 3] / scale);
     let center: Point = std::array::from_fn(|k| rest.iter().map(|p| p[k]).sum::<f64>() / rest.len() as f64);
     let basis = Mat::from_fn(rows.len(), 4, |i, k| if k < 3 { (rest[rows[i]][k] - center[k]) / scale } else { 1.0 });
-    least_squares_residual(basis.as_ref(), gram(basis.as_ref(), BLOCK_ROWS), &motion, 1e-12).unwrap_or(motion)
+    least_squares_residual(basis.as_ref(), &motion, 1e-12).unwrap_or(motion)
 }
 
-/// `X − A C` with the C that minimises `‖X − A C‖² + ρ ‖C‖²`, `ρ` as in [`ridge_factor`]; `gram` is `AᵀA`.
-fn least_squares_residual(a: MatRef<'_, f64>, gram: Mat<f64>, motion: &Mat<f64>, ridge: f64) -> Option<Mat<f64>> {
-    let factor = ridge_factor(gram, ridge)?;
+/// `X − A C` with the C that minimises `‖X − A C‖² + ρ ‖C‖²`, `ρ` as in [`ridge_factor`].
+fn least_squares_residual(a: MatRef<'_, f64>, motion: &Mat<f64>, ridge: f64) -> Option<Mat<f64>> {
+    let factor = ridge_factor(gram(a, BLOCK_ROWS), ridge)?;
     let mut solution = transposed_product(a, motion.as_ref(), BLOCK_ROWS);
     solve_cholesky(factor.as_ref(), &mut solution);
     let mut residual = motion.clone();

@@ -14,7 +14,7 @@ use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
 
 /// Points of one task: partial gradients are added up task by task, so that the sum does not depend on the number of threads.
-const TASK_POINTS: usize = 32 * LANES;
+const TASK_POINTS: usize = 16 * LANES;
 /// Square of the sine under which faces are seen edge-on: from there the rounding of their derivatives outweighs what they add.
 const EDGE_ON: f32 = 1e-6;
 /// Least square of an edge's sine.
