@@ -105,12 +105,15 @@ async function pictureOf(viewer: CagerViewer, player: Player): Promise<Blob> {
   const second = viewer.pair.player;
   if (!second) return player.picture();
   const pictures = await Promise.all([player, second].map(async (each) => createImageBitmap(await each.picture())));
-  const [{ width, height }] = pictures;
+  const [a, b] = pictures;
   const isWide = viewer.getAttribute('pictures') === 'columns';
-  const canvas = new OffscreenCanvas(isWide ? 2 * width : width, isWide ? height : 2 * height);
+  // Beside panels they are not equally wide.
+  const canvas = isWide
+    ? new OffscreenCanvas(a.width + b.width, Math.max(a.height, b.height))
+    : new OffscreenCanvas(Math.max(a.width, b.width), a.height + b.height);
   const context = canvas.getContext('2d')!;
-  for (const [k, picture] of pictures.entries())
-    context.drawImage(picture, isWide ? k * width : 0, isWide ? 0 : k * height);
+  context.drawImage(a, 0, 0);
+  context.drawImage(b, isWide ? a.width : 0, isWide ? 0 : a.height);
   return canvas.convertToBlob({ type: 'image/png' });
 }
 

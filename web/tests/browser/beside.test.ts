@@ -101,6 +101,13 @@ describe.skipIf(missing)('two captures in step', { timeout: 90_000 }, () => {
     await page.keyboard.press('i');
     await page.getByRole('complementary', { name: 'Statistics' }).waitFor();
     await expect.poll(() => free('.panel')).toBeGreaterThan(0);
+    // One picture has both in full, though the second one is wider by the panel.
+    const [first, second] = await sizes(page);
+    expect(second.width).toBeGreaterThan(first.width);
+    const saving = page.waitForEvent('download');
+    await page.keyboard.press('p');
+    const png = await readFile(await (await saving).path());
+    expect([png.readUInt32BE(16), png.readUInt32BE(20)]).toEqual([first.width + second.width, first.height]);
     await page.keyboard.press('i');
     await page.keyboard.press('d');
     await page.keyboard.press('4');
@@ -206,6 +213,22 @@ function places(page: Page): Promise<number[]> {
   return inViewer(
     page,
     (viewer) => [viewer.player!, viewer.pair.player!].map((player) => player.transport.position),
+    null,
+  );
+}
+
+/** How large both pictures are in pixels. */
+function sizes(page: Page): Promise<{ width: number; height: number }[]> {
+  return inViewer(
+    page,
+    (viewer) =>
+      [viewer.player!, viewer.pair.player!].map(
+        ({
+          stage: {
+            canvas: { width, height },
+          },
+        }) => ({ width, height }),
+      ),
     null,
   );
 }
