@@ -1,11 +1,13 @@
 import type { Player } from './player';
 
-/** CSS pixels below which the tools cover what matters. */
+/** CSS pixels up to which the tools cover what matters; the styles say the same. */
 const NARROW = 680;
 /** A finer picture than this costs more than it shows. */
 const FINEST_PIXEL_RATIO = 2;
 /** Two pictures stand side by side in a viewer that is wider than this part of its height, else one above the other. */
 const WIDE = 1.1;
+/** The least part of a picture's width that panels leave free; where they would leave less, the larger one covers the model. */
+const LEAST_FREE = 1 / 3;
 /** Between what floats and the border of the picture. */
 const GAP = 12;
 
@@ -57,7 +59,7 @@ export class Layout {
       return;
     }
     // What panels leave free is as wide in both pictures, which have one camera; the tools cover both as they do without panels.
-    const tools = isNarrow ? right : this.toolsWidth;
+    const tools = this.toolsWidth;
     const first = Math.floor((clientWidth + left - Math.max(0, right - tools)) / 2);
     this.host.style.setProperty('--first-width', `${first}px`);
     player?.resize(first, clientHeight, ratio, { top, right: tools, bottom, left });
@@ -65,7 +67,7 @@ export class Layout {
   }
 
   private get isNarrow(): boolean {
-    return this.host.clientWidth < NARROW;
+    return this.host.clientWidth <= NARROW;
   }
 
   private get toolsWidth(): number {
@@ -82,7 +84,10 @@ export class Layout {
     const boxOf = (part: string) => this.host.renderRoot.querySelector(part)?.getBoundingClientRect();
     const editor = boxOf('cager-edit-panel, cager-pose-panel');
     const inner = (boxOf('.panel') ?? (editor && boxOf('.tools')))?.left;
-    return { left: Math.round((editor?.right ?? left) - left), right: Math.round(right - (inner ?? right)) };
+    const sides = { left: Math.round((editor?.right ?? left) - left), right: Math.round(right - (inner ?? right)) };
+    if (right - left - sides.left - sides.right < LEAST_FREE * (right - left))
+      sides[sides.left > sides.right ? 'left' : 'right'] = 0;
+    return sides;
   }
 
   private measureDeck(): number {

@@ -68,6 +68,22 @@ describe.skipIf(chromium === undefined)('a capture that travels', { timeout: 90_
     expect(pages.errors).toEqual([]);
   });
 
+  test('stays_large_beside_the_narrower_of_two_panels_that_leave_no_room_for_it', async () => {
+    const device = { viewport: { width: 768, height: 1024 } };
+    const page = await pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') }, undefined, device);
+    await travel(page);
+    await page.keyboard.press('e');
+    await page.getByRole('region', { name: 'Edit cage' }).waitFor();
+    const { outside, height } = await places(page);
+    expect(outside).toBeLessThan(0);
+    await page.keyboard.press('i');
+    await page.getByRole('complementary', { name: 'Statistics' }).waitFor();
+    const covered = await places(page, ['cager-edit-panel']);
+    expect(covered.outside).toBeLessThan(0);
+    expect(covered.height).toBeGreaterThan(0.9 * height);
+    expect(pages.errors).toEqual([]);
+  });
+
   test('stays_where_somebody_has_put_the_camera', async () => {
     const page = await pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') });
     await inViewer(page, (viewer) => viewer.pause(), null);
@@ -119,12 +135,12 @@ async function travel(page: Page): Promise<void> {
 
 /**
  * By how many CSS pixels points of any frame are outside of what nothing covers, negative where all are within it, and how high the first frame is. On a phone
- * title, tools and transport cover some; on a desktop transport and panels alone, as the others stand beside the model.
+ * title, tools and transport cover some; on a desktop transport and `panels` alone, as the others stand beside the model.
  */
-function places(page: Page): Promise<{ outside: number; height: number }> {
+function places(page: Page, panels = ['.panel', 'cager-edit-panel']): Promise<{ outside: number; height: number }> {
   return inViewer(
     page,
-    async (viewer) => {
+    async (viewer, panels) => {
       viewer.pause();
       // As long as it takes until all frames are known and the camera rests.
       await new Promise((resolve) => setTimeout(resolve, 800));
@@ -133,7 +149,7 @@ function places(page: Page): Promise<{ outside: number; height: number }> {
       const boxOf = (part: string) => viewer.renderRoot.querySelector(part)!.getBoundingClientRect();
       const isPhone = clientWidth < 600;
       const top = isPhone ? boxOf('.lead').bottom : 0;
-      const has = (part: string) => viewer.renderRoot.querySelector(part) !== null;
+      const has = (part: string) => panels.includes(part) && viewer.renderRoot.querySelector(part) !== null;
       const right = isPhone ? boxOf('.tools').left : has('.panel') ? boxOf('.panel').left : clientWidth;
       const left = !isPhone && has('cager-edit-panel') ? boxOf('cager-edit-panel').right : 0;
       const bottom = boxOf('.deck').top;
@@ -158,6 +174,6 @@ function places(page: Page): Promise<{ outside: number; height: number }> {
       }
       return { outside, height: high - low };
     },
-    null,
+    panels,
   );
 }
