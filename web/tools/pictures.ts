@@ -130,7 +130,7 @@ async function bothShown(page: Page) {
   await page.waitForFunction(isShown, undefined, { timeout: READY_MS });
 }
 
-/** What is made when it is first asked for, and then again and again. */
+/** Makes something when it is first asked for, and gives the same from then on. */
 function lazily<T>(make: () => Promise<T>): () => Promise<T> {
   let made: Promise<T> | undefined;
   return () => (made ??= make());

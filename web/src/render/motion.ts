@@ -195,10 +195,13 @@ function extentOf(positions: Float32Array): Extent {
   return { box: [...low, ...high], mean: meanOf(positions, positions.length / 3), positions };
 }
 
-/** The finest parts of a capture that are looked at both ends of: the blocks around them are all there is of most captures. */
+/** Into how many parts a capture is divided at the finest; the frames at their ends are read. */
 const PARTS = 32;
-/** How many frames are read before the first picture of the capture: its ends and its middle tell most of where it goes, and the rest takes as much as all of it. */
-const EARLY_READS = 2;
+/**
+ * How many of the spread frames are read before the first decoded frame: the ends and the middle of a capture tell most of where it goes, and reading the rest
+ * would mean reading nearly all of the capture.
+ */
+const EARLY_FRAMES = 3;
 /** How long to wait for what is played. */
 const WAIT_MILLISECONDS = 200;
 
@@ -225,13 +228,11 @@ export async function surveyMotion(
   signal: AbortSignal,
 ): Promise<void> {
   if (!capture.complete) return;
-  let reads = 0;
-  const mustWait = () => player() === 'buffering' || (player() === 'preparing' && reads >= EARLY_READS);
-  for (const frame of spreadFrames(capture.frames - 1)) {
-    while (mustWait() && !signal.aborted) await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
+  const mustWait = (place: number) => player() === 'buffering' || (player() === 'preparing' && place >= EARLY_FRAMES);
+  for (const [place, frame] of [...spreadFrames(capture.frames - 1)].entries()) {
+    while (mustWait(place) && !signal.aborted) await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
     if (signal.aborted) return;
     if (motion.knows(frame)) continue;
-    reads++;
     await read(frame).catch(() => undefined);
   }
 }
