@@ -34,10 +34,11 @@ export interface Covered {
   readonly left: number;
 }
 
+/** @param line where the original ends and what is decoded begins, in CSS pixels from the left */
 export function drawSide(
   renderer: WebGLRenderer,
   side: Side,
-  split: number,
+  line: number,
   drawDecoded: () => void,
   drawOriginal: () => void,
   drawGhost: () => void,
@@ -47,11 +48,11 @@ export function drawSide(
   if (side === 'original') drawOriginal();
   if (side !== 'both') return;
   const { x: width, y: height } = renderer.getSize(new Vector2());
-  const line = Math.round(width * split);
   renderer.setScissorTest(true);
-  renderer.setScissor(line, 0, width - line, height);
+  const begin = Math.round(line);
+  renderer.setScissor(begin, 0, width - begin, height);
   drawDecoded();
-  renderer.setScissor(0, 0, line, height);
+  renderer.setScissor(0, 0, begin, height);
   drawOriginal();
   renderer.setScissorTest(false);
 }

@@ -54,6 +54,8 @@ export class Stage {
   readonly cageVertices: Float32Array;
   private side: Side = 'decoded';
   private split = 0.5;
+  /** The part of the picture's width that nothing covers, in CSS pixels. */
+  private free = { left: 0, width: 1 };
   private size = '';
   private shadowIsOld = true;
   private picturesWithShadow = 0;
@@ -178,7 +180,7 @@ export class Stage {
     this.pictureIsOld = true;
   }
 
-  /** Which side is drawn; the line between both is at `split`, a fraction of the picture's width. */
+  /** Which side is drawn; the line between both is at `split`, a fraction of the width that nothing covers. */
   setSide(side: Side, split: number) {
     this.side = side;
     this.pictureIsOld = true;
@@ -238,6 +240,7 @@ export class Stage {
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered: the rest shows what the camera looks at. */
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
     this.pictureIsOld = true;
+    this.free = { left: covered.left, width: Math.max(1, width - covered.left - covered.right) };
     for (const camera of [this.perspective, this.parallel])
       camera.setViewOffset(
         width,
@@ -283,7 +286,7 @@ export class Stage {
     const side = this.decoder.placedTextures && !this.observed ? this.side : 'decoded';
     const drawDecoded = () => this.renderer.render(this.scene, camera);
     const [drawOriginal, drawGhost] = [() => this.drawOriginal(), () => this.drawGhost()];
-    drawSide(this.renderer, side, this.split, drawDecoded, drawOriginal, drawGhost);
+    drawSide(this.renderer, side, this.line, drawDecoded, drawOriginal, drawGhost);
   }
 
   /** Points, x y z each, in diagonals and in the model's axes, as they are in the scene. */
@@ -301,10 +304,21 @@ export class Stage {
     return cornersOf(boundsOf(this.inScene(rest)));
   }
 
-  /** Where the middle of the model is in the picture that was drawn last, as a fraction of its width. */
+  /** Where the line between both sides is, in CSS pixels from the left. */
+  get line(): number {
+    return this.free.left + this.split * this.free.width;
+  }
+
+  /** The share that has the line this many CSS pixels from the left. */
+  splitAt(x: number): number {
+    return (x - this.free.left) / this.free.width;
+  }
+
+  /** The same for a line through the middle of the model as it was drawn last. */
   get middleShare(): number {
     const { projectionMatrix, matrixWorldInverse } = this.camera;
-    return this.ground.middle.clone().applyMatrix4(matrixWorldInverse).applyMatrix4(projectionMatrix).x / 2 + 0.5;
+    const { x } = this.ground.middle.clone().applyMatrix4(matrixWorldInverse).applyMatrix4(projectionMatrix);
+    return this.splitAt((x / 2 + 0.5) * this.renderer.getSize(new Vector2()).x);
   }
 
   /** Has the ground and its shadow go along with the model, whose middle is at this place of the scene. */

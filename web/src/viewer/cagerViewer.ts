@@ -287,6 +287,7 @@ export class CagerViewer extends CaptureElement {
     this.editing.draw();
     this.writePlace();
     this.marks?.place(player);
+    this.style.setProperty('--line', `${player.stage.line}px`);
     this.live.follow(player);
     this.pair.draw();
     super.tick();

@@ -40,7 +40,7 @@ export class Comparison {
     return this.surfaces ? ['decoded', 'both', 'original'] : ['decoded', 'both', 'ghost', 'original'];
   }
 
-  /** Where the original ends and the decoded model begins, as a fraction of the picture's width. */
+  /** Where the original ends and the decoded model begins, as a fraction of the width that nothing covers. */
   get split(): number {
     return this.place;
   }

@@ -93,15 +93,14 @@ function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, 
     }`;
 }
 
-/** The line between the original and the decoded model, to be dragged. */
-export function divider({ comparison }: Player) {
+/** The line between the original and the decoded model, to be dragged; `--line` says how far from the left it is drawn. */
+export function divider({ comparison, stage }: Player) {
   if (!comparison.original || comparison.side !== 'both') return nothing;
   const drag = (event: PointerEvent) => {
     const line = event.currentTarget as HTMLElement;
     if (event.type === 'pointerdown') line.setPointerCapture(event.pointerId);
     if (!line.hasPointerCapture(event.pointerId)) return;
-    const { left, width } = line.parentElement!.getBoundingClientRect();
-    comparison.split = (event.clientX - left) / width;
+    comparison.split = stage.splitAt(event.clientX - line.parentElement!.getBoundingClientRect().left);
   };
   const press = (event: KeyboardEvent) => {
     const step = { ArrowLeft: -KEY_STEP, ArrowRight: KEY_STEP }[event.key];
@@ -120,7 +119,6 @@ export function divider({ comparison }: Player) {
     aria-valuemax="100"
     aria-valuenow=${share}
     aria-valuetext=${`${share} % original`}
-    .style=${`left: ${100 * comparison.split}%`}
     @pointerdown=${drag}
     @pointermove=${drag}
     @keydown=${press}

@@ -152,6 +152,7 @@ export const overlayStyle = css`
     position: absolute;
     top: 0;
     bottom: 0;
+    left: var(--line, 50%);
     width: 28px;
     margin-left: -14px;
     cursor: ew-resize;

@@ -48,7 +48,7 @@ export class PointMarks {
       height: stage.canvas.clientHeight,
     };
     const projection = new Projection(stage.clipMatrix, picture.width, picture.height);
-    const begin = comparison.original && comparison.side === 'both' ? comparison.split * picture.width : 0;
+    const begin = comparison.original && comparison.side === 'both' ? stage.line : 0;
     const put = (mark: HTMLElement, point: number) => {
       const spot = projection.place(positionOf(measured.places, point));
       mark.hidden = !spot || spot.x < begin;

@@ -97,6 +97,64 @@ describe.skipIf(chromium === undefined)('a capture beside its original', { timeo
     expect(pages.errors).toEqual([]);
   });
 
+  it('has the line between both begin at the middle of the model beside a panel, and follow it', async () => {
+    const page = await opened();
+    await page.keyboard.press('i');
+    await page.getByRole('complementary', { name: 'Statistics' }).waitFor();
+    await dropOnViewer(page, { 'walk.npy': (await movedOriginal()).bytes });
+    await page.getByText('Error against the original').waitFor();
+    await inViewer(page, (viewer) => viewer.pause(), null);
+    await page.keyboard.press('Home');
+    await page.waitForTimeout(800);
+    await page.keyboard.press('o');
+    const line = page.getByRole('slider', { name: 'Divider between original and decoded' });
+    await line.waitFor();
+    const middle = async () => {
+      const { x, width } = (await line.boundingBox())!;
+      return x + width / 2;
+    };
+    // How far the line is from the middle of the model, and from where it is drawn, in CSS pixels.
+    const away = async () => {
+      const at = await middle();
+      const { model, drawn } = await inViewer(
+        page,
+        ({ player }) => {
+          const { stage } = player!;
+          const left = stage.canvas.getBoundingClientRect().left;
+          const points = stage.decoder.readPositions();
+          stage.decoder.place(points);
+          const { elements: e } = stage.clipMatrix;
+          const along = (row: number, at: number) =>
+            e[row] * points[at] + e[row + 4] * points[at + 1] + e[row + 8] * points[at + 2] + e[row + 12];
+          const rights = Array.from({ length: points.length / 3 }, (_, p) => along(0, 3 * p) / along(3, 3 * p));
+          const share = (2 + Math.min(...rights) + Math.max(...rights)) / 4;
+          return { model: left + share * stage.canvas.clientWidth, drawn: left + stage.line };
+        },
+        null,
+      );
+      return { model: Math.abs(at - model), drawn: Math.abs(at - drawn) };
+    };
+    const isClose = async () => {
+      const { model, drawn } = await away();
+      return model < 40 && drawn < 1;
+    };
+    await expect.poll(isClose).toBe(true);
+    const beside = await middle();
+    await page.keyboard.press('i');
+    await expect.poll(isClose).toBe(true);
+    expect(await middle()).toBeGreaterThan(beside + 100);
+
+    const { y, height } = (await line.boundingBox())!;
+    await page.keyboard.press('i');
+    await expect.poll(middle).toBeCloseTo(beside, 0);
+    await page.mouse.move(beside, y + height / 2);
+    await page.mouse.down();
+    await page.mouse.move(beside - 80, y + height / 2);
+    await page.mouse.up();
+    await expect.poll(middle).toBeCloseTo(beside - 80, 0);
+    expect(pages.errors).toEqual([]);
+  });
+
   it('says why frames of something else are not taken, and plays on', async () => {
     const page = await opened();
     await dropOnViewer(page, { 'other.npy': Buffer.concat([npyHeader([1, 2, 3]), Buffer.alloc(24)]) });
