@@ -201,6 +201,7 @@ export class Player {
 
   /** The camera of the picture: that of the controls, beside the model where it follows it. */
   get camera(): CameraState {
+    if (this.lead) return this.lead.camera;
     const { camera } = this.controls;
     return this.follows ? shifted(camera, this.centre()) : camera;
   }
@@ -236,12 +237,19 @@ export class Player {
     return this.stage.canvas;
   }
 
+  /** The picture as a file has it: the finest, with the model in its middle whatever floats above the canvas. */
   picture(): Promise<Blob> {
-    this.resolution.share = 1;
+    const { resolution } = this;
+    const { isForFile } = resolution;
+    resolution.isForFile = true;
     const canvas = this.drawn();
-    return new Promise((resolve, reject) => {
+    const picture = new Promise<Blob>((resolve, reject) => {
       canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('The image could not be saved.'))));
     });
+    resolution.isForFile = isForFile;
+    // What the file has is taken already.
+    this.drawn();
+    return picture;
   }
 
   dispose() {
@@ -338,7 +346,7 @@ export class Player {
     this.playback.follow(transport);
     this.resolution.share = lead.resolution.share;
     if (!this.motion.isEmpty) this.stage.moveGround(this.centre());
-    this.stage.draw(lead.camera, lead.resolution.share < 1);
+    this.stage.draw(this.camera, lead.resolution.share < 1);
   }
 
   private get followReach(): number {

@@ -8,6 +8,9 @@ const [SLOW, FAST] = [24, 52];
 /** Seconds between changes. */
 const PATIENCE = 0.7;
 
+/** What covers the pictures of a file. */
+const NOTHING: Covered = { top: 0, right: 0, bottom: 0, left: 0 };
+
 /** Chooses how fine pictures are: coarser while something moves on a slow device, the finest when all rests. */
 export class Quality {
   private step: number;
@@ -46,11 +49,10 @@ export class Quality {
 
 /** How fine the pictures of a stage are: coarser ones come faster while something moves. */
 export class Resolution {
-  /** Whether pictures stay as fine as they can be though something moves. */
-  keepsFinest = false;
-  covered: Covered = { top: 0, right: 0, bottom: 0, left: 0 };
+  covered = NOTHING;
   private size = { width: 1, height: 1, pixelRatio: 1 };
   private shown = 1;
+  private forFile = false;
 
   constructor(private readonly stage: Stage) {}
 
@@ -60,11 +62,21 @@ export class Resolution {
   }
 
   set share(share: number) {
-    const wanted = this.keepsFinest ? 1 : share;
+    const wanted = this.forFile ? 1 : share;
     if (wanted === this.shown) return;
     this.shown = wanted;
-    const { width, height, pixelRatio } = this.size;
-    this.stage.resize(width, height, pixelRatio * wanted, this.covered);
+    this.apply();
+  }
+
+  /** Whether pictures are for a file: as fine as they can be though something moves, with nothing above them that the model would have to stand beside. */
+  get isForFile(): boolean {
+    return this.forFile;
+  }
+
+  set isForFile(isForFile: boolean) {
+    this.forFile = isForFile;
+    if (isForFile) this.shown = 1;
+    this.apply();
   }
 
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered. */
@@ -73,5 +85,10 @@ export class Resolution {
     this.size = { width, height, pixelRatio: this.stage.isJagged ? Math.min(2, 2 * pixelRatio) : pixelRatio };
     this.shown = 0;
     this.share = share;
+  }
+
+  private apply() {
+    const { width, height, pixelRatio } = this.size;
+    this.stage.resize(width, height, pixelRatio * this.shown, this.forFile ? NOTHING : this.covered);
   }
 }

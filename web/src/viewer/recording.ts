@@ -27,7 +27,8 @@ export async function recordTurntable(
   recorder.addEventListener('dataavailable', ({ data }) => pieces.push(data));
   const stopped = new Promise<void>((resolve) => recorder.addEventListener('stop', () => resolve()));
   const start = player.controls.destination;
-  player.resolution.keepsFinest = true;
+  player.resolution.isForFile = true;
+  player.drawn();
   recorder.start();
   try {
     await turn(signal, (fraction) => {
@@ -35,9 +36,9 @@ export async function recordTurntable(
       onProgress(fraction);
     });
   } finally {
-    player.resolution.keepsFinest = false;
     recorder.stop();
     for (const track of stream.getTracks()) track.stop();
+    player.resolution.isForFile = false;
     player.controls.go(start, true);
   }
   await stopped;

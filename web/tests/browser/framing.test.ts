@@ -84,6 +84,35 @@ describe.skipIf(chromium === undefined)('a capture that travels', { timeout: 90_
     expect(pages.errors).toEqual([]);
   });
 
+  test('is_saved_as_if_no_panel_were_open', async () => {
+    const page = await pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') });
+    // Seen from where somebody has put the camera, which panels do not move.
+    await inViewer(page, (viewer) => (viewer.pause(), (viewer.frame = 0)), null);
+    await page.mouse.move(600, 300);
+    await page.mouse.wheel(0, -100);
+    await page.waitForTimeout(800);
+    const taken = () =>
+      inViewer(
+        page,
+        async (viewer) => {
+          const { player } = viewer;
+          const picture = new Uint8Array(await (await player!.picture()).arrayBuffer());
+          const { elements } = player!.stage.clipMatrix;
+          return { picture: picture.join(' '), place: elements[12] };
+        },
+        null,
+      );
+    const before = await taken();
+    await page.keyboard.press('i');
+    await page.getByRole('complementary', { name: 'Statistics' }).waitFor();
+    await page.waitForTimeout(300);
+    const after = await taken();
+    expect(after.picture === before.picture).toBe(true);
+    // What is seen still stands beside the panel.
+    expect(after.place).toBeLessThan(before.place);
+    expect(pages.errors).toEqual([]);
+  });
+
   test('stays_where_somebody_has_put_the_camera', async () => {
     const page = await pages.show({ 'walk.cager': await goldenBytes('definition3-mvc.cager') });
     await inViewer(page, (viewer) => viewer.pause(), null);
