@@ -158,7 +158,7 @@ soak: ## kill the service a hundred times under load; KILLS and SEED change how 
 	CAGER_SOAK_KILLS=$(or $(KILLS),100) $(if $(SEED),CAGER_SOAK_SEED=$(SEED)) \
 		$(CARGO) test --release --locked --test reliability -- --exact --nocapture soak::a_service_that_is_killed_keeps_what_it_said
 
-lint: ## formatting, clippy and documentation, all warnings denied; and whether the command line builds without the service
+lint: ## formatting, clippy and documentation, all warnings denied; whether the command line builds without the service, and the lock file of the Python module fits
 	$(CARGO) fmt --all --check
 	cd python && $(CARGO) metadata --format-version 1 --locked >/dev/null
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings

@@ -148,7 +148,7 @@ def held_back(folder, capture, name, cage):
         command += ["--handles", "spread", "-o", os.path.join(folder, "out.cager"), "--report", report, "--overwrite"]
         done = subprocess.run([CAGER, *command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
         if done.returncode:
-            return None, done.stderr.strip().splitlines()[0]
+            return None, "refused: " + done.stderr.strip().splitlines()[0]
     return read(report)["error"]["l2_mean"], None
 
 
@@ -168,10 +168,13 @@ def lazy(folder):
                     with open(told, "w", encoding="utf-8") as file:
                         file.write(done.stdout)
                 made_of = read(told)["vertices"]
+                if made_of == 0:
+                    found.append((float("inf"), vertices, grid, "none is made"))
+                    continue
                 error, refusal = held_back(folder, capture, f"lazy-{vertices}-{grid}", cage)
                 found.append((error if error is not None else float("inf"), made_of, grid, refusal))
             error, count, grid, refusal = min(found, key=lambda each: each[0])
-            row = [capture, str(count), str(grid), f"refused: {refusal}" if refusal else percent(error)]
+            row = [capture, str(count), str(grid), refusal or percent(error)]
             for kind in ("rest", "free"):
                 report, cage = made(folder, capture, kind, count)
                 ours = held_back(folder, capture, f"{kind}-{count}", cage)[0]

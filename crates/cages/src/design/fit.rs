@@ -8,7 +8,7 @@ use faer::{Accum, Mat, MatRef};
 /// Rows of one parallel task: a quarter of a step's.
 pub(super) const BLOCK_ROWS: usize = 550;
 
-/// Least-squares cages of a motion, `min ‖X − Φ C‖² + ρ ‖C‖²`, by products in single precision: `ρ` is far above their rounding.
+/// Least-squares cages of a motion, `min ‖X − Φ C‖² + ρ ‖C‖²`, by products in single precision.
 pub(super) struct Fit {
     /// Cages `C`, m × c.
     pub(super) cages: Mat<f32>,
@@ -19,12 +19,13 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Fits the motion X, n × c, with the ridge `ρ` as a fraction of the mean diagonal entry of `ΦᵀΦ`.
+    /// Fits the motion X, n × c, with the ridge `ρ` as a fraction of the mean diagonal entry of `ΦᵀΦ`, far above the rounding of
+    /// single precision.
     pub(super) fn new(phi: MatRef<'_, f32>, motion: MatRef<'_, f32>, ridge: f64) -> Option<Self> {
         Self::of_factor(phi, motion, || ridge_factor(to_double(gram(phi, BLOCK_ROWS).as_ref()), ridge))
     }
 
-    /// As [`Self::new`], with the factor from elsewhere.
+    /// As [`Self::new`], with a factor from elsewhere: in double precision for smaller ridges.
     pub(super) fn of_factor(
         phi: MatRef<'_, f32>,
         motion: MatRef<'_, f32>,

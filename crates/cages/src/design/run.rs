@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Steps of a design with a given number of vertices.
-const STEPS: usize = 134;
+const STEPS: usize = 140;
 /// Step lengths fall along a cosine over so many times the steps of a phase; from this share of the steps on, linearly to zero as well: slow steps to the end
 /// bring little, and a cosine over fewer steps leaves larger errors.
 const COSINE_STEPS: f64 = 1.36;
@@ -136,10 +136,10 @@ impl Run<'_> {
             let mut better = None;
             if done == FIRST_EVALUATION || done % EVALUATE_EVERY == 0 || done == phase.steps {
                 let evaluation = self.samples.evaluate(&descent.cage);
-                // A smaller cage than asked for may do; a larger one may not.
                 if done % EVALUATE_EVERY == 0 {
                     self.note(&format!("{done} steps"), &descent.cage, &evaluation);
                 }
+                // A smaller cage than asked for may do; a larger one may not.
                 if descent.cage.vertices().len() <= phase.goal && self.keep(&descent.cage, evaluation) {
                     better = Some(descent.cage.mesh());
                 }

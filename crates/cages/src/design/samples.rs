@@ -50,23 +50,19 @@ pub(super) struct Batch {
 pub(super) struct Evaluation {
     pub(super) training_error: f64,
     pub(super) validation_error: f64,
-    /// `ΦᵀΦ` of the points.
-    gram: Mat<f64>,
+    /// `ΦᵀΦ` of the points; `None` for large cages, whose condition number would take too long.
+    gram: Option<Mat<f64>>,
 }
 
 impl Evaluation {
     /// Of no cage, worse than any other.
     pub(super) fn worst() -> Self {
-        Self { training_error: f64::INFINITY, validation_error: f64::INFINITY, gram: Mat::new() }
+        Self { training_error: f64::INFINITY, validation_error: f64::INFINITY, gram: None }
     }
 
-    /// Condition number of the coordinates, infinite where they are singular; `None` for large cages, where it would take too long, and where it does
-    /// not converge.
+    /// Condition number of the coordinates, infinite where they are singular; `None` for large cages and where it does not converge.
     pub(super) fn condition_number(&self) -> Option<f64> {
-        if self.gram.nrows() > LARGE {
-            return None;
-        }
-        let squares = self.gram.self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
+        let squares = self.gram.as_ref()?.self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
         let (first, last) = (squares.first()?, squares.last()?);
         Some(if *first > 0.0 { (last / first).sqrt() } else { f64::INFINITY })
     }
@@ -87,12 +83,15 @@ impl Samples {
         };
         let (used, validation_points) = (some(MAX_POINTS), some(VALIDATION_POINTS));
         let (seen, unseen) = (evenly(&designed, VALIDATION_FRAMES), evenly(&held_back, VALIDATION_FRAMES));
-        let [seen_motion, unseen_motion] =
-            [&seen, &unseen].map(|frames| principal(&without_affine(&rest.points, &validation_points, frames)));
+        let [seen_motion, unseen_motion] = [&seen, &unseen]
+            .map(|frames| principal(&without_affine(&rest.points, &validation_points, frames), usize::MAX));
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {
             points: at(&used),
-            training: to_single(principal(&without_affine(&rest.points, &used, &designed)).as_ref(), used.len()),
+            training: to_single(
+                principal(&without_affine(&rest.points, &used, &designed), COLUMNS).as_ref(),
+                used.len(),
+            ),
             validation_points: at(&validation_points),
             validation_motion: to_single(concat![[seen_motion, unseen_motion]].as_ref(), validation_points.len()),
             held_back_from: seen_motion.ncols(),
@@ -112,9 +111,10 @@ impl Samples {
     /// Root mean square errors of a cage.
     pub(super) fn evaluate(&self, cage: &Cage) -> Evaluation {
         let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
-        // In single precision it would be off by more than the ridge.
+        // In single precision `ΦᵀΦ` would be off by more than the ridge.
         let gram = gram(to_double(phi.as_ref()).as_ref(), BLOCK_ROWS);
-        let fit = Fit::of_factor(phi.as_ref(), self.validation_motion.as_ref(), || ridge_factor(gram.clone(), RIDGE));
+        let kept = (gram.nrows() <= LARGE).then(|| gram.clone());
+        let fit = Fit::of_factor(phi.as_ref(), self.validation_motion.as_ref(), || ridge_factor(gram, RIDGE));
         let error = |first: usize, last: usize, frames: usize| {
             let Some(fit) = &fit else { return f64::INFINITY };
             let left = fit.residual.as_ref().subcols(first, last - first);
@@ -124,7 +124,7 @@ impl Samples {
         Evaluation {
             training_error: error(0, self.held_back_from, seen),
             validation_error: error(self.held_back_from, self.validation_motion.ncols(), held_back),
-            gram,
+            gram: kept,
         }
     }
 }
@@ -135,8 +135,8 @@ pub(super) fn evenly<'a>(frames: &[&'a [f64]], count: usize) -> Vec<&'a [f64]> {
     (0..count).map(|k| frames[k * frames.len() / count]).collect()
 }
 
-/// A motion in its principal directions: the fewest that leave out no more than [`LEFT_OUT`], at most [`COLUMNS`].
-fn principal(motion: &Mat<f64>) -> Mat<f64> {
+/// A motion in its principal directions: the fewest that leave out no more than [`LEFT_OUT`], and at most so many.
+fn principal(motion: &Mat<f64>, most: usize) -> Mat<f64> {
     let columns = motion.ncols();
     let Ok(eigen) = gram(motion.as_ref(), BLOCK_ROWS).self_adjoint_eigen(faer::Side::Lower) else {
         return motion.clone();
@@ -148,7 +148,7 @@ fn principal(motion: &Mat<f64>) -> Mat<f64> {
         left_out += square.max(0.0);
         left_out > may_leave
     });
-    let first = needed.unwrap_or(columns - 1).max(columns.saturating_sub(COLUMNS));
+    let first = needed.unwrap_or(columns - 1).max(columns.saturating_sub(most));
     let mut out = Mat::zeros(motion.nrows(), columns - first);
     accumulate_product(&mut out, Accum::Replace, motion.as_ref(), eigen.U().subcols(first, columns - first), 1.0);
     out

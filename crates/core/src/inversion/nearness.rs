@@ -74,18 +74,19 @@ impl Nearness {
     pub(super) fn keep(&self, cage: &mut [Point], frame: &Aabb, diagonal: f64) -> bool {
         let unit = diagonal.max(frame.size().length());
         let vertices = self.cage.vertices().len();
+        let share = |distance: f64| (((distance - self.data.margin) / unit - NEAR) / (FAR - NEAR)).min(1.0);
         // Seldom is even a corner of the box around the cage far, and boxes are found faster than distances of all vertices.
         let around = Aabb::around_all(&cage[..vertices]);
-        if frame.max_distance2(&around).sqrt() <= self.data.margin + NEAR * unit {
+        if share(frame.max_distance2(&around).sqrt()) <= 0.0 {
             return false;
         }
-        let beyond = |cage: &[Point]| (max_distance(frame, &cage[..vertices]) - self.data.margin) / unit;
-        let share = ((beyond(cage) - NEAR) / (FAR - NEAR)).min(1.0);
-        let is_far = share > 0.0;
+        let distance = |cage: &[Point]| max_distance(frame, &cage[..vertices]);
+        let share_held = share(distance(cage));
+        let is_far = share_held > 0.0;
         if is_far {
-            let held = self.held(cage, |cage| beyond(cage) <= NEAR);
+            let held = self.held(cage, |cage| share(distance(cage)) <= 0.0);
             for (row, held) in cage.iter_mut().zip(held) {
-                *row = [0, 1, 2].map(|k| (1.0 - share) * row[k] + share * held[k]);
+                *row = [0, 1, 2].map(|k| (1.0 - share_held) * row[k] + share_held * held[k]);
             }
         }
         is_far
