@@ -53,14 +53,15 @@ impl Service {
         let NewSession { uploaded, options, idempotency_key, room } = new;
         let room = Arc::new(room);
         let valid = ValidOptions::of(&options)?;
-        let (uploaded, options, request) = blocking(move || {
+        let (service, owner) = (Arc::clone(self), Arc::clone(tenant));
+        let asked = blocking(move || {
             let request = request_of(idempotency_key, &uploaded, &options);
-            (uploaded, options, request)
-        })
-        .await?;
-        // Few files, and only for keys of earlier versions.
-        let may_be = |session: &Session| session.is_of(&uploaded, &options);
-        if let Some(made) = made_before(&self.registry, &tenant.name, request.as_ref(), may_be)? {
+            let may_be = |session: &Session| session.is_of(&uploaded, &options);
+            let made = made_before(&service.registry, &owner.name, request.as_ref(), may_be)?;
+            Ok::<_, ApiError>((uploaded, options, request, made))
+        });
+        let (uploaded, options, request, made) = asked.await??;
+        if let Some(made) = made {
             return Ok(made);
         }
         let (content, made_cage) = self.resolve_cage(&tenant.name, uploaded, &options, &room).await?;
