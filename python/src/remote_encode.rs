@@ -14,7 +14,7 @@ use cager_client::cage_messages::{CageOptions, CageState, CageStyle};
 use cager_client::messages::{CageSource, FrameResult, SessionOptions};
 use cager_client::{Client, ClientError, ClientOptions, FrameSource, MeshFile, NewCage, NewSession, UploadOptions};
 use cager_formats::obj_bytes;
-use cager_geometry::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
 use cager_geometry::units::Units;
 use cager_proto::container::{self, ContainerReader, ContainerWriter};
 use futures_util::StreamExt as _;
@@ -154,14 +154,8 @@ fn prepare(job: Encoding, progress: &Arc<LoopProgress>) -> Result<Prepared, Faul
             CageOptions { vertices, mean_error, style: Some(style), seed: Some(options.seed), ..new.options.clone() };
         Ok::<_, ClientError>(NewCage { options, ..new })
     });
-    let cage = cage.map(|cage| MeshFile::new("cage.obj", mesh_obj(cage.mesh())));
+    let cage = cage.map(|cage| MeshFile::new("cage.obj", obj_bytes(&Model::from(cage.mesh().clone()))));
     Ok(Prepared { rest, cage, design: design.transpose()?, frames: kept })
-}
-
-fn mesh_obj(mesh: &TriMesh) -> Vec<u8> {
-    let mut faces = Polygons::new();
-    mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    obj_bytes(&Model { points: mesh.vertices.clone(), faces, ..Model::default() })
 }
 
 /// Waits until a cage is designed.

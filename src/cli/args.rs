@@ -90,7 +90,7 @@ pub(crate) struct EncodeArgs {
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
-    /// Closed cage around the rest pose, same formats; polygons are triangulated [default: one is designed from the capture].
+    /// Closed cage around the rest pose, same formats, polygons are triangulated; or the .cager file of another take, whose cage is taken [default: one is designed from the capture].
     #[arg(long, value_name = "CAGE", hide_default_value = true)]
     pub(crate) cage: Option<PathBuf>,
 
@@ -281,7 +281,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
-    /// Closed cage around the rest pose, same formats; polygons are triangulated.
+    /// Closed cage around the rest pose, same formats, polygons are triangulated; or a .cager file, whose cage is taken.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: PathBuf,
 

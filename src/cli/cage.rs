@@ -1,18 +1,19 @@
 //! `cager cage`: generates, designs and improves cages.
 
 use super::cage_args::{CageArgs, GeneralArg};
+use super::cage_file::read_cage_like;
 use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design;
 use super::dry_run::{read_files, tell_dry_run};
-use super::{grouped, progress, read_like, read_with_units, tell, warn};
+use super::{grouped, progress, read_with_units, tell, warn};
 use anyhow::{Result, bail};
 use cager_cages::{BoundingShape, DesignOptions, EncloseError, EncloseOptions, Style, bounding_shape, enclose};
 use cager_capture::design::default_vertices;
 use cager_capture::design::{read_frames, report as design_report};
 use cager_capture::frames::CaptureFiles;
 use cager_formats::{Target, Units, commit_together};
-use cager_geometry::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
 use cager_proto::report::DesignReport;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -82,14 +83,14 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
                 GeneralArg::Hull => BoundingShape::Hull,
             };
             let all: Vec<&Model> = models.iter().collect();
-            (of_triangles(bounding_shape(&all, shape, vertices).map_err(|e| name_file(&e, args))?), None)
+            (Model::from(bounding_shape(&all, shape, vertices).map_err(|e| name_file(&e, args))?), None)
         }
         (None, None) => {
             let options = EncloseOptions { vertices, clearance: args.clearance, per_part: args.per_part };
             let bar = progress::ticking("enclosing the rest pose");
             let cage = enclose(rest, &options);
             bar.finish_and_clear();
-            (of_triangles(cage.map_err(|e| name_file(&e, args))?), None)
+            (Model::from(cage.map_err(|e| name_file(&e, args))?), None)
         }
     };
     finish(args, (output, &targets), &models, &cage, report, warnings, clock)
@@ -105,7 +106,8 @@ struct Motion<'a> {
 
 impl<'a> Motion<'a> {
     fn new(args: &'a CageArgs, (rest, units): (&Model, Units), frames: &Path) -> Result<Self> {
-        let start = args.improve.as_ref().map(|path| read_like(path, units).map(|model| (path, model))).transpose()?;
+        let start =
+            args.improve.as_ref().map(|path| read_cage_like(path, units).map(|model| (path, model))).transpose()?;
         let options = DesignOptions {
             goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
             style: args.style.unwrap_or(Style::Editable),
@@ -140,17 +142,9 @@ fn designed(
     // An artist's cage keeps its quads.
     let cage = match start {
         Some((_, model)) => Model { points: found.cage.vertices, faces: model.faces, ..Model::default() },
-        None => of_triangles(found.cage),
+        None => Model::from(found.cage),
     };
     Ok((cage, Some(report)))
-}
-
-fn of_triangles(mesh: TriMesh) -> Model {
-    let mut faces = Polygons::new();
-    for triangle in &mesh.triangles {
-        faces.push(triangle);
-    }
-    Model { points: mesh.vertices, faces, ..Model::default() }
 }
 
 fn finish(

@@ -63,7 +63,7 @@ pub(crate) struct CageArgs {
     #[arg(long, value_name = "CAGE", conflicts_with_all = ["frames", "vertices", "clearance"])]
     pub(crate) repair: Option<PathBuf>,
 
-    /// Move the vertices of this cage to where the motion needs them; its faces, quads among them, stay. Needs --frames.
+    /// Move the vertices of this cage, a mesh or that of a .cager file, to where the motion needs them; its faces, quads among them, stay. Needs --frames.
     #[arg(long, value_name = "CAGE", requires = "frames", conflicts_with_all = ["vertices", "mean_error"])]
     pub(crate) improve: Option<PathBuf>,
 

@@ -1,10 +1,11 @@
 //! `cager compare`.
 
 use super::args::CompareArgs;
+use super::cage_file::read_cage;
 use super::checks::{check_cage, check_capture, checked_files, warn_of_departures};
 use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
-use super::solver_options::{read_cage, with_input_name};
+use super::solver_options::with_input_name;
 use super::{human_bytes, plain, progress, read_with_units};
 use anyhow::Result;
 use cager_compare::report_page::{Contents, NO_PAGE, ReportKind, ReportPage};

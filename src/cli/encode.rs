@@ -1,13 +1,14 @@
 //! `cager encode`.
 
 use super::args::{EncodeArgs, SpectrumArg};
+use super::cage_file::read_cage;
 use super::checks::{capture_files, check_cage, check_capture, warn_of_departures};
 use super::coding_args::{Unit, goal};
 use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_shared::{
     Targets, checked_options, design_options, finish, name_file, name_files, sized_design, solver_options,
 };
-use super::solver_options::{check_inversion, designed_spectrum, matrix, read_cage, spectrum_bound};
+use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
 use super::{design, encode_remote, grouped, human_bytes, progress, read_with_units, warn};
 use anyhow::{Context, Result};
 use cager_capture::coding::Goal;

@@ -4,7 +4,7 @@ use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
 use super::encode_shared::{Targets, checked_options, design_options, finish, sized_design};
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
-use super::{interrupt, is_scene, plain, progress, tell, warn};
+use super::{interrupt, is_container, is_scene, plain, progress, tell, warn};
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely, mesh_file};
 use anyhow::{Context, Result, anyhow, bail};
 use cager_cages::DesignOptions;
@@ -15,7 +15,7 @@ use cager_client::messages::SessionOptions;
 use cager_client::{FrameSource, MeshFile};
 use cager_core::cage::Cage;
 use cager_formats::{AtomicFile, Target, Units, obj_bytes};
-use cager_geometry::mesh::{Model, Point, Polygons};
+use cager_geometry::mesh::{Model, Point};
 use cager_proto::container::{ContainerReader, ContainerWriter, counted_from_zero};
 use std::io::{BufReader, BufWriter};
 use std::path::Path;
@@ -64,7 +64,10 @@ pub(super) fn run(
 
     let token = args.token.clone().or_else(|| std::env::var("CAGER_TOKEN").ok()).filter(|token| !token.is_empty());
     // As it was read: welded, turned around and in the units of the rest pose.
-    let moved_cage = cage.filter(|_| is_placed).map(|cage| MeshFile::new("cage.obj", cage_obj(cage)));
+    let is_sent_as_read = is_placed || args.cage.as_deref().is_some_and(is_container);
+    let moved_cage = cage
+        .filter(|_| is_sent_as_read)
+        .map(|cage| MeshFile::new("cage.obj", obj_bytes(&Model::from(cage.mesh().clone()))));
     let mut options = SessionOptions {
         name: session_name(&args.output),
         coordinates: Some(args.solver.coordinates.name().to_owned()),
@@ -148,13 +151,6 @@ pub(super) fn run(
         .map_err(|error| anyhow!("{error:#}; {}", goes_on(&plain(&session))))?;
     interrupt::set_last_words(String::new());
     tell(&format!("  service {}, session {}\n", plain(address), plain(&session)))
-}
-
-/// A cage as a file for a service.
-fn cage_obj(cage: &Cage) -> Vec<u8> {
-    let mut faces = Polygons::new();
-    cage.mesh().triangles.iter().for_each(|triangle| faces.push(triangle));
-    obj_bytes(&Model { points: cage.vertices().to_vec(), faces, ..Model::default() })
 }
 
 /// The container of a service, which was sent positions about an origin and knows neither it nor what they mean.

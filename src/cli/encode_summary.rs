@@ -43,6 +43,14 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     } else {
         ""
     };
+    let again = match &report.design {
+        Some(design) if output.as_os_str() != "-" => format!(
+            "  cage    designed, L2 {:.4} % on frames it was not made from; for more takes of this model pass --cage {}\n",
+            100.0 * design.held_back_error,
+            output.display()
+        ),
+        _ => String::new(),
+    };
     let s = &report.seconds;
     let designed = if s.design > 0.0 { format!(", {:.3} s of it for the cage", s.design) } else { String::new() };
     let steps = if is_verbose() {
@@ -58,7 +66,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
          \x20 error   {}\n{worst}{alone}\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
-         {refined}{chosen}\x20 time    {:.3} s{designed}\n{steps}",
+         {refined}{chosen}{again}\x20 time    {:.3} s{designed}\n{steps}",
         output.display(),
         grouped(report.frames),
         grouped(report.points),

@@ -1,9 +1,10 @@
 //! `cager explore`: shapes between poses.
 
+use super::cage_file::read_cage;
 use super::dry_run::tell_dry_run;
 use super::outputs::{OutputArgs, Outputs, folder_of};
 use super::poses::{PoseFile, Poses};
-use super::solver_options::{read_cage, with_input_name};
+use super::solver_options::with_input_name;
 use super::{grouped, progress, tell};
 use anyhow::{Context, Result, bail};
 use cager_capture::origin::{LOST, move_to, own_origin};

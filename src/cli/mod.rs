@@ -3,6 +3,7 @@
 mod args;
 mod cage;
 mod cage_args;
+mod cage_file;
 mod cage_outputs;
 mod checks;
 mod coding_args;
@@ -155,6 +156,11 @@ fn read_like(path: &Path, units: Units) -> Result<Model, cager_formats::Error> {
     let (mut model, said) = read_with_units(path, None)?;
     said.change_to(units).apply_to(&mut model.points);
     Ok(model)
+}
+
+/// Whether a file is a `.cager` file, by its name.
+fn is_container(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("cager"))
 }
 
 /// Whether a file is a scene that may have several meshes, by its name.

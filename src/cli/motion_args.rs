@@ -42,7 +42,7 @@ pub(crate) struct TransferMotionArgs {
     #[arg(long, value_parser = word::<TransferMethod>(&["fitted", "public", "rigid"]), value_name = "METHOD", default_value = "fitted")]
     pub(super) method: TransferMethod,
 
-    /// Closed cage: with fitted around the source, with public and rigid around both, in the target's space [default: one is made].
+    /// Closed cage, a mesh or a .cager file: with fitted around the source, with public and rigid around both, in the target's space [default: one is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "public")]
     pub(super) cage: Option<PathBuf>,
 

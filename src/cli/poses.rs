@@ -1,6 +1,6 @@
 //! Poses of one model: meshes, and frames of .cager files.
 
-use super::{grouped, read_model};
+use super::{grouped, is_container, read_model};
 use anyhow::{Context, Result, bail};
 use cager_capture::decode::{self, Decoding};
 use cager_capture::origin::move_from;
@@ -29,7 +29,7 @@ impl PoseFile {
             if let Some((file, frame)) = frame {
                 return Ok(Self::Frame(file.into(), frame));
             }
-        } else if word.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("cager")) {
+        } else if is_container(word) {
             bail!("{}: holds many poses; name one by its frame, counted from 0, such as IN.cager@12", word.display());
         }
         Ok(Self::Mesh(word.to_owned()))

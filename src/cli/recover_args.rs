@@ -27,7 +27,7 @@ pub(crate) struct RecoverArgs {
     #[arg(long, value_name = "FRAMES")]
     pub(super) frames: PathBuf,
 
-    /// Closed cage around the template, or one for each template in their order [default: one of about 350 vertices is made].
+    /// Closed cage around the template, a mesh or a .cager file, or one for each template in their order [default: one of about 350 vertices is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "rig")]
     pub(super) cage: Vec<PathBuf>,
 

@@ -1,9 +1,9 @@
 //! One template of `cager recover` over its frames: followed, encoded, told.
 
+use super::cage_file::read_cage;
 use super::coding_args::goal;
 use super::outputs::folder_of;
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
-use super::solver_options::read_cage;
 use super::{grouped, human_bytes, progress};
 use anyhow::{Context, Result};
 use cager_capture::encode::{EncodeProgress, Encoded};

@@ -1,53 +1,13 @@
-//! From arguments and files to a cage and the options of its solver.
+//! From arguments and files to the options of a solver.
 
 use super::args::{SolverArgs, SpectrumArg};
-use super::{grouped, read_with_units, warn};
 use anyhow::{Context, Result, bail};
-use cager_cages::diagnosis::weld;
 use cager_capture::coding::InversionChoices;
-use cager_capture::origin::move_to;
-use cager_core::cage::{Cage, CageError};
 use cager_core::inversion::{Handles, PrepareError};
 use cager_core::regularize::Regularizer;
-use cager_formats::{Units, read_matrix};
+use cager_formats::read_matrix;
 use cager_geometry::linalg::SparseMatrix;
-use cager_geometry::mesh::{Point, TriMesh};
 use std::path::Path;
-
-/// The cage in a file, about the origin and in the units of its model.
-pub(super) fn read_cage(path: &Path, flip: bool, (origin, units): (Option<Point>, Units)) -> Result<Cage> {
-    let (mut model, said) = read_with_units(path, None)?;
-    let change = said.change_to(units);
-    if !change.is_none() {
-        change.apply_to(&mut model.points);
-        let what = format!("{}: the cage is {change}, as its unit and axes are not those of its model", path.display());
-        warn(&[what]);
-    }
-    if model.faces.is_empty() {
-        bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
-    }
-    if let Some(welded) = weld(&model) {
-        let places = grouped(welded.merged);
-        warn(&[format!(
-            "{}: merged {places} vertices with others in the same place, as seams split them",
-            path.display()
-        )]);
-        model = welded.model;
-    }
-    move_to(origin, &mut model.points);
-    let mesh = TriMesh::from(&model);
-    let cage = Cage::new(if flip { mesh.flipped() } else { mesh });
-    match cage {
-        Err(CageError::Inward { .. }) if flip => {
-            bail!("{}: turned around, the faces of the cage point inwards; leave out --flip-cage", path.display())
-        }
-        Err(error @ CageError::Inward { .. }) => bail!("{}: {error}, or pass --flip-cage", path.display()),
-        _ => {}
-    }
-    let polygon_of = model.faces.polygon_of_triangle();
-    cage.map_err(|error| error.renumbered(|triangle| polygon_of[triangle] as usize))
-        .with_context(|| path.display().to_string())
-}
 
 /// What the arguments say of the inversion, for a cage of so many unknowns.
 pub(super) fn inversion_choices(args: &SolverArgs, is_coded: bool, unknowns: usize) -> Result<InversionChoices> {

@@ -1,5 +1,6 @@
 //! `cager transfer`: the motion of one model on another, encoded as any capture.
 
+use super::cage_file::read_cage;
 use super::checks::check_cage;
 use super::coding_args::goal;
 use super::design::{design, goal as design_goal};
@@ -7,7 +8,6 @@ use super::dry_run::tell_dry_run;
 use super::encode_summary::write_report;
 use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
-use super::solver_options::read_cage;
 use super::transfer_source::MotionSource;
 use super::{grouped, human_bytes, progress, read_with_units, tell, transfer_remote, warn};
 use anyhow::{Context, Error, Result};

@@ -1,5 +1,6 @@
 //! `cager transfer --server`.
 
+use super::cage_file::read_cage_like;
 use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::motion_args::TransferMotionArgs;
@@ -11,9 +12,7 @@ use cager_capture::coding::Goal;
 use cager_client::messages::SessionOptions;
 use cager_client::transfer_messages::{TransferOptions, TransferStage};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
-use cager_formats::{
-    AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_prim_with_note, read_prim_with_units,
-};
+use cager_formats::{AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_prim_with_note};
 use cager_geometry::mesh::Model;
 use cager_geometry::units::Units;
 use cager_motion::transfer::MethodChoice;
@@ -45,7 +44,8 @@ pub(super) fn run(
     };
     // Around the source, it is as the source.
     let units = if args.method()? == MethodChoice::Fitted { Units::UNKNOWN } else { units };
-    let cage = args.cage.as_ref().map(|path| cage_file(path, units)).transpose()?;
+    let cage = args.cage.as_ref().map(|path| read_cage_like(path, units)).transpose()?;
+    let cage = cage.map(|cage| MeshFile::new("cage.obj", obj_bytes(&cage)));
     // Whatever it is called here.
     let pairs = args.pairs.as_ref().map(file).transpose()?.map(|pairs| MeshFile::new("pairs.txt", pairs.bytes));
     let new = NewTransfer { cage, pairs, options, ..NewTransfer::new(sent, model_file(&args.target, None)?) };
@@ -88,17 +88,6 @@ fn model_file(path: &Path, prim: Option<&str>) -> Result<MeshFile> {
     let (model, _) = read_prim_with_note(path, prim)?;
     let name = path.with_extension("obj");
     Ok(MeshFile::new(name.file_name().unwrap_or_default().to_string_lossy(), obj_bytes(&model)))
-}
-
-/// A cage for a service, in the units of its model.
-fn cage_file(path: &Path, units: Units) -> Result<MeshFile> {
-    let (mut model, _, said) = read_prim_with_units(path, None)?;
-    let change = said.change_to(units);
-    if change.is_none() {
-        return Ok(mesh_file(path)?);
-    }
-    change.apply_to(&mut model.points);
-    Ok(MeshFile::new("cage.obj", obj_bytes(&model)))
 }
 
 fn options(args: &TransferMotionArgs, goal: Option<Goal>) -> Result<TransferOptions> {

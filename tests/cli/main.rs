@@ -1,6 +1,7 @@
 //! The program as its users meet it: command lines in, files, words and exit statuses out.
 
 mod cage;
+mod cage_of_a_take;
 mod cages_out;
 mod cases;
 mod coding;

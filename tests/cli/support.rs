@@ -256,11 +256,7 @@ impl Small {
 
 /// A mesh as files hold it.
 pub(crate) fn as_model(mesh: &TriMesh) -> Model {
-    Model {
-        points: mesh.vertices.clone(),
-        faces: polygons(mesh.triangles.iter().map(|t| t.to_vec())),
-        ..Model::default()
-    }
+    mesh.clone().into()
 }
 
 pub(crate) fn polygons(all: impl IntoIterator<Item = Vec<u32>>) -> Polygons {

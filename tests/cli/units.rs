@@ -103,6 +103,16 @@ fn a_rest_pose_a_cage_and_a_capture_are_brought_together() {
     assert!(off < 1e-4, "{off}");
     // A length needs no --unit where the rest pose says it.
     encode(&dir, names, "--max-error 5mm");
+    // The cage of a take in other units is, too.
+    let said = [("rest_cm.usdc", CENTIMETRES), ("cage_cm.usdc", CENTIMETRES), ("walk_cm.usdc", CENTIMETRES)];
+    write_all(&dir, &small, said);
+    let line = "encode --rest rest_cm.usdc --cage out.cager --frames walk_cm.usdc -o cm.cager --max-error 1e-5";
+    let said = dir.cager(line).succeeds().stderr;
+    assert!(said.contains("out.cager: the cage is scaled by 100 and turned to Z up"), "{said}");
+    dir.cager("decode cm.cager -o cm.usdc").succeeds();
+    let (units, off) = read(&dir, &small, "cm.usdc");
+    assert_eq!(units, CENTIMETRES);
+    assert!(off < 1e-4, "{off}");
     // A cage to improve is brought to the rest pose, too; what its rounding changes, the search for a better one makes larger.
     let cage = as_model(&small.cage);
     write(&dir, "cage.usdc", CENTIMETRES, &cage.faces, &[cage.points.as_flattened().to_vec()]);

@@ -2,7 +2,6 @@
 
 use cager_demo::{Capture, Options};
 use cager_formats::write_model;
-use cager_geometry::mesh::{Model, Polygons};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -62,11 +61,8 @@ pub(crate) fn words(text: &str) -> BTreeSet<String> {
 /// A small capture as the documents want it: `rest.obj`, `cage.obj`, `frames.f32` and `0.f32`, `1.f32`, …
 pub(crate) fn write_capture(folder: &Path) {
     let capture = Capture::new(&Options { points: 400, frames: FRAMES, cage_vertices: 40 });
-    let mut faces = Polygons::new();
-    capture.cage.triangles.iter().for_each(|triangle| faces.push(triangle));
     write_model(&folder.join("rest.obj"), &capture.rest).expect("rest.obj");
-    write_model(&folder.join("cage.obj"), &Model { points: capture.cage.vertices.clone(), faces, ..Model::default() })
-        .expect("cage.obj");
+    write_model(&folder.join("cage.obj"), &capture.cage.clone().into()).expect("cage.obj");
     let (mut all, mut frame) = (Vec::new(), Vec::new());
     for t in 0..FRAMES {
         capture.frame(t, &mut frame);

@@ -9,7 +9,7 @@ use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Rows, Solver, SolverOptions};
 use cager_demo::{Capture, Options};
 use cager_formats::{FrameReader, MeshFormat, Target, commit_together, read_model_bytes, write_model};
-use cager_geometry::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
 use std::path::Path;
 
 const SPECTRUM: usize = 12;
@@ -43,7 +43,7 @@ impl Reference {
         let capture = Capture::new(&Options { points, frames, cage_vertices });
         let folder = tempfile::tempdir().expect("a folder");
         let rest_obj = obj(folder.path(), &capture.rest);
-        let cage_obj = obj(folder.path(), &as_model(&capture.cage));
+        let cage_obj = obj(folder.path(), &capture.cage.clone().into());
         // As the service reads them.
         let rest = read_model_bytes(MeshFormat::Obj, Path::new("rest.obj"), &rest_obj).expect("the rest pose");
         let cage = read_model_bytes(MeshFormat::Obj, Path::new("cage.obj"), &cage_obj).expect("the cage");
@@ -154,12 +154,6 @@ fn obj(folder: &Path, model: &Model) -> Vec<u8> {
     let path = folder.join("model.obj");
     write_model(&path, model).expect("a model");
     std::fs::read(path).expect("a model")
-}
-
-fn as_model(mesh: &TriMesh) -> Model {
-    let mut faces = Polygons::new();
-    mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    Model { points: mesh.vertices.clone(), faces, ..Model::default() }
 }
 
 struct Narrow<'a> {

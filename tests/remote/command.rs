@@ -67,6 +67,17 @@ fn a_service_gives_the_bytes_and_the_report_that_this_machine_gives() {
 }
 
 #[test]
+fn the_cage_of_a_container_is_sent_as_a_mesh() {
+    let (dir, ..) = capture();
+    let server = Server::start(&dir);
+    dir.cager(ENCODE).succeeds();
+    dir.write("first.cager", dir.read("out.cager"));
+    let line = ENCODE.replace("cage.obj", "first.cager");
+    dir.cager(&format!("{line} --server {}", server.address())).succeeds();
+    assert!(dir.read("out.cager") == dir.read("first.cager"), "another cage");
+}
+
+#[test]
 fn a_capture_in_doubles_is_sent_in_singles() {
     let (dir, ..) = capture();
     let server = Server::start(&dir);

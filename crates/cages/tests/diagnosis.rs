@@ -147,8 +147,7 @@ fn no_input_is_too_broken() {
     for mesh in [TriMesh::default(), nan] {
         let findings = check(&mesh, &Model::default());
         assert!(!findings.usable());
-        let mut broken = Model { points: mesh.vertices.clone(), ..Model::default() };
-        mesh.triangles.iter().for_each(|t| broken.faces.push(t));
+        let broken = Model::from(mesh.clone());
         let _ = check(&mesh, &ball());
         let remaining = repair(&broken, &ball()).remaining;
         assert!(!remaining.usable() && !remaining.messages().is_empty());

@@ -4,7 +4,7 @@ use crate::decode::{DecodeError, frame_options, open};
 use crate::origin::move_from;
 use crate::timing::Timing;
 use cager_formats::{AtomicFile, FrameRange, Target, commit_together, create_frames, obj_bytes};
-use cager_geometry::mesh::{Model, Polygons};
+use cager_geometry::mesh::Model;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -38,10 +38,7 @@ pub fn write_cages(
     let there = container.frames();
     range.check(there, input)?;
     container.report().map_err(fail)?;
-    let mesh = container.cage().map_err(fail)?;
-    let mut faces = Polygons::new();
-    mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    let mut cage = Model { points: mesh.vertices, faces, ..Model::default() };
+    let mut cage = Model::from(container.cage().map_err(fail)?);
     move_from(container.header().origin, &mut cage.points);
     let rest = (*output != Target::StandardOutput).then(|| rest_cage_path(output.path()));
     let mut rest_file = match &rest {

@@ -275,8 +275,7 @@ impl<'a> Chosen<'a> {
         let mut options = frame_options(&mut container, there, taken, timing, salvage).map_err(fail)?;
         if what.with_cage {
             let cage = container.cage().map_err(fail)?;
-            let mut faces = Polygons::new();
-            cage.triangles.iter().for_each(|triangle| faces.push(triangle));
+            let faces = Polygons::of_triangles(&cage.triangles);
             options.cage = Some(CageMesh { points: cage.vertices.len(), faces });
         }
         let numbers_lost = salvage && container.frame_numbers().is_err();

@@ -1,7 +1,7 @@
 //! Public cages: one cage around source and target together, in the target's space (the second paper, §3.2).
 
 use cager_cages::{BoundingShape, EncloseError, EncloseOptions, bounding_shape, enclose_watched};
-use cager_geometry::mesh::{Model, Polygons, TriMesh};
+use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 
 /// The shape of a public cage.
@@ -38,7 +38,7 @@ impl PublicCage {
         target: &TriMesh,
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<TriMesh, EncloseError> {
-        let models = [model(source), model(target)];
+        let models = [Model::from(source.clone()), Model::from(target.clone())];
         let bounding = |shape, vertices| bounding_shape(&[&models[0], &models[1]], shape, vertices);
         match self {
             Self::Box => bounding(BoundingShape::Box, 8),
@@ -52,15 +52,9 @@ impl PublicCage {
     }
 }
 
-fn model(mesh: &TriMesh) -> Model {
-    let mut faces = Polygons::new();
-    mesh.triangles.iter().for_each(|t| faces.push(t));
-    Model { points: mesh.vertices.clone(), faces, ..Model::default() }
-}
-
 fn joined(source: &TriMesh, target: &TriMesh) -> Model {
     let first = source.vertices.len() as u32;
-    let mut both = model(source);
+    let mut both = Model::from(source.clone());
     both.points.extend(&target.vertices);
     target.triangles.iter().for_each(|t| both.faces.push(&t.map(|v| v + first)));
     both

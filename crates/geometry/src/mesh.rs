@@ -18,6 +18,11 @@ impl Polygons {
         Self::default()
     }
 
+    /// Faces of three corners each.
+    pub fn of_triangles(triangles: &[[u32; 3]]) -> Self {
+        Self { arities: vec![3; triangles.len()], indices: triangles.as_flattened().to_vec() }
+    }
+
     /// Appends one face.
     pub fn push(&mut self, face: &[u32]) {
         self.arities.push(face.len() as u32);
@@ -120,6 +125,12 @@ impl From<&Model> for TriMesh {
     /// Polygons become fans of triangles.
     fn from(model: &Model) -> Self {
         Self { vertices: model.points.clone(), triangles: model.faces.triangulated() }
+    }
+}
+
+impl From<TriMesh> for Model {
+    fn from(mesh: TriMesh) -> Self {
+        Self { points: mesh.vertices, faces: Polygons::of_triangles(&mesh.triangles), ..Self::default() }
     }
 }
 

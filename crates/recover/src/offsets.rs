@@ -50,9 +50,8 @@ impl OffsetSolver {
     pub fn new(rest: &TriMesh, diagonal: f64) -> Self {
         let first = welded(&rest.vertices);
         let triangles: Vec<[u32; 3]> = rest.triangles.iter().map(|t| t.map(|v| first[v as usize])).collect();
-        let mut faces = Polygons::new();
-        triangles.iter().for_each(|triangle| faces.push(triangle));
-        Self { adjacency: Adjacency::new(&faces, rest.vertices.len()), first, triangles, diagonal }
+        let adjacency = Adjacency::new(&Polygons::of_triangles(&triangles), rest.vertices.len());
+        Self { adjacency, first, triangles, diagonal }
     }
 
     /// The template's vertices moved from `positions`, where their cage has them, towards a surface: point to plane, both ways, smooth. Runs on the

@@ -158,9 +158,7 @@ fn hessian(coordinates: MatRef<'_, f64>, by_node: &[Vec<Edge>]) -> Mat<f64> {
 /// The edges between nodes of a mesh whose cells touch: a cell is what is nearer to its node than to others, along the mesh. Parts of
 /// the mesh that hold nodes and touch no other are tied to the nearest node of the rest, by up to three edges each. Edges by the numbers of the nodes in `nodes`.
 pub(crate) fn node_edges(vertices: &[DVec3], triangles: &[[u32; 3]], nodes: &[u32]) -> Vec<[u32; 2]> {
-    let mut faces = Polygons::new();
-    triangles.iter().for_each(|triangle| faces.push(triangle));
-    let adjacency = Adjacency::new(&faces, vertices.len());
+    let adjacency = Adjacency::new(&Polygons::of_triangles(triangles), vertices.len());
     let cells = cells(vertices, &adjacency, nodes);
     let mut edges = Vec::new();
     for a in 0..vertices.len() {

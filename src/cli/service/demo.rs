@@ -16,7 +16,7 @@ use cager_core::cage::Cage;
 use cager_core::sted::{Sted, StedMeter, StedOptions};
 use cager_demo::{Capture, Options};
 use cager_formats::{AtomicFile, Target, commit_together, open_frames, write_model};
-use cager_geometry::mesh::{Model, Polygons, diagonal};
+use cager_geometry::mesh::diagonal;
 use cager_proto::report::Report;
 use cager_service::local::LocalService;
 use clap::Args;
@@ -60,7 +60,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let (rest_file, cage_file) = (folder.join("rest.obj"), folder.join("cage.obj"));
     write_model(&rest_file, &capture.rest)?;
-    write_model(&cage_file, &as_model(&cage))?;
+    write_model(&cage_file, &cage.mesh().clone().into())?;
 
     // There rather than in the system's folder for temporaries, which may be small, or memory.
     let service = LocalService::start(folder)?;
@@ -107,14 +107,6 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
         file.commit()?;
     }
     tell(&table(&rows, page.is_some().then_some(&page_file))?)
-}
-
-fn as_model(cage: &Cage) -> Model {
-    let mut faces = Polygons::new();
-    for triangle in &cage.mesh().triangles {
-        faces.push(triangle);
-    }
-    Model { points: cage.vertices().to_vec(), faces, ..Model::default() }
 }
 
 /// The frames of the built-in capture, made as they are sent.

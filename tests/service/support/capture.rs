@@ -33,9 +33,7 @@ impl Mesh {
     }
 
     pub(crate) fn of(mesh: &TriMesh) -> Self {
-        let mut faces = Polygons::new();
-        mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-        Self::new(Model { points: mesh.vertices.clone(), faces, ..Model::default() })
+        Self::new(mesh.clone().into())
     }
 }
 

@@ -67,9 +67,7 @@ fn coded_cage(
     rest: &[Point],
     system: &dyn CoordinateSystem,
 ) -> Option<(CodedMesh, Cage)> {
-    let mesh = cage.mesh();
-    let mut model = Model { points: mesh.vertices.clone(), ..Model::default() };
-    mesh.triangles.iter().for_each(|triangle| model.faces.push(triangle));
+    let model = Model::from(cage.mesh().clone());
     let checked = |coded: CodedMesh| {
         let triangles = coded.mesh.faces.triangulated();
         let checked = Cage::new(TriMesh { vertices: coded.mesh.points.clone(), triangles }).ok()?;

@@ -5,7 +5,7 @@ use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_explore::quality::mean_error;
-use cager_geometry::mesh::{Model, Point, Polygons, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use faer::Mat;
 use std::path::{Path, PathBuf};
 
@@ -45,9 +45,7 @@ pub fn frames(name: &str) -> Vec<Vec<Point>> {
 
 /// As a model.
 pub fn model_of(mesh: &TriMesh) -> Model {
-    let mut faces = Polygons::new();
-    mesh.triangles.iter().for_each(|t| faces.push(t));
-    Model { points: mesh.vertices.clone(), faces, ..Model::default() }
+    mesh.clone().into()
 }
 
 /// A model with a cage made around it, or read, and mean value coordinates.

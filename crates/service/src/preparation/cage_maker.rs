@@ -7,7 +7,7 @@ use crate::store::{ContentKey, NamedFile};
 use crate::sync::lock;
 use crate::tasks::blocking;
 use cager_cages::{EncloseError, EncloseOptions, enclose_watched};
-use cager_geometry::mesh::{Model, Polygons, TriMesh, bounds};
+use cager_geometry::mesh::{Model, TriMesh, bounds};
 use std::collections::{HashMap, VecDeque};
 use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -161,9 +161,7 @@ pub(crate) fn check_extent(part: &str, rest: &Model) -> Result<(), ApiError> {
 
 /// A mesh as the bytes of an OBJ file.
 pub(crate) fn obj_of(mesh: &TriMesh) -> Vec<u8> {
-    let mut faces = Polygons::new();
-    mesh.triangles.iter().for_each(|triangle| faces.push(triangle));
-    cager_formats::obj_bytes(&Model { points: mesh.vertices.clone(), faces, ..Model::default() })
+    cager_formats::obj_bytes(&mesh.clone().into())
 }
 
 /// Error detail for a vertex count outside the allowed range.

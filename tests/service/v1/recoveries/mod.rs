@@ -44,8 +44,7 @@ fn scans() -> &'static Scans {
         };
         let frames = (0..FRAMES).map(|frame| (format!("scan_{}.ply", 5 + frame), cloud(&posed(frame as usize), frame)));
         let obj = |model: &Model| model_bytes(Path::new("model.obj"), model).expect("a model");
-        let mut cage = Model { points: capture.deformed_cage(0), ..Model::default() };
-        capture.cage.triangles.iter().for_each(|triangle| cage.faces.push(triangle));
+        let cage = Model { points: capture.deformed_cage(0), ..capture.cage.clone().into() };
         Scans { template: obj(&posed(0)), cage: obj(&cage), frames: frames.collect() }
     })
 }
