@@ -5,6 +5,7 @@ mod design;
 pub mod diagnosis;
 mod enclose;
 mod enclose_apart;
+mod thinned;
 
 pub use bounding_shape::{BoundingShape, bounding_shape};
 pub use design::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style, design};

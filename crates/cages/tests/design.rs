@@ -16,20 +16,25 @@ struct Capture {
 
 /// An arm that bends at two joints: a tube whose points follow the bones around them.
 fn capture() -> Capture {
+    capture_of(64, 20, 0.0)
+}
+
+/// The same of so many rings and points around each; every 53rd point sticks out by a fraction of the radius.
+fn capture_of(rings: u32, around: u32, spikes: f64) -> Capture {
     const FRAMES: usize = 24;
-    let (rings, around) = (64, 20);
     let mut rest = Model::default();
     for i in 0..=rings {
         for k in 0..around {
-            let turn = std::f64::consts::TAU * k as f64 / around as f64;
-            let radius = 0.12 + 0.03 * (i as f64 * 0.4).sin();
-            rest.points.push([radius * turn.cos(), radius * turn.sin(), -1.0 + 2.0 * i as f64 / rings as f64]);
+            let turn = std::f64::consts::TAU * f64::from(k) / f64::from(around);
+            let along = f64::from(i) / f64::from(rings);
+            let spike = if (i * around + k) % 53 == 7 { 1.0 + spikes } else { 1.0 };
+            let radius = spike * (0.12 + 0.03 * (along * 25.6).sin());
+            rest.points.push([radius * turn.cos(), radius * turn.sin(), -1.0 + 2.0 * along]);
         }
     }
     for i in 0..rings {
         for k in 0..around {
             let at = |i: u32, k: u32| i * around + k % around;
-            let (i, k) = (i as u32, k);
             rest.faces.push(&[at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)]);
         }
     }
@@ -286,4 +291,18 @@ fn a_stop_is_heard_while_the_rest_pose_is_enclosed() {
         if asked > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert!(matches!(stopped, Err(DesignError::Stopped)), "{stopped:?}");
+}
+
+#[test]
+fn of_a_large_model_all_points_stay_inside_a_cage_for_editing_spikes_among_them() {
+    let capture = capture_of(420, 90, 0.04);
+    assert!(capture.rest.points.len() > 35_000);
+    let enclosing =
+        enclose(&capture.rest, &cager_cages::EncloseOptions { vertices: 80, ..Default::default() }).unwrap();
+    assert!(common::verdict(&enclosing, &capture.rest).is_valid(1));
+    let found = designed(&capture, None, &with_vertices(80, Style::Editable)).unwrap();
+    let verdict = common::verdict(&found.cage, &capture.rest);
+    assert!(verdict.is_valid(1), "{verdict:?}");
+    let (first, last) = (&found.stages[0], found.stages.last().unwrap());
+    assert!(last.validation_error < first.validation_error / 1.6, "{first:?} {last:?}");
 }

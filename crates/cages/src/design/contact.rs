@@ -7,7 +7,7 @@
 
 use super::symmetry::Symmetry;
 use cager_core::cage::Cage;
-use cager_geometry::mesh::TriMesh;
+use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::distance::{closest_on_segment, closest_on_segments, closest_on_triangle};
 use cager_geometry::spatial::{Aabb, Bvh, Surface, triangles_intersect};
 use glam::DVec3;
@@ -77,8 +77,18 @@ impl Obstacles {
     }
 
     pub(super) fn new(points: Vec<DVec3>, distances: Distances, symmetry: Option<Symmetry>) -> Self {
+        Self { tree: Self::tree(&points), points, distances, symmetry }
+    }
+
+    /// Adds points.
+    pub(super) fn add(&mut self, points: impl Iterator<Item = Point>) {
+        self.points.extend(points.map(DVec3::from));
+        self.tree = Self::tree(&self.points);
+    }
+
+    fn tree(points: &[DVec3]) -> Bvh {
         let boxes: Vec<Aabb> = points.iter().map(|&p| Aabb { low: p, high: p }).collect();
-        Self { tree: Bvh::new(&boxes), points, distances, symmetry }
+        Bvh::new(&boxes)
     }
 
     /// The vertices after the move nearest to the desired one that the obstacles allow.

@@ -10,6 +10,7 @@ use super::samples::Samples;
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_geometry::linalg::accumulate_product;
+use cager_geometry::mesh::{Point, TriMesh};
 use faer::{Accum, Mat};
 use glam::DVec3;
 
@@ -28,14 +29,14 @@ const FAIRING: f64 = 0.02;
 pub(super) struct Descent<'a> {
     pub(super) cage: Cage,
     samples: &'a Samples,
-    obstacles: &'a Obstacles,
+    obstacles: Obstacles,
     adam: Adam,
     random: fastrand::Rng,
     fairing: f64,
 }
 
 impl<'a> Descent<'a> {
-    pub(super) fn new(cage: Cage, samples: &'a Samples, obstacles: &'a Obstacles, options: &DesignOptions) -> Self {
+    pub(super) fn new(cage: Cage, samples: &'a Samples, obstacles: Obstacles, options: &DesignOptions) -> Self {
         let adam = Adam::new(cage.vertices().len());
         let fairing = if options.style == Style::Editable { FAIRING } else { 0.0 };
         Self { cage, samples, obstacles, adam, random: fastrand::Rng::with_seed(options.seed), fairing }
@@ -64,6 +65,15 @@ impl<'a> Descent<'a> {
         }
     }
 
+    /// Moves another cage on, with more obstacles inside it.
+    pub(super) fn go_back(&mut self, mesh: &TriMesh, obstacles: impl Iterator<Item = Point>) {
+        if let Ok(cage) = Cage::new(mesh.clone()) {
+            self.adam = Adam::new(cage.vertices().len());
+            self.cage = cage;
+            self.obstacles.add(obstacles);
+        }
+    }
+
     /// Adds to every move a step towards the mean of the neighbours.
     fn fair(&self, desired_moves: &mut [DVec3], step_scale: f64) {
         let x = self.cage.vertices();
@@ -86,7 +96,7 @@ impl<'a> Descent<'a> {
         let phi = MeanValue.smooth_coordinates(&self.cage, &batch.points);
         let Some(fit) = Fit::new(phi.as_ref(), batch.motion.as_ref(), RIDGE) else { return };
         let Remeshing { mesh, kept } =
-            exchange::exchange(&self.cage, &batch.points, &phi, &fit, self.obstacles, share, goal);
+            exchange::exchange(&self.cage, &batch.points, &phi, &fit, &self.obstacles, share, goal);
         if let Ok(cage) = Cage::new(mesh) {
             self.cage = cage;
             self.adam.renumber(&kept);

@@ -18,10 +18,10 @@ use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
 use crate::enclose::enclose_watched;
+use crate::thinned::Thinned;
 use crate::{EncloseError, EncloseOptions};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
-use cager_geometry::spatial::outside;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -91,31 +91,20 @@ pub fn design(
         None => None,
     };
     let cage = Cage::new(mesh)?;
-    let obstacles = obstacles(rest, &cage, options.style, symmetry);
     let defects = Defects::of(cage.mesh(), &rest.points);
+    let obstacles = obstacles(rest, &defects.outside, options.style, symmetry);
+    let valid = cage.mesh().clone();
     let best = Best { mesh: cage.mesh().clone(), evaluation: samples.evaluate(&cage) };
-    let run = Run {
-        rest,
-        samples: &samples,
-        obstacles: &obstacles,
-        options,
-        clock,
-        watch,
-        best,
-        defects,
-        stages: Vec::new(),
-    };
-    Ok(run.optimise(cage, frames))
+    let run = Run { rest, samples: &samples, options, clock, watch, best, valid, defects, stages: Vec::new() };
+    Ok(run.optimise(cage, obstacles, frames))
 }
 
-/// The obstacles: the points inside the cage and, for editable cages, the cage itself.
-fn obstacles(rest: &Model, cage: &Cage, style: Style, symmetry: Option<Symmetry>) -> Obstacles {
+/// The obstacles: the points inside the cage, of a large model those that stand for the others, and, for editable cages, the cage itself.
+fn obstacles(rest: &Model, outside: &[u32], style: Style, symmetry: Option<Symmetry>) -> Obstacles {
     let diagonal = diagonal(&rest.points);
-    let mut is_outside = vec![false; rest.points.len()];
-    for (i, _) in outside(cage.mesh(), &rest.points) {
-        is_outside[i as usize] = true;
-    }
-    let inside = rest.points.iter().zip(is_outside).filter(|(_, outside)| !outside).map(|(&p, _)| p.into()).collect();
+    let standing = Thinned::of(rest).map_or_else(|| (0..rest.points.len() as u32).collect(), |thin| thin.points);
+    let inside = standing.iter().filter(|point| outside.binary_search(point).is_err());
+    let inside = inside.map(|&point| rest.points[point as usize].into()).collect();
     let distances =
         Distances { clearance: CLEARANCE * diagonal, gap: (style == Style::Editable).then_some(GAP * diagonal) };
     Obstacles::new(inside, distances, symmetry)

@@ -36,15 +36,17 @@ pub(super) struct Best {
 }
 
 /// Defects that an editable cage should not have.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Defects {
-    outside: usize,
+    /// Points of the model, ascending.
+    pub(super) outside: Vec<u32>,
     cuts: usize,
 }
 
 impl Defects {
     pub(super) fn of(mesh: &TriMesh, points: &[Point]) -> Self {
-        Self { outside: outside(mesh, points).len(), cuts: self_intersections(mesh).len() }
+        let outside = outside(mesh, points).into_iter().map(|(point, _)| point).collect();
+        Self { outside, cuts: self_intersections(mesh).len() }
     }
 }
 
@@ -52,11 +54,12 @@ impl Defects {
 pub(super) struct Run<'a> {
     pub(super) rest: &'a Model,
     pub(super) samples: &'a Samples,
-    pub(super) obstacles: &'a Obstacles,
     pub(super) options: &'a DesignOptions,
     pub(super) clock: Instant,
     pub(super) watch: &'a mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
     pub(super) best: Best,
+    /// The last cage that was kept, or the initial one.
+    pub(super) valid: TriMesh,
     /// Defects of the initial cage; later ones must not have more.
     pub(super) defects: Defects,
     pub(super) stages: Vec<Stage>,
@@ -72,8 +75,8 @@ pub(super) struct Phase {
 }
 
 impl Run<'_> {
-    pub(super) fn optimise(mut self, cage: Cage, frames: &[Vec<f64>]) -> Design {
-        let mut descent = Descent::new(cage, self.samples, self.obstacles, self.options);
+    pub(super) fn optimise(mut self, cage: Cage, obstacles: Obstacles, frames: &[Vec<f64>]) -> Design {
+        let mut descent = Descent::new(cage, self.samples, obstacles, self.options);
         let mut warnings = Vec::new();
         let evaluation = self.best.evaluation.clone();
         let begun = Progress {
@@ -89,10 +92,10 @@ impl Run<'_> {
             ControlFlow::Break(()) => ControlFlow::Break(()),
             ControlFlow::Continue(()) => self.descend(&mut descent, frames, &mut warnings),
         };
-        if self.options.style == Style::Editable && self.defects.outside > 0 {
+        if self.options.style == Style::Editable && !self.defects.outside.is_empty() {
             warnings.push(format!(
                 "{} points lie outside the cage that the design began with, and stayed there; repair it first to have all inside",
-                self.defects.outside
+                self.defects.outside.len()
             ));
         }
         if self.best.evaluation.validation_error > NOT_FOLLOWED {
@@ -133,26 +136,25 @@ impl Run<'_> {
             }
             descent.step(step_scale(step as f64 / phase.steps as f64));
             let done = step + 1;
-            let mut better = None;
+            let mut is_better = false;
             if done == FIRST_EVALUATION || done % EVALUATE_EVERY == 0 || done == phase.steps {
                 let evaluation = self.samples.evaluate(&descent.cage);
                 if done % EVALUATE_EVERY == 0 {
                     self.note(&format!("{done} steps"), &descent.cage, &evaluation);
                 }
                 // A smaller cage than asked for may do; a larger one may not.
-                if descent.cage.vertices().len() <= phase.goal && self.keep(&descent.cage, evaluation) {
-                    better = Some(descent.cage.mesh());
-                }
+                is_better = descent.cage.vertices().len() <= phase.goal && self.keep(descent, evaluation);
             }
             let fraction =
                 phase.fraction[0] + (phase.fraction[1] - phase.fraction[0]) * done as f64 / phase.steps as f64;
             let late = self.is_late();
-            if late && better.is_none() && descent.cage.vertices().len() <= phase.goal {
+            if late && !is_better && descent.cage.vertices().len() <= phase.goal {
                 // Include the progress since the last evaluation.
                 let evaluation = self.samples.evaluate(&descent.cage);
-                self.keep(&descent.cage, evaluation);
+                self.keep(descent, evaluation);
             }
             let error = Some(self.best.evaluation.validation_error).filter(|error| error.is_finite());
+            let better = is_better.then_some(&self.best.mesh);
             (self.watch)(Progress { stage: phase.stage, fraction, error, better })?;
             if late {
                 return ControlFlow::Break(());
@@ -170,22 +172,32 @@ impl Run<'_> {
         self.options.time_limit.is_some_and(|limit| self.clock.elapsed() >= limit)
     }
 
-    /// Keeps a cage that is better than the best so far.
-    fn keep(&mut self, cage: &Cage, evaluation: Evaluation) -> bool {
-        let better =
-            evaluation.validation_error < self.best.evaluation.validation_error && self.has_no_new_defects(cage);
-        if better {
-            self.best = Best { mesh: cage.mesh().clone(), evaluation };
+    /// Keeps a cage that is better than the best so far, and that is valid where it is to be edited. Moves and remeshing keep the obstacles inside; points
+    /// that these stand for may be outside all the same. They are obstacles themselves then, and the last valid cage is moved on.
+    fn keep(&mut self, descent: &mut Descent<'_>, evaluation: Evaluation) -> bool {
+        if evaluation.validation_error >= self.best.evaluation.validation_error {
+            return false;
         }
-        better
+        let mesh = descent.cage.mesh().clone();
+        if let Err(outside) = self.validated(&mesh) {
+            if !outside.is_empty() {
+                descent.go_back(&self.valid, outside.iter().map(|&point| self.rest.points[point as usize]));
+            }
+            return false;
+        }
+        self.valid = mesh.clone();
+        self.best = Best { mesh, evaluation };
+        true
     }
 
-    /// Whether an editable cage has no more defects than the initial one. Moves and remeshing preserve this; it is verified nevertheless.
-    fn has_no_new_defects(&self, cage: &Cage) -> bool {
-        self.options.style == Style::Free || {
-            let Defects { outside, cuts } = Defects::of(cage.mesh(), &self.rest.points);
-            outside <= self.defects.outside && cuts <= self.defects.cuts
+    /// Whether a cage to be edited has no defects that the initial one does not have; otherwise the points that are outside.
+    pub(super) fn validated(&self, mesh: &TriMesh) -> Result<(), Vec<u32>> {
+        if self.options.style == Style::Free {
+            return Ok(());
         }
+        let Defects { mut outside, cuts } = Defects::of(mesh, &self.rest.points);
+        outside.retain(|point| self.defects.outside.binary_search(point).is_err());
+        if outside.is_empty() && cuts <= self.defects.cuts { Ok(()) } else { Err(outside) }
     }
 
     fn note(&mut self, name: &str, cage: &Cage, evaluation: &Evaluation) {

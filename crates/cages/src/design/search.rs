@@ -48,8 +48,11 @@ impl Run<'_> {
             self.best = Best { mesh: descent.cage.mesh().clone(), evaluation: Evaluation::worst() };
             ended = self.phase(descent, &Phase { stage: "searching the smallest cage", steps: STEPS, goal, fraction });
             if !self.best.evaluation.validation_error.is_finite() {
-                self.best =
-                    Best { mesh: descent.cage.mesh().clone(), evaluation: self.samples.evaluate(&descent.cage) };
+                let mesh = descent.cage.mesh();
+                let mesh = if self.validated(mesh).is_ok() { mesh.clone() } else { self.valid.clone() };
+                let evaluation =
+                    Cage::new(mesh.clone()).map_or_else(|_| Evaluation::worst(), |cage| self.samples.evaluate(&cage));
+                self.best = Best { mesh, evaluation };
             }
             let best = self.best.clone();
             let found = self.encoded_error(&best, frames);

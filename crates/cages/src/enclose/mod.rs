@@ -8,10 +8,12 @@ mod level_set;
 mod offset;
 mod options;
 mod patch;
+mod push;
 mod quadric;
 mod simplify;
 mod source;
 
+use crate::thinned::Thinned;
 use cager_geometry::mesh::{Model, TriMesh};
 use cager_geometry::spatial::{Surface, self_intersections};
 use fair::fair;
@@ -21,6 +23,7 @@ use lattice::Octree;
 use offset::{offset_surface, offset_with_gaps, uniform_offset};
 pub use options::{EncloseError, EncloseOptions};
 use patch::EnclosedPoints;
+use push::pushed_outwards;
 use rayon::prelude::*;
 use simplify::Simplifier;
 use source::NormalizedModel;
@@ -47,7 +50,34 @@ pub fn enclose_watched(
     options: &EncloseOptions,
     watch: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<TriMesh, EncloseError> {
-    let clearance = options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, MAX_CLEARANCE);
+    check_finite(&model.points)?;
+    let (.., diagonal) = extent(&model.points)?;
+    if let Some(Thinned { model: thin, .. }) = Thinned::of(model) {
+        match enclose_all(&thin, options, watch) {
+            Err(EncloseError::Stopped) => return Err(EncloseError::Stopped),
+            Err(_) => {}
+            Ok(cage) => {
+                if let Some(cage) = pushed_outwards(cage, &model.points, clearance(options), diagonal) {
+                    return Ok(cage);
+                }
+            }
+        }
+    }
+    enclose_all(model, options, watch)
+}
+
+/// Clearance asked for, as a fraction of the diagonal.
+fn clearance(options: &EncloseOptions) -> f64 {
+    options.clearance.filter(|c| c.is_finite()).unwrap_or(0.0).clamp(0.0, MAX_CLEARANCE)
+}
+
+/// [`enclose_watched`] by all points of a model.
+fn enclose_all(
+    model: &Model,
+    options: &EncloseOptions,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<TriMesh, EncloseError> {
+    let clearance = clearance(options);
     let mut offset = first_offset(options.vertices).max(2.0 * clearance);
     let source = NormalizedModel::new(model, offset)?;
     if options.vertices < MIN_VERTICES {
