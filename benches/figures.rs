@@ -1,6 +1,7 @@
 //! Times every step on a built-in capture and prints one JSON document; `benches/run.py` puts the peers beside it.
 //!
 //! `figures FOLDER` writes rest.obj, cage.obj and frames.npy there first, so that other programs measure the same data.
+//! `figures --encoding REST CAGE FRAMES` times what bounds an encoding of files with default options from below.
 //! `figures --growth POINTS CAGE_VERTICES` prepares once and prints times and sizes.
 
 use anyhow::Context;
@@ -10,10 +11,11 @@ use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, Me
 use cager_core::inversion::{BATCH, PrepareContext, Rows, Solver, SolverOptions, Step};
 use cager_core::maxvol::{self, maxvol};
 use cager_demo::{Capture, Options};
-use cager_formats::{FrameOptions, create_frames, write_model};
+use cager_formats::{FrameOptions, create_frames, open_frames, read_model, write_model};
 use cager_geometry::linalg::svd::svd;
 use cager_geometry::linalg::to_single;
-use cager_geometry::mesh::{self, Model, Point, Polygons};
+use cager_geometry::mesh::{self, Model, Point, Polygons, TriMesh};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::cell::RefCell;
 use std::hint::black_box;
@@ -37,8 +39,9 @@ fn main() -> anyhow::Result<()> {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let value = match args.as_slice() {
         [flag, points, vertices] if flag == "--growth" => growth(points.parse()?, vertices.parse()?)?,
+        [flag, files @ ..] if flag == "--encoding" && files.len() == 3 => encoding(files)?,
         [folder] => figures(Path::new(folder))?,
-        _ => anyhow::bail!("usage: figures FOLDER | figures --growth POINTS CAGE_VERTICES; `make bench` does it all"),
+        _ => anyhow::bail!("see the head of benches/figures.rs; `make bench` does it all"),
     };
     #[allow(clippy::print_stdout)]
     {
@@ -106,11 +109,13 @@ fn figures(folder: &Path) -> anyhow::Result<Value> {
 
     let solver = Solver::prepare(&MeanValue, &cage, points, SolverOptions::PAPER)?;
     let batches: Vec<Vec<&[f32]>> = frames.chunks(BATCH).map(|b| b.iter().map(Vec::as_slice).collect()).collect();
-    let invert = timed(|| batches.iter().map(|b| solver.invert(Rows::All, None, b)).collect::<Vec<_>>());
+    // Side by side, as `encode` does; the peers multiply on as many threads.
+    let invert = timed(|| batches.par_iter().map(|b| solver.invert(Rows::All, None, b)).collect::<Vec<_>>());
     // Normals that follow from the vertices: an iteration for every frame.
     let consistent = Solver::prepare(&Green::Consistent, &cage, points, SolverOptions::PAPER)?;
     let green_invert =
-        timed_runs(FEW_RUNS, || batches.iter().map(|b| consistent.invert(Rows::All, None, b)).collect::<Vec<_>>()).0;
+        timed_runs(FEW_RUNS, || batches.par_iter().map(|b| consistent.invert(Rows::All, None, b)).collect::<Vec<_>>())
+            .0;
     let inverted: Vec<_> = batches.iter().map(|b| solver.invert(Rows::All, None, b)).collect();
     let cages: Vec<Vec<&[f32]>> =
         inverted.iter().map(|batch| batch.iter().map(|inverted| inverted.cage.as_slice()).collect()).collect();
@@ -185,13 +190,9 @@ fn quality(system: &dyn CoordinateSystem, cage: &Cage, points: &[Point], found: 
 
 /// Writes the capture for other programs; returns its frames as they read them.
 fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Vec<f32>>> {
-    let mut faces = Polygons::new();
-    for triangle in &cage.mesh().triangles {
-        faces.push(triangle);
-    }
     std::fs::create_dir_all(folder)?;
     write_model(&folder.join("rest.obj"), &capture.rest)?;
-    write_model(&folder.join("cage.obj"), &Model { points: cage.vertices().to_vec(), faces, ..Model::default() })?;
+    write_model(&folder.join("cage.obj"), &Model::from(cage.mesh().clone()))?;
     let (n, count) = (capture.rest.points.len(), capture.frames());
     let mut writer = create_frames(folder.join("frames.npy"), n, count, &Polygons::new(), &FrameOptions::default())?;
     let mut frame = Vec::new();
@@ -203,6 +204,42 @@ fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Ve
     }
     writer.finish()?;
     Ok(frames)
+}
+
+/// The parts of an encoding with default options that no program can leave out: reading the frames, and the two products of every frame, that
+/// of the operator with its handles and that of the coordinates with its cage. Beside them the preparation, without reading files.
+fn encoding(files: &[String]) -> anyhow::Result<Value> {
+    let [rest, cage, frames] = [0, 1, 2].map(|file| Path::new(&files[file]));
+    let points = &read_model(rest)?.points;
+    let cage = Cage::new(TriMesh::from(&read_model(cage)?))?;
+    let options = SolverOptions::for_unknowns(cage.vertices().len());
+    let prepare = timed(|| Solver::prepare(&MeanValue, &cage, points, options));
+    let solver = Solver::prepare(&MeanValue, &cage, points, options)?;
+    let mut kept = Vec::new();
+    let read = timed(|| {
+        let mut reader = open_frames(frames, points.len())?;
+        let mut frame = Vec::new();
+        kept.clear();
+        while reader.read_next(&mut frame)? {
+            kept.push(frame.iter().map(|&x| x as f32).collect::<Vec<f32>>());
+        }
+        Ok::<_, anyhow::Error>(())
+    });
+    let mut out = vec![Vec::new(); BATCH];
+    let batches: Vec<Vec<&[f32]>> = kept.chunks(BATCH).map(|b| b.iter().map(Vec::as_slice).collect()).collect();
+    let products = timed(|| {
+        let inverted: Vec<_> = batches.par_iter().map(|b| solver.invert(Rows::All, None, b)).collect();
+        for inverted in inverted {
+            let cages: Vec<&[f32]> = inverted.iter().map(|inverted| inverted.cage.as_slice()).collect();
+            solver.decoder().decode(&cages, &mut out[..cages.len()]);
+        }
+    });
+    Ok(json!({
+        "points": points.len(),
+        "cage_vertices": cage.vertices().len(),
+        "frames": kept.len(),
+        "seconds": { "prepare": prepare, "read": read, "products": products },
+    }))
 }
 
 fn growth(points: usize, cage_vertices: usize) -> anyhow::Result<Value> {

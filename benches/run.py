@@ -18,6 +18,8 @@ PEERS = os.path.join(ROOT, "benches", ".venv", "bin", "python")
 CAGER = os.path.join(ROOT, "target", "release", "cager")
 RESULTS = os.path.join(ROOT, "benches", "results.json")
 GUIDE = os.path.join(ROOT, "docs", "GUIDE.md")
+DATA = os.environ.get("CAGER_CAPTURES", os.path.join(ROOT, "..", "shared", "data"))
+CAPTURES = ("samba", "horse-gallop", "makehuman-cmu-walk", "anny-man_soma-02_02")
 RUNS = 5
 
 
@@ -77,6 +79,33 @@ def encode_command(folder, frames, output):
     return [CAGER, "encode", *names, "--frames", os.path.join(folder, frames), "-o", os.path.join(folder, output), "--overwrite"]
 
 
+def encoding(program, rest, cage, frames, folder):
+    """What the default encoding of files takes beside its parts that cannot be left out, and beside the peers."""
+    found = run_json([program, "--encoding", rest, cage, frames])
+    output = os.path.join(folder, "encoding.cager")
+    found["seconds"]["encode"] = wall(
+        [CAGER, "encode", "--rest", rest, "--cage", cage, "--frames", frames, "-o", output, "--overwrite"]
+    )
+    peers = os.path.join(ROOT, "benches", "peers", "peers.py")
+    files = [f"--rest={rest}", f"--cage={cage}", f"--frames={frames}"]
+    found["peers"] = run_json([PEERS, peers, *files, f"--runs={RUNS}", "--only=mvc,maxvol,maxvol_lapack,svd,pipeline"])["seconds"]
+    return found
+
+
+def encodings(program, folder):
+    """Of the built-in capture, and of those at hand: in the cage that is there, or one made around the rest pose."""
+    found = {"built in": encoding(program, *(os.path.join(folder, n) for n in ("rest.obj", "cage.obj", "frames.npy")), folder)}
+    for name in CAPTURES:
+        rest, cage, frames = (os.path.join(DATA, name, n) for n in ("rest.obj", "cage350.obj", "frames.npy"))
+        if not os.path.exists(frames):
+            continue
+        if not os.path.exists(cage):
+            cage = os.path.join(folder, "made.obj")
+            subprocess.run([CAGER, "cage", "--rest", rest, "--vertices", "350", "-o", cage, "--overwrite", "--quiet"], check=True)
+        found[name] = encoding(program, rest, cage, frames, folder)
+    return found
+
+
 def measure():
     program = figures_program()
     with tempfile.TemporaryDirectory() as folder:
@@ -86,6 +115,7 @@ def measure():
         arguments.append(f"--frames={os.path.join(folder, 'frames.npy')}")
         peers = run_json([PEERS, os.path.join(ROOT, "benches", "peers", "peers.py"), *arguments, f"--runs={RUNS}"])
 
+        found = encodings(program, folder)
         encode = encode_command(folder, "frames.npy", "capture.cager")
         container = os.path.join(folder, "capture.cager")
         ours["seconds"]["encode"] = wall(encode)
@@ -108,7 +138,7 @@ def measure():
         entry = run_json(command)
         entry["peak_bytes"] = peak_bytes(command)[0]
         growth.append(entry)
-    return {"ours": ours, "peers": peers, "memory": memory, "growth": growth}
+    return {"ours": ours, "peers": peers, "memory": memory, "growth": growth, "encodings": found}
 
 
 def truncate_npy(source, target, frames):
@@ -144,7 +174,7 @@ def table(results):
         (f"harmonic coordinates, {n:,} points, {m} vertices", o("harmonic"), p("harmonic"), grid, "2 s"),
         ("maxvol to 1.01", o("maxvol"), p("maxvol_lapack"), "the algorithm on OpenBLAS", "0.10 s"),
         (f"SVD {m} × {m}", o("svd"), p("svd"), "LAPACK", "12 ms"),
-        ("preparation in all", o("prepare"), peer_sum, "the three above", "0.20 s"),
+        ("preparation with maxvol handles", o("prepare"), peer_sum, "the three above", "0.20 s"),
         ("the same, first in its process", o("prepare_first"), peer_sum, "the three above, warm", "0.20 s"),
         ("inversion, per frame", o("invert_batched"), f("invert_batched", "with_gather"), "OpenBLAS, all frames in one product", "20 µs"),
         ("inversion and error, per frame", o("invert_measure"), f("invert_measure", "batched"), "OpenBLAS, f64, batched", "0.3 ms"),
@@ -170,6 +200,7 @@ def table(results):
         f"Coding cages alone, in the steps of `--quality preview` and groups of 256 frames, takes {seconds(cages[0])} per frame, reading them back {seconds(cages[1])}: "
         f"{1 / cages[0]:,.0f} and {1 / cages[1]:,.0f} frames/s (target 5,000), by one thread.",
     ]
+    lines += encoding_table(results["encodings"])
     lines += ["", "| growth | preparation | peak memory | prepared solver |", "|---|---|---|---|"]
     for g in results["growth"]:
         lines.append(
@@ -198,6 +229,27 @@ def table(results):
         f"scipy {results['peers']['versions']['scipy']}, OpenBLAS {results['peers']['versions']['blas']}, in the same run.",
     ]
     return "\n".join(lines)
+
+
+def encoding_table(encodings):
+    lines = [
+        "",
+        "**With default options** (`spread` handles), as users get it. The limit of `encode` is what its reading of the frames and its two products for each frame take alone, "
+        "operator by handles and coordinates by cage; a preparation comes before them.",
+        "",
+        "| capture | points, cage, frames | preparation | peer: coordinates, maxvol, SVD by LAPACK (maxvol by teneva) | `cager encode` | limit (reading + products) | encode / (preparation + limit) | peer: script |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, found in encodings.items():
+        s, p = ({key: value["median"] for key, value in found[k].items()} for k in ("seconds", "peers"))
+        common = p["mvc"] + p["svd"]
+        limit = s["read"] + s["products"]
+        lines.append(
+            f"| {name} | {found['points']:,}, {found['cage_vertices']}, {found['frames']} | {seconds(s['prepare'])} "
+            f"| {seconds(common + p['maxvol_lapack'])} ({seconds(common + p['maxvol'])}) | {seconds(s['encode'])} "
+            f"| {seconds(limit)} ({seconds(s['read'])} + {seconds(s['products'])}) | {s['encode'] / (s['prepare'] + limit):.2f} | {seconds(p['pipeline'])} |"
+        )
+    return lines
 
 
 def nested(tree, keys):

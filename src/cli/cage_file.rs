@@ -5,8 +5,9 @@ use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
 use cager_capture::decode::{self, DecodeError};
 use cager_capture::origin::{move_from, move_to};
+use cager_client::MeshFile;
 use cager_core::cage::{Cage, CageError};
-use cager_formats::Units;
+use cager_formats::{Units, obj_bytes};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use std::path::Path;
 
@@ -50,6 +51,11 @@ pub(super) fn read_cage_like(path: &Path, units: Units) -> Result<Model> {
     let (mut model, said) = read_cage_mesh(path)?;
     said.change_to(units).apply_to(&mut model.points);
     Ok(model)
+}
+
+/// A cage for a service, in the units and axes of its model.
+pub(super) fn cage_file(path: &Path, units: Units) -> Result<MeshFile> {
+    Ok(MeshFile::new("cage.obj", obj_bytes(&read_cage_like(path, units)?)))
 }
 
 /// The mesh of a cage as it stands in its file, with what that says of its coordinates.

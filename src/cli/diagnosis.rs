@@ -1,12 +1,13 @@
 //! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
 
 use super::cage_args::CageArgs;
+use super::cage_file::read_cage_like;
 use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::dry_run::tell_dry_run;
-use super::{print, read_model};
+use super::print;
 use anyhow::{Result, bail};
 use cager_cages::diagnosis::{Findings, check, repair};
-use cager_formats::{Target, commit_together};
+use cager_formats::{Target, Units, commit_together};
 use cager_geometry::mesh::{Model, TriMesh};
 use serde::Serialize;
 use std::fmt::Write;
@@ -86,7 +87,7 @@ pub(super) fn run(args: &CageArgs, targets: &Targets, rest: &Model) -> Result<()
 
 /// Exit status 1 for a cage that cannot be encoded with, so that scripts can ask.
 fn check_cage(args: &CageArgs, targets: &Targets, rest: &Model, path: &Path) -> Result<()> {
-    let cage = read_model(path)?;
+    let cage = read_cage_like(path, Units::UNKNOWN)?;
     let mesh = TriMesh::from(&cage);
     let found = check(&mesh, rest);
     if !args.outputs.dry_run {
@@ -101,7 +102,7 @@ fn check_cage(args: &CageArgs, targets: &Targets, rest: &Model, path: &Path) -> 
 }
 
 fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &Model, path: &Path) -> Result<()> {
-    let repaired = repair(&read_model(path)?, rest);
+    let repaired = repair(&read_cage_like(path, Units::UNKNOWN)?, rest);
     if !repaired.remaining.usable() {
         bail!(
             "{}: could not be repaired: {}; nothing was written",

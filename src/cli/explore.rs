@@ -36,7 +36,7 @@ pub(crate) struct ExploreArgs {
     #[arg(long, value_enum, value_name = "ON", default_value = "mesh")]
     on: On,
 
-    /// With --on cage, a closed cage around the first pose, or around the rest pose of its .cager file [default: that of the .cager file, or one that is made].
+    /// With --on cage, a closed cage, a mesh or that of a .cager file, around the first pose, or around the rest pose of its .cager file [default: that of the .cager file, or one that is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true)]
     cage: Option<PathBuf>,
 

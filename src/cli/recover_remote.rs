@@ -1,9 +1,10 @@
 //! `cager recover --server`.
 
+use super::cage_file::cage_file;
 use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
-use super::{grouped, human_bytes, plain, progress, tell, warn};
+use super::{grouped, human_bytes, is_container, plain, progress, tell, warn};
 use crate::remote::{RemoteRecovery, RemoteRecoveryProgress, mesh_file, recover_remotely};
 use anyhow::Result;
 use cager_client::NewRecovery;
@@ -32,8 +33,12 @@ pub(super) fn run(
     let file = |path: Option<&PathBuf>| path.map(|path| mesh_file(path)).transpose();
     let person = file(args.rig.as_ref())?.zip(file(args.manifold.as_ref())?).map(|(rig, manifold)| [rig, manifold]);
     let options = options(args, template, files.files.len(), person.is_some())?;
+    let cage = match args.cage.first() {
+        Some(path) if is_container(path) => Some(cage_file(path, Units::UNKNOWN)?),
+        given => file(given)?,
+    };
     let template_file = mesh_file(&args.template[0].path)?;
-    let new = NewRecovery { cage: file(args.cage.first())?, person, options, ..NewRecovery::new(template_file) };
+    let new = NewRecovery { cage, person, options, ..NewRecovery::new(template_file) };
     let mut outputs = vec![("capture.cager", &mut container)];
     outputs.extend(report.as_mut().map(|file| ("report", file)));
     outputs.extend(joints.as_mut().map(|(name, file)| (*name, file)));

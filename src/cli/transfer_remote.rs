@@ -1,6 +1,6 @@
 //! `cager transfer --server`.
 
-use super::cage_file::read_cage_like;
+use super::cage_file::cage_file;
 use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::motion_args::TransferMotionArgs;
@@ -44,8 +44,7 @@ pub(super) fn run(
     };
     // Around the source, it is as the source.
     let units = if args.method()? == MethodChoice::Fitted { Units::UNKNOWN } else { units };
-    let cage = args.cage.as_ref().map(|path| read_cage_like(path, units)).transpose()?;
-    let cage = cage.map(|cage| MeshFile::new("cage.obj", obj_bytes(&cage)));
+    let cage = args.cage.as_ref().map(|path| cage_file(path, units)).transpose()?;
     // Whatever it is called here.
     let pairs = args.pairs.as_ref().map(file).transpose()?.map(|pairs| MeshFile::new("pairs.txt", pairs.bytes));
     let new = NewTransfer { cage, pairs, options, ..NewTransfer::new(sent, model_file(&args.target, None)?) };

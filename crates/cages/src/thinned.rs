@@ -2,7 +2,7 @@
 
 use cager_geometry::mesh::{Model, Polygons, bounds, diagonal};
 use cager_geometry::vector::sub;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Models of more points are thinned, to about so many.
 const LARGE: usize = 30_000;
@@ -15,9 +15,8 @@ const SIZES: usize = 4;
 pub(crate) struct Thinned {
     /// Points of the model, ascending.
     pub(crate) points: Vec<u32>,
-    /// These points, and the faces that have corners in three voxels. They are as often there as several faces become one, so that the edges of a closed
-    /// surface stay closed.
-    pub(crate) model: Model,
+    /// For each point of the model, the place of the one that stands for it.
+    places: Vec<u32>,
 }
 
 impl Thinned {
@@ -28,16 +27,32 @@ impl Thinned {
         order.sort_unstable_by_key(|&voxel| voxels.nearest[voxel as usize].1);
         let mut place = vec![0; order.len()];
         order.iter().zip(0..).for_each(|(&voxel, k)| place[voxel as usize] = k);
-        let points: Vec<u32> = order.iter().map(|&voxel| voxels.nearest[voxel as usize].1).collect();
+        let points = order.iter().map(|&voxel| voxels.nearest[voxel as usize].1).collect();
+        Some(Self { points, places: voxels.of.iter().map(|&voxel| place[voxel as usize]).collect() })
+    }
+
+    /// These points, and the faces that have corners in three voxels, as often as several faces become one, so that the edges of a closed surface stay
+    /// closed. What is thinner than a voxel, as wires are, stays as triangles with one corner twice.
+    pub(crate) fn model(&self, model: &Model) -> Model {
         let mut faces = Polygons::new();
-        for triangle in model.faces.triangulated() {
-            let [a, b, c] = triangle.map(|v| place[voxels.of[v as usize] as usize]);
+        let (mut sides, mut edges) = (FxHashSet::default(), Vec::new());
+        let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < self.places.len());
+        for [a, b, c] in
+            model.faces.triangulated().into_iter().filter(exists).map(|t| t.map(|v| self.places[v as usize]))
+        {
             if a != b && b != c && c != a {
                 faces.push(&[a, b, c]);
+                sides.extend([[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]));
+            } else if a != b || b != c {
+                let other = if a == b { c } else { b };
+                edges.push([a.min(other), a.max(other)]);
             }
         }
-        let positions = points.iter().map(|&p| model.points[p as usize]).collect();
-        Some(Self { points, model: Model { points: positions, faces, ..Model::default() } })
+        edges.sort_unstable();
+        edges.dedup();
+        edges.iter().filter(|edge| !sides.contains(*edge)).for_each(|&[a, b]| faces.push(&[a, b, b]));
+        let points = self.points.iter().map(|&p| model.points[p as usize]).collect();
+        Model { points, faces, ..Model::default() }
     }
 }
 
@@ -117,7 +132,8 @@ mod tests {
     fn a_large_model_keeps_its_shape_and_closed_surfaces_stay_closed() {
         assert!(Thinned::of(&sphere(100)).is_none());
         let model = sphere(250);
-        let Thinned { points, model: thin } = Thinned::of(&model).expect("a large model");
+        let found = Thinned::of(&model).expect("a large model");
+        let (points, thin) = (&found.points, found.model(&model));
         assert!((14_000..28_000).contains(&points.len()), "{}", points.len());
         assert!(points.is_sorted() && points.len() == thin.points.len());
         assert!(points.iter().zip(&thin.points).all(|(&i, p)| model.points[i as usize] == *p));

@@ -4,7 +4,7 @@ mod common;
 
 use cager_cages::{EncloseError, EncloseOptions, enclose};
 use cager_geometry::mesh::{Model, Point, TriMesh};
-use common::{append, model, revolved, sphere, torus, verdict};
+use common::{append, model, revolved, sphere, torus, torus_of, verdict};
 
 fn options(vertices: usize) -> EncloseOptions {
     EncloseOptions { vertices, ..EncloseOptions::default() }
@@ -161,6 +161,56 @@ fn the_same_model_gives_the_same_bits_on_any_number_of_threads() {
     let (one, three) = (on(1), on(3));
     assert_eq!(bits(&one), bits(&three));
     assert_eq!(one.triangles, three.triangles);
+}
+
+/// A wheel of 36,000 points whose ten spokes are a thousandth of it thick, each with points at its ends alone; places along the spokes.
+fn wheel() -> (Model, Vec<Point>) {
+    let mut wheel = model(&torus_of([450, 80], [0.0; 3], 1.0, 0.1, 2));
+    let mut along = Vec::new();
+    for spoke in 0..10 {
+        let (sin, cos) = (0.7 + std::f64::consts::TAU * f64::from(spoke) / 10.0).sin_cos();
+        let at = |r: f64, k: u32| {
+            let (across, up) = (std::f64::consts::TAU * f64::from(k) / 8.0).sin_cos();
+            [cos * r - sin * 0.002 * across, sin * r + cos * 0.002 * across, 0.002 * up]
+        };
+        let first = wheel.points.len() as u32;
+        (0..8).for_each(|k| wheel.points.extend([at(0.0, k), at(0.95, k)]));
+        (0..8).for_each(|k| wheel.faces.push(&[0, 1, 3, 2].map(|corner| first + (2 * k + corner) % 16)));
+        along.extend((0..40).map(|k| at(0.95 * (f64::from(k) + 0.5) / 40.0, 0)));
+    }
+    (wheel, along)
+}
+
+#[test]
+fn spokes_thinner_than_the_voxels_of_a_large_model_are_enclosed_along_their_length() {
+    let (wheel, along) = wheel();
+    assert!(wheel.points.len() > 30_000, "{}", wheel.points.len());
+    for clearance in [None, Some(0.005)] {
+        let cage = enclose(&wheel, &EncloseOptions { clearance, ..options(400) }).unwrap();
+        let verdict = verdict(&cage, &wheel);
+        assert!(verdict.is_valid(1) && verdict.clearance >= clearance.unwrap_or(0.0) * (1.0 - 1e-9), "{verdict:?}");
+        // Points are promised to be inside, and nearly all of what is between them is.
+        let outside = cager_geometry::spatial::outside(&cage, &along).len();
+        assert!(outside <= 8, "{outside} of {} places along the spokes", along.len());
+    }
+}
+
+#[test]
+fn parts_and_clouds_of_many_points_are_enclosed_too_with_the_same_bits_on_any_number_of_threads() {
+    let mut spheres = model(&sphere([0.0; 3], 1.0, 140));
+    append(&mut spheres, &sphere([2.3, 0.2, 0.1], 0.9, 40));
+    assert!(spheres.points.len() > 30_000);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| enclose(&spheres, &EncloseOptions { per_part: true, ..options(200) }).unwrap())
+    };
+    let (one, three) = (on(1), on(3));
+    assert!(verdict(&one, &spheres).is_valid(2));
+    assert_eq!(one, three);
+    assert_enclosed("cloud", &Model { points: random(40_000), ..Model::default() }, &[50, 350]);
+    // Faces that name points that are not there are left out.
+    spheres.faces.push(&[0, 1, 1_000_000]);
+    assert_enclosed("spheres", &spheres, &[200]);
 }
 
 #[test]

@@ -175,7 +175,7 @@ impl Run<'_> {
     /// Keeps a cage that is better than the best so far, and that is valid where it is to be edited. Moves and remeshing keep the obstacles inside; points
     /// that these stand for may be outside all the same. They are obstacles themselves then, and the last valid cage is moved on.
     fn keep(&mut self, descent: &mut Descent<'_>, evaluation: Evaluation) -> bool {
-        if evaluation.validation_error >= self.best.evaluation.validation_error {
+        if evaluation.validation_error.total_cmp(&self.best.evaluation.validation_error).is_ge() {
             return false;
         }
         let mesh = descent.cage.mesh().clone();

@@ -27,6 +27,7 @@ use push::pushed_outwards;
 use rayon::prelude::*;
 use simplify::Simplifier;
 use source::NormalizedModel;
+use source::points_on_faces;
 pub(crate) use source::{check_finite, extent};
 use std::ops::ControlFlow;
 
@@ -52,12 +53,14 @@ pub fn enclose_watched(
 ) -> Result<TriMesh, EncloseError> {
     check_finite(&model.points)?;
     let (.., diagonal) = extent(&model.points)?;
-    if let Some(Thinned { model: thin, .. }) = Thinned::of(model) {
-        match enclose_all(&thin, options, watch) {
+    if let Some(thin) = Thinned::of(model) {
+        match enclose_all(&thin.model(model), options, watch) {
             Err(EncloseError::Stopped) => return Err(EncloseError::Stopped),
             Err(_) => {}
             Ok(cage) => {
-                if let Some(cage) = pushed_outwards(cage, &model.points, clearance(options), diagonal) {
+                let mut inside = model.points.clone();
+                inside.extend(points_on_faces(model, diagonal * first_offset(options.vertices)));
+                if let Some(cage) = pushed_outwards(cage, &inside, clearance(options), diagonal) {
                     return Ok(cage);
                 }
             }

@@ -39,17 +39,7 @@ impl NormalizedModel {
         let open = has_free_edges(&triangles);
         let mut used = vec![false; points.len()];
         triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
-        let surface_area = triangles.iter().map(|t| area(t.map(|v| points[v as usize]))).sum::<f64>();
-        let spacing_on_faces = (2.5 * spacing).max((surface_area / 10_000.0).sqrt());
-        let mut on_faces = Vec::new();
-        for t in &triangles {
-            sample_face(t.map(|v| points[v as usize]), spacing_on_faces, &mut on_faces);
-        }
-        // Of slivers there are many more than their area needs.
-        if on_faces.len() > CHECKED_POINTS {
-            let mut seen = HashSet::new();
-            on_faces.retain(|p| seen.insert((2.0 * p / spacing_on_faces).floor().to_array().map(|x| x as i64)));
-        }
+        let on_faces = on_faces(&points, &triangles, spacing);
         triangles.extend((0..points.len() as u32).filter(|&v| !used[v as usize]).map(|v| [v; 3]));
         let surface = Surface::new(points.clone(), triangles);
         Ok(Self { points, surface, open, on_faces, spacing, center, scale })
@@ -69,6 +59,29 @@ impl NormalizedModel {
     pub(super) fn restored(&self, p: DVec3) -> [f64; 3] {
         (self.center + self.scale * p).to_array()
     }
+}
+
+/// Points on the large faces of a model, which are to stay inside too; `spacing` is in its unit.
+pub(super) fn points_on_faces(model: &Model, spacing: f64) -> Vec<Point> {
+    let points: Vec<DVec3> = model.points.iter().map(|&p| p.into()).collect();
+    let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < points.len());
+    let triangles: Vec<[u32; 3]> = model.faces.triangulated().into_iter().filter(exists).collect();
+    on_faces(&points, &triangles, spacing).into_iter().map(Into::into).collect()
+}
+
+fn on_faces(points: &[DVec3], triangles: &[[u32; 3]], spacing: f64) -> Vec<DVec3> {
+    let surface_area = triangles.iter().map(|t| area(t.map(|v| points[v as usize]))).sum::<f64>();
+    let spacing = (2.5 * spacing).max((surface_area / 10_000.0).sqrt());
+    let mut found = Vec::new();
+    for t in triangles {
+        sample_face(t.map(|v| points[v as usize]), spacing, &mut found);
+    }
+    // Of slivers there are many more than their area needs.
+    if found.len() > CHECKED_POINTS {
+        let mut seen = HashSet::new();
+        found.retain(|p| seen.insert((2.0 * p / spacing).floor().to_array().map(|x| x as i64)));
+    }
+    found
 }
 
 /// Refuses points with coordinates that are not finite.
@@ -137,6 +150,7 @@ fn has_free_edges(triangles: &[[u32; 3]]) -> bool {
     let mut edges: Vec<(u32, u32, i32)> = triangles
         .iter()
         .flat_map(|t| (0..3).map(|k| (t[k], t[(k + 1) % 3])))
+        .filter(|(a, b)| a != b)
         .map(|(a, b)| (a.min(b), a.max(b), if a < b { 1 } else { -1 }))
         .collect();
     edges.sort_unstable();

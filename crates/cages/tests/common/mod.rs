@@ -234,7 +234,11 @@ pub fn revolved(rows: u32, profile: impl Fn(f64) -> [f64; 2], center: Point) -> 
 
 /// A torus around an axis of space.
 pub fn torus(center: Point, radius: f64, tube: f64, axis: usize) -> TriMesh {
-    let (n, m) = (40_u32, 16_u32);
+    torus_of([40, 16], center, radius, tube, axis)
+}
+
+/// The same of so many points along it and around it.
+pub fn torus_of([n, m]: [u32; 2], center: Point, radius: f64, tube: f64, axis: usize) -> TriMesh {
     let mut mesh = TriMesh::default();
     for i in 0..n {
         for j in 0..m {
