@@ -41,7 +41,9 @@ fn main() -> anyhow::Result<()> {
         [flag, points, vertices] if flag == "--growth" => growth(points.parse()?, vertices.parse()?)?,
         [flag, files @ ..] if flag == "--encoding" && files.len() == 3 => encoding(files)?,
         [folder] => figures(Path::new(folder))?,
-        _ => anyhow::bail!("see the head of benches/figures.rs; `make bench` does it all"),
+        _ => anyhow::bail!(
+            "usage: figures FOLDER | figures --encoding REST CAGE FRAMES | figures --growth POINTS CAGE_VERTICES; `make bench` does it all"
+        ),
     };
     #[allow(clippy::print_stdout)]
     {
@@ -206,8 +208,8 @@ fn write(capture: &Capture, cage: &Cage, folder: &Path) -> anyhow::Result<Vec<Ve
     Ok(frames)
 }
 
-/// The parts of an encoding with default options that no program can leave out: reading the frames, and the two products of every frame, that
-/// of the operator with its handles and that of the coordinates with its cage. Beside them the preparation, without reading files.
+/// What an encoding with default options does at the least, one after the other: reading the frames, and the two products of every frame, that of the
+/// operator with its handles and that of the coordinates with its cage, for the errors. Beside them the preparation, without reading files.
 fn encoding(files: &[String]) -> anyhow::Result<Value> {
     let [rest, cage, frames] = [0, 1, 2].map(|file| Path::new(&files[file]));
     let points = &read_model(rest)?.points;
