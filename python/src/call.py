@@ -16,8 +16,18 @@ async def call(start):
         finish = await asyncio.shield(ended)
     except asyncio.CancelledError:
         stop()
-        await asyncio.wait([ended], timeout=10)
+        await cleaned_up(ended, loop.time() + 10)
         # Its result goes now, not with what keeps this exception.
         ended = None
         raise
     return finish()
+
+
+async def cleaned_up(ended, limit):
+    """Waits for the end, also where the task is cancelled again meanwhile: by a callback, a time limit, a shutdown."""
+    loop = asyncio.get_running_loop()
+    while not ended.done() and loop.time() < limit:
+        try:
+            await asyncio.wait([ended], timeout=limit - loop.time())
+        except asyncio.CancelledError:
+            pass
