@@ -119,7 +119,7 @@ export default defineConfig(({ mode }) => ({
           maxWorkers: 1,
           isolate: false,
           // A machine that does other things as well upsets one now and then.
-          retry: process.env.CI ? 1 : 0,
+          retry: 1,
           sequence: { groupOrder: 1 },
         },
       },

@@ -223,8 +223,8 @@ def test_progress_is_told_and_an_exception_in_it_ends_the_encoding(small):
 def test_the_user_can_interrupt_it(small):
     frames = np.concatenate([small.frames] * 300)
     timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
     with pytest.raises(KeyboardInterrupt):
+        timer.start()
         for _ in range(100):
             cager.encode(small.rest, small.faces, frames, small.cage, max_error=1e-3)
     timer.join()

@@ -244,7 +244,7 @@ def test_a_service_that_is_gone_is_told(single, tmp_path):
                 gone.set()
 
         task = asyncio.create_task(encoding(client, long, on_progress=progress))
-        await gone.wait()
+        await asyncio.wait_for(gone.wait(), 60)
         await asyncio.wait_for(task, 1)
 
     began = time.monotonic()

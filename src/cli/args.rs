@@ -24,6 +24,7 @@ use cager_formats::FrameRange;
 use clap::{Args, Parser, Subcommand};
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Turns animated mesh captures into light, editable, streamable cages.
 ///
@@ -169,8 +170,8 @@ pub(crate) struct DesignArgs {
     pub(crate) seed: Option<u64>,
 
     /// End the design with the best cage so far after so many seconds.
-    #[arg(long, value_name = "S", conflicts_with = "cage", value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) time_limit: Option<u32>,
+    #[arg(long, value_name = "S", conflicts_with = "cage", value_parser = names::seconds)]
+    pub(crate) time_limit: Option<Duration>,
 }
 
 #[derive(Args)]

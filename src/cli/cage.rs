@@ -17,7 +17,7 @@ use cager_geometry::mesh::{Model, TriMesh};
 use cager_proto::report::DesignReport;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Farthest that a cage may be asked to keep from the points, as a fraction of the diagonal.
 const MAX_CLEARANCE: f64 = 0.5;
@@ -112,7 +112,7 @@ impl<'a> Motion<'a> {
             goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
             style: args.style.unwrap_or(Style::Editable),
             seed: args.seed,
-            time_limit: args.time_limit.map(|s| Duration::from_secs(s.into())),
+            time_limit: args.time_limit,
             keep_connectivity: start.is_some(),
             symmetry: args.symmetry.map(|axis| axis as usize),
         };

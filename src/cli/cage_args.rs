@@ -7,6 +7,7 @@ use cager_cages::Style;
 use cager_compare::report_page::Up;
 use clap::{ArgGroup, Args, ValueEnum};
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Make a cage around a model, design one from its motion, or check, repair or improve one.
 ///
@@ -76,8 +77,8 @@ pub(crate) struct CageArgs {
     pub(crate) seed: u64,
 
     /// End a design with the best cage so far after so many seconds.
-    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) time_limit: Option<u32>,
+    #[arg(long, value_name = "S", value_parser = names::seconds)]
+    pub(crate) time_limit: Option<Duration>,
 
     /// Write a page for a browser, in which model and cage turn.
     #[arg(long, value_name = "PICTURE.html")]

@@ -159,6 +159,9 @@ pub(super) fn check_capture(
         Mismatch::Axes(Some(up)) if turns => format!("pass --up {}", up.name()),
         Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
         Mismatch::Axes(_) => "export both with the same axes".to_owned(),
+        Mismatch::Units(_) if turns => {
+            "say those of the files that do not say them with --unit and --up, or scale one of them".to_owned()
+        }
         Mismatch::Units(_) => "scale one of them".to_owned(),
     };
     let words: Vec<String> = found.iter().map(ToString::to_string).collect();

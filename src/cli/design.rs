@@ -9,13 +9,9 @@ use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// What the number of vertices of a cage around so many points follows from.
+/// What the number of vertices of a cage around so many points follows from: what is asked for, as far as the points determine so many.
 pub(super) fn goal(vertices: Option<u32>, mean_error: Option<f64>, points: usize) -> Result<Goal> {
-    if let Some(vertices) = vertices.filter(|&vertices| vertices as usize > points) {
-        bail!(
-            "a cage of {vertices} vertices has more unknowns than the rest pose has points ({points}); ask for fewer vertices"
-        );
-    }
+    let vertices = vertices.filter(|&vertices| vertices as usize <= points);
     match mean_error {
         Some(error) if !(error.is_finite() && error > 0.0) => {
             bail!("--mean-error: is {error}; give a fraction of the rest pose's diagonal above 0, such as 0.001")

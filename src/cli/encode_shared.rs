@@ -19,7 +19,7 @@ use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, Target, commit_together};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::Model;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Where the container goes, and the report.
 pub(super) struct Targets {
@@ -67,7 +67,7 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
         goal: design::goal(args.design.cage_vertices, args.coding.mean_error, points)?,
         style: args.design.style.unwrap_or(if mean_value { Style::Free } else { Style::Editable }),
         seed: args.design.seed.unwrap_or(0),
-        time_limit: args.design.time_limit.map(|s| Duration::from_secs(s.into())),
+        time_limit: args.design.time_limit,
         ..DesignOptions::default()
     })
 }

@@ -7,6 +7,7 @@ use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use std::time::Duration;
 
 /// A name and what it means.
 type Names = [(&'static str, &'static str)];
@@ -64,6 +65,13 @@ pub(super) fn coordinates() -> impl TypedValueParser<Value = &'static dyn Coordi
 }
 
 /// Handles without a count of their own.
+/// A time above 0, also in parts of a second.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|seconds| *seconds > 0.0);
+    let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.ok_or_else(|| "give seconds above 0, such as 30".to_owned())
+}
+
 pub(super) fn handles() -> impl TypedValueParser<Value = Handles> {
     named(HANDLES, |name| Handles::by_name(name, None))
 }

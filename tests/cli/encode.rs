@@ -226,6 +226,28 @@ fn no_progress_bar_appears_in_a_pipe() {
 }
 
 #[test]
+fn a_stray_point_is_named_where_the_error_cannot_be_held() {
+    let (dir, small) = Dir::with_capture();
+    let mut frames = small.frames.clone();
+    frames[3][3 * 7 + 1] = -1e7;
+    dir.frames("frames.npy", &frames);
+    let said = dir.cager(&format!("{ENCODE} --max-error 1e-3 --force")).run().stderr;
+    let words = "as point 7 of frame 3 is ";
+    assert!(said.contains(words) && said.contains("diagonals of the rest pose away from the origin"), "{said}");
+}
+
+#[test]
+fn no_more_vertices_are_designed_than_the_points_determine() {
+    let (dir, small) = Dir::with_capture();
+    let more = small.rest.points.len() + 1;
+    let line = "encode --rest rest.obj --frames frames.npy -o out.cager --time-limit 0.2 --report report.json";
+    dir.cager(&format!("{line} --cage-vertices {more}")).succeeds();
+    let vertices = dir.json("report.json")["cage_vertices"].as_u64().expect("a number");
+    assert!(vertices as usize <= small.rest.points.len(), "{vertices}");
+    assert!(dir.cager(&line.replace("0.2", "0")).run().stderr.contains("give seconds above 0, such as 30"));
+}
+
+#[test]
 fn only_the_outputs_are_left_in_the_folder() {
     let (dir, _) = Dir::with_encoded();
     assert_eq!(dir.names(""), ["cage.obj", "frames.npy", "out.cager", "report.json", "rest.obj"]);

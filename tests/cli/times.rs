@@ -14,7 +14,8 @@ fn adds_up(report: &Value) {
     let before = sum(&["design", "coordinates", "maxvol", "svd"]);
     let all = before + sum(&["read", "invert", "measure", "code", "write"]);
     let total = seconds(report, "total");
-    assert!(before <= total && all > 0.8 * total, "{}", report["seconds"]);
+    // Besides what a busy machine takes between the parts.
+    assert!(before <= total && total - all < f64::max(0.2 * total, 0.3), "{}", report["seconds"]);
     assert!(before + seconds(report, "read") < 1.2 * total, "{}", report["seconds"]);
 }
 

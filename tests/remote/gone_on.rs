@@ -169,7 +169,8 @@ fn an_upload_that_is_interrupted_says_how_to_go_on() {
     file.set_len((header.len() + 12 * points * frames) as u64).expect("room for holes");
     let line = format!("{ENCODE} --server {}", server.address());
     for signal in [Signal::INT, Signal::TERM] {
-        let before = sessions(&server).len();
+        let before = sessions(&server);
+        let is_new = |id: &str| before.iter().all(|known| known.id != id);
         let mut command = Command::new(env!("CARGO_BIN_EXE_cager"));
         let mut child = command
             .args(line.split_whitespace())
@@ -178,11 +179,10 @@ fn an_upload_that_is_interrupted_says_how_to_go_on() {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the program runs");
-        while sessions(&server).len() == before {
+        // Until it sends frames, so that it has heard of its session.
+        while !sessions(&server).iter().any(|known| is_new(&known.id) && known.frames.received > 0) {
             assert!(child.try_wait().expect("a process").is_none(), "it ended before it could be interrupted");
         }
-        // It has made the session, but perhaps not heard of it yet.
-        std::thread::sleep(std::time::Duration::from_millis(200));
         kill_process(Pid::from_child(&child), signal).expect("a signal");
         let mut said = String::new();
         child.stderr.take().expect("stderr").read_to_string(&mut said).expect("text");

@@ -294,16 +294,45 @@ fn of_several_animations_the_first_or_the_chosen_one_is_read() {
     };
     for (animation, by) in [(None, 1.0), (Some("walk"), 1.0), (Some("run"), 2.0), (Some("2"), 3.0), (Some("1"), 2.0)] {
         let mut reader = take(animation).unwrap();
-        assert!(reader.notes()[0].contains("of its 3 animations "), "{:?}", reader.notes());
+        assert_eq!(reader.notes().is_empty(), animation.is_some(), "{:?}", reader.notes());
         close(&all(&mut *reader)[1], &moved(|[x, y, z]| [x + by, y, z]), 1e-6);
     }
-    let note = &take(Some("run")).unwrap().notes()[0];
-    assert!(note.contains("run is read, and walk, animation 2 left out; choose one with --animation"), "{note}");
+    let note = &take(None).unwrap().notes()[0];
+    let told = "of its 3 animations walk is read, and run, animation 2 left out; choose one with --animation";
+    assert!(note.contains(told), "{note}");
     for gone in ["jump", "3"] {
         let error = message(take(Some(gone)));
         let listed = format!("holds no animation {gone} that moves the mesh, but walk, run, animation 2; give one of");
         assert!(error.contains(&listed), "{error}");
     }
+}
+
+#[test]
+fn channels_without_a_node_and_meshes_that_are_switched_off_are_left_out() {
+    let mut built = Built::default();
+    built.points();
+    let times = built.floats("SCALAR", &[0.0, 1.0]);
+    let across = built.floats("VEC3", &[0.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    let hidden = r#"{"mesh":0,"children":[2],"extensions":{"KHR_node_visibility":{"visible":false}}}"#;
+    let with = |channel: &str| {
+        let nodes = format!(r#""scenes":[{{"nodes":[0,1]}}],"nodes":[{{"mesh":0}},{hidden},{{"mesh":0}}]"#);
+        let moved = r#"{"sampler":0,"target":{"node":0,"path":"translation"}}"#;
+        let sampler = format!(r#"{{"input":{times},"output":{across}}}"#);
+        built.file(&format!(
+            r#"{MESH},{nodes},"animations":[{{"channels":[{moved},{channel}],"samplers":[{sampler}]}}]"#
+        ))
+    };
+    let pointer = |to: &str| {
+        format!(
+            r#"{{"sampler":0,"target":{{"path":"pointer","extensions":{{"KHR_animation_pointer":{{"pointer":"{to}"}}}}}}}}"#
+        )
+    };
+    for channel in [r#"{"sampler":0,"target":{"path":"scale"}}"#.to_owned(), pointer("/materials/0/alphaCutoff")] {
+        let bytes = with(&channel);
+        close(&all(&mut *open(&bytes, 4).unwrap())[1], &moved(|[x, y, z]| [x + 4.0, y, z]), 1e-6);
+    }
+    let error = message(open(&with(&pointer("/nodes/0/scale")), 4));
+    assert!(error.contains("moves nodes by KHR_animation_pointer"), "{error}");
 }
 
 #[test]
@@ -444,6 +473,9 @@ fn normals(path: &Path, frames: usize) -> Vec<Vec<[f64; 3]>> {
     let targets: Vec<_> =
         primitive.targets.as_ref().unwrap().iter().map(|target| floats(target.normals.unwrap().value())).collect();
     let weights = floats(root.animations[0].samplers[0].output.value());
+    // Programs hold sliders within that, and a normal is of length 1.
+    assert!(weights.iter().all(|weight| (0.0..=1.0).contains(weight)), "{weights:?}");
+    assert!(base.as_chunks().0.iter().all(|[x, y, z]: &[f64; 3]| (x * x + y * y + z * z - 1.0).abs() < 1e-5));
     let sum = |frame: usize| {
         let mut sum = base.clone();
         for (k, target) in targets.iter().enumerate() {

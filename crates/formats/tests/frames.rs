@@ -271,6 +271,8 @@ fn arrays_that_are_not_read_are_described_with_the_line_that_converts_them() {
     // The order of its axes is told; `reshape` would scramble it.
     let error = message(open("a.npy", &npy("'<f4'", "'fortran_order': False, 'shape': (5, 2, 3)", &[0; 120]), 5));
     assert!(error.contains("has the shape (5, 2, 3), points before frames; ") && error.contains("transpose(1, 0, 2)"));
+    let error = message(open("a.npy", &npy("'<f4'", "'fortran_order': False, 'shape': (5, 3, 2)", &[0; 120]), 5));
+    assert!(error.contains("has the shape (5, 3, 2), points before frames; ") && error.contains("transpose(2, 0, 1)"));
     assert!(of("'<f4'", "'fortran_order': False, 'shape': (2, 2, 3) + (1)").contains("is not understood"));
 }
 

@@ -84,6 +84,23 @@ fn samples_are_taken_by_time_and_the_last_of_a_time_counts() {
 }
 
 #[test]
+fn what_is_switched_off_is_not_in_the_way_and_quaternions_are_taken_as_they_are() {
+    let at = |x: u32| format!("point3f[] points = [({x}, 0, 0), (1, 0, 0), (0, 1, 0)]");
+    let orient = "quatd xformOp:orient = (1, 0, 0, 2)\nuniform token[] xformOpOrder = [\"xformOp:orient\"]";
+    let shown = mesh(&format!("{}\n{orient}", at(3)));
+    let off = |properties: &str| {
+        let hidden = mesh(&at(7)).replace("#usda 1.0\n", "");
+        format!("def Xform \"x\" {{\n{properties}\n{hidden}\n}}\n")
+    };
+    let text = format!("{shown}{}", off("token visibility = \"invisible\""));
+    // By the matrix of OpenUSD, which divides by no length.
+    assert_eq!(all(&mut *open(&text, 3).unwrap())[0][..3], [3.0 * -7.0, 3.0 * 4.0, 0.0]);
+    // What comes and goes is there.
+    let blinking = format!("{shown}{}", off("token visibility.timeSamples = { 0: \"invisible\", 2: \"inherited\" }"));
+    assert!(message(open(&blinking, 3)).contains("--prim"));
+}
+
+#[test]
 fn what_cannot_be_read_names_its_line_or_a_way_out() {
     let points = "point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]";
     let within = |text: &str| mesh(&format!("{points}\n{text}"));

@@ -43,8 +43,9 @@ pub const MIN_TOKEN_BYTES: usize = 16;
 const MAX_TOKEN_BYTES: usize = 1024;
 /// Name of the only tenant of a service without tokens.
 pub const LOCAL: &str = "local";
-/// Interval at which the tokens file is checked for changes.
-const POLL_INTERVAL: Duration = Duration::from_secs(1);
+/// Interval at which the tokens file is checked for changes, and how long it must then stay as it is: who rewrites a file empties it first. A second together.
+const POLL_INTERVAL: Duration = Duration::from_millis(750);
+const SETTLED_FOR: Duration = Duration::from_millis(250);
 
 /// Share of the solving threads relative to other waiting tenants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
@@ -303,14 +304,16 @@ impl Access {
     fn reload_if_changed(&self) -> Result<Option<usize>, AccessError> {
         let Some(path) = &self.tokens.path else { return Ok(None) };
         let stamp = Stamp::of(path);
-        {
-            let mut seen = lock(&self.tokens.seen);
-            if *seen == stamp {
-                return Ok(None);
-            }
-            // Recorded even if the file is broken, so that it is reported once.
-            *seen = stamp;
+        let has_changed = || *lock(&self.tokens.seen) != stamp;
+        if !has_changed() {
+            return Ok(None);
         }
+        std::thread::sleep(SETTLED_FOR);
+        if Stamp::of(path) != stamp {
+            return Ok(None);
+        }
+        // Recorded even if the file is broken, so that it is reported once.
+        *lock(&self.tokens.seen) = stamp;
         let mut entries = Entries::read(path, self.tokens.defaults)?;
         let count = entries.tenants().count();
         let before = self.entries();

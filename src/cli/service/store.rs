@@ -52,7 +52,7 @@ pub(crate) enum StoreCommand {
     Usage,
     /// Read everything, and name what is damaged; exit status 1 if something is.
     Verify,
-    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager.
+    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager; damaged ones are named and left out, with exit status 1.
     Export {
         /// Where to; it may be there.
         #[arg(value_name = "DIR")]
@@ -168,7 +168,9 @@ fn verify(opened: &Opened) -> Result<()> {
     }
     tell(&format!("read {bytes} bytes of {} sessions and jobs and {} models\n", all.len(), keys.len()))?;
     if damaged > 0 {
-        bail!("{damaged} of them are damaged; restore those from a backup, or delete them");
+        bail!(
+            "{damaged} of them are damaged; complete the sessions again whose containers are, restore the others from a backup, or delete them"
+        );
     }
     print("nothing is damaged\n")
 }
@@ -179,10 +181,19 @@ fn export(opened: &Opened, output: &Path, wanted: &[String]) -> Result<()> {
         bail!("there is no session {unknown}");
     }
     fs::create_dir_all(output).with_context(|| format!("{}: cannot be made", output.display()))?;
-    let (mut written, mut running) = (0, 0);
+    let (mut written, mut running, mut damaged) = (0, 0, 0);
     for session in opened.sessions.iter().filter(|session| wanted.is_empty() || wanted.contains(&session.id)) {
-        if store.completion(&session.id)?.is_none() {
-            running += 1;
+        let damage = match store.completion(&session.id) {
+            Ok(None) => {
+                running += 1;
+                continue;
+            }
+            Ok(Some(mark)) => store.container_damage(&session.id, &mark),
+            Err(error) => Some(error.to_string()),
+        };
+        if let Some(why) = damage {
+            damaged += 1;
+            print(&format!("session {} of {}: {why}\n", session.id, session.tenant))?;
             continue;
         }
         let folder = output.join(&session.tenant);
@@ -195,5 +206,9 @@ fn export(opened: &Opened, output: &Path, wanted: &[String]) -> Result<()> {
         file.commit().with_context(failed)?;
         written += 1;
     }
-    tell(&format!("wrote {written} containers; {running} sessions are not completed and have none\n"))
+    tell(&format!("wrote {written} containers; {running} sessions are not completed and have none\n"))?;
+    if damaged > 0 {
+        bail!("{damaged} containers are damaged or cannot be read, and were left out");
+    }
+    Ok(())
 }

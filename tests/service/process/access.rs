@@ -1,7 +1,8 @@
 //! Who may use the service, and what one tenant can learn of another.
 
-use crate::support::{Capture, TestApp, folder, service, write_tokens};
+use crate::support::{Capture, TestApp, eventually, folder, service, write_tokens};
 use cager_proto::messages::{CacheUse, SessionList};
+use std::collections::BTreeSet;
 use std::io::Read as _;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -77,9 +78,8 @@ async fn a_revoked_token_stops_working_and_a_new_one_begins() {
     app.caller(Some("carl-has-a-long-secret")).get("/v1/sessions").await.expect(200);
     // A file that cannot be read locks nobody out.
     std::fs::write(app.tokens_file(), "[[token]\n").expect("a file");
-    tokio::time::sleep(Duration::from_millis(1500)).await;
+    eventually("it is noticed", async || app.log().contains("not reloaded").then_some(())).await;
     anna.get("/v1/sessions").await.expect(200);
-    assert!(app.log().contains("not reloaded"));
 }
 
 #[tokio::test]
@@ -129,7 +129,7 @@ async fn a_token_that_may_read_looks_and_decodes_and_changes_nothing() {
     let file = std::fs::read_to_string(app.tokens_file()).expect("tokens");
     std::fs::write(app.tokens_file(), format!("{file}{entry}")).expect("tokens");
     let (anna, viewer) = (app.caller(Some(ANNA)), app.caller(Some(VIEWER)));
-    crate::support::eventually("the token is known", async || {
+    eventually("the token is known", async || {
         (viewer.get("/v1/sessions").await.status == 200).then_some(())
     })
     .await;
@@ -187,6 +187,28 @@ async fn without_tokens_pages_of_other_origins_are_refused() {
     let asked = app.request(http::Method::OPTIONS, "/v1/sessions").header("origin", "https://tools.studio");
     let reply = app.send(asked.header("access-control-request-method", "POST")).await;
     assert_eq!(reply.header("access-control-allow-origin"), "https://tools.studio");
+    // The page reads what the document says of responses.
+    let document = app.get_with("/openapi.json", &[("origin", "https://tools.studio")]).await.expect(200);
+    let shown = document.header("access-control-expose-headers").to_owned();
+    let own: BTreeSet<String> =
+        document.text().split('"').filter(|word| word.starts_with("Cager-")).map(str::to_lowercase).collect();
+    assert!(own.len() > 4 && own.iter().all(|name| shown.contains(name)), "{own:?}: {shown}");
+}
+
+#[tokio::test]
+async fn pages_learn_nothing_from_the_operators_listener_but_health() {
+    let port = std::net::TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).expect("a port").port();
+    let _app = TestApp::with(&[&format!("admin_listen=127.0.0.1:{port}")]);
+    let operator = crate::support::Api::new(std::net::SocketAddr::from(([127, 0, 0, 1], port)), None, false);
+    for headers in [[("host", "evil.example")], [("origin", "https://evil.example")]] {
+        for path in ["/metrics", "/admin/tenants"] {
+            operator.get(path).await.expect(200);
+            operator.get_with(path, &headers).await.problem(403, "forbidden");
+        }
+        for path in ["/healthz", "/readyz"] {
+            operator.get_with(path, &headers).await.expect(200);
+        }
+    }
 }
 
 #[tokio::test]

@@ -93,7 +93,7 @@ async fn what_a_killed_process_had_others_go_on_with() {
     }
     let took = clock.elapsed();
     eprintln!("all tenants answered {} ms after the kill", took.as_millis());
-    assert!(took < Duration::from_secs(5), "{took:?}");
+    assert!(took < Duration::from_secs(20), "{took:?}");
     shared_out(&database, "4").await;
     for (api, id, _) in &made {
         api.upload(id, 15, capture.raw(15..40)).await;
@@ -193,7 +193,7 @@ async fn streams_that_pass_through_a_process_end_with_it() {
         while follower.chunk().await.is_ok_and(|piece| piece.is_some()) {}
     }
     assert!(b.ended().await.0.success());
-    assert!(clock.elapsed() < Duration::from_secs(10), "it waited for {:?}", clock.elapsed());
+    assert!(clock.elapsed() < Duration::from_secs(20), "it waited for {:?}", clock.elapsed());
 }
 
 #[tokio::test(flavor = "multi_thread")]

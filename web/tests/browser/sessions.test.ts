@@ -197,7 +197,7 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
       }, hidden);
     await setHidden(true);
     // What has begun may end.
-    await page.waitForTimeout(500);
+    await page.waitForTimeout(2000);
     let asked = 0;
     page.on('request', () => (asked += 1));
     await page.waitForTimeout(2500);

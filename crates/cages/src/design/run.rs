@@ -100,7 +100,7 @@ impl Run<'_> {
         }
         if self.best.evaluation.validation_error > NOT_FOLLOWED {
             warnings.push(format!(
-                "even the best cage found leaves an error of {:.1} % of the diagonal: the frames tear the model apart, or are not of this rest pose",
+                "even the best cage found leaves an error of {:.1} % of the diagonal: the frames tear the model apart, have points far from their places, or are not of this rest pose",
                 100.0 * self.best.evaluation.validation_error
             ));
         }

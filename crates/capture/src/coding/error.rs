@@ -1,13 +1,36 @@
 //! Why frames cannot be coded as asked for.
 
 use cager_core::coordinates::CoordinatesError;
+use std::fmt;
+
+/// The position that is farthest from the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Farthest {
+    /// From 0.
+    pub frame: usize,
+    /// From 0.
+    pub point: usize,
+    /// Its largest coordinate, in diagonals of the rest pose.
+    pub diagonals: f64,
+}
+
+impl fmt::Display for Farthest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            ", as point {} of frame {} is {:.0} diagonals of the rest pose away from the origin (check whether that is its place)",
+            self.point, self.frame, self.diagonals
+        )
+    }
+}
 
 /// Why frames cannot be coded as asked for.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum CodingError {
     /// Below what single precision can hold.
     #[error(
-        "an error of {asked:.1e} of the diagonal is below what positions in single precision can hold here; {}",
+        "an error of {asked:.1e} of the diagonal is below what positions in single precision can hold here{}; {}",
+        farthest.map(|far| far.to_string()).unwrap_or_default(),
         if *least < 1.0 { format!("ask for at least {least:.1e}, or move the capture closer to the origin") } else { "check these frames, whose positions are very far from the origin".to_owned() }
     )]
     BelowPrecision {
@@ -15,6 +38,8 @@ pub enum CodingError {
         asked: f64,
         /// Smallest possible.
         least: f64,
+        /// What it follows from.
+        farthest: Option<Farthest>,
     },
     /// Too little room.
     #[error(

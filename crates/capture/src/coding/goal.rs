@@ -38,7 +38,7 @@ impl Goal {
         if asked < least {
             // As it is printed, so that who asks for that is not refused.
             let unit = 10f64.powf(least.log10().floor() - 1.0);
-            return Err(CodingError::BelowPrecision { asked, least: (least / unit).ceil() * unit });
+            return Err(CodingError::BelowPrecision { asked, least: (least / unit).ceil() * unit, farthest: None });
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Groups of frames: collected, coded, and read back to measure what they decode to.
 
-use super::error::CodingError;
+use super::error::{CodingError, Farthest};
 use super::goal::{Carried, Goal, slack};
 use super::model::GroupDecoder;
 use cager_codec::{
@@ -119,7 +119,7 @@ impl GroupCoder {
 
     /// Codes what was collected and begins the next group.
     pub fn close(&mut self) -> Result<CodedGroup, CodingError> {
-        self.goal.check_precision(self.diagonal, self.slack())?;
+        self.goal.check_precision(self.diagonal, self.slack()).map_err(|error| self.explained(error))?;
         let (residual, ratio) = match self.carried.chosen {
             Some(chosen) => chosen,
             None => self.choose()?,
@@ -150,6 +150,21 @@ impl GroupCoder {
             let sum = if is_bound { self.model.largest_sum(&self.cages) } else { 0.0 };
             slack(self.diagonal, sum, farthest)
         })
+    }
+
+    /// Names the position that an error follows from, where it is far away.
+    fn explained(&self, error: CodingError) -> CodingError {
+        /// Diagonals that are told of.
+        const FAR: f64 = 10.0;
+        let CodingError::BelowPrecision { asked, least, .. } = error else { return error };
+        let places =
+            self.frames.iter().enumerate().flat_map(|(k, frame)| {
+                frame.iter().enumerate().map(move |(at, x)| (x.abs() / self.diagonal, k, at / 3))
+            });
+        let farthest = places.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(diagonals, ..)| *diagonals > FAR);
+        let farthest =
+            farthest.map(|(diagonals, frame, point)| Farthest { frame: self.carried.frames + frame, point, diagonals });
+        CodingError::BelowPrecision { asked, least, farthest }
     }
 
     pub(super) fn uncountable(&self) -> CodingError {

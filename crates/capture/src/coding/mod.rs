@@ -13,7 +13,7 @@ mod model;
 mod steps;
 
 pub use cage_size::{CageSizes, FRAMES as CAGE_SIZE_FRAMES};
-pub use error::CodingError;
+pub use error::{CodingError, Farthest};
 pub(crate) use goal::HELD;
 pub use goal::{Carried, Goal, Room, group_frames, slack};
 pub use group::{CodedGroup, GroupCoder};

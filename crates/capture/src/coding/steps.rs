@@ -213,7 +213,7 @@ impl GroupCoder {
             Ok((group, mean / goal))
         })?;
         let asked = goal / self.diagonal;
-        self.finish(found.ok_or(CodingError::BelowPrecision { asked, least: 2.0 * asked })?)
+        self.finish(found.ok_or(CodingError::BelowPrecision { asked, least: 2.0 * asked, farthest: None })?)
     }
 
     /// In the bytes that belong to these of the frames that are left.

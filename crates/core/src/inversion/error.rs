@@ -17,7 +17,8 @@ pub enum PrepareError {
     },
     /// The system is underdetermined.
     #[error(
-        "the rest pose has {points} points, fewer than the {unknowns} unknowns of the cage; use a coarser cage or a denser model"
+        "the rest pose has {points} points, fewer than the {unknowns} unknowns of the cage; use {}a denser model",
+        if *unknowns > 4 { "a coarser cage or " } else { "" }
     )]
     TooFewPoints {
         /// Number of points n.

@@ -147,6 +147,11 @@ fn axes(shape: &[u64], expected: u64, place: Place<'_>) -> Result<(u64, u64, Ord
             let what = format!("has the shape ({points}, {frames}, 3), points before frames; {}", place.save(&made));
             return Err(Fault::unsupported(what));
         }
+        [points, 3, frames] if points == expected && frames != expected && frames != 3 => {
+            let made = format!("{}.transpose(2, 0, 1)", place.load(""));
+            let what = format!("has the shape ({points}, 3, {frames}), points before frames; {}", place.save(&made));
+            return Err(Fault::unsupported(what));
+        }
         [frames, points, 3] => (frames, points, Order::Points),
         [points, 3] => (1, points, Order::Points),
         [frames, points, 4] if points == expected => (frames, points, Order::Homogeneous),

@@ -71,9 +71,9 @@ impl Clip {
             channels.push(channel);
         }
         let others: Vec<usize> = moving.into_iter().filter(|&k| k != first).collect();
-        let note = (!others.is_empty()).then(|| {
+        let note = (!others.is_empty() && wanted.is_none()).then(|| {
             format!(
-                "of its {} animations {} is read, and {} left out; choose one with --animation, where the command has it, or export it to a file of its own",
+                "of its {} animations {} is read, and {} left out; choose one with --animation, where the command has it, or export them merged into one (in Blender: Animation mode, Active actions merged)",
                 others.len() + 1,
                 name(root, first),
                 listed(root, &others)

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use gltf::json::Root;
+use gltf::json::{Root, Value};
 
 use crate::error::Fault;
 use crate::text::quoted;
@@ -53,7 +53,14 @@ pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
             "describes more than {MAX_OBJECTS} objects; export the mesh alone, without its scene"
         )));
     }
-    let root: Root = gltf::json::deserialize::from_slice(json).map_err(|cause| {
+    let parsed = match gltf::json::deserialize::from_slice(json) {
+        Ok(root) => Ok(root),
+        Err(cause) => match without_channels_of_no_node(json)? {
+            Some(document) => gltf::json::deserialize::from_value(document),
+            None => Err(cause),
+        },
+    };
+    let root: Root = parsed.map_err(|cause| {
         // It may repeat a text of the file, of any length.
         let cause = cause.to_string();
         let shown: String = cause.chars().take(SHOWN).collect();
@@ -70,6 +77,29 @@ pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
         }
         None => Ok(root),
     }
+}
+
+/// The JSON without channels of animations that move no node, which readers have to leave out; none where there are no such. What may move the mesh is refused.
+fn without_channels_of_no_node(json: &[u8]) -> Result<Option<Value>, Fault> {
+    let Ok(mut document) = gltf::json::deserialize::from_slice::<Value>(json) else { return Ok(None) };
+    let (mut is_changed, mut moves) = (false, false);
+    let animations = document.get_mut("animations").and_then(|all| all.as_array_mut());
+    for animation in animations.into_iter().flatten() {
+        let Some(channels) = animation.get_mut("channels").and_then(|all| all.as_array_mut()) else { continue };
+        channels.retain(|channel| {
+            let has_node = channel["target"].get("node").is_some();
+            let pointer = channel["target"]["extensions"]["KHR_animation_pointer"]["pointer"].as_str();
+            moves |= !has_node && pointer.is_some_and(|to| to.starts_with("/nodes/") || to.starts_with("/meshes/"));
+            is_changed |= !has_node;
+            has_node
+        });
+    }
+    if moves {
+        return Err(Fault::unsupported(
+            "moves nodes by KHR_animation_pointer, which is not read; export them with channels of their own",
+        ));
+    }
+    Ok(is_changed.then_some(document))
 }
 
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";

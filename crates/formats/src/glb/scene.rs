@@ -48,12 +48,17 @@ impl Placement {
 }
 
 impl Scene {
-    /// The meshes of the default scene in the order of their nodes, or all meshes as they are where no node has one.
+    /// The meshes of the default scene that are shown, or all of it where none is, in the order of their nodes, or all meshes as they are where no node has one.
     pub(super) fn of(root: &Root) -> Result<Self, Fault> {
-        let (worlds, parents) = transforms(root)?;
+        let Tree { worlds, parents, hidden } = Tree::of(root)?;
         let mut placements = Vec::new();
+        let all_hidden =
+            (0..root.nodes.len()).all(|k| root.nodes[k].mesh.is_none() || worlds[k].is_none() || hidden[k]);
         for (k, (node, world)) in root.nodes.iter().zip(&worlds).enumerate() {
             let (Some(mesh), Some(world)) = (node.mesh, world) else { continue };
+            if hidden[k] && !all_hidden {
+                continue;
+            }
             let others = node.extensions.as_ref().map(|extensions| &extensions.others);
             if others.is_some_and(|others| others.contains_key("EXT_mesh_gpu_instancing")) {
                 return Err(Fault::unsupported(format!(
@@ -81,6 +86,13 @@ impl Scene {
     }
 }
 
+/// Whether a node is switched off with all below it.
+fn hides(node: &Node) -> bool {
+    let others = node.extensions.as_ref().map(|extensions| &extensions.others);
+    let visible = others.and_then(|others| others.get("KHR_node_visibility")?.get("visible")?.as_bool());
+    visible == Some(false)
+}
+
 pub(super) fn apply(transform: &Affine, p: Point) -> Point {
     let [a, b, c, d] = *transform;
     add(combination(p, [a, b, c]), d)
@@ -91,25 +103,34 @@ pub(super) fn mirrors(transform: &Affine) -> bool {
     dot(a, cross(b, c)) < 0.0
 }
 
-/// As [`transforms`] gives it.
-type Tree = (Vec<Option<Affine>>, Vec<Option<usize>>);
+/// All nodes of the default scene.
+struct Tree {
+    /// From each node's space to the world's; none for nodes outside the scene.
+    worlds: Vec<Option<Affine>>,
+    /// The node above each.
+    parents: Vec<Option<usize>>,
+    /// Whether the node, or one above it, is switched off.
+    hidden: Vec<bool>,
+}
 
-/// From each node's space to the world's, none for nodes outside the default scene; and the node above each.
-fn transforms(root: &Root) -> Result<Tree, Fault> {
-    let (mut transforms, mut parents) = (vec![None; root.nodes.len()], vec![None; root.nodes.len()]);
-    let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, IDENTITY, None)).collect();
-    while let Some((index, parent, above)) = open.pop() {
-        let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), root.nodes.len()))?;
-        if transforms[index].is_some() {
-            return Err(Fault::damaged(format!(
-                "node {index} is reached twice, but nodes make a tree; export the mesh again"
-            )));
+impl Tree {
+    fn of(root: &Root) -> Result<Self, Fault> {
+        let count = root.nodes.len();
+        let mut tree = Self { worlds: vec![None; count], parents: vec![None; count], hidden: vec![false; count] };
+        let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, IDENTITY, None, false)).collect();
+        while let Some((index, parent, above, is_hidden)) = open.pop() {
+            let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), count))?;
+            if tree.worlds[index].is_some() {
+                return Err(Fault::damaged(format!(
+                    "node {index} is reached twice, but nodes make a tree; export the mesh again"
+                )));
+            }
+            let (world, is_hidden) = (compose(&parent, &local(node)), is_hidden || hides(node));
+            (tree.worlds[index], tree.parents[index], tree.hidden[index]) = (Some(world), above, is_hidden);
+            open.extend(children(node).map(|child| (child, world, Some(index), is_hidden)));
         }
-        let world = compose(&parent, &local(node));
-        (transforms[index], parents[index]) = (Some(world), above);
-        open.extend(children(node).map(|child| (child, world, Some(index))));
+        Ok(tree)
     }
-    Ok((transforms, parents))
 }
 
 fn roots(root: &Root) -> Result<Vec<usize>, Fault> {

@@ -10,7 +10,7 @@ pub(super) fn choose<'a>(layer: &mut Box<dyn Layer + 'a>, prim: Option<&str>) ->
     let there: Vec<usize> = (0..layer.prims().len()).filter(is_there).collect();
     let mut meshes: Vec<usize> = there.iter().copied().filter(|&k| layer.prims()[k].is_mesh).collect();
     if prim.is_none() && meshes.len() > 1 {
-        meshes = without_guides(layer, meshes)?;
+        meshes = shown(layer, meshes)?;
     }
     let first_composed = |prims: &[Prim], among: &[usize]| among.iter().find_map(|&k| Some((k, prims[k].composed?)));
     if meshes.is_empty() {
@@ -31,17 +31,26 @@ pub(super) fn choose<'a>(layer: &mut Box<dyn Layer + 'a>, prim: Option<&str>) ->
     }
 }
 
-/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides.
-fn without_guides<'a>(layer: &mut Box<dyn Layer + 'a>, meshes: Vec<usize>) -> Result<Vec<usize>, Failure> {
+/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides, and what is switched off is invisible.
+fn shown<'a>(layer: &mut Box<dyn Layer + 'a>, meshes: Vec<usize>) -> Result<Vec<usize>, Failure> {
     let mut rendered = Vec::new();
     for &mesh in &meshes {
-        let purpose = layer.attribute(mesh as u32, "purpose")?.still();
-        let purpose = purpose.map_or(Ok(Vec::new()), |purpose| layer.tokens(purpose, 1))?;
-        if purpose != ["guide"] {
+        let mut is_hidden = says(layer, mesh, "purpose", "guide")?;
+        for prim in layer.ancestry(mesh).collect::<Vec<_>>() {
+            is_hidden = is_hidden || says(layer, prim, "visibility", "invisible")?;
+        }
+        if !is_hidden {
             rendered.push(mesh);
         }
     }
     Ok(if rendered.is_empty() { meshes } else { rendered })
+}
+
+/// Whether an attribute of a prim is this token at all times.
+fn says<'a>(layer: &mut Box<dyn Layer + 'a>, prim: usize, name: &str, token: &str) -> Result<bool, Failure> {
+    let said = layer.attribute(prim as u32, name)?;
+    let value = said.still().filter(|_| said.times.len() < 2);
+    Ok(value.map_or(Ok(Vec::new()), |value| layer.tokens(value, 1))? == [token])
 }
 
 impl Objects for Box<dyn Layer + '_> {

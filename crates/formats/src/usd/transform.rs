@@ -90,9 +90,14 @@ impl Kind {
                 }
             }
             Self::Orient => {
-                let axis = [values[0], values[1], values[2]];
-                let half = axis.iter().map(|x| x * x).sum::<f64>().sqrt().atan2(values[3]);
-                matrix = rotation(axis, (2.0 * half).to_degrees());
+                // As OpenUSD has it: quaternions are not made to be of length 1.
+                let [x, y, z, w] = std::array::from_fn(|k| values[k]);
+                let rows = [
+                    [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],
+                    [2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)],
+                    [2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)],
+                ];
+                matrix.iter_mut().zip(rows).for_each(|(to, row)| to[..3].copy_from_slice(&row));
             }
             Self::Matrix => matrix.as_flattened_mut().copy_from_slice(values),
         }

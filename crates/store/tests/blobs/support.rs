@@ -97,7 +97,10 @@ impl Server {
     /// Has the bucket refuse what is written, or take it again.
     pub(crate) fn set_read_only(&self, is_read_only: bool) {
         let line = format!("fs.configure -locationPrefix=/buckets/{BUCKET} -readOnly={is_read_only} -apply");
-        self.shell(&line).expect("the shell");
+        let began = Instant::now();
+        while let Err(error) = self.shell(&line) {
+            assert!(began.elapsed() < Duration::from_secs(60), "{error}");
+        }
     }
 
     /// Gives its shell a line.
@@ -113,13 +116,16 @@ impl Server {
         drop(said);
         // It would wait for ever for a server that has just ended.
         let began = Instant::now();
-        while shell.try_wait().map_err(|error| error.to_string())?.is_none() {
-            if began.elapsed() > Duration::from_secs(5) {
-                shell.kill().and_then(|()| shell.wait()).map_err(|error| error.to_string())?;
+        loop {
+            match shell.try_wait().map_err(|error| error.to_string())? {
+                Some(status) if status.success() => return Ok(()),
+                Some(status) => return Err(format!("the shell ended with {status}")),
+                None if began.elapsed() > Duration::from_secs(5) => {
+                    shell.kill().and_then(|()| shell.wait()).map_err(|error| error.to_string())?;
+                }
+                None => std::thread::sleep(Duration::from_millis(20)),
             }
-            std::thread::sleep(Duration::from_millis(20));
         }
-        Ok(())
     }
 
     /// By another thread, since those of asynchronous tests may not wait.

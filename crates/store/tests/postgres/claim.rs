@@ -84,10 +84,13 @@ fn a_change_that_is_under_way_is_waited_for() {
     // A change that holds what changes hold.
     let held = server.sql("SELECT objid::bigint FROM pg_locks WHERE locktype = 'advisory'");
     let object = held.parse::<i64>().expect("a number") as u32 as i32;
-    let sql = format!("BEGIN; SELECT pg_advisory_xact_lock_shared({}, {object}); SELECT pg_sleep(0.6)", 0x6361_6767);
+    let sql = format!("BEGIN; SELECT pg_advisory_xact_lock_shared({}, {object}); SELECT pg_sleep(3)", 0x6361_6767);
     std::thread::scope(|scope| {
         scope.spawn(|| server.sql(&sql));
-        std::thread::sleep(Duration::from_millis(200));
+        let waits = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND mode = 'ShareLock' AND granted";
+        while server.sql(waits).trim() == "0" {
+            std::thread::sleep(Duration::from_millis(20));
+        }
         cut_off(&server);
         let clock = Instant::now();
         server.open().claim().expect("it is free");

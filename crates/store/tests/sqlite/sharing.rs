@@ -18,6 +18,8 @@ fn together<T: Send>(dir: &Dir, calls: Vec<Call<'_, T>>) -> Vec<T> {
             called
         });
         let calls: Vec<_> = calls.collect();
+        // Until the last of them waits too.
+        std::thread::sleep(Duration::from_millis(300));
         lock.execute_batch("COMMIT").expect("unlocked");
         calls.into_iter().map(|call| call.join().expect("an answer")).collect()
     })

@@ -210,14 +210,14 @@ async fn the_same_request_again_gives_the_same_shape_space() {
 
 #[tokio::test]
 async fn shape_spaces_belong_to_their_tenant_and_are_forgotten_after_a_while() {
-    let app = TestApp::guarded_with(&[("anna", ANNA, ""), ("bert", BERT, "")], &["shape_idle_s=1"]);
+    let app = TestApp::guarded_with(&[("anna", ANNA, ""), ("bert", BERT, "")], &["shape_idle_s=4"]);
     let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
     let made: ShapeSpace = create_keyed(&anna, poses(&json!({})), "k").await.is(201);
     bert.get(&format!("/v1/shapespaces/{}/pose?weights=1,0", made.id)).await.problem(404, "not-found");
     let list: ShapeSpaceList = bert.get("/v1/shapespaces").await.is(200);
     assert!(list.shapespaces.is_empty());
     shape(&anna, &made.id, "weights=1,0").await;
-    tokio::time::sleep(Duration::from_millis(1100)).await;
+    tokio::time::sleep(Duration::from_millis(4200)).await;
     anna.get(&format!("/v1/shapespaces/{}/pose?weights=1,0", made.id)).await.problem(404, "not-found");
     // So is the key.
     assert_ne!(create_keyed(&anna, poses(&json!({})), "k").await.is::<ShapeSpace>(201).id, made.id);

@@ -13,6 +13,21 @@ pub(super) fn exponential(element: &mut [u8]) {
     }
 }
 
+/// Three components of a unit quaternion and a scale, whose lowest two bits say which component is left out, the largest, become all four.
+pub(super) fn quaternion(element: &mut [u8]) {
+    for bytes in element.as_chunks_mut::<8>().0 {
+        let [x, y, z, scale] = [0, 2, 4, 6].map(|k| i16::from_le_bytes([bytes[k], bytes[k + 1]]));
+        let largest = usize::from(scale as u16 & 3);
+        let scale = std::f64::consts::FRAC_1_SQRT_2 / f64::from(scale | 3);
+        let [x, y, z] = [x, y, z].map(|part| f64::from(part) * scale);
+        let w = (1.0 - x * x - y * y - z * z).max(0.0).sqrt();
+        for (k, part) in [w, x, y, z].into_iter().enumerate() {
+            let whole = (part * 32767.0).round() as i16;
+            bytes.as_chunks_mut::<2>().0[(largest + k) % 4] = whole.to_le_bytes();
+        }
+    }
+}
+
 /// Light, two differences of colours and opacity become red, green, blue and opacity.
 pub(super) fn color(element: &mut [u8]) {
     if let Ok(bytes) = <&mut [u8; 4]>::try_from(&mut *element) {
@@ -48,6 +63,14 @@ mod tests {
         let mut bytes = [(-2_i32 << 24 | 3).to_le_bytes(), (1_i32 << 24 | 0xff_ffff).to_le_bytes()].concat();
         exponential(&mut bytes);
         assert_eq!(bytes, [0.75_f32.to_le_bytes(), (-2.0_f32).to_le_bytes()].concat());
+    }
+
+    #[test]
+    fn the_largest_part_of_a_quaternion_follows_from_the_others() {
+        // A half turn about an axis between y and z, where z is left out.
+        let mut bytes = [0_i16, 0, 0x7ff, 0x7ff & !3 | 2].map(i16::to_le_bytes).concat();
+        quaternion(&mut bytes);
+        assert_eq!(bytes, [0_i16, 23170, 23170, 0].map(i16::to_le_bytes).concat());
     }
 
     #[test]

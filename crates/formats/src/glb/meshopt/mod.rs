@@ -36,10 +36,11 @@ impl Packed {
         let mode = match (text("mode"), text("filter").unwrap_or("NONE")) {
             (Some("ATTRIBUTES"), "NONE") => Some(Mode::Attributes(None)),
             (Some("ATTRIBUTES"), "EXPONENTIAL") => Some(Mode::Attributes(Some(filters::exponential))),
+            (Some("ATTRIBUTES"), "QUATERNION") => Some(Mode::Attributes(Some(filters::quaternion))),
             (Some("ATTRIBUTES"), "COLOR") => Some(Mode::Attributes(Some(filters::color))),
             (Some("TRIANGLES"), "NONE") => Some(Mode::Triangles),
             (Some("INDICES"), "NONE") => Some(Mode::Indices),
-            // Octahedra and quaternions are no positions.
+            // Octahedra are no positions.
             _ => None,
         };
         let packed = || {

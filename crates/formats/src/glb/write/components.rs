@@ -6,8 +6,8 @@ use std::ops::Range;
 use cager_geometry::linalg::{BLOCK_ROWS, eigen, gram, mirrored, multiply};
 use cager_geometry::mesh::diagonal;
 use faer::Mat;
-use rayon::prelude::*;
 
+use super::deviation::{Deviation, Errors};
 use super::frames::Frames;
 use super::stored::Stored;
 use crate::error::Fault;
@@ -36,77 +36,53 @@ impl Wanted {
     }
 }
 
-/// How far what is written is from the frames.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Deviation {
-    pub(crate) targets: usize,
-    /// The largest distance of a point.
-    pub(crate) largest: f64,
-    /// The root of the mean squared distance over all points and frames.
-    pub(crate) rms: f64,
-    pub(crate) diagonal: f64,
-}
-
-impl Deviation {
-    /// Of the diagonal.
-    pub(crate) fn share(&self, distance: f64) -> f64 {
-        if distance == 0.0 { 0.0 } else { distance / self.diagonal }
-    }
-}
-
 /// Targets, and their weights in each frame.
 pub(super) struct Components {
-    /// Frame after frame.
+    pub(super) stored: Stored,
+    /// Frame after frame, from 0 to 1: programs hold the sliders of morph targets within that.
     pub(super) weights: Vec<f32>,
     pub(super) deviation: Deviation,
 }
 
 impl Components {
-    /// Stores as many targets as are wanted; behind those that [`Deviation::targets`] counts there may be others.
-    /// All of it lies beside its place by `rounding`, which counts as an error.
+    /// Those of frames. All of what is stored lies beside its place by `rounding`, which counts as an error.
     pub(super) fn of(
         frames: &Frames<'_>,
-        stored: &mut Stored,
+        floats: bool,
         wanted: &Wanted,
-        rounding: [f64; 3],
+        rounding: impl Fn(&Stored) -> [f64; 3],
     ) -> Result<Self, Fault> {
         let most = wanted.most().min(frames.count - 1).min(frames.length);
-        let base = stored.base_values();
-        let directions = Directions::of(frames, &base, most)?;
-        stored.reserve(most);
-        let mut largest = vec![0.0_f64; most];
-        for rows in frames.row_blocks() {
-            let block = directions.shapes(frames, &base, rows);
-            largest.iter_mut().enumerate().for_each(|(k, largest)| *largest = largest.max(block.col(k).norm_max()));
-        }
-        let mut weights = directions.weights.clone();
-        let mut scales = Vec::with_capacity(most);
-        for (k, &largest) in largest.iter().enumerate() {
-            let [scale, inverse] = stored.scales(largest, weights.col(k).norm_max());
-            // As they are read.
-            weights.col_mut(k).iter_mut().for_each(|weight| *weight = f64::from((*weight * inverse) as f32));
-            scales.push(scale);
-        }
-        let mut decoded = base.clone();
-        decoded.iter_mut().enumerate().for_each(|(k, x)| *x += rounding[k % 3]);
-        let first_level = if wanted.max_error.is_some() { 1.min(most) } else { most };
-        let mut errors = Errors { first_level, frames: vec![vec![[0.0; 2]; most + 1 - first_level]; frames.count] };
-        for rows in frames.row_blocks() {
-            let mut shapes = directions.shapes(frames, &base, rows.clone());
-            for (k, scale) in scales.iter().enumerate() {
-                let shape = shapes.col_as_slice_mut(k);
-                shape.iter_mut().for_each(|x| *x *= scale);
-                stored.put(k, rows.start, shape);
+        let mean = frames.mean();
+        let directions = Directions::of(frames, &mean, most)?;
+        let diagonal = wanted.diagonal.unwrap_or_else(|| diagonal(mean.as_chunks().0));
+        let holds = |found: &Deviation| wanted.max_error.is_none_or(|error| found.largest <= error * diagonal);
+        let mut targets = most;
+        if wanted.max_error.is_some() {
+            let mut errors = Errors::new(1.min(most), most, frames.count);
+            for rows in frames.row_blocks() {
+                let shapes = directions.shapes(frames, &mean, rows.clone());
+                errors.add(&frames.rows(rows, &mean), &shapes, directions.weights.as_ref());
             }
-            errors.add(&frames.rows(rows, &decoded), &shapes, &weights);
+            targets = errors.deviations(frames.length / 3, diagonal).find(holds).map_or(most, |found| found.targets);
         }
-        let diagonal = wanted.diagonal.unwrap_or_else(|| diagonal(base.as_chunks().0));
-        let deviation = errors.choose(frames.length / 3, wanted.max_error, diagonal)?;
-        let weights = (0..frames.count)
-            .flat_map(|frame| (0..deviation.targets).map(move |k| (frame, k)))
-            .map(|at| weights[at] as f32)
-            .collect();
-        Ok(Self { weights, deviation })
+        loop {
+            let stored = directions.stored(frames, &mean, targets, floats, diagonal, &rounding);
+            let found = &stored.deviation;
+            if holds(found) {
+                return Ok(stored);
+            }
+            if targets == most {
+                return Err(Fault::unsupported(format!(
+                    "cannot hold --max-error {}: {} morph targets are {:.2e} of the diagonal from the frames; allow more, keep fewer frames, take --float where that is near, or write .usdc or .abc",
+                    wanted.max_error.unwrap_or_default(),
+                    found.targets,
+                    found.share(found.largest)
+                )));
+            }
+            // What is rounded takes more of them.
+            targets = (targets + 1 + targets / 4).min(most);
+        }
     }
 }
 
@@ -138,6 +114,65 @@ impl Directions {
         Ok(Self { weights, shapes: Some(shapes) })
     }
 
+    /// The first targets as they are stored. The base is where all their weights are smallest, so that none is negative.
+    fn stored(
+        &self,
+        frames: &Frames<'_>,
+        mean: &[f64],
+        targets: usize,
+        floats: bool,
+        diagonal: f64,
+        rounding: &impl Fn(&Stored) -> [f64; 3],
+    ) -> Components {
+        let first = |rows: Range<usize>| self.shapes(frames, mean, rows).subcols(0, targets).to_owned();
+        let mut weights = self.weights.subcols(0, targets).to_owned();
+        let smallest: Vec<f64> =
+            weights.col_iter().map(|weights| weights.iter().copied().fold(f64::INFINITY, f64::min)).collect();
+        let ranges: Vec<f64> = (0..targets)
+            .map(|k| {
+                let weights = weights.col_as_slice_mut(k);
+                weights.iter_mut().for_each(|weight| *weight -= smallest[k]);
+                weights.iter().copied().fold(0.0, f64::max)
+            })
+            .collect();
+        let (mut base, mut largest) = (mean.to_vec(), vec![0.0_f64; targets]);
+        for rows in frames.row_blocks() {
+            let shapes = first(rows.clone());
+            for (k, largest) in largest.iter_mut().enumerate() {
+                let shape = shapes.col_as_slice(k);
+                *largest = shape.iter().fold(*largest, |largest, x| largest.max(x.abs()));
+                base[rows.clone()].iter_mut().zip(shape).for_each(|(base, x)| *base += smallest[k] * x);
+            }
+        }
+        let reach = ranges.iter().zip(&largest).map(|(range, largest)| range * largest).fold(0.0, f64::max);
+        let mut stored = Stored::base(&base, reach, targets, floats);
+        let scales: Vec<f64> = (0..targets)
+            .map(|k| {
+                let [scale, inverse] = stored.scales(largest[k], ranges[k]);
+                // As they are read.
+                let read = |weight: f64| f64::from(((weight * inverse) as f32).min(1.0));
+                weights.col_as_slice_mut(k).iter_mut().for_each(|weight| *weight = read(*weight));
+                scale
+            })
+            .collect();
+        let rounding = rounding(&stored);
+        let mut decoded = stored.base_values();
+        decoded.iter_mut().enumerate().for_each(|(k, x)| *x += rounding[k % 3]);
+        let mut errors = Errors::new(targets, targets, frames.count);
+        for rows in frames.row_blocks() {
+            let mut shapes = first(rows.clone());
+            for (k, scale) in scales.iter().enumerate() {
+                let shape = shapes.col_as_slice_mut(k);
+                shape.iter_mut().for_each(|x| *x *= scale);
+                stored.put(k, rows.start, shape);
+            }
+            errors.add(&frames.rows(rows, &decoded), &shapes, weights.as_ref());
+        }
+        let deviation = errors.deviations(frames.length / 3, diagonal).next().unwrap_or_default();
+        let all = weights.row_iter().flat_map(|frame| frame.iter().map(|&x| x as f32).collect::<Vec<_>>());
+        Components { weights: all.collect(), stored, deviation }
+    }
+
     /// Some rows of the shapes.
     fn shapes(&self, frames: &Frames<'_>, base: &[f64], rows: Range<usize>) -> Mat<f64> {
         if let Some(shapes) = &self.shapes {
@@ -154,54 +189,4 @@ fn leading(lower: Mat<f64>, count: usize) -> Result<Mat<f64>, Fault> {
     let found = eigen(mirrored(lower).as_ref());
     let (_, vectors) = found.ok_or_else(|| Fault::invalid("has no principal components; write .npy instead"))?;
     Ok(vectors.subcols(0, count).to_owned())
-}
-
-/// How far frames are from what the first targets make of them, for several numbers of targets.
-struct Errors {
-    /// The smallest of these.
-    first_level: usize,
-    /// By frame and number of targets: the largest squared distance of a point, and the sum of all.
-    frames: Vec<Vec<[f64; 2]>>,
-}
-
-impl Errors {
-    /// Adds some points of all frames: what they differ from the base, what targets move them by, and the weights of these.
-    fn add(&mut self, differences: &Mat<f64>, shapes: &Mat<f64>, weights: &Mat<f64>) {
-        let first_level = self.first_level;
-        self.frames.par_iter_mut().enumerate().for_each(|(frame, levels)| {
-            let mut rest = differences.col_as_slice(frame).to_vec();
-            for k in 0..=shapes.ncols() {
-                if let Some(level) = k.checked_sub(first_level) {
-                    let squared = rest.as_chunks().0.iter().map(|&[x, y, z]| x * x + y * y + z * z);
-                    let [largest, sum] = &mut levels[level];
-                    (*largest, *sum) = squared.fold((*largest, *sum), |(most, sum), x: f64| (most.max(x), sum + x));
-                }
-                if k < shapes.ncols() {
-                    let weight = weights[(frame, k)];
-                    rest.iter_mut().zip(shapes.col_as_slice(k)).for_each(|(rest, &x)| *rest -= weight * x);
-                }
-            }
-        });
-    }
-
-    /// The fewest targets that hold the error, a share of the diagonal, or all where none is said.
-    fn choose(&self, points: usize, max_error: Option<f64>, diagonal: f64) -> Result<Deviation, Fault> {
-        let of = |level: usize| {
-            let frames = self.frames.iter().map(|levels| levels[level]);
-            let [largest, sum] = frames.fold([0.0_f64, 0.0], |[most, sum], [x, y]| [most.max(x), sum + y]);
-            let rms = (sum / (points * self.frames.len()) as f64).sqrt();
-            Deviation { targets: self.first_level + level, largest: largest.sqrt(), rms, diagonal }
-        };
-        let levels = self.frames.first().map_or(0, Vec::len);
-        let holds = |found: &Deviation| max_error.is_none_or(|error| found.largest <= error * diagonal);
-        (0..levels).map(of).find(holds).ok_or_else(|| {
-            let found = of(levels - 1);
-            Fault::unsupported(format!(
-                "cannot hold --max-error {}: {} morph targets are {:.2e} of the diagonal from the frames; allow more, keep fewer frames, take --float where that is near, or write .usdc or .abc",
-                max_error.unwrap_or_default(),
-                found.targets,
-                found.share(found.largest)
-            ))
-        })
-    }
 }

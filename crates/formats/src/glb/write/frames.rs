@@ -30,12 +30,6 @@ impl<'a> Frames<'a> {
         mean
     }
 
-    /// The largest difference of a coordinate from a shape.
-    pub(super) fn farthest(&self, shape: &[f64]) -> f64 {
-        let frames = self.values.chunks_exact(self.length);
-        frames.flat_map(|frame| frame.iter().zip(shape)).map(|(&x, y)| (f64::from(x) - y).abs()).fold(0.0, f64::max)
-    }
-
     /// Differences of coordinates from a shape: a row each, a column for each frame.
     pub(super) fn rows(&self, rows: Range<usize>, shape: &[f64]) -> Mat<f64> {
         let at = |frame: usize, row: usize| f64::from(self.values[frame * self.length + row]) - shape[row];

@@ -1,6 +1,7 @@
 //! Frames as morph targets, the principal components of all of them, with their weights as an animation.
 
 mod components;
+mod deviation;
 mod document;
 mod frames;
 mod normals;
@@ -12,11 +13,11 @@ use cager_geometry::mesh::Point;
 
 use crate::error::Fault;
 use components::Components;
-pub(crate) use components::{Deviation, LARGEST_SIDE, Wanted};
+pub(crate) use components::{LARGEST_SIDE, Wanted};
+pub(crate) use deviation::Deviation;
 use document::Document;
 use frames::Frames;
 use normals::Normals;
-use stored::Stored;
 
 /// What is written beside the frames.
 pub(crate) struct Scene {
@@ -36,7 +37,6 @@ pub(crate) struct Scene {
 /// A mesh with its morph targets, ready to be written.
 pub(crate) struct Morphs<'a> {
     scene: &'a Scene,
-    stored: Stored,
     components: Components,
     normals: Option<Normals>,
 }
@@ -48,23 +48,20 @@ impl<'a> Morphs<'a> {
     /// More than is wanted is lost; a file beyond 4 GiB.
     pub(crate) fn of(values: &[f32], points: usize, wanted: &Wanted, scene: &'a Scene) -> Result<Self, Fault> {
         let frames = Frames::new(values, points);
-        let mut stored = Stored::base(&frames, scene.floats);
         // The node's place is rounded too.
-        let place = document::place(&stored, scene);
-        let rounding = place.map(|x| f64::from(x as f32) - x);
-        let components = Components::of(&frames, &mut stored, wanted, rounding)?;
-        stored.truncate(components.deviation.targets);
+        let rounding = |stored: &stored::Stored| document::place(stored, scene).map(|x| f64::from(x as f32) - x);
+        let components = Components::of(&frames, scene.floats, wanted, rounding)?;
         let targets = components.deviation.targets;
         let normals = (scene.normals && !scene.triangles.is_empty())
             .then(|| Normals::of(values, points, &scene.triangles, &components.weights, targets));
-        let morphs = Self { scene, stored, components, normals };
+        let morphs = Self { scene, components, normals };
         morphs.document().check()?;
         Ok(morphs)
     }
 
     fn document(&self) -> Document<'_> {
         let normals = self.normals.as_ref().map_or(&[][..], |normals| &normals.0);
-        Document { scene: self.scene, stored: &self.stored, weights: &self.components.weights, normals }
+        Document { scene: self.scene, stored: &self.components.stored, weights: &self.components.weights, normals }
     }
 
     /// Targets, and how far what is written is from the frames.

@@ -10,7 +10,7 @@ pub(super) struct Normals(pub(super) Vec<[f32; 3]>);
 impl Normals {
     /// Of frames of so many points and the weights of their targets, frame after frame.
     ///
-    /// Weights of principal components are about orthogonal over the frames, so a least-squares fit is one product for each target. As programs make
+    /// Weights of principal components are about orthogonal over the frames but for their means, so a least-squares fit is one product for each target. As programs make
     /// the sum of a length of 1, what is fitted is normals divided by the length of their mean.
     pub(super) fn of(frames: &[f32], points: usize, triangles: &[[u32; 3]], weights: &[f32], targets: usize) -> Self {
         let count = frames.len() / (3 * points);
@@ -42,6 +42,15 @@ impl Normals {
             }
         });
         let mut all: Vec<[f32; 3]> = sums.into_iter().map(unit).collect();
+        // Where all weights are 0, and of length 1 again, as the sum may have any.
+        for (point, base) in all.iter_mut().enumerate() {
+            for (fitted, mean) in fitted.iter().skip(point).step_by(points).zip(&means) {
+                base.iter_mut().zip(fitted).for_each(|(base, x)| *base -= mean * x);
+            }
+            let scale = base.iter().map(|x| x * x).sum::<f32>().sqrt().max(SHORTEST).recip();
+            fitted.iter_mut().skip(point).step_by(points).flatten().for_each(|x| *x *= scale);
+            *base = unit(base.map(f64::from));
+        }
         all.extend(fitted);
         Self(all)
     }

@@ -1,13 +1,9 @@
 //! Positions as they are stored: floats, or whole numbers of 16 bits that the node scales.
 
-use super::frames::Frames;
-
 /// The largest whole number that is stored.
 const LARGEST: f64 = 32767.0;
-/// The largest weight of a target: some programs limit their sliders so.
-const HEAVIEST: f64 = 10.0;
 
-/// The mean shape and what targets add to it. A position is `centre + step × (base + Σ weight × target)`.
+/// The base and what targets add to it. A position is `centre + step × (base + Σ weight × target)`.
 pub(super) struct Stored {
     pub(super) values: Values,
     pub(super) centre: [f32; 3],
@@ -24,48 +20,32 @@ pub(super) enum Values {
 }
 
 impl Stored {
-    /// The mean of all frames, without targets yet.
-    pub(super) fn base(frames: &Frames<'_>, floats: bool) -> Self {
-        let mean = frames.mean();
-        let length = mean.len();
+    /// A base, with room for so many targets, which move by `reach` at the most.
+    pub(super) fn base(base: &[f64], reach: f64, targets: usize, floats: bool) -> Self {
+        let length = base.len();
         if floats {
-            let values = Values::Floats(mean.iter().map(|&x| x as f32).collect());
-            return Self { values, centre: [0.0; 3], step: 1.0, length };
+            let mut values: Vec<f32> = base.iter().map(|&x| x as f32).collect();
+            values.resize((targets + 1) * length, 0.0);
+            return Self { values: Values::Floats(values), centre: [0.0; 3], step: 1.0, length };
         }
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for (k, &x) in mean.iter().enumerate() {
+        for (k, &x) in base.iter().enumerate() {
             (low[k % 3], high[k % 3]) = (low[k % 3].min(x), high[k % 3].max(x));
         }
         let centre: [f32; 3] = std::array::from_fn(|k| (0.5 * (low[k] + high[k])) as f32);
-        let half = (0..length).map(|k| (mean[k] - f64::from(centre[k % 3])).abs()).fold(0.0, f64::max);
-        // Motions far larger than the model need larger steps, as weights are bounded.
-        let step = rounded_up(half.max(frames.farthest(&mean) / HEAVIEST) / LARGEST);
+        let half = (0..length).map(|k| (base[k] - f64::from(centre[k % 3])).abs()).fold(0.0, f64::max);
+        // Motions larger than the model need larger steps, as weights are 1 at the most.
+        let step = rounded_up(half.max(reach) / LARGEST);
         let whole = |(k, x): (usize, &f64)| ((x - f64::from(centre[k % 3])) / f64::from(step)).round() as i16;
-        let values = Values::Shorts(mean.iter().enumerate().map(whole).collect());
-        Self { values, centre, step, length }
+        let mut values: Vec<i16> = base.iter().enumerate().map(whole).collect();
+        values.resize((targets + 1) * length, 0);
+        Self { values: Values::Shorts(values), centre, step, length }
     }
 
-    /// Coordinates of the mean shape as they are read.
+    /// Coordinates of the base as they are read.
     pub(super) fn base_values(&self) -> Vec<f64> {
         let step = f64::from(self.step);
         (0..self.length).map(|k| f64::from(self.centre[k % 3]) + step * self.number(k)).collect()
-    }
-
-    /// Room for so many targets.
-    pub(super) fn reserve(&mut self, targets: usize) {
-        let length = (targets + 1) * self.length;
-        match &mut self.values {
-            Values::Floats(values) => values.resize(length, 0.0),
-            Values::Shorts(values) => values.resize(length, 0),
-        }
-    }
-
-    pub(super) fn truncate(&mut self, targets: usize) {
-        let length = (targets + 1) * self.length;
-        match &mut self.values {
-            Values::Floats(values) => values.truncate(length),
-            Values::Shorts(values) => values.truncate(length),
-        }
     }
 
     /// What a target is multiplied with to use all bits, and what its weights are then, by the largest number of it and of its weights.

@@ -12,12 +12,13 @@ const MODIFIERS: [&str; 9] =
     ["custom", "uniform", "varying", "config", "add", "append", "prepend", "delete", "reorder"];
 
 /// Attributes that are asked for, beside the operations of transforms.
-const WANTED: [&str; 7] = [
+const WANTED: [&str; 8] = [
     "points",
     "faceVertexCounts",
     "faceVertexIndices",
     "orientation",
     "purpose",
+    "visibility",
     "primvars:skel:jointIndices",
     "skel:blendShapes",
 ];
