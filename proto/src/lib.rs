@@ -3,6 +3,7 @@
 //! * [`cage_messages`]: the JSON bodies of cage design.
 //! * [`container`]: the `.cager` file: a rest pose, its cage and one solved cage per frame, with random access.
 //! * [`messages`]: the JSON bodies of the service.
+//! * [`object`]: JSON that has to be an object.
 //! * [`record`]: the frame record, `application/vnd.cager.frames`: one frame with its number and its error.
 //! * [`recovery_messages`]: the JSON bodies of recoveries.
 //! * [`report`]: what is told of an encoding, in `report.json` and in a container.
@@ -17,6 +18,7 @@ pub mod cage_messages;
 pub mod container;
 pub mod le;
 pub mod messages;
+pub mod object;
 pub mod record;
 pub mod recovery_messages;
 pub mod report;

@@ -2,6 +2,7 @@
 //!
 //! Lengths are fractions of the rest pose's bounding-box diagonal, times are seconds.
 
+use crate::object::Object;
 pub use crate::report::ConditionNumber;
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +85,7 @@ pub struct SessionOptions {
     #[cfg_attr(feature = "schema", schema(minimum = 0))]
     pub lambda: Option<f64>,
     /// Where the cage comes from if none is sent as a part; made from the rest pose where this is left out as well.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "cage_source")]
     pub cage: Option<CageSource>,
     /// Turn a cage inside out whose faces all point inwards.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -133,6 +134,10 @@ pub struct CageSource {
     /// The cage is that of this completed design, see `POST /v1/cages`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
+}
+
+fn cage_source<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<CageSource>, D::Error> {
+    Ok(Option::<Object<CageSource>>::deserialize(deserializer)?.map(|Object(source)| source))
 }
 
 /// A threshold; the command line's `auto` needs frames to measure.

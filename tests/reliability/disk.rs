@@ -192,3 +192,15 @@ async fn a_frame_that_was_stored_without_an_answer_is_none_to_another_of_its_num
     inside.check(&SMALL, &session.id, &answered).await;
     inside.finish(&SMALL, &session).await;
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_export_waits_for_room_on_the_disk() {
+    let inside = Inside::new().await;
+    let session = inside.ready(&SMALL, "exported").await;
+    inside.finish(&SMALL, &session).await;
+    let path = format!("/v1/sessions/{}/export?format=npy", session.id);
+    inside.disk.set_free_bytes(Some(1 << 16));
+    assert_eq!(inside.status(&path).await, 507);
+    inside.disk.set_free_bytes(None);
+    assert_eq!(inside.status(&path).await, 200);
+}

@@ -274,6 +274,22 @@ fn text_is_read_with_the_files_beside_it() {
 }
 
 #[test]
+fn rates_are_told_apart_long_after_the_beginning() {
+    for rate in [30.0, 30_000.0 / 1001.0, 24.0, 24_000.0 / 1001.0] {
+        let mut built = Built::default();
+        built.points();
+        let numbered: Vec<f64> = (0..12).map(|k| 30_000.0 + f64::from(k)).collect();
+        let times: Vec<f32> = numbered.iter().map(|frame| (frame / rate) as f32).collect();
+        let times = built.floats("SCALAR", &times);
+        let across = built.floats("VEC3", &(0..36).map(|k| k as f32).collect::<Vec<_>>());
+        let moved = animation(&[(r#"{"node":0,"path":"translation"}"#, "LINEAR", times, across)]);
+        let bytes = built.file(&format!(r#"{MESH},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],{moved}"#));
+        let reader = open(&bytes, 4).unwrap();
+        assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(rate), numbered));
+    }
+}
+
+#[test]
 fn of_several_animations_the_first_or_the_chosen_one_is_read() {
     let mut built = Built::default();
     built.points();

@@ -64,6 +64,7 @@ kinds! {
     TOO_MANY_STREAMS TOO_MANY_REQUESTS "too-many-streams" "The tenant has as many streams open as it may";
     TOO_MANY_JOBS TOO_MANY_REQUESTS "too-many-jobs" "The tenant has as many jobs waiting as it may";
     SHARE_TAKEN TOO_MANY_REQUESTS "share-taken" "The tenant holds its share of what all tenants use";
+    HEADER_TOO_LARGE REQUEST_HEADER_FIELDS_TOO_LARGE "header-too-large" "The header is too large";
     INTERNAL INTERNAL_SERVER_ERROR "internal" "The service failed";
     BUSY SERVICE_UNAVAILABLE "busy" "The service has too much to do";
     STOPPING SERVICE_UNAVAILABLE "stopping" "The service is stopping";

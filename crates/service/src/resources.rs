@@ -157,7 +157,7 @@ impl Resources {
             kept_solvers: kept_solvers(config.budget(config.cache_bytes)),
             preparing: config.budget(config.max_preparing as u64),
             making_cages: config.budget(config.max_preparing as u64),
-            preparers: Arc::new(pool("prepare", config.workers, threads::NICE_PREPARE)?),
+            preparers: Arc::new(pool("prepare", config.workers, threads::NICE_BACKGROUND)?),
             parse_slots: config.budget(MAX_CONCURRENT_PARSING),
             requests: config.budget(config.max_requests as u64),
             streams: config.budget(config.max_streams as u64),

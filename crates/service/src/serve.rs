@@ -3,7 +3,7 @@
 use crate::cage_job::local_designer;
 use crate::config::ServeConfig;
 use crate::http::listen::{Limits, serve, tls_config};
-use crate::http::{Operated, admin, router, seen, seen_by_operators, spare};
+use crate::http::{Operated, admin, router, seen, seen_by_operators, spare, without_pages};
 use crate::resources::Resources;
 use crate::service::{Service, StartError};
 use crate::shards;
@@ -156,7 +156,9 @@ async fn listen_for_operators(
     let address = listener.local_addr()?;
     tracing::info!(%address, "listening for operators");
     let limits = Limits { max_connections: OPERATORS, max_per_address: OPERATORS, ..config.limits() };
-    let routes = admin(operated, seen.clone(), address.ip().is_loopback());
+    let open_to_all = address.ip().is_loopback();
+    let seen = if open_to_all { without_pages(seen) } else { seen };
+    let routes = admin(operated, seen.clone(), open_to_all);
     tokio::spawn(serve(listener, routes, spare(seen), limits, None, drained));
     Ok(())
 }

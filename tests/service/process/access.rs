@@ -129,10 +129,7 @@ async fn a_token_that_may_read_looks_and_decodes_and_changes_nothing() {
     let file = std::fs::read_to_string(app.tokens_file()).expect("tokens");
     std::fs::write(app.tokens_file(), format!("{file}{entry}")).expect("tokens");
     let (anna, viewer) = (app.caller(Some(ANNA)), app.caller(Some(VIEWER)));
-    eventually("the token is known", async || {
-        (viewer.get("/v1/sessions").await.status == 200).then_some(())
-    })
-    .await;
+    eventually("the token is known", async || (viewer.get("/v1/sessions").await.status == 200).then_some(())).await;
     let capture = Capture::tiny();
     let session = anna.completed(capture, 3).await;
     let path = |rest: &str| format!("/v1/sessions/{}{rest}", session.id);

@@ -56,6 +56,13 @@ async fn what_is_stored_is_counted_checked_and_copied() {
     assert_eq!(damaged.status.code(), Some(1), "{}", said(&damaged));
     assert!(said(&damaged).contains(&format!("session {other} of local: ")), "{}", said(&damaged));
     assert!(said(&damaged).contains("1 of them are damaged") && !said(&damaged).contains(&whole), "{}", said(&damaged));
+    assert!(said(&damaged).contains("complete the session again"), "{}", said(&damaged));
+    let copies = folder();
+    let copied = store(&data, &["export", &copies.path().display().to_string()]);
+    assert_eq!(copied.status.code(), Some(1), "{}", said(&copied));
+    assert!(said(&copied).contains(&format!("session {other} of local: ")), "{}", said(&copied));
+    assert!(std::fs::read(copies.path().join(format!("local/{whole}.cager"))).expect("a copy") == container);
+    assert!(!copies.path().join(format!("local/{other}.cager")).exists());
     let nowhere = store(&data.join("none"), &["usage"]);
     assert!(said(&nowhere).contains("there is no such folder"), "{}", said(&nowhere));
 }

@@ -302,6 +302,16 @@ impl TestApp {
         kib.trim().trim_end_matches(" kB").parse::<u64>().expect("a number") / 1024
     }
 
+    /// Niceness of a thread.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn niceness(&self, thread: &str) -> i32 {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.process.id())).expect("its threads");
+        let mut stats = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("stat")).ok());
+        let own = stats.find(|stat| stat.contains(&format!("({thread})"))).expect("the thread");
+        let fields = own.rsplit(") ").next().expect("its fields");
+        fields.split(' ').nth(16).expect("its niceness").parse().expect("a number")
+    }
+
     /// Asks the service to stop.
     pub(crate) fn terminate(&self) {
         let pid = rustix::process::Pid::from_child(&self.process);

@@ -187,6 +187,11 @@ const LARGEST_ROUNDING: f64 = 0.02;
 
 /// The rate at which all keys are at whole frames, as far as single precision tells.
 fn usual_rate(keys: &[f64]) -> Option<f64> {
-    let is_whole = |frame: f64| (frame - frame.round()).abs() <= (1e-3 + 1e-6 * frame.abs()).min(LARGEST_ROUNDING);
-    RATES.into_iter().find(|rate| keys.iter().all(|key| is_whole(key * rate)))
+    let first = keys.first()?;
+    let is_whole = |key: f64, rate: f64| {
+        // A digit of the key, and what programs lose that add up steps.
+        let lost = key.abs() * f64::from(f32::EPSILON) + 1e-6 * (key - first);
+        (key * rate - (key * rate).round()).abs() <= (1e-3 + lost * rate).min(LARGEST_ROUNDING)
+    };
+    RATES.into_iter().find(|&rate| keys.iter().all(|&key| is_whole(key, rate)))
 }

@@ -55,6 +55,7 @@ impl Work for CageDesign {
 
     fn enter(progress: &mut Progress, phase: &Phase<Finished>) {
         progress.stage = None;
+        progress.seconds = progress.seconds();
         progress.began = matches!(phase, Phase::Running).then(Instant::now);
         if !matches!(phase, Phase::Running) {
             progress.best = None;
@@ -73,6 +74,15 @@ pub(crate) struct Progress {
     sampled: u32,
     best: Option<Best>,
     began: Option<Instant>,
+    /// How long it took, once it has ended.
+    seconds: f64,
+    timed_out: bool,
+}
+
+impl Progress {
+    fn seconds(&self) -> f64 {
+        self.began.map_or(self.seconds, |began| began.elapsed().as_secs_f64())
+    }
 }
 
 /// The best cage so far of a running design.
@@ -121,6 +131,10 @@ impl CageJob {
         state_of(&self.status().phase)
     }
 
+    fn set_timed_out(&self) {
+        self.status().progress.timed_out = true;
+    }
+
     fn set_sampled(&self, sampled: usize) {
         self.status().progress.sampled = sampled as u32;
     }
@@ -166,8 +180,8 @@ impl CageJob {
             fraction: progress.fraction,
             error: CageError { designed: None, held_back: progress.error },
             stages: Vec::new(),
-            seconds: progress.began.map_or(0.0, |began| began.elapsed().as_secs_f64()),
-            timed_out: false,
+            seconds: progress.seconds(),
+            timed_out: progress.timed_out,
             warnings: Vec::new(),
             problem: None,
         };

@@ -1,4 +1,4 @@
-//! Running designs: a limited number at a time, tenants in turn, on threads of the lowest priority.
+//! Running designs: a limited number at a time, tenants in turn, on threads of low priority.
 
 use super::create::workshop_with;
 use super::{Best, CageDesign, CageJob, Finished, options, samples};
@@ -170,7 +170,12 @@ impl Service {
         };
         let designed = self.designs.design(&rest, &frames, &options, &mut watch);
         drop((frames, taken));
-        let designed = designed.map_err(|error| refused(&error))?;
+        let designed = designed.map_err(|error| {
+            if matches!(error, DesignError::Stopped) {
+                job.set_timed_out();
+            }
+            refused(&error)
+        })?;
         let best = Best::new(&designed.cage);
         let found = finished(&designed, &best, count, job.progress().error, clock);
         Ok((found, workshop_with(&self.store, &best.obj)?))
@@ -216,8 +221,8 @@ fn refused(error: &DesignError) -> ApiError {
             ApiError::new(problem::INVALID_FRAME, format!("frames: {error}"))
         }
         DesignError::Stopped => {
-            let detail = "time_limit: there was no cage when the time was over; give more seconds, or try again when the service has less to do";
-            ApiError::new(problem::INVALID_OPTIONS, detail)
+            let detail = "there was no cage when the time was over; try again when the service has less to do, or give more seconds";
+            ApiError::new(problem::BUSY, detail)
         }
         _ => ApiError::new(problem::INVALID_GEOMETRY, format!("rest: {error}")),
     }

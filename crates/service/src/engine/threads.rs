@@ -2,10 +2,9 @@
 
 /// Niceness of threads that solve frames: lower priority than the threads that serve requests, but not starved by other processes.
 pub(crate) const NICE_SOLVE: i32 = 5;
-/// Niceness of threads that prepare: a ninth of the weight of those that solve, so that frames hardly wait and preparations still end.
-pub(crate) const NICE_PREPARE: i32 = 15;
-/// Niceness of threads for background work.
-pub(crate) const NICE_BACKGROUND: i32 = 19;
+/// Niceness of threads that prepare and of those for background work: a third of the weight of those that solve, and a ninth of that of other programs, beside
+/// which they must still end.
+pub(crate) const NICE_BACKGROUND: i32 = 10;
 
 /// A rayon pool of `count` threads (0: one per processor) named `name-0`, `name-1`, …, whose priority is lowered by `nice`.
 ///

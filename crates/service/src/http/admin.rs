@@ -67,8 +67,15 @@ pub fn admin(operated: Operated, seen: Router, open_to_all: bool) -> Router {
     finished(routes)
 }
 
-/// Refuses requests from web pages in the operator's browser.
+/// Routes that web pages in the operator's browser do not reach, except for probes.
+pub fn without_pages(routes: Router) -> Router {
+    routes.layer(from_fn(refuse_web_pages))
+}
+
 async fn refuse_web_pages(request: Request, next: Next) -> Result<Response, ApiError> {
+    if origin::is_probe(&request) {
+        return Ok(next.run(request).await);
+    }
     if request.headers().contains_key(header::ORIGIN) || !origin::is_this_machine(&request) {
         return Err(ApiError::new(problem::FORBIDDEN, "pages may not operate the service; use curl or a script"));
     }

@@ -9,7 +9,7 @@ use crate::admission::Permit;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::frames::RANGES;
-use crate::session::{Phase, Session};
+use crate::session::{Phase, Session, gone};
 use axum::body::Body;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -70,8 +70,8 @@ impl Form {
     }
 }
 
-/// Solved cages: m × 3 little-endian f32 each, or frame records. With `follow` the stream stays open until the session is completed.
-/// Cages of a completed session never change: they have an `ETag` and take `Range`.
+/// Solved cages: m × 3 little-endian f32 each, or frame records. With `follow` the stream stays open until the session is completed, and breaks off where
+/// that is deleted. Cages of a completed session never change: they have an `ETag` and take `Range`.
 #[utoipa::path(
     get, path = "/v1/sessions/{id}/cages", operation_id = "get_cages", tag = "results", params(openapi::Id, CagesQuery, openapi::Conditions),
     responses(
@@ -188,8 +188,10 @@ fn follow(
                 let read = tokio::task::spawn_blocking(move || form.read(&reading, next as u32, most)).await;
                 let bytes = match read.map_err(io::Error::other).and_then(|bytes| bytes) {
                     Ok(bytes) => bytes,
-                    Err(_) if session.is_going() => return None,
-                    Err(error) => return Some((Err(error), (u64::MAX, changes, place))),
+                    Err(error) => {
+                        let error = if session.is_going() { gone().into() } else { error };
+                        return Some((Err(error), (u64::MAX, changes, place)));
+                    }
                 };
                 if !bytes.is_empty() {
                     let stride = form.stride(session.facts().map_or(1, |facts| facts.unknowns));
@@ -202,7 +204,7 @@ fn follow(
                 }
                 tokio::select! {
                     _ = changes.changed() => {}
-                    () = session.deleted().cancelled() => return None,
+                    () = session.deleted().cancelled() => return Some((Err(gone().into()), (u64::MAX, changes, place))),
                     () = service.stopping().cancelled() => {
                         let error = io::Error::other("the service is stopping");
                         return Some((Err(error), (u64::MAX, changes, place)));

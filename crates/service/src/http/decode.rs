@@ -10,6 +10,7 @@ use crate::file_bodies::{TELLING_BYTES, refuse_file};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::{Session, gone};
+use crate::store::StoreError;
 use crate::sync::lock;
 use axum::body::Body;
 use axum::extract::{Request, State};
@@ -65,16 +66,17 @@ pub(crate) async fn post(
     service.check_queue(&tenant)?;
     let place = service.stream(&tenant)?;
     let facts = prepared(&service, &session).await?;
-    let (model, cages) = if with_model {
+    let (model, cages, declared) = if with_model {
         let (model, cages) = other_model::read(&service, &tenant, request).await?;
-        (Some(model), cages)
+        (Some(model), cages, None)
     } else {
+        let declared = http_body::Body::size_hint(request.body()).exact();
         let cages = request.into_body().into_data_stream().map(|piece| piece.map_err(|error| body_error(&error)));
-        (None, cages.boxed())
+        (None, cages.boxed(), declared)
     };
     // The body is spooled before the model is bound, so that the client can keep sending meanwhile.
     let space = Permit::empty(&service.spool_space, &tenant.name);
-    let spool = Arc::new(PositionSpool::new(&service.config.data, space).map_err(|error| spool_error(&error))?);
+    let spool = Arc::new(PositionSpool::new(&service.config.data, space).map_err(spool_error)?);
     let arrived = spool.arrived.subscribe();
     let limit = service.config.max_rest_bytes;
     tokio::spawn(spool_cages(Arc::clone(&spool), cages, limit, Arc::clone(&service), Arc::clone(&session)));
@@ -100,8 +102,9 @@ pub(crate) async fn post(
     let frame_bytes = 12 * u64::from(facts.unknowns);
     let queued = Arc::clone(&service.queued_frames);
     let mut decoding = CageDecoding { spool, arrived, lane, session, queued, frame_bytes, next: 0, _place: place };
-    // Wait for the first result, so that its error can have an HTTP status.
+    // Wait for the first result, so that its error can have an HTTP status, as what is known of the end by then.
     let first = decoding.next().await?;
+    decoding.ends_whole(declared)?;
     let rest = futures_util::stream::unfold(decoding, |mut decoding| async {
         match decoding.next().await {
             Ok(None) => None,
@@ -191,7 +194,7 @@ async fn spool_cages(
         }
         match tokio::task::spawn_blocking(move || writing.append(bytes, &chunk)).await {
             Ok(Ok(())) => bytes += length,
-            Ok(Err(error)) => break Err(spool_error(&error)),
+            Ok(Err(error)) => break Err(spool_error(error)),
             Err(error) => break Err(ApiError::internal(&error)),
         }
         spool.arrived.send_modify(|arrived| arrived.bytes = bytes);
@@ -199,13 +202,8 @@ async fn spool_cages(
     spool.arrived.send_modify(|arrived| arrived.end = Some(end));
 }
 
-fn spool_error(error: &io::Error) -> ApiError {
-    match error.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            ApiError::new(problem::STORAGE_FULL, "the service's disk is full; try again later").retry_after(60)
-        }
-        _ => ApiError::internal(error),
-    }
+fn spool_error(error: io::Error) -> ApiError {
+    StoreError::of(Path::new("tmp"), "write cages to", error).into()
 }
 
 /// Produces the response body.
@@ -228,6 +226,26 @@ async fn read(spool: Arc<PositionSpool>, at: u64, length: u64) -> Result<Vec<u8>
 }
 
 impl CageDecoding {
+    /// Checks that the body has whole cages, where its length is declared or it has ended.
+    ///
+    /// # Errors
+    /// It ends within a cage.
+    fn ends_whole(&self, declared: Option<u64>) -> Result<(), ApiError> {
+        let arrived = self.arrived.borrow();
+        match declared.or_else(|| matches!(arrived.end, Some(Ok(()))).then_some(arrived.bytes)) {
+            Some(bytes) if !bytes.is_multiple_of(self.frame_bytes) => Err(self.cut_off(bytes)),
+            _ => Ok(()),
+        }
+    }
+
+    /// The response for a body of so many bytes, whose last cage is not whole.
+    fn cut_off(&self, bytes: u64) -> ApiError {
+        let (cage, rest) = (bytes / self.frame_bytes, bytes % self.frame_bytes);
+        let of = self.frame_bytes;
+        let detail = format!("the body ends within cage {cage}, after {rest} of {of} bytes; send whole cages");
+        ApiError::new(problem::BAD_REQUEST, detail)
+    }
+
     /// Positions of the next few cages; `None` at the end of the body.
     async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
         const AT_A_TIME: u64 = 4;
@@ -246,13 +264,7 @@ impl CageDecoding {
                         let length = arrived.bytes.min(TELLING_BYTES as u64);
                         refuse_file(&read(Arc::clone(&self.spool), 0, length).await?)?;
                     }
-                    let detail = format!(
-                        "the body ends within cage {}, after {} of {} bytes; send whole cages",
-                        self.next,
-                        arrived.bytes - at,
-                        self.frame_bytes
-                    );
-                    return Err(ApiError::new(problem::BAD_REQUEST, detail));
+                    return Err(self.cut_off(arrived.bytes));
                 }
                 None => {}
             }

@@ -7,7 +7,7 @@ use crate::admission::Permit;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::{Phase, Session};
-use crate::store::Completion;
+use crate::store::{Completion, StoreError};
 use crate::tasks::blocking;
 use axum::extract::State;
 use axum::response::{IntoResponse as _, Response};
@@ -19,6 +19,7 @@ use http::header::{CONTENT_DISPOSITION, ETAG};
 use http::{HeaderMap, HeaderValue, StatusCode};
 use serde::Deserialize;
 use std::fs::File;
+use std::io;
 use std::ops::Range;
 use std::os::unix::fs::FileExt as _;
 use std::path::Path;
@@ -82,8 +83,14 @@ pub(crate) struct ExportQuery {
     get, path = "/v1/sessions/{id}/export", operation_id = "export_session", tag = "results",
     params(openapi::Id, ExportQuery, openapi::Conditions),
     responses(
-        (status = 200, description = "The file", content_type = "application/octet-stream", body = Vec<u8>),
-        (status = 206, description = "The range asked for", content_type = "application/octet-stream", body = Vec<u8>),
+        (status = 200, description = "The file", content(
+            (Vec<u8> = "application/octet-stream"), (Vec<u8> = "model/gltf-binary"), (Vec<u8> = "model/vnd.usd"),
+            (Vec<u8> = "model/vnd.usdz+zip"),
+        )),
+        (status = 206, description = "The range asked for", content(
+            (Vec<u8> = "application/octet-stream"), (Vec<u8> = "model/gltf-binary"), (Vec<u8> = "model/vnd.usd"),
+            (Vec<u8> = "model/vnd.usdz+zip"),
+        )),
         (status = 304, description = "The client's copy is current"),
     ),
 )]
@@ -141,13 +148,15 @@ async fn made(
     let bytes = positions + FACE_BYTES * 2 * points + FILE_BYTES;
     // Principal components are found of all frames at once.
     let kept = if format == Format::Glb { 2 * positions } else { 0 };
-    let fits = bytes <= service.spool_space.most().min(service.store.free_bytes() / 2);
-    if !fits || kept > service.decoding_memory.most() {
+    if bytes > service.spool_space.most() || kept > service.decoding_memory.most() {
         let detail = format!(
             "its {frames} frames of {points} points make a file that is too large to be written here; download capture.cager and decode it: cager decode capture.cager -o FILE.{}",
             format.extension()
         );
         return Err(ApiError::new(problem::TOO_LARGE, detail));
+    }
+    if bytes > service.store.free_bytes() / 2 {
+        return Err(no_room());
     }
     let mut space = Permit::empty(&service.spool_space, tenant);
     space.grow(bytes).map_err(|full| {
@@ -174,7 +183,7 @@ async fn made(
         store.bring(&container)?;
         let written = coders.install(|| write(&container, &folder, &name)).map_err(|error| {
             tracing::error!(session = %of.meta.id, %error, "a file of its frames could not be written");
-            if of.is_going() { crate::session::gone() } else { refused(&error) }
+            if of.is_going() { crate::session::gone() } else { refused(&folder, &error) }
         });
         written.map(|(file, length)| (file, length, space))
     });
@@ -205,16 +214,22 @@ fn write(container: &Path, folder: &Path, name: &str) -> anyhow::Result<(File, u
     Ok((file, length))
 }
 
-fn refused(error: &anyhow::Error) -> ApiError {
-    let is_full = error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
-        .any(|cause| matches!(cause.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded));
-    if is_full {
-        let detail = "the service's disk has no room for the file; try again later, or decode the container yourself: cager decode";
-        return ApiError::new(problem::STORAGE_FULL, detail).retry_after(60);
+fn refused(folder: &Path, error: &anyhow::Error) -> ApiError {
+    use io::ErrorKind::{InvalidData, InvalidInput, Other, UnexpectedEof};
+    let mut kinds = error.chain().filter_map(|cause| Some(cause.downcast_ref::<io::Error>()?.kind()));
+    // These are of what was read, others of the disk.
+    let by_disk = kinds.find(|kind| !matches!(kind, InvalidData | InvalidInput | Other | UnexpectedEof));
+    match by_disk.map(|kind| StoreError::of(folder, "write", kind.into())) {
+        Some(StoreError::Full { .. }) => no_room(),
+        Some(error) => error.into(),
+        None => ApiError::internal(&"the file could not be written; the log has the reason"),
     }
-    ApiError::internal(&"the file could not be written; the log has the reason")
+}
+
+fn no_room() -> ApiError {
+    let detail =
+        "the service's disk has no room for the file; try again later, or decode the container yourself: cager decode";
+    ApiError::new(problem::STORAGE_FULL, detail).retry_after(60)
 }
 
 /// The session's name as the name of a file.

@@ -2,6 +2,7 @@
 
 use super::guarded::revocable;
 use super::listen::ConnectionHandle;
+use super::waiting::body_error;
 use crate::auth::{Denied, Grant, Scope, Tenant};
 use crate::jobs::{Job, Run, Work, kind_of};
 use crate::problem::{self, ApiError};
@@ -13,6 +14,7 @@ use axum::extract::rejection::{JsonRejection, QueryRejection};
 use axum::extract::{FromRequestParts, Path, State};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use cager_proto::object::Object;
 use http::request::Parts;
 use http::{HeaderMap, header};
 use std::convert::Infallible;
@@ -193,8 +195,8 @@ impl<S: Sync + Send, T: serde::de::DeserializeOwned> axum::extract::FromRequest<
             let detail = format!("the body has {declared} bytes, and a JSON body may have {JSON_BYTES}");
             return Err(ApiError::new(problem::TOO_LARGE, detail).limit(JSON_BYTES));
         }
-        match <axum::Json<T> as axum::extract::FromRequest<S>>::from_request(request, state).await {
-            Ok(axum::Json(body)) => Ok(Self(body)),
+        match <axum::Json<Object<T>> as axum::extract::FromRequest<S>>::from_request(request, state).await {
+            Ok(axum::Json(Object(body))) => Ok(Self(body)),
             Err(JsonRejection::MissingJsonContentType(_)) => {
                 Err(ApiError::new(problem::MEDIA_TYPE, "send the body as application/json"))
             }
@@ -204,6 +206,7 @@ impl<S: Sync + Send, T: serde::de::DeserializeOwned> axum::extract::FromRequest<
             Err(error) if error.status() == http::StatusCode::PAYLOAD_TOO_LARGE => {
                 Err(ApiError::new(problem::TOO_LARGE, "the body is larger than a JSON body may be"))
             }
+            Err(JsonRejection::BytesRejection(error)) => Err(body_error(&error)),
             Err(error) => Err(ApiError::new(problem::BAD_REQUEST, format!("body: {}", error.body_text()))),
         }
     }

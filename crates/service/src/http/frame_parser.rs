@@ -7,6 +7,9 @@ use cager_core::inversion::Rows;
 use cager_proto::record::{self, FrameHeader, Kind, RecordError};
 use serde::Deserialize;
 
+/// The highest number of a frame: a capture has at most `u32::MAX`.
+const LAST_FRAME: u32 = u32::MAX - 1;
+
 /// A complete frame.
 #[derive(Debug, PartialEq)]
 pub(crate) struct ReceivedFrame {
@@ -38,7 +41,7 @@ pub(crate) struct FrameReader {
     layout: BodyLayout,
     points: u32,
     handles: u32,
-    /// Number of the next raw frame; an error beyond `u32::MAX`.
+    /// Number of the next raw frame; an error beyond [`LAST_FRAME`].
     next: u64,
     head: Vec<u8>,
     record: Option<FrameHeader>,
@@ -92,16 +95,11 @@ impl FrameReader {
         }
         self.begun = true;
         let (frame, rows, needed) = match self.layout {
-            BodyLayout::Raw { rows, .. } => {
-                let frame = u32::try_from(self.next).map_err(|_| {
-                    ApiError::new(problem::INVALID_FRAME, "the frame numbers pass 4294967295, the highest there is")
-                })?;
-                (frame, rows, self.frame_bytes())
-            }
+            BodyLayout::Raw { rows, .. } => (numbered(self.next)?, rows, self.frame_bytes()),
             BodyLayout::Records => {
                 let Some(header) = self.header(input)? else { return Ok(None) };
                 let rows = if header.kind == Kind::HandleRows { Rows::Handles } else { Rows::All };
-                (header.frame, rows, header.row_bytes() as usize)
+                (numbered(header.frame.into())?, rows, header.row_bytes() as usize)
             }
         };
         if self.bytes.capacity() < needed {
@@ -182,6 +180,17 @@ impl FrameReader {
         }
         Ok(self.record)
     }
+}
+
+/// The number of a frame.
+///
+/// # Errors
+/// There is none so high.
+fn numbered(frame: u64) -> Result<u32, ApiError> {
+    u32::try_from(frame).ok().filter(|frame| *frame <= LAST_FRAME).ok_or_else(|| {
+        let detail = format!("the frame numbers pass {LAST_FRAME}, the highest there is");
+        ApiError::new(problem::INVALID_FRAME, detail)
+    })
 }
 
 fn refused(error: &RecordError) -> ApiError {
@@ -269,7 +278,13 @@ mod tests {
     fn a_body_that_ends_within_a_frame_says_where() {
         let error = read(BodyLayout::Raw { first: 4, rows: Rows::All }, &[0; 70], 64).unwrap_err();
         assert!(error.problem.detail.contains("frame 5, after 10 of 60 bytes"), "{}", error.problem.detail);
-        let error = read(BodyLayout::Raw { first: u32::MAX, rows: Rows::All }, &[0; 120], 64).unwrap_err();
-        assert!(error.problem.detail.contains("4294967295"));
+        let last = |first, bytes: &[u8]| read(BodyLayout::Raw { first, rows: Rows::All }, bytes, 64);
+        assert_eq!(last(LAST_FRAME, &[0; 60]).unwrap().len(), 1);
+        for (first, bytes) in [(LAST_FRAME, &[0; 120][..]), (u32::MAX, &[0; 60])] {
+            assert!(last(first, bytes).unwrap_err().problem.detail.contains("4294967294"));
+        }
+        let mut record = Vec::new();
+        record::encode(Kind::Positions, u32::MAX, f32::NAN, f32::NAN, &[1.0; 15], &mut record).unwrap();
+        assert!(read(BodyLayout::Records, &record, 64).unwrap_err().problem.detail.contains("4294967294"));
     }
 }

@@ -26,8 +26,7 @@ pub(crate) struct FramesOfJob {
     pub(super) first: u32,
     /// Number of frames; all that are there where it is left out.
     pub(super) count: Option<u32>,
-    /// Keep the stream open for frames still to be made, in order, to the last one. It breaks off where a recovery is completed before all cages of the
-    /// first pass are sent, since the final ones are others.
+    /// Keep the stream open for frames still to be made, in order, to the last one.
     #[serde(default)]
     pub(super) follow: bool,
 }
@@ -114,8 +113,11 @@ impl<W: Work> Following<W> {
         loop {
             changes.mark_unchanged();
             let left = self.end.map_or(self.piece, |end| end.saturating_sub(self.next).min(self.piece));
-            if left == 0 || self.job.deleted().is_cancelled() {
+            if left == 0 {
                 return Ok(None);
+            }
+            if self.job.deleted().is_cancelled() {
+                return Err(deleted());
             }
             let Some(mut read) = self.read.take() else { return Ok(None) };
             let decodes = read.decodes(&self.job);
@@ -141,7 +143,7 @@ impl<W: Work> Following<W> {
             }
             tokio::select! {
                 _ = changes.changed() => {}
-                () = self.job.deleted().cancelled() => return Ok(None),
+                () = self.job.deleted().cancelled() => return Err(deleted()),
                 () = self.service.stopping().cancelled() => return Err(io::Error::other("the service is stopping")),
             }
         }
@@ -162,8 +164,12 @@ impl<W: Work> Following<W> {
         };
         tokio::select! {
             taken = taken => Ok(taken),
-            () = job.deleted().cancelled() => Err(io::Error::other("the job was deleted")),
+            () = job.deleted().cancelled() => Err(deleted()),
             () = service.stopping().cancelled() => Err(io::Error::other("the service is stopping")),
         }
     }
+}
+
+fn deleted() -> io::Error {
+    io::Error::other("the job was deleted")
 }

@@ -43,7 +43,7 @@ mod spooled;
 mod transfers;
 mod waiting;
 
-pub use admin::{Operated, admin};
+pub use admin::{Operated, admin, without_pages};
 pub(crate) use extract::only_reads;
 pub(crate) use guarded::until;
 pub(crate) use health::{health, may_see_metrics, rendered_metrics};

@@ -12,6 +12,7 @@ use crate::store::NamedFile;
 use axum::body::{Body, BodyDataStream};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
+use cager_proto::object::Object;
 use futures_util::{StreamExt as _, stream};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
@@ -191,6 +192,7 @@ pub(super) async fn read_options<T: DeserializeOwned>(mut field: Field<'_>) -> R
         }
     }
     serde_json::from_slice(&bytes)
+        .map(|Object(options)| options)
         .map_err(|error| ApiError::new(problem::INVALID_OPTIONS, format!("part \"options\": {error}")))
 }
 

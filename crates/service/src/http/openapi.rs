@@ -284,11 +284,12 @@ fn can_answer(status: u16, guarded: bool, path: &str, operation: &Operation) -> 
         RefOr::T(response) => Some(response.content.len()),
         RefOr::Ref(_) => None,
     });
-    let negotiates = forms.max().unwrap_or(0) > 1;
+    let is_export = takes(operation, "format");
+    let negotiates = forms.max().unwrap_or(0) > 1 && !is_export;
     match status {
         // Whatever the route: a request that is broken or stalls, too many connections, a fault of the service.
-        400 | 405 | 408 | 500 | 503 => true,
-        507 => path == "/readyz" || takes_body,
+        400 | 405 | 408 | 431 | 500 | 503 => true,
+        507 => path == "/readyz" || takes_body || is_export,
         401 | 403 if path == "/metrics" => true,
         _ if !guarded => false,
         401 | 403 | 429 => true,
@@ -296,7 +297,8 @@ fn can_answer(status: u16, guarded: bool, path: &str, operation: &Operation) -> 
         406 => negotiates,
         409 => in_session || takes_body,
         410 => in_session,
-        413 | 415 | 422 => takes_body,
+        413 => takes_body || is_export,
+        415 | 422 => takes_body,
         416 => takes(operation, "Range"),
         _ => false,
     }
@@ -320,7 +322,8 @@ fn describe_bytes(operation: &mut Operation) {
 }
 
 fn describe_content(media_type: &str, content: &mut RefOr<Content>) {
-    let is_bytes = media_type == "application/octet-stream" || media_type.starts_with("application/vnd.cager");
+    let is_bytes = media_type == "application/octet-stream"
+        || ["application/vnd.cager", "model/"].iter().any(|kind| media_type.starts_with(kind));
     let RefOr::T(content) = content else { return };
     if is_bytes {
         let format = SchemaFormat::KnownFormat(KnownFormat::Binary);

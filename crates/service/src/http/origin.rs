@@ -36,6 +36,11 @@ pub(super) fn is_this_machine(request: &Request) -> bool {
     is_known(host_of(request), &[])
 }
 
+/// Whether a request asks for health, which everybody may.
+pub(super) fn is_probe(request: &Request) -> bool {
+    matches!(request.uri().path(), "/healthz" | "/readyz")
+}
+
 fn text(request: &Request, name: HeaderName) -> Option<&str> {
     request.headers().get(name).and_then(|value| value.to_str().ok())
 }
@@ -86,8 +91,11 @@ pub(super) fn cors(config: &ServeConfig) -> Option<CorsLayer> {
         header::RETRY_AFTER,
         header::WWW_AUTHENTICATE,
         name("cager-columns"),
+        name("cager-faces"),
+        name("cager-frames"),
         name("cager-outside"),
         name("cager-rows"),
+        name("cager-vertices"),
         name("x-request-id"),
     ];
     let methods = [Method::GET, Method::HEAD, Method::POST, Method::PATCH, Method::DELETE];

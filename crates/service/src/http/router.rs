@@ -19,7 +19,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{BoxError, Router};
 use cager_proto::messages::Problem;
-use http::{Extensions, HeaderMap, HeaderValue, StatusCode, Version, header};
+use http::{Extensions, HeaderMap, HeaderValue, Method, StatusCode, Version, header};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tower::timeout::TimeoutLayer;
@@ -151,6 +151,7 @@ pub(crate) fn finished(routes: Router) -> Router {
             ApiError::internal(&format!("a request panicked: {text}")).into_response()
         }))
         .layer(from_fn(host))
+        .layer(from_fn(without_range))
         .layer(from_fn(decoded))
         .layer(from_fn(finish))
         .layer(CompressionLayer::new().compress_when(is_worth_compressing))
@@ -186,7 +187,7 @@ async fn check_host_and_origin(
     request: Request,
     next: Next,
 ) -> Result<Response, ApiError> {
-    if !service.access.is_guarded() && !matches!(request.uri().path(), "/healthz" | "/readyz") {
+    if !service.access.is_guarded() && !origin::is_probe(&request) {
         origin::check(&request, &service.config).inspect_err(|_| service.rejected("origin"))?;
     }
     Ok(next.run(request).await)
@@ -232,6 +233,14 @@ async fn host(request: Request, next: Next) -> Response {
     if request.version() == Version::HTTP_11 && named != 1 {
         let detail = format!("the request has {named} Host headers; HTTP/1.1 wants one");
         return ApiError::new(problem::BAD_REQUEST, detail).into_response();
+    }
+    next.run(request).await
+}
+
+/// Ranges are of GET alone (RFC 9110, §14.2).
+async fn without_range(mut request: Request, next: Next) -> Response {
+    if request.method() == Method::HEAD {
+        request.headers_mut().remove(header::RANGE);
     }
     next.run(request).await
 }

@@ -150,7 +150,11 @@ impl Session {
             }
             Err(error) => {
                 self.bytes.fetch_sub(stored_bytes(solved), Relaxed);
-                tracing::warn!(session = %self.meta.id, %error, "frames could not be written");
+                if self.is_going() {
+                    tracing::debug!(session = %self.meta.id, "the session was deleted before its frames were written");
+                } else {
+                    tracing::warn!(session = %self.meta.id, %error, "frames could not be written");
+                }
                 let error = self.fail_if_damaged(error);
                 self.give_up(solved, &error);
             }

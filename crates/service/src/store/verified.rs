@@ -42,7 +42,7 @@ impl Store {
         if kind == Kind::Session {
             found.note(self.check_frames(id));
             if let Some(mark) = found.note(self.completion(id)).flatten() {
-                self.verify_container(id, &mark, &mut found);
+                found.damage.extend(self.container_damage(id, &mark));
             }
             for entry in found.note(self.files().list(&folder)).unwrap_or_default() {
                 if entry.name.to_str().is_some_and(|name| name.starts_with("group-") || name.starts_with("last-")) {
@@ -63,9 +63,19 @@ impl Store {
         Ok(found)
     }
 
-    fn verify_container(&self, id: &str, mark: &Completion, found: &mut Verified) {
+    /// What is wrong with the container of a completed session, and what to do; reads all of it.
+    pub fn container_damage(&self, id: &str, mark: &Completion) -> Option<String> {
         let path = self.container_path(id);
-        found.note(self.files().check_digest(&path, mark.container_bytes, &mark.container_digest));
+        let error = self.files().check_digest(&path, mark.container_bytes, &mark.container_digest).err()?;
+        // In a bucket the service looks at its length alone.
+        let is_noticed = !self.files().disk.is_elsewhere();
+        Some(match error {
+            StoreError::Damaged { path, what } if is_noticed => {
+                let path = path.display();
+                format!("{path} is damaged: {what}; complete the session again, restore it from a backup, or delete it")
+            }
+            error => error.to_string(),
+        })
     }
 
     /// Reads the rest pose, the cage and the matrix of sessions with this key, and changes nothing.

@@ -71,3 +71,14 @@ async fn frames_are_answered_promptly_while_a_cage_is_designed() {
     assert_eq!(app.cage_job(&job.id).await.state, CageState::Running, "designed all the while");
     app.delete(&format!("/v1/cages/{}", job.id)).await.expect(204);
 }
+
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn background_work_gives_way_to_frames_and_still_ends_beside_other_programs() {
+    let app = TestApp::start();
+    let [usual, frames] = ["cager", "solve-0"].map(|thread| app.niceness(thread));
+    for thread in ["design-0", "code-0", "complete-0", "prepare-0"] {
+        let nice = app.niceness(thread);
+        assert!((frames + 5..=usual + 10).contains(&nice), "{thread}: {nice}, not {usual} and {frames}");
+    }
+}

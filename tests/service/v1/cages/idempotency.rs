@@ -7,7 +7,7 @@ use serde_json::json;
 #[tokio::test]
 async fn the_same_request_again_gives_the_same_design_even_after_a_restart() {
     let mut app = TestApp::start();
-    let parts = |seed| cage_form(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 1.0, "seed": seed}));
+    let parts = |seed| cage_form(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 10.0, "seed": seed}));
     let first: CageJob = app.design_with(parts(1), Some("key")).await.is(202);
     assert_eq!(app.design_with(parts(1), Some("key")).await.is::<CageJob>(202).id, first.id);
     app.design_with(parts(2), Some("key")).await.problem(422, "idempotency-key-reused");

@@ -14,7 +14,7 @@ async fn designs_are_listed_newest_first() {
     let app = TestApp::start();
     let mut ids = Vec::new();
     for seed in 0..3 {
-        let options = json!({"vertices": 32, "seed": seed, "time_limit_s": 1.0});
+        let options = json!({"vertices": 32, "seed": seed, "time_limit_s": 10.0});
         ids.push(app.design(Capture::tiny(), &options).await.id);
     }
     let list: CageJobList = app.get("/v1/cages").await.is(200);
@@ -29,7 +29,7 @@ async fn a_tenants_design_is_nobody_elses() {
     let app = TestApp::guarded(&[("anna", ANNA, "scope = \"admin\"\n"), ("bert", BERT, "")]);
     let (anna, bert) = (app.caller(Some(ANNA)), app.caller(Some(BERT)));
     let capture = Capture::tiny();
-    let job = anna.design(capture, &json!({"vertices": 32, "time_limit_s": 1.0})).await;
+    let job = anna.design(capture, &json!({"vertices": 32, "time_limit_s": 10.0})).await;
     anna.designed(&job.id).await;
     for path in ["", "/events", "/cage.obj"] {
         bert.get(&format!("/v1/cages/{}{path}", job.id)).await.problem(404, "not-found");
@@ -43,7 +43,7 @@ async fn a_tenants_design_is_nobody_elses() {
     bert.create_with(parts(), None).await.problem(422, "invalid-options");
     anna.create_with(parts(), None).await.is::<Session>(201);
     // The same input of another tenant is designed again.
-    let own = bert.design(capture, &json!({"vertices": 32, "time_limit_s": 1.0})).await;
+    let own = bert.design(capture, &json!({"vertices": 32, "time_limit_s": 10.0})).await;
     bert.designed(&own.id).await;
     assert_eq!(app.metric("cager_designs_total{result=\"completed\"}").await, 2.0);
 }

@@ -133,5 +133,5 @@ async fn more_than_may_be_sent_or_stored_is_refused_and_leaves_nothing() {
     let form = cage_form_of(&small.rest.obj, "frames", &small.raw(0..40).repeat(2), &options);
     app.design_with(form, None).await.problem(507, "quota-exceeded");
     nothing_is_left(&app).await;
-    app.design(capture, &json!({"vertices": 32, "time_limit_s": 1.0})).await;
+    app.design(capture, &json!({"vertices": 32, "time_limit_s": 10.0})).await;
 }

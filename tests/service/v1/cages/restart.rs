@@ -29,7 +29,7 @@ async fn a_design_that_a_restart_interrupts_is_begun_anew_and_ends() {
 #[tokio::test]
 async fn a_killed_service_designs_what_it_was_asked_and_keeps_what_it_had() {
     let mut app = TestApp::start();
-    let options = json!({"vertices": 32, "time_limit_s": 1.0});
+    let options = json!({"vertices": 32, "time_limit_s": 10.0});
     let done = app.design(Capture::tiny(), &options).await;
     let done = app.designed(&done.id).await;
     let path = format!("/v1/cages/{}/cage.obj", done.id);
@@ -46,7 +46,7 @@ async fn a_killed_service_designs_what_it_was_asked_and_keeps_what_it_had() {
 #[tokio::test]
 async fn a_damaged_cage_is_found_and_its_design_has_failed_from_then_on() {
     let mut app = TestApp::with_its_files(&[]);
-    let job = app.design(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 1.0})).await;
+    let job = app.design(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 10.0})).await;
     app.designed(&job.id).await;
     let file = app.cage_file(&job.id, "cage.obj");
     let mut bytes = std::fs::read(&file).expect("a cage");

@@ -1,7 +1,7 @@
 //! Recoveries are repeated, listed, deleted and counted as sessions are.
 
 use super::{FRAMES, complete, create, created, post, recovery, scans, until};
-use crate::support::TestApp;
+use crate::support::{TestApp, piece};
 use cager_proto::recovery_messages::{Recovery, RecoveryList};
 use serde_json::json;
 
@@ -36,8 +36,13 @@ async fn a_recovery_that_is_deleted_while_it_runs_is_gone_and_its_followers_hear
     };
     post(&app, &job.id, 0, scans().parts(0..FRAMES)).await.expect(200);
     until(&app, &job.id, |recovery| recovery.frames.followed >= 1).await;
+    let mut cages = app.open(&format!("{path}/cages?follow=true")).await;
+    piece("a cage", &mut cages).await.expect("a stream").expect("a cage");
     app.delete(&path).await.expect(204);
     assert!(events.await.expect("a stream").ends_with("event: deleted\ndata: {}\n\n"));
+    while let Ok(more) = piece("the end of the cages", &mut cages).await {
+        more.expect("no good end");
+    }
     app.get(&path).await.problem(404, "not-found");
     post(&app, &job.id, 0, scans().parts(0..1)).await.problem(404, "not-found");
     assert!(!app.data().join("recoveries").join(&job.id).exists());

@@ -73,6 +73,8 @@ async fn options_that_do_not_fit_the_cage_are_refused_at_once() {
         (json!({"regularizer": "matrix"}), vec!["regularizer_matrix: ".to_owned(), "send it".to_owned()]),
         (json!({"spectrum": "auto"}), vec!["spectrum auto".to_owned(), "give a number".to_owned()]),
         (json!({"spectrum": "much"}), vec!["\"much\"".to_owned(), "a number of singular directions".to_owned()]),
+        (json!(["walk"]), vec!["an object".to_owned()]),
+        (json!({"cage": [300]}), vec!["an object".to_owned()]),
         (json!({"spectrum": -1}), vec!["-1".to_owned(), "a number of singular directions".to_owned()]),
     ] {
         let problem = app.create_with(form(capture, &options), None).await.problem(422, "invalid-options");

@@ -91,7 +91,7 @@ async fn a_request_repeated_after_its_design_was_deleted_still_gets_its_session(
     let app = TestApp::start();
     let capture = Capture::tiny();
     let design: CageJob =
-        app.design_with(cage_form(capture, &json!({"vertices": 32, "time_limit_s": 1.0})), None).await.is(202);
+        app.design_with(cage_form(capture, &json!({"vertices": 32, "time_limit_s": 10.0})), None).await.is(202);
     app.designed(&design.id).await;
     let parts = || {
         let options = text(&json!({"cage": {"id": design.id}}));

@@ -4,6 +4,7 @@ use super::Limits;
 use super::body::{RequestBody, ResponseBody};
 use super::head::Head;
 use super::state::{ConnectionHandle, State};
+use crate::problem::{HEADER_TOO_LARGE, ProblemKind};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::ConnectInfo;
@@ -96,8 +97,8 @@ fn refusal(request: &Request<Incoming>, head: Option<Head>, limits: &Limits) -> 
 }
 
 fn too_large(detail: &str, limit: usize) -> Response<Body> {
-    let status = StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE;
-    problem(status, "header-too-large", "The header is too large", detail, Some(limit as u64))
+    let ProblemKind { status, word, title } = HEADER_TOO_LARGE;
+    problem(status, word, title, detail, Some(limit as u64))
 }
 
 fn problem(status: StatusCode, word: &str, title: &str, detail: &str, limit: Option<u64>) -> Response<Body> {

@@ -15,7 +15,8 @@ use std::sync::Arc;
 const PIECE_FRAMES: u32 = 64;
 
 /// Cages: m × 3 little-endian f32 each, `cage_vertices` of the recovery. As frames come those of the first pass; of a completed recovery the final ones,
-/// which never change: they have an `ETag` and take `Range`.
+/// which never change: they have an `ETag` and take `Range`. With `follow`, the stream breaks off where the recovery is completed before all cages of the
+/// first pass are sent, since the final ones are others.
 #[utoipa::path(
     get, path = "/v1/recoveries/{id}/cages", operation_id = "get_recovered_cages", tag = "recoveries", params(openapi::JobId, FramesOfJob, openapi::Conditions),
     responses(

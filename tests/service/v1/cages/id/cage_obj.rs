@@ -37,7 +37,7 @@ async fn the_best_cage_so_far_is_there_while_the_design_runs() {
 #[tokio::test]
 async fn parts_of_a_result_can_be_fetched() {
     let app = TestApp::start();
-    let job = app.design(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 1.0})).await;
+    let job = app.design(Capture::tiny(), &json!({"vertices": 32, "time_limit_s": 10.0})).await;
     app.designed(&job.id).await;
     let path = format!("/v1/cages/{}/cage.obj", job.id);
     let whole = app.get(&path).await.expect(200);

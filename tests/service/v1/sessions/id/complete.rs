@@ -1,6 +1,6 @@
 //! `POST …/complete`: when a capture is whole, and that it stays as it is.
 
-use crate::support::{Capture, OCTETS, TestApp};
+use crate::support::{Capture, OCTETS, Raw, TestApp};
 use cager_proto::messages::{Session, SessionState};
 use futures_util::future::join_all;
 use serde_json::json;
@@ -70,11 +70,25 @@ async fn a_number_of_frames_that_cannot_be_is_refused() {
     let session = app.ready(Capture::tiny()).await;
     let path = format!("/v1/sessions/{}/complete", session.id);
     app.complete(&session.id, 0).await.problem(422, "invalid-options");
-    for body in [json!({"frames": -1}), json!({"frames": "3"}), json!({}), json!({"frames": 1, "more": 2}), json!([])] {
+    for body in
+        [json!({"frames": -1}), json!({"frames": "3"}), json!({}), json!({"frames": 1, "more": 2}), json!([3, true])]
+    {
         app.post_json(&path, &body).await.problem(422, "invalid-options");
     }
     app.post(&path, "application/json", "{\"frames\":").await.problem(400, "bad-request");
     app.post(&path, "text/plain", "{\"frames\":1}").await.problem(415, "media-type");
+    assert_eq!(app.session(&session.id).await.state, SessionState::Ready);
+}
+
+#[tokio::test]
+async fn a_request_to_complete_that_stops_arriving_is_given_up() {
+    let app = TestApp::with(&["body_timeout_s=1"]);
+    let session = app.ready(Capture::tiny()).await;
+    let mut raw = Raw::connect(&app).await;
+    let path = format!("/v1/sessions/{}/complete", session.id);
+    raw.head("POST", &path, &[("content-type", "application/json"), ("content-length", "12")]).await;
+    raw.write(b"{\"frames\"").await;
+    raw.reply().await.problem(408, "request-timeout");
     assert_eq!(app.session(&session.id).await.state, SessionState::Ready);
 }
 

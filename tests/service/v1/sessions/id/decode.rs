@@ -69,6 +69,15 @@ async fn what_is_no_cage_is_refused() {
     app.post(&path, "application/json", "[]").await.problem(415, "media-type");
     let problem = app.post(&path, OCTETS, one[..one.len() - 4].to_vec()).await.problem(400, "bad-request");
     assert!(problem.detail.contains("cage 0"), "{}", problem.detail);
+    for whole in [1, 5] {
+        let more = [&bytes(&cages[..whole]), &[0][..]].concat();
+        let problem = app.post(&path, OCTETS, more).await.problem(400, "bad-request");
+        assert!(
+            problem.detail.starts_with(&format!("the body ends within cage {whole}, after 1 ")),
+            "{}",
+            problem.detail
+        );
+    }
     let mut nan = one.clone();
     nan[4 * 31..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     let problem = app.post(&path, OCTETS, nan).await.problem(422, "invalid-frame");

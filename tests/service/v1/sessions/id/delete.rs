@@ -1,7 +1,8 @@
-//! `DELETE /v1/sessions/{id}`: what is gone is gone, and streams of it end in good order.
+//! `DELETE /v1/sessions/{id}`: what is gone is gone, and streams of it say so.
 
-use crate::support::{Capture, OCTETS, Raw, TestApp, chunked, eventually, piece};
+use crate::support::{Capture, OCTETS, RECORDS, Raw, TestApp, chunked, eventually, piece};
 use cager_proto::messages::{Problem, SessionState};
+use http::Method;
 
 #[tokio::test]
 async fn a_deleted_session_is_unknown_everywhere_and_takes_no_space() {
@@ -36,6 +37,9 @@ async fn deleting_ends_uploads_followers_and_events() {
     upload.piece().await.expect("a record");
     let mut follower = app.open(&at("/cages?first=0&follow=true")).await;
     piece("a beginning", &mut follower).await.expect("a stream").expect("a cage");
+    let records = app.request(Method::GET, &at("/cages?first=0&follow=true")).header("accept", RECORDS);
+    let mut records = records.send().await.expect("an answer");
+    piece("a beginning", &mut records).await.expect("a stream").expect("a record");
     let mut events = app.http2().open(&at("/events")).await;
     piece("a beginning", &mut events).await.expect("a stream").expect("an event");
     let mut decoding = Raw::connect(&app).await;
@@ -47,12 +51,30 @@ async fn deleting_ends_uploads_followers_and_events() {
     let problem: Problem = serde_json::from_slice(&last).expect("a problem");
     assert_eq!((problem.status, problem.word()), (410, "session-deleted"));
     assert!(upload.piece().await.is_none());
-    assert_eq!(piece("the end of the cages", &mut follower).await.expect("a clean end"), None);
+    // Who ends in good order has all there is.
+    piece("the end of the cages", &mut follower).await.expect_err("cut off");
+    piece("the end of the records", &mut records).await.expect_err("cut off");
     let told = piece("a last event", &mut events).await.expect("a stream").expect("an event");
     assert!(std::str::from_utf8(&told).expect("UTF-8").contains("event: deleted"), "{told:?}");
     assert_eq!(piece("the end of the events", &mut events).await.expect("a clean end"), None);
     decoding.reply().await.problem(410, "session-deleted");
     eventually("all places are free", async || (app.metric("cager_streams").await == 0.0).then_some(())).await;
+}
+
+#[tokio::test]
+async fn deleting_under_an_upload_is_no_fault_of_the_disk() {
+    let app = TestApp::start();
+    let capture = Capture::small();
+    for _ in 0..5 {
+        let session = app.ready(capture).await;
+        let (api, id) = (app.stranger(), session.id.clone());
+        let path = format!("/v1/sessions/{id}/frames?first=0");
+        let upload = tokio::spawn(async move { api.post(&path, OCTETS, capture.raw(0..40).repeat(100)).await });
+        eventually("frames are solved", async || (app.session(&id).await.frames.solved > 0).then_some(())).await;
+        app.delete(&format!("/v1/sessions/{id}")).await.expect(204);
+        upload.await.expect("an answer");
+    }
+    assert!(!app.log().contains(" WARN "), "{}", app.log());
 }
 
 #[tokio::test]

@@ -1,6 +1,7 @@
 //! `GET /v1/sessions/{id}/export`.
 
-use crate::support::{Capture, TestApp, eventually, folder};
+use crate::support::{Capture, OCTETS, TestApp, eventually, folder};
+use http::Method;
 use std::process::Command;
 
 /// What `cager decode` makes of a container.
@@ -37,6 +38,9 @@ async fn a_completed_session_is_written_in_the_formats_of_other_programs() {
         assert_eq!(part.body, reply.body[10..20]);
         app.get_with(&path, &[("if-none-match", reply.header("etag"))]).await.expect(304);
     }
+    let path = format!("/v1/sessions/{}/export?format=npy", session.id);
+    let head = app.request(Method::HEAD, &path).header("range", "bytes=10-19");
+    assert_eq!(app.send(head).await.expect(200).header("content-range"), "");
     // Nothing of them is left.
     let left = || std::fs::read_dir(app.data().join("tmp")).expect("a folder").count();
     eventually("that they are removed", async || (left() == 0).then_some(())).await;
@@ -53,4 +57,11 @@ async fn what_cannot_be_written_is_refused_in_words() {
     assert!(problem.detail.contains("usdc"), "{}", problem.detail);
     app.get(&path).await.problem(400, "bad-request");
     app.get("/v1/sessions/none/export?format=abc").await.problem(404, "not-found");
+    // A folder that takes no files.
+    let session = app.completed(Capture::tiny(), 5).await;
+    std::fs::remove_dir_all(app.data().join("tmp")).expect("removed");
+    let path = format!("/v1/sessions/{}/export?format=abc", session.id);
+    app.get(&path).await.problem(503, "storage-failed");
+    let path = format!("/v1/sessions/{}/decode", session.id);
+    app.post(&path, OCTETS, vec![0; 12]).await.problem(503, "storage-failed");
 }

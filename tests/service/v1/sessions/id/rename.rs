@@ -42,7 +42,7 @@ async fn names_that_are_no_names_and_sessions_that_are_not_there_are_refused() {
     let session = app.ready(Capture::tiny()).await;
     let problem = renamed(&app, &session.id, &json!({ "name": "n".repeat(201) })).await.problem(422, "invalid-options");
     assert_eq!(problem.detail, "name: is longer than 200 characters; shorten it");
-    for body in [json!({}), json!({ "name": null }), json!({ "name": "a", "fps": 2 })] {
+    for body in [json!({}), json!({ "name": null }), json!({ "name": "a", "fps": 2 }), json!(["a"])] {
         renamed(&app, &session.id, &body).await.problem(422, "invalid-options");
     }
     assert_eq!(app.session(&session.id).await.name, session.name);

@@ -49,7 +49,7 @@ async fn a_cage_that_was_not_sent_is_not_told_as_one() {
     let made = reqwest::multipart::Form::new().part("rest", file("rest.obj", &capture.rest.obj));
     let made: Session =
         app.create_with(made.part("options", text(&json!({"cage": {"vertices": 60}}))), None).await.is(201);
-    let options = json!({"frames": 2, "vertices": 32, "time_limit_s": 1.0});
+    let options = json!({"frames": 2, "vertices": 32, "time_limit_s": 10.0});
     let design = cage_form_of(&capture.rest.obj, "frames.f32", &capture.raw(0..2), &options);
     let design: cager_proto::cage_messages::CageJob = app.design_with(design, None).await.is(202);
     app.designed(&design.id).await;
