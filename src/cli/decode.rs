@@ -2,6 +2,7 @@
 
 use super::args::DecodeArgs;
 use super::dry_run::{size, tell_dry_run};
+use super::edit::DETAIL_LOST;
 use super::outputs::Outputs;
 use super::stretches::StretchList;
 use super::{grouped, plain, progress, read_like, tell, warn};
@@ -28,6 +29,9 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let edited = transfer.with_cages.as_ref().map(|path| EditedCages::open(path, &container)).transpose()?;
     let model = transfer.model.as_ref().map(|path| read_like(path, container.header().units)).transpose()?;
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
+    if edited.is_some() && container.has_residual() && !transfer.cages {
+        warn(&[DETAIL_LOST.to_owned()]);
+    }
     drop(container);
     // Checked against the file that has the frames.
     let range = transfer.range(there, transfer.with_cages.as_ref().unwrap_or(&args.input))?;

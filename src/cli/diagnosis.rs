@@ -7,6 +7,7 @@ use super::dry_run::tell_dry_run;
 use super::print;
 use anyhow::{Result, bail};
 use cager_cages::diagnosis::{Findings, check, repair};
+use cager_capture::mismatch::cage_mismatch;
 use cager_formats::{Target, Units, commit_together};
 use cager_geometry::mesh::{Model, TriMesh};
 use serde::Serialize;
@@ -50,10 +51,10 @@ pub(super) struct CheckReport {
 }
 
 impl CheckReport {
-    fn new(found: &Findings, changes: Vec<String>) -> Self {
+    fn new(found: &Findings, unfit: Option<&String>, changes: Vec<String>) -> Self {
         Self {
-            usable: found.usable(),
-            editable: found.editable(),
+            usable: found.usable() && unfit.is_none(),
+            editable: found.editable() && unfit.is_none(),
             vertices: found.vertices,
             faces: found.faces,
             components: found.defects.components,
@@ -72,7 +73,7 @@ impl CheckReport {
             condition_number: found.condition_number.filter(|condition| condition.is_finite()),
             singular: found.condition_number == Some(f64::INFINITY),
             changes,
-            findings: found.messages(),
+            findings: unfit.into_iter().cloned().chain(found.messages()).collect(),
         }
     }
 }
@@ -90,15 +91,29 @@ fn check_cage(args: &CageArgs, targets: &Targets, rest: &Model, path: &Path) -> 
     let cage = read_cage_like(path, Units::UNKNOWN)?;
     let mesh = TriMesh::from(&cage);
     let found = check(&mesh, rest);
+    let unfit = unfit(&mesh, rest, &found);
     if !args.outputs.dry_run {
-        let report = CheckReport::new(&found, Vec::new());
+        let report = CheckReport::new(&found, unfit.as_ref(), Vec::new());
         commit_together(targets.complete(&report, (args, &TriMesh::from(rest), &mesh))?)?;
     }
-    print(&verdict(path, &found))?;
-    if !found.usable() {
-        bail!("{}: cannot be encoded with; try --repair", path.display());
+    print(&verdict(path, &found, unfit.as_ref()))?;
+    match unfit {
+        _ if !found.usable() => bail!("{}: cannot be encoded with; try --repair", path.display()),
+        Some(_) => {
+            bail!("{}: does not fit the rest pose; take the cage of this model, in its units and axes", path.display())
+        }
+        None => Ok(()),
     }
-    Ok(())
+}
+
+/// Why a rest pose cannot be encoded with a cage that others may be.
+fn unfit(mesh: &TriMesh, rest: &Model, found: &Findings) -> Option<String> {
+    if !found.usable() {
+        return None;
+    }
+    let (vertices, points) = (mesh.vertices.len(), rest.points.len());
+    let too_many = || format!("has {vertices} vertices, more than the {points} points of the rest pose can tell apart");
+    (vertices > points).then(too_many).or_else(|| cage_mismatch(mesh, rest))
 }
 
 fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &Model, path: &Path) -> Result<()> {
@@ -110,12 +125,14 @@ fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &M
             repaired.remaining.messages().join("; ")
         );
     }
-    let report = CheckReport::new(&repaired.remaining, repaired.changes.clone());
+    let mesh = TriMesh::from(&repaired.cage);
+    let unfit = unfit(&mesh, rest, &repaired.remaining);
+    let report = CheckReport::new(&repaired.remaining, unfit.as_ref(), repaired.changes.clone());
     if args.outputs.dry_run {
         return tell_dry_run(output, "a repaired cage", &[targets.report.clone(), targets.picture.clone()]);
     }
     let mut files = vec![complete_file(output, &cage_bytes(output, &repaired.cage)?)?];
-    files.extend(targets.complete(&report, (args, &TriMesh::from(rest), &TriMesh::from(&repaired.cage)))?);
+    files.extend(targets.complete(&report, (args, &TriMesh::from(rest), &mesh))?);
     commit_together(files)?;
     let mut text = String::new();
     for change in &repaired.changes {
@@ -124,14 +141,15 @@ fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &M
     if repaired.changes.is_empty() {
         text += "  changed  nothing: there was nothing to repair\n";
     }
-    print(&format!("{}{text}", verdict(output.path(), &repaired.remaining)))
+    print(&format!("{}{text}", verdict(output.path(), &repaired.remaining, unfit.as_ref())))
 }
 
-fn verdict(path: &Path, found: &Findings) -> String {
-    let sentence = match (found.usable(), found.editable()) {
-        (_, true) => "usable, free of self-intersection and around every point",
+fn verdict(path: &Path, found: &Findings, unfit: Option<&String>) -> String {
+    let sentence = match (found.usable() && unfit.is_none(), found.editable()) {
+        (true, true) => "usable, free of self-intersection and around every point",
         (true, false) => "usable, but not for every purpose",
-        (false, false) => "not usable",
+        (false, _) if unfit.is_some() => "not usable for this rest pose",
+        (false, _) => "not usable",
     };
     let mut text = format!(
         "{}: {sentence}\n  cage     {} vertices, {} triangles, {} part{}",
@@ -145,7 +163,7 @@ fn verdict(path: &Path, found: &Findings) -> String {
         let _ = write!(text, ", condition number {condition:.1}");
     }
     text.push('\n');
-    for sentence in found.messages() {
+    for sentence in unfit.into_iter().cloned().chain(found.messages()) {
         let _ = writeln!(text, "  found    {sentence}");
     }
     text

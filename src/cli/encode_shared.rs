@@ -31,7 +31,7 @@ impl Targets {
     pub(super) fn new(args: &EncodeArgs) -> Result<Self> {
         let inputs = [&args.rest, &args.frames].into_iter().chain(&args.cage).chain(&args.solver.regularizer_matrix);
         let mut outputs = Outputs::new(args.outputs, inputs)?;
-        let output = outputs.binary(&args.output, "walk.cager")?;
+        let output = outputs.container(&args.output, "walk.cager")?;
         Ok(Self { output, report: args.report.as_ref().map(|path| outputs.text(path)).transpose()? })
     }
 

@@ -31,9 +31,11 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     });
     let worst = report.error.worst.map_or_else(String::new, |worst| {
         let point = worst.point.map_or_else(String::new, |point| format!("point {point} of "));
+        let number = report.frame_numbers.get(worst.frame).filter(|&&number| number != worst.frame as f64);
+        let number = number.map_or_else(String::new, |number| format!(" ({number} in its capture)"));
         format!(
-            "  worst   {point}frame {}: off by {} where the rest pose is {} across\n",
-            report.frame_numbers.get(worst.frame).copied().unwrap_or(worst.frame as f64),
+            "  worst   {point}frame {}{number}: off by {} where the rest pose is {} across\n",
+            worst.frame,
             significant(worst.distance),
             significant(report.diagonal)
         )

@@ -13,7 +13,7 @@ use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::reject_far_points;
 use cager_explore::ShapeError;
 use cager_explore::interpolate::{CagedShapes, ShapePath, ShapeSpace};
-use cager_formats::{FrameOptions, Units, create_frames, frames_path};
+use cager_formats::{FrameOptions, create_frames, frames_path};
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use cager_motion::pose_cage::around;
 use clap::{Args, ValueEnum};
@@ -93,7 +93,7 @@ pub(super) fn run(args: &ExploreArgs) -> Result<()> {
     let faces = &poses.model.faces;
     let origin = own_origin(&poses.model.points);
     let rounding = LOST * diagonal(&poses.model.points);
-    let options = FrameOptions { origin, rounding, ..FrameOptions::default() };
+    let options = FrameOptions { origin, rounding, units: poses.units, ..FrameOptions::default() };
     let mut writer = create_frames(output, poses.model.points.len(), count, faces, &options)?;
     let bar = progress::frames("shaping", count);
     let shapes = shapes(args, &triangles, points, bound.as_ref()).map_err(|error| named(error, 0))?;
@@ -144,7 +144,7 @@ fn refuse_one_mesh(output: &Path, count: usize) -> Result<()> {
 /// The cage that is given, or that comes with the first pose; its model lies about in it.
 fn given_cage(args: &ExploreArgs, poses: &Poses) -> Result<Option<Cage>> {
     let Some(path) = &args.cage else { return poses.cage() };
-    let cage = read_cage(path, false, (None, Units::UNKNOWN))?;
+    let cage = read_cage(path, false, (None, poses.units))?;
     let far = reject_far_points(&cage, &poses.model.points);
     far.map_err(|error| with_input_name(&error, poses.file(0).path(), path))?;
     Ok(Some(cage))

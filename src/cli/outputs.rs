@@ -3,7 +3,7 @@
 use super::{global_args, interrupt};
 use anyhow::{Result, bail};
 use cager_formats::atomic::destination;
-use cager_formats::{AtomicFile, Target, frame_files, frames_path};
+use cager_formats::{AtomicFile, CacheFormat, MeshFormat, Target, frame_files, frames_path};
 use clap::Args;
 use std::fs;
 use std::io::IsTerminal;
@@ -44,10 +44,18 @@ impl Outputs {
         Ok(target)
     }
 
-    /// A binary file, refused on a terminal with a hint to redirect it as in `example`.
-    pub(super) fn binary(&mut self, path: &Path, example: &str) -> Result<Target> {
+    /// A container, refused on a terminal with a hint to redirect it as in `example`, and under the name of another format.
+    pub(super) fn container(&mut self, path: &Path, example: &str) -> Result<Target> {
         refuse_terminal(path, example)?;
-        self.text(path)
+        let target = self.text(path)?;
+        if CacheFormat::from_path(path).is_some() || MeshFormat::from_path(path).is_ok() {
+            bail!(
+                "{}: what is written is a container; name it {}, and write other formats of it with `cager decode`",
+                path.display(),
+                path.with_extension("cager").display()
+            );
+        }
+        Ok(target)
     }
 
     /// Frames in any of their formats.

@@ -1,12 +1,14 @@
 //! Poses of one model: meshes, and frames of .cager files.
 
-use super::{grouped, is_container, read_model};
+use super::{grouped, is_container, read_with_units, warn};
 use anyhow::{Context, Result, bail};
 use cager_capture::decode::{self, Decoding};
+use cager_capture::mismatch::{Mismatch, mismatches};
 use cager_capture::origin::move_from;
 use cager_core::cage::Cage;
-use cager_formats::{FrameRange, ScratchDir, open_frames};
+use cager_formats::{FrameRange, ScratchDir, Units, open_frames};
 use cager_geometry::mesh::{Model, Point};
+use cager_geometry::units::Change;
 use cager_motion::pose_faces::same_faces;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -42,17 +44,17 @@ impl PoseFile {
         }
     }
 
-    /// The model that has this pose: of a mesh as it stands, of a .cager file at rest.
-    fn model(&self) -> Result<Model> {
+    /// The model that has this pose, of a mesh as it stands, of a .cager file at rest, and what its positions mean.
+    fn model(&self) -> Result<(Model, Units)> {
         let (path, frame) = match self {
-            Self::Mesh(path) => return Ok(read_model(path)?),
+            Self::Mesh(path) => return Ok(read_with_units(path, None)?),
             Self::Frame(path, frame) => (path, *frame),
         };
         let mut container = decode::open(path)?;
         FrameRange::only(frame).check(container.frames(), path)?;
         let mut rest = container.rest().with_context(|| path.display().to_string())?;
         move_from(container.header().origin, &mut rest.points);
-        Ok(rest)
+        Ok((rest, container.header().units))
     }
 
     /// The cage that comes with the model.
@@ -80,6 +82,10 @@ pub(super) struct Poses {
     files: Vec<PoseFile>,
     /// The first one's: as it stands, or at rest.
     pub(super) model: Model,
+    /// What its positions mean, and those of all poses are brought to.
+    pub(super) units: Units,
+    /// What brings each pose to the first one's units and axes.
+    changes: Vec<Change>,
     /// Of meshes; none of frames, which are decoded later.
     read: Vec<Option<Vec<Point>>>,
 }
@@ -87,10 +93,12 @@ pub(super) struct Poses {
 impl Poses {
     /// Reads meshes, and what .cager files have at rest; all have the points and faces of the first.
     pub(super) fn open(files: Vec<PoseFile>) -> Result<Self> {
-        let (mut model, mut read) = (Model::default(), Vec::new());
+        let (mut model, mut units) = (Model::default(), Units::UNKNOWN);
+        let (mut changes, mut read) = (Vec::new(), Vec::new());
         for (k, file) in files.iter().enumerate() {
-            let found = file.model()?;
+            let (mut found, said) = file.model()?;
             if k == 0 {
+                units = said;
                 if found.faces.is_empty() {
                     bail!("{file}: has no faces, and shapes are found between poses of a mesh; give one with faces");
                 }
@@ -106,9 +114,16 @@ impl Poses {
                 );
             }
             same_faces((file, &found.faces), (&files[0], &model.faces))?;
+            let change = said.change_to(units);
+            if !change.is_none() {
+                change.apply_to(&mut found.points);
+                warn(&[format!("{file}: the pose is {change}, as its unit and axes are not those of {}", files[0])]);
+            }
+            refuse_other_order((file, &found.points), (&files[0], &model))?;
+            changes.push(change);
             read.push(matches!(file, PoseFile::Mesh(_)).then_some(found.points));
         }
-        Ok(Self { files, model, read })
+        Ok(Self { files, model, units, changes, read })
     }
 
     /// Number of poses.
@@ -138,12 +153,23 @@ impl Poses {
                         Some(scratch) => scratch,
                         none => none.insert(ScratchDir::create(folder)?),
                     };
-                    decoded(file, &scratch.path().join(format!("{k}.npy")), self.model.points.len())?
+                    let mut points = decoded(file, &scratch.path().join(format!("{k}.npy")), self.model.points.len())?;
+                    self.changes[k].apply_to(&mut points);
+                    points
                 }
             });
         }
         Ok(all)
     }
+}
+
+/// Points in another order give shapes of nothing.
+fn refuse_other_order((file, points): (&PoseFile, &[Point]), (first, model): (&PoseFile, &Model)) -> Result<()> {
+    let found = mismatches(model, &[points.as_flattened().to_vec()]);
+    let Some(Mismatch::Order(longer)) = found.first() else { return Ok(()) };
+    bail!(
+        "{file}: does not look like a pose of {first}: its points come in another order: edges of that are {longer:.0} times longer in this; export both from one program with the order of the points kept"
+    )
 }
 
 fn decoded(file: &PoseFile, into: &Path, points: usize) -> Result<Vec<Point>> {

@@ -27,7 +27,7 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
     let mut outputs = Outputs::new(args.outputs, files)?;
     let named = |path: &Path, at: usize| if count == 1 { path.to_owned() } else { numbered(path, at) };
     let mut targets = |at: usize| {
-        let output = outputs.binary(&named(&args.output, at), "dance.cager")?;
+        let output = outputs.container(&named(&args.output, at), "dance.cager")?;
         let report = args.report.as_ref().map(|path| outputs.text(&named(path, at))).transpose()?;
         Ok::<_, anyhow::Error>((output, report))
     };

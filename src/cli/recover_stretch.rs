@@ -181,7 +181,7 @@ fn summary(report: &RecoveryReport, encoded: &cager_proto::report::Report, outpu
         "{}: {} frames of {} points as cages of {} vertices\n\
          {placed}\x20 frames  {} followed from the one before, {} found by a wider search, {} lost\n\
          \x20 surface template to surface {}, surface to template {} of the diagonal, on average\n\
-         \x20 size    {}; errors of encoding: L2 {} on average, {} at most\n\
+         \x20 size    {}; errors of encoding: L2 {} on average, L∞ {} at most\n\
          \x20 time    {:.3} s: {:.3} s to prepare, {:.3} s to follow, {:.3} s to refine\n",
         output.display(),
         grouped(report.frames.len()),

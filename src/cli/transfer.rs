@@ -30,7 +30,7 @@ use std::path::Path;
 pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let inputs = args.source_rest.iter().chain(&args.source_frames).chain(&args.source).chain(&args.cage);
     let mut outputs = Outputs::new(args.outputs, inputs.chain(&args.pairs).chain([&args.target]))?;
-    let output = outputs.binary(&args.output, "walk.cager")?;
+    let output = outputs.container(&args.output, "walk.cager")?;
     let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
     let method = args.method()?;
     let (align, matrix) = args.alignment()?;
@@ -192,7 +192,7 @@ fn summary(report: &TransferReport, encoded: &cager_proto::report::Report, cage:
     format!(
         "{}: {} frames of {} points as cages of {} vertices\n\
          \x20 aligned turned by {:.1} degrees, scaled by {:.4}{runner_up}\n\
-         {laid}{}\x20 size    {}; errors of encoding: L2 {:.3} % on average, {:.3} % at most\n\
+         {laid}{}\x20 size    {}; errors of encoding: L2 {:.3} % on average, L∞ {:.3} % at most\n\
          \x20 time    {:.3} s to prepare, {:.3} s to move, {:.3} s to measure\n",
         output.display(),
         grouped(report.frames),

@@ -155,6 +155,26 @@ fn check_names_everything_that_is_wrong_and_repair_puts_it_right() {
 }
 
 #[test]
+fn a_cage_in_other_units_or_of_more_vertices_than_points_does_not_fit() {
+    let (dir, small) = Dir::with_capture();
+    let mut large = as_model(&small.cage);
+    large.points.iter_mut().flatten().for_each(|x| *x *= 1000.0);
+    dir.model("large.obj", &large);
+    dir.model("box.obj", &quad_box(&small.rest.points));
+    for (line, what) in [
+        ("--rest rest.obj --check large.obj", "check the units"),
+        ("--rest box.obj --check cage.obj", "more than the 8 points"),
+    ] {
+        let said = dir.cager(&format!("cage {line} --report check.json --overwrite")).run();
+        assert_eq!(said.status, Some(1));
+        assert!(said.stdout.contains("not usable for this rest pose") && said.stdout.contains(what), "{}", said.stdout);
+        assert_eq!(dir.json("check.json")["usable"], false);
+    }
+    let repaired = dir.cager("cage --rest rest.obj --repair large.obj -o repaired.obj").succeeds().stdout;
+    assert!(repaired.contains("not usable for this rest pose"), "{repaired}");
+}
+
+#[test]
 fn a_repair_moves_a_cage_out_to_the_points_it_left_outside_and_keeps_its_quads() {
     let (dir, small) = Dir::with_capture();
     let mut tight = quad_box(&small.rest.points);

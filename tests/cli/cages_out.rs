@@ -101,6 +101,30 @@ fn cages_decode_to_the_same_positions_and_edited_ones_to_moved_ones() {
 }
 
 #[test]
+fn a_coded_file_stays_as_it_is_where_no_cage_is_edited_and_says_what_edits_leave_out() {
+    let (dir, _) = Dir::with_capture();
+    dir.cager(&format!("{ENCODE} --max-error 1e-3")).succeeds();
+    let mut cages = stored(&dir, "out.cager");
+    dir.frames("edited.npy", &cages);
+    let said = dir.cager("edit out.cager --with-cages edited.npy -o same.cager").succeeds();
+    assert_eq!(
+        (said.stdout.as_str(), said.stderr.as_str()),
+        ("same.cager: 20 frames, 0 of them with another cage\n", "")
+    );
+    assert!(dir.read("same.cager") == dir.read("out.cager"));
+    cages[5][0] += 0.5;
+    dir.frames("edited.npy", &cages);
+    for line in
+        ["edit out.cager --with-cages edited.npy -o edited.cager", "decode out.cager --with-cages edited.npy -o b.npy"]
+    {
+        let said = dir.cager(line).succeeds();
+        assert!(said.stderr.contains("do not follow edits and are left out"), "{line}: {}", said.stderr);
+    }
+    let said = dir.cager("inspect edited.cager").succeeds().stdout;
+    assert!(!said.contains("guaranteed") && said.contains("not measured"), "{said}");
+}
+
+#[test]
 fn edited_cages_are_kept_in_a_container_that_decodes_is_inspected_and_is_edited_again() {
     let (dir, small) = Dir::with_encoded();
     let points = small.rest.points.len();

@@ -263,16 +263,6 @@ fn a_large_plane_is_read_again() {
 }
 
 #[test]
-fn edited_files_promise_nothing_and_lose_the_residual() {
-    let (dir, small) = Dir::with_capture();
-    coded(&dir, &small, "--max-error 1e-4");
-    dir.cager("decode out.cager --cages -o cages.npy").succeeds();
-    dir.cager("edit out.cager --with-cages cages.npy -o edited.cager").succeeds();
-    let said = dir.cager("inspect edited.cager").succeeds().stdout;
-    assert!(!said.contains("guaranteed") && said.contains("not measured"), "{said}");
-}
-
-#[test]
 fn what_is_intact_of_a_damaged_or_cut_file_is_decoded() {
     let (dir, small) = Dir::with_capture();
     // Long enough for two groups.

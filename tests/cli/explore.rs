@@ -1,8 +1,9 @@
 //! Shapes between poses: `explore`.
 
 use crate::refused::refused;
-use crate::support::{Dir, Small, as_model, measure, polygons, read_frames};
-use cager_geometry::mesh::Model;
+use crate::support::{Dir, ENCODE, Small, as_model, measure, polygons, read_frames};
+use cager_formats::{FrameOptions, Units, Up, create_frames, open_frames};
+use cager_geometry::mesh::{Model, Point};
 
 const EXPLORE: &str = "explore stand.obj sit.obj";
 
@@ -111,6 +112,58 @@ fn shapes_on_a_cage_are_near_those_on_the_mesh() {
         let found = read_frames(&dir.path("cage.npy"), small.rest.points.len());
         let far = measure(&small.rest.points, &mesh, &found).l2;
         assert!(far.iter().all(|&far| far < 0.02), "{cage}: {far:?}");
+    }
+}
+
+#[test]
+fn shapes_have_the_unit_and_axis_of_the_first_pose_and_others_are_brought_to_it() {
+    let (dir, small) = with_poses();
+    let n = small.rest.points.len();
+    let centimetres = Units::new(Up::Z, 0.01);
+    dir.cager(&format!("{ENCODE} --unit m")).succeeds();
+    let change = Units::METRES.change_to(centimetres);
+    let pose: Vec<f32> = small.posed(7).points.iter().flat_map(|&p| change.apply(p)).map(|x| x as f32).collect();
+    let options = FrameOptions { units: centimetres, ..FrameOptions::default() };
+    let mut file = create_frames(dir.path("sit.usdc"), n, 1, &small.rest.faces, &options).expect("a pose");
+    file.write_frame(&pose).expect("a pose");
+    file.finish().expect("a pose");
+    dir.cager(&format!("{EXPLORE} --steps 3 -o metres.npy")).succeeds();
+    let metres = read_frames(&dir.path("metres.npy"), n);
+    let ends = |name: &str| -> (Units, Vec<f64>) {
+        let mut reader = open_frames(dir.path(name), n).expect("shapes");
+        let (units, mut frame) = (reader.units(), Vec::new());
+        for _ in 0..reader.frames() {
+            assert!(reader.read_next(&mut frame).expect("a shape"));
+        }
+        (units, frame)
+    };
+
+    let line = "explore sit.usdc out.cager@0 --steps 3 --overwrite";
+    for on in ["mesh", "cage --cage out.cager"] {
+        let said = dir.cager(&format!("{line} --on {on} -o shapes.usdc")).succeeds();
+        assert!(said.stderr.contains("out.cager@0: the pose is scaled by 100,"), "{}", said.stderr);
+        assert!(said.stderr.contains("those of sit.usdc"), "{}", said.stderr);
+        let (units, end) = ends("shapes.usdc");
+        assert_eq!(units, centimetres);
+        let long = |frame: &[f64]| cager_geometry::mesh::diagonal(frame.as_chunks::<3>().0);
+        assert!((long(&end) / long(&metres[0]) / 100.0 - 1.0).abs() < 0.05, "{on}");
+    }
+    dir.cager("explore out.cager@0 out.cager@7 -o container.usdc").succeeds();
+    assert_eq!(ends("container.usdc").0.metres_per_unit, Some(1.0));
+    dir.cager("explore sit.usdc sit.usdc -o same.usdc").succeeds();
+    assert_eq!(ends("same.usdc").0, centimetres);
+}
+
+#[test]
+fn poses_whose_points_come_in_another_order_are_refused() {
+    let (dir, small) = with_poses();
+    let n = small.rest.points.len();
+    let pose = small.posed(7);
+    let shuffled: Vec<Point> = (0..n).map(|k| pose.points[(k * 7919 + 13) % n]).collect();
+    dir.model("shuffled.obj", &Model { points: shuffled, ..pose });
+    for first in ["stand.obj", "out.cager@3"] {
+        let words = ["shuffled.obj", first, "points come in another order", "times longer", "export both"];
+        refused(&dir, &format!("explore {first} shuffled.obj -o out.npy"), &words);
     }
 }
 

@@ -20,6 +20,14 @@ fn only_overwritten(dir: &Dir, line: &str, file: &str) -> Vec<u8> {
 }
 
 #[test]
+fn a_container_is_not_written_under_the_name_of_another_format() {
+    let (dir, _) = Dir::with_encoded();
+    for name in ["walk.pc2", "walk.glb", "walk.obj"] {
+        refused(&dir, &format!("{ENCODE_NEW} -o {name}"), &[name, "walk.cager", "cager decode"]);
+    }
+}
+
+#[test]
 fn no_output_is_replaced_without_overwrite() {
     let (dir, _) = Dir::with_encoded();
     dir.cager("decode out.cager --cages -o cages.npy").succeeds();

@@ -191,6 +191,65 @@ fn templates_that_are_turned_or_of_another_size_are_refused_and_brought_to_the_f
 }
 
 #[test]
+fn surfaces_of_quite_another_size_or_place_are_refused_and_lost_where_forced() {
+    let (dir, dance) = (Dir::new(), Dance::of(3));
+    dir.model("rest.obj", &dance.rest);
+    let write = |change: &dyn Fn(Point) -> Point| {
+        for frame in 0..3 {
+            let seen = dance.seen(frame, 4000);
+            let points = seen.points.iter().map(|&p| change(p)).collect();
+            dir.write(&format!("scan_{frame}.ply"), ply(&Observation { points, ..seen }, true));
+        }
+    };
+    let times = |scale: f64| move |p: Point| p.map(|x| scale * x);
+    for (scale, words) in [(1000.0, "about 1000 times as large"), (0.01, "about 100 times smaller")] {
+        write(&times(scale));
+        refused(&dir, RECOVER, &["scan_0.ply", words, "--scale auto"]);
+        refused(&dir, &format!("{RECOVER} --align auto"), &["scan_0.ply", "times", "the template", "--scale auto"]);
+    }
+    let said = dir.cager(&format!("{RECOVER} --scale auto")).succeeds();
+    assert!(said.stdout.contains("scaled by 0.0") && said.stdout.contains(" 0 lost"), "{}", said.stdout);
+    write(&|p| add(p, [20.0, 0.0, 0.0]));
+    let line = format!("{RECOVER} --overwrite");
+    refused(&dir, &line, &["scan_0.ply", "away from the template", "times its diagonal", "--align auto"]);
+    let said = dir.cager(&format!("{line} --align auto")).succeeds();
+    assert!(said.stdout.contains(" 0 lost"), "{}", said.stdout);
+    let said = dir.cager(&format!("{line} --force")).succeeds();
+    assert!(
+        said.stdout.contains(" 3 lost") && said.stderr.contains("frames: 0, 1, 2"),
+        "{}{}",
+        said.stdout,
+        said.stderr
+    );
+}
+
+#[test]
+fn points_far_from_all_others_are_left_out_and_told() {
+    let (dir, dance) = (Dir::new(), Dance::of(3));
+    dir.model("rest.obj", &dance.rest);
+    let write = |strays: bool| {
+        for frame in 0..3 {
+            let mut seen = dance.seen(frame, 4000);
+            if strays && frame != 1 {
+                seen.points.push([1e6; 3]);
+                seen.normals.push([0.0, 0.0, 1.0]);
+            }
+            dir.write(&format!("scan_{frame}.ply"), ply(&seen, true));
+        }
+    };
+    write(false);
+    assert_eq!(dir.cager(RECOVER).succeeds().stderr, "");
+    let without = dir.read("out.cager");
+    write(true);
+    let said = dir.cager(&format!("{RECOVER} --overwrite --report report.json")).succeeds();
+    assert!(said.stderr.contains("were left out, 2 together, in frames: 0, 2\n"), "{}", said.stderr);
+    assert!(dir.read("out.cager") == without, "strays change what is found");
+    let report = dir.json("report.json");
+    assert!(report["from_surface"].as_f64().expect("a distance") < 0.002);
+    assert_eq!((&report["frames"][0]["strays"], &report["frames"][1]["strays"]), (&1.into(), &0.into()));
+}
+
+#[test]
 fn frames_without_a_surface_are_refused_by_name_and_passed_over_by_force() {
     let (dir, dance) = (Dir::new(), Dance::new());
     dir.model("rest.obj", &dance.rest);
@@ -220,9 +279,14 @@ fn frames_without_a_surface_are_refused_by_name_and_passed_over_by_force() {
         dir.write("scan_2.ply", ply(&cloud, true));
         refused(&dir, RECOVER, &["scan_2.ply", word]);
     }
-    dir.write("scan_2.ply", ply(&line, false));
-    let said = dir.cager(&format!("{RECOVER} --force")).succeeds();
-    assert!(said.stderr.contains("stays as it was, in frames: 2\n"), "{}", said.stderr);
+    let nan = ply(&dance.seen(2, 100), true).replacen("\n0.", "\nnan ", 1).replacen("\n-0.", "\nnan ", 1);
+    dir.write("scan_2.ply", "");
+    refused(&dir, RECOVER, &["scan_2.ply", "empty", "--force"]);
+    for text in [ply(&line, false), nan, String::new()] {
+        dir.write("scan_2.ply", text);
+        let said = dir.cager(&format!("{RECOVER} --force --overwrite")).succeeds();
+        assert!(said.stderr.contains("stays as it was, in frames: 2\n"), "{}", said.stderr);
+    }
     let names: Vec<String> = dir.names("");
     assert_eq!(names, ["out.cager", "rest.obj", "scan_0.ply", "scan_1.ply", "scan_2.ply", "scan_3.ply"]);
 }

@@ -18,12 +18,14 @@ pub struct Edited {
     pub frames: usize,
     /// Frames whose cage is another than in the container it came from, or has no counterpart there.
     pub changed: usize,
+    /// Whether the container had corrections of points beside the cages, which are left out.
+    pub loses_detail: bool,
     /// The container, complete but for its name.
     pub container: AtomicFile,
 }
 
 /// Writes the container at `input` again with edited cages. Unchanged frames keep their errors; those of changed frames are not measured,
-/// since the capture is not available.
+/// since the capture is not available. Where no frame is changed, the container is copied.
 ///
 /// # Errors
 /// Damage; edited cages that cannot be read; an output that refuses.
@@ -35,6 +37,9 @@ pub fn edit(
     progress: &mut dyn FnMut(usize),
 ) -> Result<Edited, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
+    if container.has_residual() && is_same(&mut container, &mut edited, input)? {
+        return copied(input, output, edited.frames());
+    }
     let refused = |cause: container::Error| written(output.path(), cause);
     let (mut rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
     rest.colors = container.colors().map_err(fail)?;
@@ -71,7 +76,31 @@ pub fn edit(
     let buffered = writer.finish(Some(&report)).map_err(refused)?;
     let mut container = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
     container.complete()?;
-    Ok(Edited { frames, changed, container })
+    Ok(Edited { frames, changed, loses_detail: loses, container })
+}
+
+/// Whether all cages are those of the container.
+fn is_same(container: &mut Container, edited: &mut EditedCages, input: &Path) -> Result<bool, DecodeError> {
+    if edited.frames() != container.frames() {
+        return Ok(false);
+    }
+    let (mut old, mut new) = (Vec::new(), Vec::new());
+    for frame in 0..edited.frames() {
+        edited.read_frame(frame, &mut new)?;
+        container.read_frame(frame, &mut old).map_err(|cause| DecodeError::container(input, cause))?;
+        if old != new {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+fn copied(input: &Path, output: &Target, frames: usize) -> Result<Edited, DecodeError> {
+    let read = |cause| cager_formats::Error::Io { path: input.to_owned(), action: Action::Read, cause };
+    let mut file = AtomicFile::create(output)?;
+    std::io::copy(&mut std::fs::File::open(input).map_err(read)?, &mut file).map_err(read)?;
+    file.complete()?;
+    Ok(Edited { frames, changed: 0, loses_detail: false, container: file })
 }
 
 /// The parts of the summary that are still valid.

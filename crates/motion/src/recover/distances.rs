@@ -3,6 +3,7 @@
 use super::surfaces::Followed;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::Surface;
+use cager_registration::NearestPoints;
 
 /// Distances between a template and an observed surface, as shares of the diagonal.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
@@ -30,6 +31,24 @@ impl Distances {
             largest: distances.last()? / diagonal,
         })
     }
+}
+
+/// A template that lies farther from the observed points than this share of the diagonal, as they do from it, is nowhere near.
+const NOWHERE_NEAR: f64 = 0.2;
+
+/// Whether most points of both, the template's and the observed ones, have none of the other's near.
+pub(super) fn is_elsewhere(samples: &[Point], seen: &Followed, from_surface: Option<Distances>, diagonal: f64) -> bool {
+    // What this measures is seldom far, and looked at more closely only then.
+    if from_surface.is_none_or(|distances| distances.mean < NOWHERE_NEAR) {
+        return false;
+    }
+    let observed: Vec<Point> = seen.target.points().iter().map(glam::DVec3::to_array).collect();
+    let is_far = |points: &[Point], others: &[Point]| {
+        let tree = NearestPoints::new(others.iter().copied());
+        let far = points.iter().filter(|&&p| tree.nearest(p).1 > (NOWHERE_NEAR * diagonal).powi(2));
+        2 * far.count() > points.len()
+    };
+    is_far(samples, &observed) && is_far(&observed, samples)
 }
 
 /// Observed points that are measured to the template, at the most.

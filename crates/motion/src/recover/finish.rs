@@ -2,7 +2,7 @@
 
 use super::RecoverError;
 use super::colors::Painter;
-use super::distances::distances;
+use super::distances::{distances, is_elsewhere};
 use super::positions::RecoveredFrames;
 use super::report::{FrameReport, How};
 use super::source::SurfaceSource;
@@ -65,8 +65,12 @@ impl<'a> Finisher<'a> {
         let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
         let points: Vec<Point> = self.samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
         let distances = seen.map_or((None, None), |seen| distances(&mesh, &points, seen, self.diagonal));
+        let how = match seen {
+            Some(seen) if is_elsewhere(&points, seen, distances.1, self.diagonal) => how.lost(),
+            _ => how,
+        };
         let named = (self.written.number(frame), self.source.file(frame));
-        Ok(FrameReport::new(named, how, distances, seen.map(|seen| seen.notes)))
+        Ok(FrameReport::new(named, how, distances, seen.map(|seen| (seen.notes, seen.strays))))
     }
 
     /// All frames, ready to be read.

@@ -11,6 +11,8 @@ mod placement;
 mod positions;
 mod report;
 mod source;
+mod spread;
+mod start;
 mod surfaces;
 
 pub use distances::Distances;
@@ -23,6 +25,7 @@ pub use placement::{Placement, placed_units};
 pub use positions::RecoveredFrames;
 pub use report::{FrameReport, RecoveryReport};
 pub use source::{Arrival, SurfaceSource};
+pub use start::as_large;
 pub use surfaces::observed;
 
 use any_subject::Recovering;
@@ -37,6 +40,7 @@ use cager_recover::people::ModelError;
 use cager_registration::{ObservationError, RegistrationError, outward};
 use finish::{Finisher, Written};
 use report::Seconds;
+use start::Placing;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfaces::Surfaces;
@@ -53,6 +57,9 @@ pub enum RecoverError {
     /// A stored file cannot be read.
     #[error("{0}")]
     Stored(String),
+    /// A file is no mesh and no cloud, is empty, or has coordinates that are none.
+    #[error("{0}; or go on without such frames with --force")]
+    Unusable(cager_formats::Error),
     /// A file holds no surface that can be followed.
     #[error("{}: frame {frame}: {cause}; or go on without such frames with --force", .path.display())]
     Surface {
@@ -95,12 +102,30 @@ pub enum RecoverError {
         degrees: f64,
     },
     /// The template has another size.
-    #[error("{}: this first surface is {scale:.3} times as large as the template; add --scale auto, or --force to go on as it is", .path.display())]
+    #[error("{}: this first surface is {} the template; add --scale auto, or --force to go on as it is", .path.display(), as_large(*.scale))]
     OtherSize {
         /// The file of the first surface.
         path: PathBuf,
         /// How much larger it is.
         scale: f64,
+    },
+    /// The template of a person, which is not scaled, has quite another size.
+    #[error("{}: this first surface is {} the template; scale one of them, or add --force to go on as it is", .path.display(), as_large(*.scale))]
+    OtherPerson {
+        /// The file of the first surface.
+        path: PathBuf,
+        /// How much larger it is.
+        scale: f64,
+    },
+    /// The template is not where the first surface is.
+    #[error("{}: this first surface lies {distance:.3} away from the template, {diagonals:.1} times its diagonal; add --align auto, or --force to go on as it is", .path.display())]
+    Elsewhere {
+        /// The file of the first surface.
+        path: PathBuf,
+        /// From middle to middle, in the frames' unit.
+        distance: f64,
+        /// The same in diagonals of the template.
+        diagonals: f64,
     },
 }
 
@@ -220,6 +245,10 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
     let mut cage = cage.mesh().clone();
     let placement = surfaces.on_pool(|| Placement::find(&mut template, &mut cage, &seen.observation, &options))?;
     surfaces.diagonal = diagonal(&template);
+    let placing = Placing { align: options.align, scale: options.scale, is_person: person.is_some() };
+    if !force {
+        surfaces.on_pool(|| placing.check(&template, (&source.file(first), &seen.observation)))?;
+    }
     let cage = Cage::new(cage)?;
     let mut rest = TriMesh::from(&template);
     rest.triangles = outward(&rest.vertices, &rest.triangles);

@@ -83,7 +83,7 @@ fn turned([x, y, z]: Point, up: Up) -> Point {
 }
 
 /// A template as a surface.
-fn seen(template: &Model) -> Option<Observation> {
+pub(super) fn seen(template: &Model) -> Option<Observation> {
     let mesh = TriMesh::from(template);
     Observation::of_mesh(&mesh.vertices, &mesh.triangles, &ObservationOptions::default()).ok().map(|(seen, _)| seen)
 }

@@ -27,7 +27,7 @@ pub struct RecoveryReport {
     pub lost: Vec<f64>,
     /// The number of the frame from which on the template lies worse all at once and to the end: the topology seems to have changed for good.
     pub changed_from: Option<f64>,
-    /// From the template to the surfaces, on average over the frames that are not lost.
+    /// From the template to the surfaces, on average over the frames that are not lost, or over all where all are.
     pub to_surface: Option<f64>,
     /// And back.
     pub from_surface: Option<f64>,
@@ -59,6 +59,8 @@ pub struct FrameReport {
     pub turned: bool,
     /// Whether normals were estimated from the points.
     pub estimated_normals: bool,
+    /// Points alone and far from all others, which were left out.
+    pub strays: usize,
 }
 
 /// Seconds of each part.
@@ -82,6 +84,11 @@ pub(super) struct How {
 impl How {
     /// There was nothing to follow.
     pub(super) const NO_SURFACE: Self = Self { outcome: "no_surface", score: f64::INFINITY };
+
+    /// The same where the template lies nowhere near.
+    pub(super) fn lost(self) -> Self {
+        Self { outcome: "lost", ..self }
+    }
 
     /// A frame of the first pass with this cage and these joints.
     pub(super) fn first_look<'a>(self, frame: usize, cage: &'a [Point], joints: &'a [Point]) -> RecoverProgress<'a> {
@@ -120,8 +127,9 @@ impl FrameReport {
         (number, file): (f64, PathBuf),
         how: How,
         (to_surface, from_surface): (Option<Distances>, Option<Distances>),
-        notes: Option<ObservationNotes>,
+        seen: Option<(ObservationNotes, usize)>,
     ) -> Self {
+        let (notes, strays) = seen.unwrap_or_default();
         Self {
             number,
             file,
@@ -129,8 +137,9 @@ impl FrameReport {
             score: how.score(),
             to_surface,
             from_surface,
-            turned: notes.is_some_and(|notes| notes.turned),
-            estimated_normals: notes.is_some_and(|notes| notes.estimated_normals),
+            turned: notes.turned,
+            estimated_normals: notes.estimated_normals,
+            strays,
         }
     }
 }
@@ -143,10 +152,11 @@ impl RecoveryReport {
         frames: Vec<FrameReport>,
         seconds: Seconds,
     ) -> Self {
+        let all_lost = frames.iter().all(|frame| frame.outcome == "lost");
         let mean = |of: fn(&FrameReport) -> Option<Distances>| {
             let found: Vec<f64> = frames
                 .iter()
-                .filter(|frame| frame.outcome != "lost")
+                .filter(|frame| all_lost || frame.outcome != "lost")
                 .filter_map(of)
                 .map(|distances| distances.mean)
                 .collect();
@@ -193,6 +203,9 @@ impl RecoveryReport {
         tell(&of(|frame| frame.outcome == "no_surface"), "no surface, so the template stays as it was, in frames");
         tell(&of(|frame| frame.turned), "the surface faced inwards, and was turned, in frames");
         tell(&of(|frame| frame.estimated_normals), "there are no normals, so they were estimated, in frames");
+        let strays: usize = self.frames.iter().map(|frame| frame.strays).sum();
+        let what = format!("points alone and far from all others were left out, {strays} together, in frames");
+        tell(&of(|frame| frame.strays > 0), &what);
         warnings.extend(self.changed_from.map(|number| format!(
             "the template lies worse from frame {number} to the end: where the topology changed for good there, go on with another template (--template {number}:OTHER)"
         )));

@@ -2,6 +2,7 @@
 
 use super::RecoverError;
 use super::source::{Arrival, SurfaceSource};
+use super::spread::leave_out_strays;
 use cager_capture::origin::move_to;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::spatial::Surface;
@@ -30,6 +31,8 @@ pub(super) struct Surfaces<'a> {
 pub(super) struct Seen {
     pub(super) observation: Observation,
     pub(super) notes: ObservationNotes,
+    /// Points that were left out.
+    pub(super) strays: usize,
     /// Its triangles, to measure distances to; none of a cloud.
     pub(super) surface: Option<Surface>,
     pub(super) colored: Option<Colored>,
@@ -52,6 +55,7 @@ impl Colored {
 pub(super) struct Followed {
     pub(super) target: Target,
     pub(super) notes: ObservationNotes,
+    pub(super) strays: usize,
     pub(super) surface: Option<Surface>,
     pub(super) colored: Option<Colored>,
 }
@@ -73,6 +77,22 @@ pub fn observed(
     }
 }
 
+/// Tells files whose contents are no surface from those that cannot be read.
+fn unusable(error: RecoverError) -> RecoverError {
+    use cager_formats::Error::{Damaged, Invalid, NonFinite};
+    match error {
+        RecoverError::Formats(cause @ (Damaged { .. } | Invalid { .. } | NonFinite { .. })) => {
+            RecoverError::Unusable(cause)
+        }
+        other => other,
+    }
+}
+
+/// Whether a frame may be passed over.
+fn holds_no_surface(error: &RecoverError) -> bool {
+    matches!(error, RecoverError::Surface { .. } | RecoverError::Unusable(_))
+}
+
 impl Surfaces<'_> {
     /// Does work on the threads that are for it.
     pub(super) fn on_pool<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
@@ -84,23 +104,24 @@ impl Surfaces<'_> {
 
     /// Reads a frame.
     fn read(&self, frame: usize) -> Result<Seen, RecoverError> {
-        let mut model = self.source.read(frame)?;
+        let mut model = self.source.read(frame).map_err(unusable)?;
         move_to(self.origin, &mut model.points);
+        let strays = if model.faces.is_empty() { leave_out_strays(&mut model) } else { 0 };
         let found = observed(&model, frame, self.points);
         let path = || self.source.file(frame);
         let (observation, notes) = found.map_err(|cause| RecoverError::Surface { path: path(), frame, cause })?;
         let surface = (!model.faces.is_empty()).then(|| Surface::from(&TriMesh::from(&model)));
         let colored = self.colors.then(|| Colored::of(&model)).flatten();
-        Ok(Seen { observation, notes, surface, colored })
+        Ok(Seen { observation, notes, strays, surface, colored })
     }
 
     /// Reads a frame for a template; nothing of one that has no surface, where that is allowed.
     fn follow(&self, frame: usize) -> Result<Option<Followed>, RecoverError> {
         match self.read(frame) {
-            Ok(Seen { observation, notes, surface, colored }) => {
-                Ok(Some(Followed { target: Target::new(&observation, self.diagonal), notes, surface, colored }))
+            Ok(Seen { observation, notes, strays, surface, colored }) => {
+                Ok(Some(Followed { target: Target::new(&observation, self.diagonal), notes, strays, surface, colored }))
             }
-            Err(RecoverError::Surface { .. }) if self.force => Ok(None),
+            Err(error) if self.force && holds_no_surface(&error) => Ok(None),
             Err(error) => Err(error),
         }
     }
@@ -116,7 +137,7 @@ impl Surfaces<'_> {
             }
             match self.on_pool(|| self.read(frame)) {
                 Ok(seen) => return Ok((frame, seen)),
-                Err(error) if !self.force || !matches!(error, RecoverError::Surface { .. }) => return Err(error),
+                Err(error) if !self.force || !holds_no_surface(&error) => return Err(error),
                 Err(error) => {
                     first_error.get_or_insert(error);
                 }

@@ -10,6 +10,7 @@ use cager_explore::placement::{Placement, lowest};
 use cager_formats::FrameReader;
 use cager_geometry::mesh::{Point, TriMesh};
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::time::Instant;
 
@@ -54,13 +55,33 @@ pub fn transfer(mut job: TransferJob<'_>, progress: &dyn Fn(usize)) -> Result<Tr
     let moved = clock.elapsed().as_secs_f64();
 
     let clock = Instant::now();
-    let (mut report, warnings) = mover.report(job.target.points.len(), count);
+    let (mut report, mut warnings) = mover.report(job.target.points.len(), count);
     let quality = MotionQuality::new(&TriMesh::from(job.target), &job.source.points);
     report.quality = measured(quality, &mut frames, source)?;
     frames.rewind()?;
+    warnings.extend(torn(&report.quality));
     let seconds = &mut report.seconds;
     (seconds.prepare, seconds.frames, seconds.measure) = (prepared, moved, clock.elapsed().as_secs_f64());
     Ok(Transferred { frames, report, warnings })
+}
+
+/// What is to be said of a model that hardly keeps its shape.
+fn torn(quality: &QualityReport) -> Option<String> {
+    /// Of the volume at rest, and of the area.
+    const VOLUMES: RangeInclusive<f64> = 0.2..=5.0;
+    const STRETCHED: f64 = 0.5;
+    let volume = quality.volume.filter(|found| found.iter().any(|volume| !VOLUMES.contains(volume)));
+    let stretched = quality.stretched.filter(|share| *share > STRETCHED);
+    let what = match (volume, stretched) {
+        (Some([least, most]), _) => format!("its volume is {least:.1} to {most:.1} times that at rest"),
+        (None, Some(share)) => {
+            format!("{:.0} % of its surface are twice as long as at rest or half as long", 100.0 * share)
+        }
+        (None, None) => return None,
+    };
+    Some(format!(
+        "the motion does not keep the model's shape ({what}): look at the result, and take mean value coordinates or another --method"
+    ))
 }
 
 /// What files of frames on their way are made of.
@@ -178,4 +199,18 @@ fn measured(
         quality.push(shape.as_chunks().0, pose.as_chunks().0);
     }
     Ok(quality.summary().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_that_loses_its_shape_is_told_of() {
+        let of = |volume, stretched| torn(&QualityReport { volume, stretched, ..QualityReport::default() });
+        assert_eq!(of(Some([0.8, 1.3]), Some(0.1)), None);
+        assert_eq!(of(None, None), None);
+        assert!(of(Some([-9.0, 1.0]), None).is_some_and(|said| said.contains("volume is -9.0 to 1.0 times")));
+        assert!(of(None, Some(0.8)).is_some_and(|said| said.contains("80 % of its surface")));
+    }
 }

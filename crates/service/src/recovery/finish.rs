@@ -10,7 +10,7 @@ use cager_capture::coding::Goal;
 use cager_capture::encode::Encoded;
 use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{Error, Target, Units};
-use cager_motion::recover::{Encoding, JOINTS_RATE, RecoverError, Recovered};
+use cager_motion::recover::{Encoding, JOINTS_RATE, RecoverError, Recovered, as_large};
 use cager_proto::report::json_file;
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
@@ -76,7 +76,17 @@ pub(super) fn refused(error: &RecoverError) -> ApiError {
             path.display()
         ),
         RecoverError::OtherSize { path, scale } => format!(
-            "{}: this first surface is {scale:.3} times as large as the template; make the recovery anew with scale auto, or with force to go on as it is (--scale auto and --force on the command line)",
+            "{}: this first surface is {} the template; make the recovery anew with scale auto, or with force to go on as it is (--scale auto and --force on the command line)",
+            path.display(),
+            as_large(*scale)
+        ),
+        RecoverError::OtherPerson { path, scale } => format!(
+            "{}: this first surface is {} the template; scale one of them, or make the recovery anew with force to go on as it is (--force on the command line)",
+            path.display(),
+            as_large(*scale)
+        ),
+        RecoverError::Elsewhere { path, distance, diagonals } => format!(
+            "{}: this first surface lies {distance:.3} away from the template, {diagonals:.1} times its diagonal; make the recovery anew with align auto, or with force to go on as it is (--align auto and --force on the command line)",
             path.display()
         ),
         other => other.to_string(),
@@ -86,10 +96,13 @@ pub(super) fn refused(error: &RecoverError) -> ApiError {
             ApiError::internal(error)
         }
         RecoverError::Formats(_)
+        | RecoverError::Unusable(_)
         | RecoverError::Surface { .. }
         | RecoverError::NoSurface { .. }
         | RecoverError::Turned { .. }
-        | RecoverError::OtherSize { .. } => ApiError::new(problem::INVALID_FRAME, detail),
+        | RecoverError::OtherSize { .. }
+        | RecoverError::OtherPerson { .. }
+        | RecoverError::Elsewhere { .. } => ApiError::new(problem::INVALID_FRAME, detail),
         _ => ApiError::new(problem::INVALID_GEOMETRY, detail),
     }
 }
