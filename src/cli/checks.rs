@@ -160,7 +160,7 @@ pub(super) fn check_capture(
         Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
         Mismatch::Axes(_) => "export both with the same axes".to_owned(),
         Mismatch::Units(_) if turns => {
-            "say those of the files that do not say them with --unit and --up, or scale one of them".to_owned()
+            "give --unit and --up for files that do not say theirs, or scale one of them".to_owned()
         }
         Mismatch::Units(_) => "scale one of them".to_owned(),
     };

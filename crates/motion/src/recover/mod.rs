@@ -57,7 +57,7 @@ pub enum RecoverError {
     /// A stored file cannot be read.
     #[error("{0}")]
     Stored(String),
-    /// A file is no mesh and no cloud, is empty, or has coordinates that are none.
+    /// A file that holds neither a mesh nor a cloud, is empty, or has coordinates that are NaN or infinite.
     #[error("{0}; or go on without such frames with --force")]
     Unusable(cager_formats::Error),
     /// A file holds no surface that can be followed.

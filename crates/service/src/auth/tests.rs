@@ -157,14 +157,18 @@ async fn a_file_that_is_being_rewritten_revokes_nothing() {
     let stop = CancellationToken::new();
     let watching = tokio::spawn(access.clone().watch(stop.clone()));
     let granted = access.authenticate(&bearer(SECOND)).unwrap();
+    let (mut last, mut longest) = (Instant::now(), Duration::ZERO);
     for _ in 0..30 {
         // Emptied, half of it, and whole.
         for part in ["", text.split_at(text.len() / 2).0, &text] {
             fs::write(&path, part).unwrap();
             tokio::time::sleep(Duration::from_millis(30)).await;
+            longest = longest.max(last.elapsed());
+            last = Instant::now();
         }
     }
-    assert!(!granted.revoked.is_cancelled());
+    // On a busy machine the file may have stood still for that long.
+    assert!(!granted.revoked.is_cancelled() || longest > SETTLED_FOR / 2);
     stop.cancel();
     watching.await.unwrap();
 }

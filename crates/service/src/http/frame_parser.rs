@@ -185,7 +185,7 @@ impl FrameReader {
 /// The number of a frame.
 ///
 /// # Errors
-/// There is none so high.
+/// It is beyond [`LAST_FRAME`].
 fn numbered(frame: u64) -> Result<u32, ApiError> {
     u32::try_from(frame).ok().filter(|frame| *frame <= LAST_FRAME).ok_or_else(|| {
         let detail = format!("the frame numbers pass {LAST_FRAME}, the highest there is");

@@ -61,7 +61,7 @@ impl Components {
         if wanted.max_error.is_some() {
             let mut errors = Errors::new(1.min(most), most, frames.count);
             for rows in frames.row_blocks() {
-                let shapes = directions.shapes(frames, &mean, rows.clone());
+                let shapes = directions.shapes(frames, &mean, rows.clone(), most);
                 errors.add(&frames.rows(rows, &mean), &shapes, directions.weights.as_ref());
             }
             targets = errors.deviations(frames.length / 3, diagonal).find(holds).map_or(most, |found| found.targets);
@@ -124,7 +124,6 @@ impl Directions {
         diagonal: f64,
         rounding: &impl Fn(&Stored) -> [f64; 3],
     ) -> Components {
-        let first = |rows: Range<usize>| self.shapes(frames, mean, rows).subcols(0, targets).to_owned();
         let mut weights = self.weights.subcols(0, targets).to_owned();
         let smallest: Vec<f64> =
             weights.col_iter().map(|weights| weights.iter().copied().fold(f64::INFINITY, f64::min)).collect();
@@ -137,7 +136,7 @@ impl Directions {
             .collect();
         let (mut base, mut largest) = (mean.to_vec(), vec![0.0_f64; targets]);
         for rows in frames.row_blocks() {
-            let shapes = first(rows.clone());
+            let shapes = self.shapes(frames, mean, rows.clone(), targets);
             for (k, largest) in largest.iter_mut().enumerate() {
                 let shape = shapes.col_as_slice(k);
                 *largest = shape.iter().fold(*largest, |largest, x| largest.max(x.abs()));
@@ -160,7 +159,7 @@ impl Directions {
         decoded.iter_mut().enumerate().for_each(|(k, x)| *x += rounding[k % 3]);
         let mut errors = Errors::new(targets, targets, frames.count);
         for rows in frames.row_blocks() {
-            let mut shapes = first(rows.clone());
+            let mut shapes = self.shapes(frames, mean, rows.clone(), targets);
             for (k, scale) in scales.iter().enumerate() {
                 let shape = shapes.col_as_slice_mut(k);
                 shape.iter_mut().for_each(|x| *x *= scale);
@@ -173,13 +172,13 @@ impl Directions {
         Components { weights: all.collect(), stored, deviation }
     }
 
-    /// Some rows of the shapes.
-    fn shapes(&self, frames: &Frames<'_>, base: &[f64], rows: Range<usize>) -> Mat<f64> {
+    /// Some rows of the first `count` shapes.
+    fn shapes(&self, frames: &Frames<'_>, base: &[f64], rows: Range<usize>, count: usize) -> Mat<f64> {
         if let Some(shapes) = &self.shapes {
-            return shapes.subrows(rows.start, rows.len()).to_owned();
+            return shapes.submatrix(rows.start, 0, rows.len(), count).to_owned();
         }
-        let mut out = Mat::zeros(rows.len(), self.weights.ncols());
-        multiply(out.as_mut(), frames.rows(rows, base).as_ref(), self.weights.as_ref());
+        let mut out = Mat::zeros(rows.len(), count);
+        multiply(out.as_mut(), frames.rows(rows, base).as_ref(), self.weights.subcols(0, count));
         out
     }
 }
