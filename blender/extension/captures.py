@@ -2,9 +2,10 @@
 
 import os
 
-import bpy
 import cager
 import numpy as np
+
+from . import paths
 
 _opened = {}
 
@@ -13,9 +14,10 @@ class Opened:
     """A capture with what is asked of it in every frame. Positions are relative to `offset`, as Blender has single precision alone."""
 
     def __init__(self, path):
-        self.path = path
         self.capture = cager.open(path)
         self.rest_cage = self.capture.rest_cage
+        report = self.capture.report
+        self.has_details, self.is_free = bool(report.get("coding")), report.get("coordinates") == "green-free"
         self.stored = np.asarray(self.capture.cages)
         is_far = self.stored.dtype == np.float64
         self.offset = self.rest_cage.mean(axis=0).astype(np.float32).astype(float) if is_far else np.zeros(3)
@@ -27,37 +29,59 @@ class Opened:
     def __len__(self):
         return len(self.capture)
 
-    def positions(self, frame):
-        """The model in a frame, (n, 3)."""
-        return self._relative(self.capture[frame])
+    def positions(self, frame, part=0):
+        """The model in a frame, (n, 3), or a part of the way to the next."""
+        return self._relative(between(self.capture, frame, part))
 
-    def edited(self, frame, points):
-        """The cage of a frame with vertices that were moved, (m, 3); None where none was."""
-        moved = np.abs(points - self.cages[frame]).max(axis=1) > self.tolerance
+    def edited(self, points, frame, part=0):
+        """The cage of a frame with vertices that were moved, (m, 3); None where none was. Raises CagerError."""
+        moved = self.differs(points, between(self.cages, frame, part))
         if not moved.any():
             return None
-        cage = np.array(self.stored[frame], float)
+        if self.is_free:
+            raise cager.CagerError(
+                "this capture has green-free coordinates, whose cage cannot be edited: undo what was edited, click on the model, choose Encode selected, and edit the capture that this makes"
+            )
+        cage = np.array(between(self.stored, frame, part), float)
         cage[moved] = points[moved] + self.offset
         return cage
+
+    def differs(self, points, others):
+        """Which vertices of two cages are in other places, (m,)."""
+        return np.abs(points - others).max(axis=1) > self.tolerance
 
     def posed(self, cage):
         """The model in an edited cage, (n, 3)."""
         return self._relative(self.capture.pose(cage))
 
+    def details(self, frame):
+        """What the cage of a frame leaves over, (n, 3)."""
+        return self.positions(frame) - self.posed(self.stored[frame])
+
     def _relative(self, positions):
         return positions if positions.dtype == np.float32 else (positions - self.offset).astype(np.float32)
 
 
+def between(frames, frame, part):
+    """What is a part of the way from a frame to the next."""
+    return (1 - part) * frames[frame] + part * frames[frame + 1] if part else frames[frame]
+
+
 def of_path(path):
-    """The capture of a file, opened once. Raises CagerError."""
-    path = os.path.realpath(bpy.path.abspath(path))
+    """The capture of a file, opened once, by its whole path. Raises CagerError."""
+    path = os.path.realpath(path)
     if path not in _opened:
         _opened[path] = Opened(path)
     return _opened[path]
 
 
 def of_model(model):
-    return of_path(model.cager.file)
+    """The capture that a model shows. Raises CagerError."""
+    path = paths.found(model)
+    opened = of_path(path)
+    if model.cager.found != path:
+        model.cager.found = path
+    return opened
 
 
 def forget(path=None):
@@ -65,12 +89,18 @@ def forget(path=None):
     if path is None:
         _opened.clear()
     else:
-        _opened.pop(os.path.realpath(bpy.path.abspath(path)), None)
+        _opened.pop(os.path.realpath(path), None)
 
 
 def models(scene):
-    """Objects of a scene that show a capture."""
-    return [thing for thing in scene.objects if thing.type == "MESH" and thing.cager.file]
+    """Objects that show a capture: those of a scene, and of the collections that it has instances of."""
+    things, instanced = list(scene.objects), set()
+    for thing in things:
+        collection = thing.instance_collection if thing.instance_type == "COLLECTION" else None
+        if collection and collection not in instanced:
+            instanced.add(collection)
+            things += collection.all_objects
+    return [thing for thing in dict.fromkeys(things) if thing.type == "MESH" and thing.cager.file]
 
 
 def model_of(thing):
@@ -83,6 +113,7 @@ def model_of(thing):
     return next((each for each in children if each.cager.file and thing in (each.parent, each.cager.cage)), None)
 
 
-def frame_of(model, scene_frame):
-    """The frame of the capture in a frame of the scene; the first before it begins, and the last after its end."""
-    return min(max(scene_frame - model.cager.first, 0), len(of_model(model)) - 1)
+def place_of(model, time):
+    """The frame of the capture at a time, and the part of the way to the next; the first before it begins, the last after its end."""
+    place = min(max(time - model.cager.first, 0), len(of_model(model)) - 1)
+    return int(place), place - int(place)

@@ -1,5 +1,6 @@
 """Edits a cage in a frame, saves edited cages, and exports what is seen for other programs."""
 
+import math
 import os
 
 import bpy
@@ -7,9 +8,10 @@ import cager
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from . import captures
+from . import captures, paths, times
 from .edits import edited_capture, leave_edit_mode, spans
-from .objects import key_name
+from .keys import key_name
+from .reading import Refused
 
 FORMATS = (
     ("usdc", "USD (.usdc)", "Universal Scene Description, for Houdini, Maya, Unreal and Omniverse"),
@@ -35,13 +37,22 @@ class OfModel:
         model = captures.model_of(context.object)
         try:
             return (model, *edited_capture(context, model))
-        except (cager.CagerError, OSError) as error:
+        except (cager.CagerError, OSError, Refused) as error:
             self.report({"ERROR"}, str(error))
             return None
 
+    def refused_as_linked(self, context):
+        """Reports that the capture is of a library, which Blender does not change."""
+        library = paths.library_of_edits(captures.model_of(context.object))
+        if library:
+            self.report(
+                {"ERROR"},
+                f"The capture is linked from {os.path.basename(library.filepath)}: to edit its cage, append it instead, or choose Object > Relations > Make Local > All.",
+            )
+        return library is not None
+
     def warn_of_details(self, model, frames):
-        coding = captures.of_model(model).capture.report.get("coding")
-        if frames and coding:
+        if frames and captures.of_model(model).has_details:
             self.report(
                 {"WARNING"},
                 "Details that the cage does not follow are left out, as they belong to the cages before they were edited. To keep them, encode with Keep: Motion of the cage",
@@ -56,15 +67,19 @@ class EditFrame(OfModel, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
+        if self.refused_as_linked(context):
+            return {"CANCELLED"}
         model = captures.model_of(context.object)
         cage = model.cager.cage
         keys = cage and cage.data.shape_keys
-        frame = context.scene.frame_current
+        frame = math.floor(times.now(context.scene))
         place = keys.key_blocks.find(key_name(frame)) if keys else -1
         if place < 0:
             self.report({"ERROR"}, f"There is no cage for frame {frame}: go to a frame of the capture, and import it with its cage.")
             return {"CANCELLED"}
         leave_edit_mode(context)
+        if frame != times.now(context.scene):
+            times.go_to(context.scene, frame)
         for each in context.selected_objects:
             each.select_set(False)
         cage.select_set(True)
@@ -81,10 +96,11 @@ class SaveEdits(OfModel, bpy.types.Operator, ExportHelper):
     bl_label = "Save edited cages"
 
     filename_ext = ".cager"
+    filepath: paths.file_property("File", "The .cager file to write")
     filter_glob: StringProperty(default="*.cager", options={"HIDDEN"})
 
     def execute(self, context):
-        found = self.edited(context)
+        found = None if self.refused_as_linked(context) else self.edited(context)
         if found is None:
             return {"CANCELLED"}
         model, capture, frames = found
@@ -93,14 +109,15 @@ class SaveEdits(OfModel, bpy.types.Operator, ExportHelper):
             return {"CANCELLED"}
         self.warn_of_details(model, frames)
         try:
-            capture.save(self.filepath, overwrite=True)
+            path = paths.chosen(self.filepath)
+            capture.save(path, overwrite=True)
         except (cager.CagerError, OSError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        captures.forget(self.filepath)
-        model.cager.file = self.filepath
-        context.scene.frame_set(context.scene.frame_current)
-        self.report({"INFO"}, f"{os.path.basename(self.filepath)}: edited in frames {spans(frames)}")
+        captures.forget(path)
+        model.cager.file = paths.kept(path)
+        times.again(context.scene)
+        self.report({"INFO"}, f"{os.path.basename(path)}: edited in frames {spans(frames)}")
         return {"FINISHED"}
 
 
@@ -111,6 +128,7 @@ class Export(OfModel, bpy.types.Operator, ExportHelper):
     bl_label = "Export CageR capture"
 
     filename_ext = ""
+    filepath: paths.file_property("File", "The file to write, with the ending of the format")
     check_extension = None
     format: EnumProperty(name="Format", items=FORMATS)
     with_cage: BoolProperty(name="With cage", description="Keep the cage in USD as a second mesh, a guide that is not rendered")
@@ -126,8 +144,8 @@ class Export(OfModel, bpy.types.Operator, ExportHelper):
             return {"CANCELLED"}
         model, capture, frames = found
         self.warn_of_details(model, frames)
-        path = with_ending(self.filepath, self.format)
         try:
+            path = paths.chosen(with_ending(self.filepath, self.format))
             losses = capture.export(path, overwrite=True, with_cage=self.with_cage and self.format in ("usdc", "usdz"))
         except (cager.CagerError, OSError) as error:
             self.report({"ERROR"}, str(error))

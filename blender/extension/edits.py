@@ -3,7 +3,8 @@
 import bpy
 import numpy as np
 
-from . import captures, live
+from . import captures, live, times
+from .reading import Refused, switched_on
 
 
 def leave_edit_mode(context):
@@ -13,23 +14,23 @@ def leave_edit_mode(context):
 
 
 def edited_capture(context, model):
-    """The capture as it is seen in the scene, and the scene's frames that were edited. Raises CagerError."""
+    """The capture as it is seen in the scene, and the scene's frames that were edited. Raises CagerError and Refused."""
     leave_edit_mode(context)
     opened, scene = captures.of_model(model), context.scene
     if model.cager.cage is None:
         return opened.capture, []
-    cages, frames, before = np.array(opened.stored), [], scene.frame_current
-    try:
-        with live.paused():
+    cages, frames = np.array(opened.stored), []
+    with times.kept(scene):
+        with live.paused(model), switched_on(context, [model, model.cager.cage]):
             for k in range(len(opened)):
-                scene.frame_set(model.cager.first + k)
+                times.go_to(scene, model.cager.first + k)
+                if not any(each.visible_get() for each in (model, model.cager.cage)):
+                    raise Refused(f"{model.name} is hidden in frame {scene.frame_current}: take off the animation that hides it.")
                 points = live.cage_of(model, context.evaluated_depsgraph_get())
-                cage = None if points is None else opened.edited(k, points)
+                cage = None if points is None else opened.edited(points, k)
                 if cage is not None:
                     cages[k] = cage
                     frames.append(model.cager.first + k)
-    finally:
-        scene.frame_set(before)
     return opened.capture.with_cages(cages) if frames else opened.capture, frames
 
 

@@ -7,7 +7,8 @@ import cager
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from . import captures, import_operators
+from . import captures, import_operators, paths
+from .edits import leave_edit_mode
 from .encoding import Encoding
 from .reading import Refused
 
@@ -23,6 +24,7 @@ class EncodeSelected(bpy.types.Operator, ExportHelper):
     bl_label = "Encode selected"
 
     filename_ext = ".cager"
+    filepath: paths.file_property("File", "The .cager file to write")
     filter_glob: StringProperty(default="*.cager", options={"HIDDEN"})
 
     @classmethod
@@ -33,8 +35,10 @@ class EncodeSelected(bpy.types.Operator, ExportHelper):
     def execute(self, context):
         global running, told
         try:
-            running = Encoding(context, context.object, self.filepath)
-        except Refused as error:
+            path = paths.chosen(self.filepath)
+            leave_edit_mode(context)
+            running = Encoding(context, context.object, path)
+        except (Refused, cager.CagerError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         told = ("", False)

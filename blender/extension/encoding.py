@@ -6,8 +6,8 @@ import time
 import cager
 import numpy as np
 
-from . import live
-from .reading import KINDS, Refused, closed_cage, seen
+from . import live, times
+from .reading import KINDS, Refused, closed_cage, seen, switched_on
 
 
 class Cancelled(Exception):
@@ -27,7 +27,7 @@ class Encoding:
             "frame_rate": self.scene.render.fps / self.scene.render.fps_base,
         }
         self.shows, self.name = chosen.show, thing.name
-        self.first, self.before = self.scene.frame_start, self.scene.frame_current
+        self.first = self.scene.frame_start
         self.total = self.scene.frame_end - self.first + 1
         self.stage, self.fraction = "reading frames", 0.0
         self.capture = self.error = self.faces = self.cage_mesh = None
@@ -62,18 +62,31 @@ class Encoding:
 
     def _read(self, context, seconds):
         end = time.monotonic() + seconds
-        with live.paused():
+        if context.scene != self.scene:
+            raise Refused(f"Another scene was chosen while {self.name} was read: encode it again, and stay in its scene meanwhile.")
+        if self.thing.mode != "OBJECT":
+            raise Refused(f"{self.name} is edited while it is read: encode it again, and stay in Object Mode meanwhile.")
+        with times.kept(self.scene), switched_on(context, self._needed()):
             while len(self.frames) < self.total and not self._stopped.is_set():
                 self.scene.frame_set(self.first + len(self.frames))
                 self._read_frame(context.evaluated_depsgraph_get())
                 self.fraction = len(self.frames) / self.total
                 if time.monotonic() > end:
                     break
-            self.scene.frame_set(self.before)
+
+    def _needed(self):
+        """What is read next: the cage in the first frame alone."""
+        return [self.thing] if self.frames or not self.cage else [self.thing, self.cage]
 
     def _read_frame(self, depsgraph):
-        points, faces = seen(self.thing, depsgraph, with_faces=not self.frames)
         frame = self.first + len(self.frames)
+        for each in self._needed():
+            if not each.visible_get():
+                raise Refused(f"{each.name} is hidden in frame {frame}: show it in the viewport, or take off the animation that hides it.")
+        problem = live.problems.get(self.thing.name_full)
+        if problem:
+            raise Refused(f"{self.name} does not play: {problem}")
+        points, faces = seen(self.thing, depsgraph, with_faces=not self.frames)
         if not self.frames:
             if not len(points):
                 raise Refused(f"{self.name} has no vertices in frame {frame}: click on the mesh that is seen.")

@@ -5,7 +5,7 @@ import cager
 from bpy.props import BoolProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from . import captures, objects
+from . import captures, objects, paths, times
 
 
 class ImportCapture(bpy.types.Operator, ImportHelper):
@@ -16,8 +16,15 @@ class ImportCapture(bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER", "UNDO"}
 
     filename_ext = ".cager"
+    filepath: paths.file_property("File", "The .cager file to add")
     filter_glob: StringProperty(default="*.cager", options={"HIDDEN"})
-    first: IntProperty(name="First frame", default=1, description="Frame of the scene that shows the capture's first")
+    first: IntProperty(
+        name="First frame",
+        default=1,
+        min=-times.LAST_FRAME,
+        max=times.LAST_FRAME,
+        description="Frame of the scene that shows the capture's first",
+    )
     y_is_up: BoolProperty(name="Y is up", description="Turn a capture of a program whose upward axis is Y, such as Maya")
     with_cage: BoolProperty(name="Cage", default=True, description="Add the cage, with a shape key for each frame to edit")
     set_range: BoolProperty(
@@ -50,7 +57,7 @@ def imported(context, path, first, y_is_up=False, with_cage=True, set_range=True
             scene.render.fps_base = scene.render.fps / capture.frame_rate
     # The model is written while frames are rendered.
     scene.render.use_lock_interface = True
-    scene.frame_set(scene.frame_current)
+    times.again(scene)
     return model
 
 

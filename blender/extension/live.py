@@ -7,29 +7,29 @@ import cager
 import numpy as np
 from bpy.app.handlers import persistent
 
-from . import captures
+from . import captures, keys, paths, times
 from .reading import cage_seen
 
-# By the name of the model: what cannot be shown and why, and the frame and cage that were shown last.
+# By the whole name of the model: what cannot be shown and why, and the place and cage that were shown last.
 problems, _last = {}, {}
-_is_paused = False
+_paused = None
 
 
 @contextmanager
-def paused():
-    """Leaves models as they are while frames are gone through."""
-    global _is_paused
-    before, _is_paused = _is_paused, True
+def paused(model):
+    """Leaves a model as it is while frames are gone through. Its cage and other captures go on, which its cage may hang on."""
+    global _paused
+    _paused = model
     try:
         yield
     finally:
-        _is_paused = before
+        _paused = None
 
 
 def cage_of(model, depsgraph):
     """The cage of a model as it is seen; None without one. Raises CagerError where it has other vertices than the capture's."""
     cage = model.cager.cage
-    if cage is None or cage.name not in depsgraph.scene.objects:
+    if cage is None or not cage.evaluated_get(depsgraph).is_evaluated:
         return None
     points, count = cage_seen(model, cage, depsgraph), captures.of_model(model).cages.shape[1]
     if len(points) != count:
@@ -40,23 +40,36 @@ def cage_of(model, depsgraph):
 
 
 def show(model, scene, depsgraph, only_if_new=False):
-    """Shows a model in the scene's frame, in its cage where that was edited."""
+    """Shows a model at the scene's time, in its cage where that was edited."""
+    name = model.name_full
     try:
-        opened, frame = captures.of_model(model), captures.frame_of(model, scene.frame_current)
+        opened, place = captures.of_model(model), captures.place_of(model, times.now(scene))
         points = cage_of(model, depsgraph)
-        last = _last.get(model.name)
-        if only_if_new and last and last[0] == frame and np.array_equal(last[1], points):
+        last = _last.get(name)
+        if only_if_new and last and last[0] == place and np.array_equal(last[1], points):
             return
-        edited = None if points is None else opened.edited(frame, points)
-        write(model.data, opened.positions(frame) if edited is None else opened.posed(edited))
-        _last[model.name] = frame, points
-        problems.pop(model.name, None)
+        edited = None if points is None else opened.edited(points, *place)
+        write(model.data, opened.positions(*place) if edited is None else opened.posed(edited) + details(model, opened, points, *place))
+        _last[name] = place, points
+        problems.pop(name, None)
     except (cager.CagerError, OSError) as error:
         # It is opened again as soon as it can be.
-        captures.forget(model.cager.file)
-        if problems.get(model.name) != str(error):
-            print(f"CageR: {model.name}: {error}")
-        problems[model.name] = str(error)
+        captures.forget(paths.found(model))
+        if problems.get(name) != str(error):
+            print(f"CageR: {name}: {error}")
+        problems[name] = str(error)
+
+
+def details(model, opened, points, frame, part):
+    """What an edited cage does not follow: fades between a frame that has its details and one whose key was edited, else none."""
+    if not (part and opened.has_details and model.cager.cage.data.shape_keys):
+        return 0
+    first, blocks = model.cager.first, model.cager.cage.data.shape_keys.key_blocks
+    cages = {k: keys.points_of(blocks, first + k) for k in (frame, frame + 1)}
+    if any(cage is None for cage in cages.values()) or opened.differs(points, captures.between(cages, frame, part)).any():
+        return 0
+    weights = {frame: np.float32(1 - part), frame + 1: np.float32(part)}
+    return sum(weights[k] * opened.details(k) for k in weights if opened.edited(cages[k], k) is None)
 
 
 def write(mesh, positions):
@@ -64,15 +77,37 @@ def write(mesh, positions):
         raise cager.CagerError(
             f"{mesh.name} has {len(mesh.vertices)} vertices where the capture has {len(positions)}: import the capture again"
         )
-    mesh.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(positions, np.float32).ravel())
+    places = mesh.attributes["position"].data
+    if mesh.library:
+        # Blender writes meshes of libraries one by one alone.
+        for place, position in zip(places, positions.tolist()):
+            place.vector = position
+    else:
+        places.foreach_set("vector", np.ascontiguousarray(positions, np.float32).ravel())
     mesh.update()
 
 
-def show_all(scene, depsgraph=None):
-    if _is_paused:
-        return
+def pose_cages(scene):
+    """Lets the cages of a scene follow its time."""
     for model in captures.models(scene):
-        show(model, scene, depsgraph or bpy.context.evaluated_depsgraph_get())
+        cage = model.cager.cage
+        if cage and cage.data.shape_keys:
+            try:
+                keys.weigh(cage.data.shape_keys.key_blocks, model.cager.first, *captures.place_of(model, times.now(scene)))
+            except (cager.CagerError, OSError):
+                # Why, is told as the model is shown.
+                pass
+
+
+def show_all(scene, depsgraph=None):
+    for model in captures.models(scene):
+        if model != _paused:
+            show(model, scene, depsgraph or bpy.context.evaluated_depsgraph_get())
+
+
+@persistent
+def before_frame(scene, _=None):
+    pose_cages(scene)
 
 
 @persistent
@@ -82,12 +117,10 @@ def on_frame(scene, depsgraph=None):
 
 @persistent
 def on_edit(scene, depsgraph):
-    if _is_paused:
-        return
     changed = {update.id.original for update in depsgraph.updates if update.is_updated_geometry or update.is_updated_transform}
     for model in captures.models(scene) if changed else ():
         cage = model.cager.cage
-        if cage and {cage, cage.data, cage.data.shape_keys} & changed:
+        if cage and model != _paused and {cage, cage.data, cage.data.shape_keys} & changed:
             show(model, scene, depsgraph, only_if_new=True)
 
 
@@ -95,6 +128,7 @@ def on_edit(scene, depsgraph):
 def on_undo(*_):
     _last.clear()
     if bpy.context.scene:
+        pose_cages(bpy.context.scene)
         show_all(bpy.context.scene)
 
 
@@ -106,6 +140,7 @@ def on_load(*_):
 
 
 HANDLERS = (
+    ("frame_change_pre", before_frame),
     ("frame_change_post", on_frame),
     ("depsgraph_update_post", on_edit),
     ("load_post", on_load),

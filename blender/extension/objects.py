@@ -4,14 +4,22 @@ import math
 import os
 
 import bpy
+import cager
 
-from . import captures
+from . import captures, keys, paths
+from .times import LAST_FRAME
 
 
 def add(context, path, first, y_is_up=False, with_cage=True):
     """Adds a capture to the scene; returns its model. Raises CagerError."""
-    opened = captures.of_path(path)
-    name = os.path.splitext(os.path.basename(path))[0]
+    whole = paths.chosen(path)
+    opened = captures.of_path(whole)
+    capture, last = opened.capture, first + len(opened) - 1
+    if last > LAST_FRAME:
+        raise cager.CagerError(f"{path}: would end in frame {last}, and Blender's last is {LAST_FRAME}: choose an earlier first frame")
+    # A damaged file is found here, before anything is added.
+    rest, faces, cage_faces = capture.rest, capture.faces, capture.cage_faces
+    name = os.path.splitext(os.path.basename(whole))[0]
     root = bpy.data.objects.new(name, None)
     root.empty_display_size = 0.1
     root.location = opened.offset
@@ -19,21 +27,21 @@ def add(context, path, first, y_is_up=False, with_cage=True):
         root.rotation_euler.x = math.pi / 2
         root.location = [opened.offset[0], -opened.offset[2], opened.offset[1]]
     context.collection.objects.link(root)
-    model = child(context, root, name + " model", opened.capture.rest - opened.offset, opened.capture.faces)
+    model = child(context, root, name + " model", rest - opened.offset, faces)
     model.data.shade_smooth()
     # Its place is that of the empty: moved by itself, it would leave its cage.
     model.lock_location = model.lock_rotation = model.lock_scale = (True, True, True)
     if with_cage:
-        cage = child(context, root, name + " cage", opened.rest_cage - opened.offset, opened.capture.cage_faces)
+        cage = child(context, root, name + " cage", opened.rest_cage - opened.offset, cage_faces)
         cage.display_type = "WIRE"
         cage.hide_render = True
-        key_frames(cage, opened.cages, first)
+        keys.add(cage, opened.cages, first)
         model.cager.cage = cage
         # Blender does not evaluate what is hidden, unless what is seen depends on it. Unbound, the modifier does nothing else.
         model.modifiers.new("Follows its cage", "MESH_DEFORM").object = cage
     model.cager.first = first
     # From now on it is shown.
-    model.cager.file = path
+    model.cager.file = paths.kept(path)
     return model
 
 
@@ -44,20 +52,3 @@ def child(context, root, name, points, faces):
     thing.parent = root
     context.collection.objects.link(thing)
     return thing
-
-
-def key_frames(cage, cages, first):
-    """A shape key for each frame, at its full value there and at none in the frames beside it."""
-    cage.shape_key_add(name="rest", from_mix=False)
-    for k, points in enumerate(cages):
-        key = cage.shape_key_add(name=key_name(first + k), from_mix=False)
-        key.data.foreach_set("co", points.ravel())
-        for step, value in ((-1, 0), (1, 0), (0, 1)):
-            # The first holds before the capture begins, and the last after its end.
-            if 0 <= k + step < len(cages):
-                key.value = value
-                key.keyframe_insert("value", frame=first + k + step)
-
-
-def key_name(scene_frame):
-    return f"frame {scene_frame}"

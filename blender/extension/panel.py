@@ -5,7 +5,7 @@ import textwrap
 
 import bpy
 
-from . import captures, encode_operators, live
+from . import captures, encode_operators, live, paths
 
 
 class CagerPanel:
@@ -30,9 +30,13 @@ class CapturePanel(CagerPanel, bpy.types.Panel):
         column.label(text=os.path.basename(link.file), icon="MESH_DATA")
         column.prop(link, "file", text="")
         column.prop(link, "cage")
-        problem = live.problems.get(model.name)
+        problem = live.problems.get(model.name_full)
         if problem:
             lines(layout.box(), problem, icon="ERROR")
+            return
+        if paths.library_of_edits(model):
+            lines(layout.box(), "Linked: it plays here. To edit its cage, append it, or choose Object > Relations > Make Local > All.", icon="LINKED")
+            layout.operator("cager.export", text="Export", icon="EXPORT")
             return
         column = layout.column(align=True)
         column.operator("cager.edit_frame", icon="EDITMODE_HLT")

@@ -1,5 +1,7 @@
 """Reads what Blender shows: positions of evaluated meshes, their faces, and cages as they are seen."""
 
+from contextlib import contextmanager
+
 import bmesh
 import numpy as np
 
@@ -32,12 +34,42 @@ def faces(mesh):
     return np.array(each) if same and len(each[0]) in (3, 4) else [face.tolist() for face in each]
 
 
+def turned(faces):
+    return faces[:, ::-1] if isinstance(faces, np.ndarray) else [face[::-1] for face in faces]
+
+
+@contextmanager
+def switched_on(context, things):
+    """Objects as if none was hidden, as Blender does not go on with what is."""
+    layer, everything = context.view_layer, context.scene.collection.objects
+    hidden = [thing for thing in things if not thing.visible_get(view_layer=layer)]
+    before = [(thing, thing.hide_viewport, thing.hide_get(view_layer=layer), thing in everything.values()) for thing in hidden]
+    try:
+        for thing, _, _, is_there in before:
+            # What is in the scene's own collection is in none that is switched off.
+            if not is_there:
+                everything.link(thing)
+            thing.hide_viewport = False
+            thing.hide_set(False, view_layer=layer)
+        yield
+    finally:
+        for thing, is_off, is_hidden, is_there in before:
+            if not is_there:
+                everything.unlink(thing)
+            thing.hide_viewport = is_off
+            if is_hidden:
+                thing.hide_set(True, view_layer=layer)
+
+
 def seen(thing, depsgraph, with_faces=False):
     """Positions of an object in the world, modifiers applied, and its faces."""
     shown = thing.evaluated_get(depsgraph)
     mesh = shown.to_mesh()
     try:
-        return placed(coordinates(mesh), shown.matrix_world), faces(mesh) if with_faces else None
+        points = placed(coordinates(mesh), shown.matrix_world)
+        # What is mirrored has its faces the other way round.
+        is_mirrored = shown.matrix_world.determinant() < 0
+        return points, (turned(faces(mesh)) if is_mirrored else faces(mesh)) if with_faces else None
     finally:
         shown.to_mesh_clear()
 

@@ -3,6 +3,8 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
+from . import paths, times
+
 
 def is_mesh(_, thing):
     return thing.type == "MESH"
@@ -11,8 +13,15 @@ def is_mesh(_, thing):
 class CagerLink(bpy.types.PropertyGroup):
     """The capture that an object shows; none where it has no file."""
 
-    file: StringProperty(name="File", subtype="FILE_PATH", description="The .cager file that this object shows")
-    first: IntProperty(name="First frame", default=1, description="Frame of the scene that shows the capture's first")
+    file: paths.file_property("File", "The .cager file that this object shows")
+    found: StringProperty(options={"HIDDEN"}, description="The whole path of the file where it was last")
+    first: IntProperty(
+        name="First frame",
+        default=1,
+        min=-times.LAST_FRAME,
+        max=times.LAST_FRAME,
+        description="Frame of the scene that shows the capture's first",
+    )
     cage: PointerProperty(name="Cage", type=bpy.types.Object, poll=is_mesh, description="The object that is edited")
 
 

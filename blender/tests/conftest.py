@@ -94,3 +94,18 @@ def seen(thing):
     points = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", points)
     return points.reshape(-1, 3)
+
+
+def add(name, points, faces):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([tuple(map(float, point)) for point in points], [], faces)
+    thing = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def world(scene, thing, frame):
+    """Positions of an object in the world in a frame."""
+    scene.frame_set(frame)
+    matrix = np.array(thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    return seen(thing) @ matrix[:3, :3].T + matrix[:3, 3]

@@ -175,6 +175,34 @@ def test_what_does_not_fit_the_capture_is_said(scene, small, model, tmp_path):
     assert not bpy.ops.cager.export.poll()
 
 
+def test_a_cage_that_cannot_be_edited_is_said_in_blenders_words(scene, tmp_path):
+    path = str(tmp_path / "free.cager")
+    encoded(path, coordinates="green-free")
+    bpy.ops.cager.import_capture(filepath=path)
+    model = bpy.context.object
+    move(model, 2, [5], Vector((0.3, 0, 0)))
+    assert "choose Encode selected" in part("live").problems[model.name]
+    for run in (bpy.ops.cager.save_edits, lambda filepath: bpy.ops.cager.export(filepath=filepath, format="npy")):
+        with pytest.raises(RuntimeError, match="green-free .* choose Encode selected") as refused:
+            run(filepath=str(tmp_path / "edited.cager"))
+        assert "--" not in str(refused.value)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert os.listdir(tmp_path) == ["free.cager"]
+
+
+def test_a_hidden_capture_is_exported_as_it_is(scene, small, model, tmp_path):
+    for each in (model, model.cager.cage):
+        each.hide_viewport = True
+    scene.frame_set(4)
+    assert bpy.ops.cager.export(filepath=str(tmp_path / "out.npy"), format="npy") == {"FINISHED"}
+    assert np.array_equal(np.load(tmp_path / "out.npy"), small.capture.decode())
+    assert model.hide_viewport and model.cager.cage.hide_viewport
+    for each in (model, model.cager.cage):
+        each.keyframe_insert("hide_viewport", frame=1)
+    with pytest.raises(RuntimeError, match="small model is hidden in frame 1: take off the animation"):
+        bpy.ops.cager.export(filepath=str(tmp_path / "out.npy"), format="npy")
+
+
 def test_lost_details_are_warned_of(scene, tmp_path, capfd):
     path = str(tmp_path / "coded.cager")
     encoded(path, max_error=1e-4)

@@ -7,7 +7,7 @@ import cager
 import numpy as np
 import pytest
 
-from conftest import part, seen, tube
+from conftest import add, part, seen, tube, world
 
 
 def animated(scene, name="Tube"):
@@ -27,20 +27,6 @@ def animated(scene, name="Tube"):
     cage.modifiers.new("apart", "EDGE_SPLIT").split_angle = 0.1
     bpy.context.view_layer.objects.active = thing
     return thing, cage
-
-
-def add(name, points, faces):
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata([tuple(map(float, point)) for point in points], [], faces)
-    thing = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
-
-
-def world(scene, thing, frame):
-    scene.frame_set(frame)
-    matrix = np.array(thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-    return seen(thing) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def test_the_selected_object_becomes_a_capture_that_is_shown(scene, tmp_path):
