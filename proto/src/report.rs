@@ -87,11 +87,12 @@ pub struct Report {
     pub rank: usize,
     /// Singular values of the inverted matrix, descending; NaN, in JSON `null`, where they were not computed. Of 1,024 unknowns or more, of
     /// which few are regularised, only the first and the last are; containers then have none of them.
-    #[serde(deserialize_with = "numbers_or_null")]
+    #[serde(deserialize_with = "numbers_or_null", skip_serializing_if = "Vec::is_empty")]
     pub singular_values: Vec<f64>,
     /// How the handles of maximum volume were found.
     pub maxvol: Volume,
     /// Rows read, in their order: those of maximum volume first. Where every point is read, only those.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub handle_indices: Vec<u32>,
     /// Errors of what a decoder of the written file gets back.
     pub error: Errors,

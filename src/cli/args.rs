@@ -266,7 +266,7 @@ pub(crate) struct InspectArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Print JSON with the keys of the encode report, without its times.
+    /// Print JSON with the keys of the encode report that the file keeps.
     #[arg(long)]
     pub(crate) json: bool,
 }

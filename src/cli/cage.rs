@@ -73,6 +73,12 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         return tell_dry_run(output, "a cage", &[targets.report.clone(), targets.picture.clone()]);
     }
     let vertices = args.vertices.map_or(default_vertices(rest.points.len()), |n| n as usize);
+    // As with frames: more than the points can tell apart are of no use.
+    let vertices = if args.general.is_none() && vertices > rest.points.len() {
+        default_vertices(rest.points.len())
+    } else {
+        vertices
+    };
     let mut warnings = Vec::new();
     let (cage, report) = match (&args.frames, args.general) {
         (Some(frames), None) => designed(args, (rest, units), frames, &mut warnings)?,
@@ -197,11 +203,13 @@ fn summary(report: &CageReport, output: &Path) -> String {
         format!("{}: {} vertices, {} triangles\n", output.display(), grouped(report.vertices), grouped(report.faces));
     if let Some(design) = &report.design {
         let first = design.stages.first().map_or(design.held_back_error, |stage| stage.held_back_error);
+        let times = first / design.held_back_error;
+        // A search for the smallest cage may end with fewer vertices than the first one, and more error.
+        let better = if times >= 1.05 { format!(", {times:.1} times below the first cage's") } else { String::new() };
         text += &format!(
-            "  error   {:.4} % of the diagonal on frames not seen ({:.4} % on those seen), {:.1} times below the first cage's\n",
+            "  error   {:.4} % of the diagonal on frames not seen ({:.4} % on those seen){better}\n",
             100.0 * design.held_back_error,
             100.0 * design.designed_error,
-            first / design.held_back_error
         );
     }
     let tidy = match (report.points_outside, report.self_intersections) {

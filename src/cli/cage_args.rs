@@ -73,11 +73,11 @@ pub(crate) struct CageArgs {
     pub(crate) symmetry: Option<Up>,
 
     /// Seed of what a design draws at random: the same seed gives the same cage.
-    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    #[arg(long, value_name = "SEED", default_value_t = 0, requires = "frames")]
     pub(crate) seed: u64,
 
     /// End a design with the best cage so far after so many seconds.
-    #[arg(long, value_name = "S", value_parser = names::seconds)]
+    #[arg(long, value_name = "S", value_parser = names::seconds, requires = "frames")]
     pub(crate) time_limit: Option<Duration>,
 
     /// Write a page for a browser, in which model and cage turn.

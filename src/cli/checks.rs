@@ -9,6 +9,7 @@ use cager_capture::encode::{EncodeError, sample_frames};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::mismatch::{self, Mismatch, cage_mismatch, mismatches};
 use cager_capture::timing::Timing;
+use cager_formats::RATES;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
 use cager_geometry::units::Up;
 use clap::Args;
@@ -82,8 +83,8 @@ pub(super) fn up(text: &str) -> Result<Up, String> {
 }
 
 fn rate(text: &str) -> Result<f64, String> {
-    let found = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
-    found.ok_or_else(|| "give a positive number of frames per second".to_owned())
+    let found = text.parse().ok().filter(|rate: &f64| RATES.contains(rate));
+    found.ok_or_else(|| "give a number of frames per second from 0.001 to 1,000,000".to_owned())
 }
 
 fn frame_number(text: &str) -> Result<f64, String> {

@@ -141,11 +141,11 @@ impl FromStr for TargetSize {
     }
 }
 
-/// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked. A mean error is what a cage meets that is designed for it.
+/// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked. A mean error is met by coding, or by a cage that is designed for it.
 pub(super) fn goal(
     coding: &CodingArgs,
     units: Units,
-    has_cage: bool,
+    codes_mean: bool,
     rest: &Model,
     frames: usize,
 ) -> Result<Option<Goal>> {
@@ -175,7 +175,7 @@ pub(super) fn goal(
         (.., Some(Quality::Standard)) => Some(Goal::Standard),
         (.., Some(Quality::Master)) => Some(Goal::MASTER),
         _ => match coding.mean_error {
-            Some(error) if has_cage => {
+            Some(error) if codes_mean => {
                 if !(error > 0.0 && error < 1.0) {
                     bail!(
                         "--mean-error: is {error}; give a fraction of the rest pose's diagonal above 0, such as 0.001"

@@ -26,6 +26,13 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let inputs = [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()];
     let output = Outputs::new(args.outputs, inputs.into_iter().flatten())?.frames(&args.output)?;
     let container = if args.salvage { decode::open_cut(&args.input) } else { decode::open(&args.input) }?;
+    if container.lacks_end() {
+        let lost = match container.frames().checked_sub(1) {
+            Some(last) => format!("frames after frame {last} are lost, if it had any"),
+            None => "no frame is left of it".to_owned(),
+        };
+        warn(&[format!("{}: was cut, or is damaged: {lost}; get the file again", args.input.display())]);
+    }
     let edited = transfer.with_cages.as_ref().map(|path| EditedCages::open(path, &container)).transpose()?;
     let model = transfer.model.as_ref().map(|path| read_like(path, container.header().units)).transpose()?;
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);

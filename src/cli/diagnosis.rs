@@ -99,6 +99,9 @@ fn check_cage(args: &CageArgs, targets: &Targets, rest: &Model, path: &Path) -> 
     print(&verdict(path, &found, unfit.as_ref()))?;
     match unfit {
         _ if !found.usable() => bail!("{}: cannot be encoded with; try --repair", path.display()),
+        Some(_) if mesh.vertices.len() > rest.points.len() => {
+            bail!("{}: has more vertices than the rest pose has points; take a coarser cage", path.display())
+        }
         Some(_) => {
             bail!("{}: does not fit the rest pose; take the cage of this model, in its units and axes", path.display())
         }

@@ -9,7 +9,7 @@ use super::encode_shared::{
     Targets, checked_options, design_options, finish, name_file, name_files, sized_design, solver_options,
 };
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
-use super::{design, encode_remote, grouped, human_bytes, progress, read_with_units, warn};
+use super::{design, encode_remote, grouped, human_bytes, progress, read_with_units, tell, warn};
 use anyhow::{Context, Result};
 use cager_capture::coding::Goal;
 use cager_capture::design::{read_frames, report as design_report};
@@ -59,8 +59,9 @@ pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
             matrix(&args.solver)?;
             spectrum_bound(&args.solver)?;
             let clock_design = Instant::now();
-            let (cage, report) = designed(args, &files, &rest)?;
-            let design = Some((report, clock_design.elapsed().as_secs_f64()));
+            let (cage, mut design) = designed(args, &files, &rest)?;
+            design.seconds = clock_design.elapsed().as_secs_f64();
+            let design = Some(design);
             encode_locally(args, &targets, &files, &rest, &cage, design, clock)
         }
         (Some(address), cage) => encode_remote::run(args, &targets, address, &files, &rest, cage.as_ref(), clock),
@@ -109,15 +110,27 @@ fn dry_run(
     tell_dry_run(&targets.output, &what, std::slice::from_ref(&targets.report))
 }
 
+/// How a cage was designed.
+struct Designed {
+    report: DesignReport,
+    seconds: f64,
+    /// Whether the mean error that was asked for is not met.
+    missed: bool,
+}
+
 /// A cage from the capture itself.
-fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, DesignReport)> {
+fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, Designed)> {
     let options = sized_design(args, files, rest)?;
     let frames = read_frames(files).map_err(|error| name_files(error, args))?;
     let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
     warn(&design.warnings);
-    let report = design_report(&design, &options, frames.len());
+    if design.missed {
+        tell("what the cage leaves is coded beside it, so that the mean error holds\n")?;
+    }
+    let designed =
+        Designed { report: design_report(&design, &options, frames.len()), seconds: 0.0, missed: design.missed };
     let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
-    Ok((cage, report))
+    Ok((cage, designed))
 }
 
 fn encode_locally(
@@ -126,12 +139,13 @@ fn encode_locally(
     files: &CaptureFiles,
     rest: &Model,
     cage: &Cage,
-    design: Option<(DesignReport, f64)>,
+    design: Option<Designed>,
     clock: Instant,
 ) -> Result<()> {
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let mut frames = files.open()?;
-    let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
+    let codes_mean = design.as_ref().is_none_or(|design| design.missed);
+    let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage, codes_mean)?);
     let matrix = matrix(&args.solver)?;
     let choose = match (args.solver.spectrum, spectrum_bound(&args.solver)?) {
         (Some(SpectrumArg::Auto), bound) => {
@@ -147,7 +161,7 @@ fn encode_locally(
     };
     let report_file = targets.begin_report()?;
     // All that was done so far.
-    let design_seconds = design.as_ref().map_or(0.0, |(_, seconds)| *seconds);
+    let design_seconds = design.as_ref().map_or(0.0, |design| design.seconds);
     let read_seconds = clock.elapsed().as_secs_f64() - design_seconds;
 
     let bar = progress::PreparationBar::new("encoding", frames.frames())
@@ -163,7 +177,7 @@ fn encode_locally(
         matrix: matrix.as_ref(),
         choose,
         memory,
-        goal: goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, announced)?,
+        goal: goal(&args.coding, args.coding.units(), codes_mean, rest, announced)?,
         origin: files.origin,
         units,
         exact_rest: args.coding.exact_rest,
@@ -176,7 +190,7 @@ fn encode_locally(
     let mut encoded = result.map_err(|error| name_files(error, args))?;
     encoded.report.seconds.read += read_seconds;
     encoded.report.seconds.design = design_seconds;
-    encoded.report.design = design.map(|(report, _)| report);
+    encoded.report.design = design.map(|design| design.report);
     finish(targets, encoded, report_file, clock)
 }
 

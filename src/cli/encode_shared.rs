@@ -13,7 +13,7 @@ use cager_capture::encode::{self, Encoded, sample_frames};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::memory::{Memory, free_bytes};
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, Target, commit_together};
@@ -63,6 +63,8 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
             "--mean-error: is measured with mean value coordinates; give --cage-vertices, or leave --coordinates out"
         );
     }
+    // Its normals are unknowns too, two for each vertex.
+    let points = if args.solver.coordinates.name() == Green::Free.name() { points.div_ceil(3) } else { points };
     Ok(DesignOptions {
         goal: design::goal(args.design.cage_vertices, args.coding.mean_error, points)?,
         style: args.design.style.unwrap_or(if mean_value { Style::Free } else { Style::Editable }),
@@ -105,11 +107,11 @@ fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Resu
     Ok(best)
 }
 
-/// What the arguments say of the inversion, and what is usual for this rest pose and cage.
-pub(super) fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage) -> Result<SolverOptions> {
+/// What the arguments say of the inversion, and what is usual for this rest pose and cage, which a [mean error](goal) is coded with or not.
+pub(super) fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage, codes_mean: bool) -> Result<SolverOptions> {
     let unknowns = args.solver.coordinates.values(cage).unknowns();
     // The number of frames says how large a file may be, not whether it is coded.
-    let is_coded = goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, 1)?.is_some();
+    let is_coded = goal(&args.coding, args.coding.units(), codes_mean, rest, 1)?.is_some();
     Ok(inversion_choices(&args.solver, is_coded, unknowns)?.options(unknowns))
 }
 
@@ -120,7 +122,7 @@ pub(super) fn checked_options(
     cage: &Cage,
     matrix: Option<&SparseMatrix>,
 ) -> Result<SolverOptions> {
-    let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage)?);
+    let (system, options) = (args.solver.coordinates, solver_options(args, rest, cage, args.cage.is_some())?);
     let unknowns = system.values(cage).unknowns();
     let delta = matrix.map_or(Ok(()), |_| Regularizer::Matrix.delta(matrix, cage, unknowns).map(|_| ()));
     // A service knows its own memory.

@@ -10,7 +10,7 @@ use super::stretches::{Stretch, StretchList, cut, numbered};
 use super::{grouped, read_with_units, recover_remote, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::origin::{move_to, own_origin};
-use cager_formats::{AtomicFile, MeshSequence, Target, Units, commit_together, mesh_sequence};
+use cager_formats::{AtomicFile, MeshSequence, Target, Units, commit_together, mesh_sequence, missing_frames};
 use cager_geometry::mesh::{Model, Point};
 use cager_motion::recover::placed_units;
 use cager_proto::report::json_file;
@@ -169,6 +169,10 @@ fn frames(args: &RecoverArgs) -> Result<MeshSequence> {
     let no_frames: Vec<_> = args.template.iter().map(|key| &key.path).chain(&args.cage).cloned().collect();
     let mut files = mesh_sequence(&args.frames, &no_frames)?;
     warn(&files.notes);
+    if let Some(missing) = files.numbers.as_deref().and_then(missing_frames) {
+        let what = "what follows a gap is recovered as if it came next";
+        warn(&[format!("{}: missing frames: {missing}; {what}", args.frames.display())]);
+    }
     if let Some(start) = args.timing.start {
         files.numbers = Some((0..files.files.len()).map(|frame| start + frame as f64).collect());
     }

@@ -165,11 +165,16 @@ fn a_cage_in_other_units_or_of_more_vertices_than_points_does_not_fit() {
         ("--rest rest.obj --check large.obj", "check the units"),
         ("--rest box.obj --check cage.obj", "more than the 8 points"),
     ] {
+        let coarser = line.contains("box");
         let said = dir.cager(&format!("cage {line} --report check.json --overwrite")).run();
         assert_eq!(said.status, Some(1));
         assert!(said.stdout.contains("not usable for this rest pose") && said.stdout.contains(what), "{}", said.stdout);
+        assert_eq!(said.stderr.contains("take a coarser cage"), coarser, "{}", said.stderr);
         assert_eq!(dir.json("check.json")["usable"], false);
     }
+    // Nor is such a cage made.
+    dir.cager("cage --rest rest.obj --vertices 1400 -o fits.obj").succeeds();
+    assert!(read_cage(&dir, "fits.obj").points.len() <= small.rest.points.len());
     let repaired = dir.cager("cage --rest rest.obj --repair large.obj -o repaired.obj").succeeds().stdout;
     assert!(repaired.contains("not usable for this rest pose"), "{repaired}");
 }
@@ -257,4 +262,15 @@ fn the_smallest_cage_for_an_error_is_found() {
     let reached = dir.json("out.json")["error"]["l2_mean"].as_f64().expect("an error");
     assert!(reached < 0.0045, "{reached}");
     assert!(dir.json("small.json")["vertices"].as_u64().expect("a number") < 150);
+    // A large error takes a few vertices, fewer than can be merged of a cage that is close to the model.
+    let said = dir
+        .cager("cage --rest rest.obj --frames frames.npy --mean-error 0.1 -o tiny.obj --report tiny.json")
+        .succeeds();
+    assert!(dir.json("tiny.json")["vertices"].as_u64().expect("a number") <= 12, "{}", said.stdout);
+    // What no cage meets is coded.
+    let line = "encode --rest rest.obj --frames frames.npy --mean-error 1e-5 --time-limit 2 -o out.cager --overwrite --report out.json";
+    let said = dir.cager(line).succeeds();
+    assert!(said.stderr.contains("was not reached") && said.stdout.contains("coded beside it"), "{}", said.stderr);
+    let reached = dir.json("out.json")["error"]["l2_mean"].as_f64().expect("an error");
+    assert!(reached <= 1e-5, "{reached}");
 }

@@ -239,6 +239,12 @@ fn points_far_from_all_others_are_left_out_and_told() {
     };
     write(false);
     assert_eq!(dir.cager(RECOVER).succeeds().stderr, "");
+    // A frame that is missing among the names is told of.
+    std::fs::rename(dir.path("scan_2.ply"), dir.path("scan_3.ply")).expect("a file");
+    let said = dir.cager(&format!("{RECOVER} --overwrite")).succeeds().stderr;
+    assert!(said.contains("missing frames: 2;"), "{said}");
+    std::fs::rename(dir.path("scan_3.ply"), dir.path("scan_2.ply")).expect("a file");
+    dir.cager(&format!("{RECOVER} --overwrite")).succeeds();
     let without = dir.read("out.cager");
     write(true);
     let said = dir.cager(&format!("{RECOVER} --overwrite --report report.json")).succeeds();

@@ -286,6 +286,14 @@ impl<'a> Chosen<'a> {
             let mut at = wanted.iter();
             options.numbers.retain(|_| at.next().is_none_or(|frame| !damaged.contains(frame)));
             wanted.retain(|frame| !damaged.contains(frame));
+            if wanted.is_empty() {
+                let what = match damaged[..] {
+                    [] => "it ends before the first".to_owned(),
+                    [frame] => format!("frame {frame} is damaged"),
+                    [first, .., last] => format!("frames {first} to {last} are damaged"),
+                };
+                return Err(DecodeError::Lost { path: path.to_owned(), what });
+            }
         } else {
             // Decoding does not need it, but a damaged file is refused wherever the damage is.
             container.report().map_err(fail)?;

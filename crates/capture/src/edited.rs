@@ -86,7 +86,7 @@ impl EditedCages {
         self.change.apply_to(points);
         move_to(self.origin, points);
         out.extend(self.wide.iter().map(|&x| x as f32));
-        match out.iter().position(|x| !x.is_finite()) {
+        match out.iter().position(|x| x.is_nan() || x.abs() > FARTHEST) {
             Some(k) => Err(self.fail(format!(
                 "frame {frame}: vertex {} of the cage is too far away for single precision, in which cages are kept; move it closer",
                 k / 3
@@ -99,6 +99,9 @@ impl EditedCages {
         DecodeError::Edited { path: self.path.clone(), what }
     }
 }
+
+/// Coordinates of cages whose decoded positions are sure to be finite, at the most.
+const FARTHEST: f32 = 1e-4 * f32::MAX;
 
 /// Rewrites a point-count error in terms of the cage.
 fn named(error: Error, vertices: usize, points: u64) -> DecodeError {

@@ -27,8 +27,8 @@ pub use cager_geometry::units::{Units, Up};
 pub use error::{Action, Error};
 pub use frames::{
     CacheFormat, CageMesh, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence,
-    MorphOptions, create_frames, frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames, open_frames,
-    open_frames_bytes, open_frames_in, open_raw_frames, open_selected_frames,
+    MorphOptions, RATES, create_frames, frame_files, frame_numbers, frames_path, mesh_sequence, missing_frames,
+    open_frames, open_frames_bytes, open_frames_in, open_raw_frames, open_selected_frames,
 };
 pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};

@@ -85,6 +85,11 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(reader)
     }
 
+    /// Whether what follows the last frame is missing, as of a file that was cut: frames after it may have been there.
+    pub fn lacks_end(&self) -> bool {
+        self.entry(tag::ERRORS).is_err()
+    }
+
     /// Whether a frame can be read, with its residual where `residual` asks for it.
     pub fn is_intact(&mut self, frame: usize, residual: bool) -> bool {
         let chunk = self.chunks.partition_point(|&k| self.entries[k].header.first as usize <= frame);

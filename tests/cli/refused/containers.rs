@@ -22,7 +22,8 @@ fn files_that_are_no_containers_are_refused() {
     for file in ["text.cager", "short.cager", "empty.cager", "zeros.cager", "folder.cager", "rest.obj"] {
         for line in [format!("inspect {file}"), format!("inspect --json {file}"), format!("decode {file} -o back.npy")]
         {
-            refused(&dir, &line, &[file, "is not a .cager file"]);
+            let what = if file == "folder.cager" { "is a folder" } else { "is not a .cager file" };
+            refused(&dir, &line, &[file, what]);
         }
     }
     for line in ["inspect newer.cager", "decode newer.cager -o back.npy"] {

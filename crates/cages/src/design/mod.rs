@@ -95,7 +95,8 @@ pub fn design(
     let obstacles = obstacles(rest, &defects.outside, options.style, symmetry);
     let valid = cage.mesh().clone();
     let best = Best { mesh: cage.mesh().clone(), evaluation: samples.evaluate(&cage) };
-    let run = Run { rest, samples: &samples, options, clock, watch, best, valid, defects, stages: Vec::new() };
+    let run =
+        Run { rest, samples: &samples, options, clock, watch, best, valid, defects, stages: Vec::new(), missed: false };
     Ok(run.optimise(cage, obstacles, frames))
 }
 

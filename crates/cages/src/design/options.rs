@@ -96,6 +96,8 @@ pub struct Design {
     pub stages: Vec<Stage>,
     /// Whether the time limit ended it.
     pub timed_out: bool,
+    /// Whether the error that was asked for is not met.
+    pub missed: bool,
     /// What a user should know.
     pub warnings: Vec<String>,
 }

@@ -63,6 +63,8 @@ pub(super) struct Run<'a> {
     /// Defects of the initial cage; later ones must not have more.
     pub(super) defects: Defects,
     pub(super) stages: Vec<Stage>,
+    /// Whether the error that was asked for is not met.
+    pub(super) missed: bool,
 }
 
 /// A sequence of steps with a target number of vertices.
@@ -109,7 +111,7 @@ impl Run<'_> {
         if let Ok(cage) = Cage::new(mesh.clone()) {
             self.stages.push(stage("the best", &cage, &evaluation, self.clock));
         }
-        Design { cage: mesh, stages: self.stages, timed_out, warnings }
+        Design { cage: mesh, stages: self.stages, timed_out, missed: self.missed, warnings }
     }
 
     fn descend(

@@ -1,14 +1,16 @@
 //! Search for the smallest cage within an error bound, by extrapolating how the error falls with the number of vertices.
 
 use super::descent::Descent;
-use super::options::MAX_VERTICES;
+use super::options::{MAX_VERTICES, Progress};
 use super::run::{Best, Phase, Run};
 use super::samples::{Evaluation, evenly};
+use crate::enclose::{EncloseOptions, enclose_watched};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{BATCH, Rows, Solver, SolverOptions};
 use std::ops::ControlFlow;
 
+const STAGE: &str = "searching the smallest cage";
 /// Vertices to begin with.
 const FIRST_VERTICES: usize = 100;
 /// Steps with each number of vertices.
@@ -46,7 +48,7 @@ impl Run<'_> {
             let fraction = [round as f64 / MAX_ROUNDS as f64, (round + 1) as f64 / MAX_ROUNDS as f64];
             // Results with another number of vertices do not count.
             self.best = Best { mesh: descent.cage.mesh().clone(), evaluation: Evaluation::worst() };
-            ended = self.phase(descent, &Phase { stage: "searching the smallest cage", steps: STEPS, goal, fraction });
+            ended = self.phase(descent, &Phase { stage: STAGE, steps: STEPS, goal, fraction });
             if !self.best.evaluation.validation_error.is_finite() {
                 let mesh = descent.cage.mesh();
                 let mesh = if self.validated(mesh).is_ok() { mesh.clone() } else { self.valid.clone() };
@@ -67,6 +69,17 @@ impl Run<'_> {
             if ended.is_break() || (found <= error && found >= MIN_SHARE_OF_GOAL * error) {
                 break;
             }
+            if count > goal && found <= error {
+                // No more vertices could be merged without leaving points outside; a cage that is made with fewer lies farther out.
+                let options = EncloseOptions { vertices: goal, ..EncloseOptions::default() };
+                let mut watch =
+                    || (self.watch)(Progress { stage: STAGE, fraction: fraction[1], error: Some(found), better: None });
+                match enclose_watched(self.rest, &options, &mut watch) {
+                    Ok(mesh) if mesh.vertices.len() < count => descent.go_back(&mesh, std::iter::empty()),
+                    _ => break,
+                }
+                continue;
+            }
             // The error falls about as the number of vertices rises.
             let aimed = (goal as f64 * (found / (AIM * error))).ceil() as usize;
             let next = aimed.clamp(goal / 2, goal * 2).clamp(4, most);
@@ -85,6 +98,7 @@ impl Run<'_> {
                     best.mesh.vertices.len()
                 ));
                 self.best = best;
+                self.missed = true;
             }
         }
         ended

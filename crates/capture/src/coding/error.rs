@@ -31,7 +31,11 @@ pub enum CodingError {
     #[error(
         "an error of {asked:.1e} of the diagonal is below what positions in single precision can hold here{}; {}",
         farthest.map(|far| far.to_string()).unwrap_or_default(),
-        if *least < 1.0 { format!("ask for at least {least:.1e}, or move the capture closer to the origin") } else { "check these frames, whose positions are very far from the origin".to_owned() }
+        match farthest {
+            _ if *least >= 1.0 => "check these frames, whose positions are very far from the origin".to_owned(),
+            Some(_) => format!("ask for at least {least:.1e}, or move the capture closer to the origin"),
+            None => format!("ask for at least {least:.1e}"),
+        }
     )]
     BelowPrecision {
         /// Asked for.
@@ -42,13 +46,11 @@ pub enum CodingError {
         farthest: Option<Farthest>,
     },
     /// Too little room.
-    #[error(
-        "{asked} bytes are too few for this capture and cage: the smallest possible file has about {least}; take a smaller cage, or allow more"
-    )]
+    #[error("{asked} bytes are too few for this capture and cage: allow at least {least}, or take a smaller cage")]
     TooSmall {
         /// Asked for.
         asked: u64,
-        /// About the smallest.
+        /// About the smallest that is met.
         least: u64,
     },
     /// Numbers that cannot be counted in steps.

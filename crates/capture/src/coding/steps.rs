@@ -227,14 +227,22 @@ impl GroupCoder {
             let bytes = group.bytes();
             Ok((group, bytes as f64 / share.max(1) as f64))
         })?;
-        if let Some(group) = found {
-            let (bytes, frames) =
-                (room.bytes.saturating_sub(group.bytes()), room.frames.saturating_sub(self.frames.len()));
-            self.carried.room = Some(Room { bytes, frames, other: room.other + group.bytes() });
-            return self.finish(group);
-        }
-        let coarsest = self.encode(self.frames.len(), 2.0 * self.diagonal, USUAL_RATIO)?.bytes();
-        Err(CodingError::TooSmall { asked, least: room.other + (coarsest as f64 / part).ceil() as u64 })
+        let found = match found {
+            Some(group) => group,
+            None => {
+                let steps = (2.0 * self.diagonal, USUAL_RATIO);
+                let coarsest = self.encode(self.frames.len(), steps.0, steps.1)?;
+                if coarsest.bytes() > share {
+                    let frames = (coarsest.bytes() as f64 / part).ceil() as u64;
+                    return Err(CodingError::TooSmall { asked, least: room.other + frames });
+                }
+                self.carried.chosen = Some(steps);
+                coarsest
+            }
+        };
+        let (bytes, frames) = (room.bytes.saturating_sub(found.bytes()), room.frames.saturating_sub(self.frames.len()));
+        self.carried.room = Some(Room { bytes, frames, other: room.other + found.bytes() });
+        self.finish(found)
     }
 }
 

@@ -20,6 +20,12 @@ pub enum DecodeError {
         /// What went wrong; part of the message, so not a source as well.
         cause: container::Error,
     },
+    /// The container is a folder.
+    #[error("{}: is a folder; name a .cager file", .path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
     /// The container is a pipe or a device.
     #[error("{}: is a pipe or a device, and frames are read from anywhere in a .cager file; save it as a file first", .path.display())]
     NotAFile {
@@ -40,6 +46,14 @@ pub enum DecodeError {
         /// The container.
         path: PathBuf,
         /// What it needs.
+        what: String,
+    },
+    /// No frame that was asked for is intact.
+    #[error("{}: no frame is left: {what}; get the file again", .path.display())]
+    Lost {
+        /// The container.
+        path: PathBuf,
+        /// Which frames are damaged.
         what: String,
     },
     /// The coordinates of the file's model do not exist.
@@ -131,7 +145,7 @@ fn open_with(
     }
     let file = File::open(path).map_err(|e| fail(container::Error::from(e)))?;
     if file.metadata().is_ok_and(|m| m.is_dir()) {
-        return Err(fail(container::Error::NotAContainer));
+        return Err(DecodeError::Folder { path: path.to_owned() });
     }
     read(BufReader::new(file)).map_err(|cause| match Signature::stand_in_of(path) {
         Some(other) if matches!(cause, container::Error::NotAContainer) => other.into(),

@@ -3,6 +3,7 @@
 use super::{MethodFigures, NoiseFigures, System, SystemFigures};
 use crate::methods::Method;
 use crate::noise::RADIUS;
+use cager_core::coordinates::{CoordinateSystem, Green};
 use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use serde::Serialize;
@@ -62,7 +63,9 @@ pub(crate) fn recommend(systems: &[System]) -> Recommendation {
         let bound = ACCURATE * of.iter().map(|c| c.l2_mean).fold(f64::INFINITY, f64::min);
         of.iter().filter(|c| c.l2_mean <= bound && c.smoothness.is_finite()).cloned().collect::<Vec<_>>()
     };
-    let editing = least(&mut all.iter().flat_map(|of| accurate(of)).collect::<Vec<_>>().iter(), |c| c.smoothness);
+    // Cages with normals of their own are not edited.
+    let editable = all.iter().flat_map(|of| accurate(of)).filter(|c| c.system != Green::Free.name());
+    let editing = least(&mut editable.collect::<Vec<_>>().iter(), |c| c.smoothness);
     Recommendation { editing, accuracy, accurate: ACCURATE }
 }
 

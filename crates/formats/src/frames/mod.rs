@@ -36,6 +36,9 @@ use cager_geometry::units::Units;
 use crate::error::Error;
 
 pub(crate) use block::read_values;
+/// Frames per second that files hold: beyond, times are infinite, or frames no longer apart.
+pub const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+
 pub use numbers::missing_frames;
 pub use range::FrameRange;
 pub use selection::FrameSelection;

@@ -103,6 +103,7 @@ impl MeshFormat {
                 found.display(),
                 extensions(&Self::ALL)
             ),
+            None if path.is_dir() => "is a folder; name a file of a mesh".to_owned(),
             None => format!("has no file name extension; give it one of {}", extensions(&Self::ALL)),
         };
         Err(Fault::unsupported(found).at(path))

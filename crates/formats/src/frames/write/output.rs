@@ -6,6 +6,7 @@ use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::units::{Change, Units};
 
 use crate::error::{Error, Fault};
+use crate::frames::RATES;
 
 /// The frames of an output, one after another; dropped before [`FrameWriter::finish`] they leave nothing.
 pub trait FrameWriter: Send {
@@ -173,9 +174,9 @@ impl Announced {
         if !(ascending && counted && options.numbers.iter().all(|x| x.is_finite())) {
             return Err(Fault::invalid("cannot have these frame numbers; give one for each frame, ascending"));
         }
-        if !(options.fps > 0.0 && options.fps.is_finite()) {
+        if !RATES.contains(&options.fps) {
             return Err(Fault::invalid(format!(
-                "cannot have {} frames per second; give a positive number",
+                "cannot have {} frames per second; give a number from 0.001 to 1,000,000",
                 options.fps
             )));
         }
