@@ -19,7 +19,7 @@ pub(super) fn read(cache: CacheFormat, mesh: MeshFormat, name: &str, mut bytes: 
         Ok(reader) => reader,
         Err(error) => {
             let text = error.to_string();
-            assert!(text.starts_with(name) && text.len() < 2000, "{text}");
+            assert!(text.starts_with(name) && text.chars().count() < 2000, "{text}");
             return;
         }
     };

@@ -98,6 +98,7 @@ pub(crate) fn shown_path(scene: &impl Objects, object: usize) -> String {
 
 /// A name as messages have it.
 pub(crate) fn shown(name: &str) -> String {
-    let more = if name.chars().nth(SHOWN).is_some() { "…" } else { "" };
-    name.chars().take(SHOWN).flat_map(char::escape_debug).collect::<String>() + more
+    let mut escaped = name.chars().flat_map(char::escape_debug);
+    let start: String = escaped.by_ref().take(SHOWN).collect();
+    if escaped.next().is_some() { start + "…" } else { start }
 }
