@@ -97,6 +97,8 @@ export interface LiveStatus {
   readonly retryAt: number | null;
   /** Seconds from a frame's being solved to its being here, within half a round trip; null before it was measured. */
   readonly latencySeconds: number | null;
+  /** The first frame that later ones wait for, as it has not come to the service; null where none is missing. */
+  readonly missingFrame: number | null;
   /** Frames that are solved and not here yet. */
   readonly behindFrames: number;
   /** Bits and frames that arrived in the last seconds, per second. */

@@ -1,4 +1,4 @@
-import { fragmentOf, parseFragment, type Route } from './routes';
+import { fragmentOf, keepView, parseFragment, type Route } from './routes';
 import { page, tokens } from './style/tokens';
 import { isContainer, type Dropped } from './files/classify';
 import { pickedFiles } from './files/drop';
@@ -37,6 +37,7 @@ async function show(anew = false) {
   const wanted = fragmentOf(route);
   if (wanted === shown && !anew) {
     document.querySelector('cager-viewer-page')?.goTo(view.toString());
+    document.querySelector('cager-sessions')?.goTo(view);
     return;
   }
   shown = wanted;
@@ -82,8 +83,7 @@ addEventListener('dragover', (event) => event.preventDefault());
 addEventListener('drop', dropCapture);
 document.addEventListener('filechosen', (event) => chooseFiles(event as CustomEvent<readonly Dropped[]>));
 document.addEventListener('viewchange', (event) => {
-  const { route } = parseFragment(location.hash);
-  const view = new URLSearchParams((event as CustomEvent<string>).detail);
-  if ('id' in route || route.page === 'file') history.replaceState(null, '', fragmentOf(route, view));
+  const { page } = parseFragment(location.hash).route;
+  if (page !== 'sessions' && page !== 'upload') keepView(new URLSearchParams((event as CustomEvent<string>).detail));
 });
 void show();

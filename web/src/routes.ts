@@ -1,4 +1,4 @@
-/** Routes of the page, all in the fragment: `#/`, `#/session/ID`, `#/recovery/ID`, `#/transfer/ID`, `#/file`, `#/upload`. What follows `?` is the state of the view, for links. */
+/** Routes of the page, all in the fragment: `#/`, `#/session/ID`, `#/recovery/ID`, `#/transfer/ID`, `#/file`, `#/upload`. What follows `?` is the state of the view, for links; of the list, what is searched and the page. */
 
 import type { JobKind } from './viewer/serviceCapture';
 
@@ -32,6 +32,21 @@ export function fragmentOf(route: Route, view = new URLSearchParams()): string {
         : `#/${route.page}`;
   const query = view.toString();
   return query === '' ? path : `${path}?${query}`;
+}
+
+/** The list as it was shown last, for ways back to it. */
+let list = '#/';
+
+export function listAddress(): string {
+  return list;
+}
+
+/** Keeps a view in the address of its route, without a step of the history. */
+export function keepView(view: URLSearchParams) {
+  const { route } = parseFragment(location.hash);
+  const address = fragmentOf(route, view);
+  if (route.page === 'sessions') list = address;
+  history.replaceState(null, '', address);
 }
 
 function splitOnce(text: string, separator: string): [string, string] {

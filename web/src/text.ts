@@ -1,5 +1,12 @@
 /** Figures as people read them, and what went wrong. */
 
+export const SYSTEM_NAMES = {
+  mvc: 'Mean value',
+  harmonic: 'Harmonic',
+  green: 'Green',
+  'green-free': 'Green, free normals',
+} as const;
+
 const NUMBER = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
 
 /** `12,000`. */
@@ -81,6 +88,11 @@ export function fileNameOf(address: string): string {
   } catch {
     return name;
   }
+}
+
+/** The address of the service beside the page, for the command line. */
+export function serviceAddress(): string {
+  return new URL('.', document.baseURI).href.replace(/\/$/, '');
 }
 
 /** What went wrong, in one sentence. */

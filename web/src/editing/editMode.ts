@@ -3,7 +3,7 @@ import type { Player } from '../viewer/player';
 import { counts, weightAt, type FrameRange } from './cageEdit';
 import { EditKeeper } from './editKeeper';
 import type { CageEditor } from './editor';
-import { customElement, property } from 'lit/decorators.js';
+import { customElement, property, query } from 'lit/decorators.js';
 import { controls } from '../style/controls';
 import { counted } from '../text';
 import type { KeptEdits } from './keptEdits';
@@ -13,7 +13,7 @@ import type { ViewerHost } from '../viewer/host';
  * Says that a capture has edits from before.
  *
  * @fires takeup when they are to be there again
- * @fires throwaway when they are to be forgotten
+ * @fires throwaway when they are to be forgotten, and somebody was asked whether they are
  */
 @customElement('cager-kept-offer')
 export class KeptOffer extends LitElement {
@@ -42,6 +42,9 @@ export class KeptOffer extends LitElement {
       p {
         flex: 1 1 220px;
       }
+      .buttons {
+        margin-top: var(--cager-space-4);
+      }
       @container (max-width: 1000px) {
         :host {
           top: calc(var(--cager-space-3) + 64px);
@@ -58,6 +61,7 @@ export class KeptOffer extends LitElement {
   ];
 
   @property({ attribute: false }) kept!: KeptEdits;
+  @query('dialog') private readonly dialog!: HTMLDialogElement;
 
   override render() {
     const { edits, changed } = this.kept;
@@ -66,8 +70,20 @@ export class KeptOffer extends LitElement {
       <p role="status">${counted(edits.length, 'edit')} kept in this browser, from ${when}</p>
       <div class="row">
         <button class="primary" @click=${() => this.dispatchEvent(new Event('takeup'))}>Restore</button>
-        <button @click=${() => this.dispatchEvent(new Event('throwaway'))}>Discard</button>
+        <button @click=${() => this.dialog.showModal()}>Discard</button>
       </div>
+      <dialog aria-labelledby="discard" @keydown=${(event: Event) => event.stopPropagation()}>
+        <form method="dialog">
+          <h2 id="discard">Discard ${counted(edits.length, 'edit')}?</h2>
+          <p>They are permanently deleted from this browser.</p>
+          <div class="buttons">
+            <button autofocus>Cancel</button>
+            <button type="button" class="danger" @click=${() => this.dispatchEvent(new Event('throwaway'))}>
+              Discard
+            </button>
+          </div>
+        </form>
+      </dialog>
     `;
   }
 }

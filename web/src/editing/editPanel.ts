@@ -92,7 +92,7 @@ export class EditPanel extends LitElement {
     const { selection } = model;
     const chosen =
       selection.length === 0
-        ? 'Nothing selected'
+        ? 'None selected'
         : selection.length === 1
           ? `Vertex ${selection[0]}`
           : `${selection.length} vertices`;
@@ -187,18 +187,15 @@ export class EditPanel extends LitElement {
         <button @click=${() => exporting.stop.abort()}>Cancel</button>
       </footer>`;
     }
-    const button = (kind: ExportKind, label: string) => {
+    const button = (kind: ExportKind, label: string, title: string) => {
       const reason = obstacle(this.editor.player.capture, kind);
-      return html`<button
-        title=${reason ?? 'Save the capture with all enabled edits'}
-        ?disabled=${reason !== null}
-        @click=${() => void this.export(kind)}
-      >
-        ${glyphs.download} ${label}
+      return html`<button title=${reason ?? title} ?disabled=${reason !== null} @click=${() => void this.export(kind)}>
+        ${label}
       </button>`;
     };
     return html`<footer class="row" aria-label="Export">
-      ${button('container', '.cager')} ${button('frames', 'Decoded frames')}
+      ${button('container', 'Save .cager', 'The capture with all enabled edits, to play or to decode')}
+      ${button('frames', 'Save positions (.npy)', 'All points of all frames with all enabled edits, as a NumPy array')}
     </footer>`;
   }
 

@@ -78,7 +78,7 @@ export const editPanelStyle = css`
     min-width: 0;
     height: 6px;
   }
-  @container (max-width: 680px) {
+  @container (max-width: 680px) and (max-aspect-ratio: 4/3) {
     .panel {
       align-self: stretch;
     }

@@ -1,4 +1,4 @@
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 import { classify, reassigned } from './classify';
 
 const drop = (files: Record<string, number>) =>
@@ -39,7 +39,26 @@ test('a_folder_of_numbered_meshes_is_a_row_of_frames_in_natural_order', () => {
   expect(items.map(({ role }) => role)).toEqual(['rest', 'frames']);
 });
 
+test('rest_poses_of_several_captures_are_listed_one_by_one_with_the_reason', () => {
+  const folders = drop({ 'arm1/rest.obj': 10, 'arm2/rest.obj': 20, 'arm1/frames.npy': 50 });
+  expect(folders.map(({ name, role }) => [name, role])).toEqual([
+    ['rest.obj', 'rest'],
+    ['frames.npy', 'frames'],
+    ['rest.obj', 'unused'],
+  ]);
+  expect(folders[2].remark).toMatch(/Another file is used/);
+  expect(reassigned(folders, folders[2], 'rest').map(({ role }) => role)).toEqual(['unused', 'frames', 'rest']);
+  // Chosen in two folders after one another, they have one path.
+  const file = new File(['v'], 'rest.obj');
+  expect(classify([file, file].map((file) => ({ file, path: 'rest.obj' })))).toHaveLength(2);
+  expect(roles({ 'f1/mesh.obj': 9, 'f2/mesh.obj': 9 })).toEqual({ 'mesh.obj and 1 more': 'frames' });
+  expect(roles({ 'base_1.obj': 9, 'base_2.obj': 9 })).toEqual({ 'base_1.obj and 1 more': 'frames' });
+});
+
 test('what_cannot_be_used_says_why', () => {
+  vi.stubGlobal('document', { baseURI: 'https://cager.example/captures/' });
+  expect(drop({ 'walk.abc': 1 })[0]).toMatchObject({ choices: ['unused'] });
+  expect(drop({ 'walk.usdc': 1 })[0].remark).toContain('cager encode --server https://cager.example/captures”');
   expect(drop({ 'done.cager': 1 })[0].remark).toContain('Already encoded');
   expect(drop({ 'notes.txt': 1 })[0]).toMatchObject({ role: 'unused', choices: ['unused'] });
 });

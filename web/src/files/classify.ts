@@ -1,5 +1,6 @@
 /** What dropped files are taken for: a rest pose, a cage, frames. People can say otherwise afterwards. */
 
+import { serviceAddress } from '../text';
 import { extensionOf } from './meshes';
 
 /** A file and where it lay in what was dropped. */
@@ -28,22 +29,32 @@ export interface Item {
 
 const ARRAYS = new Set(['npy', 'pc2', 'mdd']);
 const MESHES = new Set(['obj', 'ply', 'off', 'stl', 'glb']);
+const [REST, CAGE] = [/rest|bind|base|neutral/i, /cage|wrap/i];
 const NATURAL = new Intl.Collator('en', { numeric: true });
 
-/** Remarks on formats that the command line takes and this page does not. */
+/** Remarks on formats that this page does not take. */
 const ELSEWHERE: Readonly<Record<string, string>> = {
   cager: 'Already encoded: open it with “Open file”.',
   npz: 'Save only the position array, as .npy.',
 };
+/** Animations that the command line takes and this page does not. */
+const ANIMATIONS = new Set(['abc', 'usd', 'usda', 'usdc', 'usdz', 'gltf', 'mcx', 'mc']);
+
+export function encodeElsewhere(): string {
+  return `The page reads frames from .npy, .pc2, .mdd and .obj; encode this file with “cager encode --server ${serviceAddress()}”.`;
+}
+
+const LEFT = 'Another file is used for this. Upload one capture at a time.';
 
 /** Sorts files into items and gives each a role; at most one is the rest pose, one the cage and one the frames. */
 export function classify(dropped: readonly Dropped[]): Item[] {
   const rows = new Map<string, File[]>();
   const visible = dropped.filter(({ path }) => !path.split('/').some((part) => part.startsWith('.')));
   for (const { file, path } of [...visible].sort((a, b) => NATURAL.compare(a.path, b.path))) {
-    const extension = extensionOf(file.name);
-    // Files whose names differ in their last number alone are frames of one row.
-    const key = extension === 'obj' ? path.replace(/\d+(\D*)$/, '#$1') : path;
+    // Files whose paths differ in their last number alone are frames of one row; a rest pose or a cage in each of some folders is none.
+    const isNumbered = /\d/.test(REST.test(file.name) || CAGE.test(file.name) ? file.name : path);
+    const key =
+      isNumbered && extensionOf(file.name) === 'obj' ? path.replace(/\d+(\D*)$/, '#$1') : `${rows.size} ${path}`;
     const row = rows.get(key);
     if (row) row.push(file);
     else rows.set(key, [file]);
@@ -55,7 +66,7 @@ export function classify(dropped: readonly Dropped[]): Item[] {
 /** The items with one given another role; whatever had it before is not used then. */
 export function reassigned(items: readonly Item[], changed: Item, role: Role): Item[] {
   return items.map((item) => {
-    if (item === changed) return { ...item, role };
+    if (item === changed) return { ...item, role, remark: '' };
     return role !== 'unused' && item.role === role ? { ...item, role: 'unused' } : item;
   });
 }
@@ -67,20 +78,22 @@ function itemOf(files: File[]): Item {
   if (files.length > 1) return { ...base, name: `${name} and ${files.length - 1} more`, choices: ['frames', 'unused'] };
   if (ARRAYS.has(extension)) return { ...base, name, choices: ['frames', 'unused'] };
   if (MESHES.has(extension)) return { ...base, name, choices: ['rest', 'cage', 'unused'] };
-  const remark = ELSEWHERE[extension] ?? 'Unsupported file type.';
+  const remark = ANIMATIONS.has(extension) ? encodeElsewhere() : (ELSEWHERE[extension] ?? 'Unsupported file type.');
   return { ...base, name, choices: ['unused'], remark };
 }
 
 function withRoles(items: Item[]): Item[] {
   const meshes = items.filter((item) => item.choices.includes('rest'));
   const named = (word: RegExp) => meshes.find((item) => word.test(item.name));
-  const cage = named(/cage|wrap/i) ?? bySize(meshes).at(meshes.length > 1 ? 0 : meshes.length);
-  const rest = named(/rest|bind|base|neutral/i) ?? bySize(meshes.filter((item) => item !== cage)).at(-1);
+  const others = meshes.filter((item) => !REST.test(item.name));
+  const cage = named(CAGE) ?? bySize(others).at(meshes.length > 1 ? 0 : others.length);
+  const rest = named(REST) ?? bySize(meshes.filter((item) => item !== cage)).at(-1);
   const frames = bySize(items.filter((item) => item.choices.includes('frames'))).at(-1);
   const order: readonly Role[] = ['rest', 'frames', 'cage', 'unused'];
   const withRole = items.map((item): Item => {
     const role = item === frames ? 'frames' : item === rest ? 'rest' : item === cage ? 'cage' : 'unused';
-    return { ...item, role };
+    const isLeft = role === 'unused' && item.choices.length > 1;
+    return { ...item, role, remark: isLeft ? LEFT : item.remark };
   });
   return withRole.sort((a, b) => order.indexOf(a.role) - order.indexOf(b.role));
 }

@@ -23,6 +23,14 @@ export async function pointsOf(file: File): Promise<number | null> {
   return null;
 }
 
+/** Whether a `.glb` file moves. */
+export async function isAnimated(file: File): Promise<boolean> {
+  if (extensionOf(file.name) !== 'glb') return false;
+  const length = new DataView(await file.slice(0, 20).arrayBuffer()).getUint32(12, true);
+  const head = JSON.parse(await file.slice(20, 20 + length).text()) as { animations?: unknown[] };
+  return (head.animations?.length ?? 0) > 0;
+}
+
 /** Positions of the `v` lines of a Wavefront file, x y z each. */
 export async function objPoints(file: File): Promise<Float32Array> {
   const text = await file.text();

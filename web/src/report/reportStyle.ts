@@ -234,6 +234,9 @@ export const reportStyle = css`
     h1 {
       font-size: 22px;
     }
+    h2 {
+      scroll-margin-top: 132px;
+    }
     .bar {
       flex-direction: column;
       align-items: start;
@@ -241,7 +244,8 @@ export const reportStyle = css`
       padding-inline: var(--cager-space-4);
     }
     nav {
-      max-width: 100%;
+      flex-wrap: wrap;
+      gap: 0 var(--cager-space-4);
     }
   }
   @media print {

@@ -21,6 +21,11 @@ export class Backoff {
   }
 }
 
+/** Ends every {@link pause}, as the return of the network does. */
+export function retryNow() {
+  globalThis.dispatchEvent(new Event('online'));
+}
+
 /** Waits; the return of the network ends it early, and `signal` ends it with its reason. */
 export async function pause(seconds: number, signal?: AbortSignal) {
   const over = new EventTarget();

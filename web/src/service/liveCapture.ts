@@ -55,6 +55,7 @@ export class LiveCapture implements SessionCapture {
   private finished: Capture | null = null;
   private lastProblem: string | null = null;
   private late = 0;
+  private missingFrame: number | null = null;
   /** What the errors were fetched for, and when: coding a group changes them, and frames passed over bring none. */
   private errorsFetched = { coded: -1, skipped: -1, at: -Infinity };
 
@@ -78,6 +79,7 @@ export class LiveCapture implements SessionCapture {
       },
       skipped: (end) => (this.frames = end),
       looked: (look) => {
+        this.missingFrame = look.frames.missing[0]?.[0] ?? null;
         this.groups?.looked(look);
         void this.fetchErrors(look);
       },
@@ -113,6 +115,7 @@ export class LiveCapture implements SessionCapture {
       state: isOver ? 'ended' : follower.state,
       retryAt: isOver ? null : follower.retryAt,
       latencySeconds: follower.latency.seconds,
+      missingFrame: this.missingFrame,
       behindFrames: isOver ? 0 : follower.behind,
       bitsPerSecond: 8 * follower.bytes.perSecond(),
       framesPerSecond: follower.frames.perSecond(),

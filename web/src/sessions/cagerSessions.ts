@@ -1,6 +1,7 @@
 import { LitElement, html, nothing } from 'lit';
 import { customElement, query, state } from 'lit/decorators.js';
 import { repeat } from 'lit/directives/repeat.js';
+import { keepView, parseFragment } from '../routes';
 import type { Session } from '../service/messages';
 import { ServiceProblem, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
@@ -15,6 +16,8 @@ import {
   renameDialog,
   isFiltering,
   matches,
+  placeOf,
+  viewOf,
   type StateFilter,
   filterBar,
   listHeader,
@@ -60,8 +63,15 @@ export class Sessions extends LitElement {
   private clock: ReturnType<typeof setInterval> | undefined;
   private fetchingOlder = false;
 
+  /** Shows what an address names. */
+  goTo(view: URLSearchParams) {
+    ({ text: this.text, state: this.states, page: this.page } = placeOf(view));
+    this.keepView();
+  }
+
   override connectedCallback() {
     super.connectedCallback();
+    this.goTo(parseFragment(location.hash).view);
     this.list.addEventListener('change', this.changed);
     this.figures.addEventListener('change', this.changed);
     pageToken.addEventListener('wanted', this.tokenWanted);
@@ -190,8 +200,9 @@ export class Sessions extends LitElement {
     const last = Math.max(0, Math.ceil(matching.length / PAGE_ROWS) - 1);
     const first = PAGE_ROWS * Math.min(this.page, last);
     const isWhole = !this.list.hasOlder;
-    // Older pages may have more of what is asked for.
-    if (!isWhole && matching.length < first + PAGE_ROWS && isFiltering(filter)) void this.fetchOlder();
+    // Older pages may have more of what is asked for, or the page that an address names.
+    const isShort = isFiltering(filter) ? matching.length < first + PAGE_ROWS : this.page > last;
+    if (!isWhole && isShort) void this.fetchOlder();
     return { rows: matching.slice(first, first + PAGE_ROWS), first, matching: matching.length, isWhole };
   }
 
@@ -199,12 +210,18 @@ export class Sessions extends LitElement {
     this.text = text;
     this.states = states;
     this.page = 0;
+    this.keepView();
+  }
+
+  private keepView() {
+    keepView(viewOf({ text: this.text, state: this.states, page: this.page }));
   }
 
   private async turn(pages: number) {
     const { first, rows, matching, isWhole } = this.shown(this.list.sessions);
     if (pages > 0 && !isWhole && first + rows.length >= matching) await this.fetchOlder();
     this.page = Math.max(0, first / PAGE_ROWS + pages);
+    this.keepView();
     this.scrollTo({ top: 0 });
   }
 
@@ -295,6 +312,7 @@ export class Sessions extends LitElement {
     if (pageToken.token === null) forgetThumbnails();
     this.wantsToken = false;
     this.page = 0;
+    this.keepView();
     this.figures.reset();
     this.list.reset();
   };
@@ -304,4 +322,10 @@ export class Sessions extends LitElement {
     else this.list.start();
     this.requestUpdate();
   };
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'cager-sessions': Sessions;
+  }
 }

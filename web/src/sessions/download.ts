@@ -32,7 +32,5 @@ export async function download(
     if (total > 0) onProgress(Math.min(1, received / total));
   }
   if (total > 0 && received < total) throw new Error('The download was interrupted. Start it again.');
-  // Signs that file systems do not take.
-  const file = `${name.replace(/[\\/:*?"<>|\p{Cc}]+/gu, '-')}.${format}`;
-  save(new Blob(pieces, { type: response.headers.get('content-type') ?? '' }), file);
+  save(new Blob(pieces, { type: response.headers.get('content-type') ?? '' }), `${name}.${format}`);
 }

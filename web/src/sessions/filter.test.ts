@@ -1,6 +1,7 @@
 import { expect, test } from 'vitest';
 import type { Session } from '../service/messages';
-import { isFiltering, matches } from './listParts';
+import { isFiltering, matches, placeOf, viewOf } from './listParts';
+import { nameOf } from './row';
 
 const session = { name: 'Shot 042 hero', id: '01a2', state: 'ready', coordinates: 'harmonic' } as Session;
 
@@ -9,6 +10,23 @@ test('every_word_must_be_somewhere', () => {
   expect(['', 'shot', 'HERO 042', '01A2', 'harmonic ready'].map(found)).toEqual([true, true, true, true, true]);
   expect(['villain', 'shot 043'].map(found)).toEqual([false, false]);
   expect(matches({ ...session, name: null }, { text: 'shot', state: 'all' })).toBe(false);
+});
+
+test('the_address_keeps_what_is_searched_and_the_page', () => {
+  const place = { text: 'a & b', state: 'failed', page: 2 } as const;
+  expect(placeOf(viewOf(place))).toEqual(place);
+  expect(viewOf({ text: '', state: 'all', page: 0 }).toString()).toBe('');
+  const odd = new URLSearchParams('state=odd&page=-3');
+  expect(placeOf(odd)).toEqual({ text: '', state: 'all', page: 0 });
+});
+
+test('coordinates_are_found_by_the_name_that_is_shown', () => {
+  expect(matches({ ...session, coordinates: 'mvc' }, { text: 'mean value', state: 'all' })).toBe(true);
+});
+
+test('sessions_of_one_minute_without_a_name_are_told_apart', () => {
+  const names = ['01a22357aa000001', '01a22357bb000002'].map((id) => nameOf({ ...session, id, name: null }));
+  expect(names).toEqual(['Session aa000001', 'Session bb000002']);
 });
 
 test('running_is_all_that_is_not_over', () => {

@@ -5,7 +5,7 @@ import { sentenceOf } from '../service/problem';
 import { pageToken } from '../service/token';
 import { currentJob } from '../upload/currentJob';
 import { isUnfinished, type SessionList } from './sessionList';
-import { counted } from '../text';
+import { counted, serviceAddress, SYSTEM_NAMES } from '../text';
 import { nameOf } from './row';
 import walk from './walk.svg';
 import { iconButton, segments } from '../style/parts';
@@ -22,7 +22,8 @@ export interface Filter {
 export function matches(session: Session, filter: Filter): boolean {
   const isOver = session.state === 'completed' || session.state === 'failed';
   if (filter.state === 'running' ? isOver : filter.state !== 'all' && session.state !== filter.state) return false;
-  const text = [session.name ?? '', session.id, session.state, session.coordinates].join(' ').toLowerCase();
+  const { name, id, state, coordinates } = session;
+  const text = [name ?? '', id, state, coordinates, SYSTEM_NAMES[coordinates]].join(' ').toLowerCase();
   return filter.text
     .toLowerCase()
     .split(/\s+/)
@@ -39,6 +40,22 @@ const STATES: readonly (readonly [StateFilter, string])[] = [
   ['completed', 'Completed'],
   ['failed', 'Failed'],
 ];
+
+/** What an address names: what is searched, and the page, counted from 0. */
+export function placeOf(view: URLSearchParams): Filter & { readonly page: number } {
+  const [state] = STATES.find(([state]) => state === view.get('state')) ?? STATES[0];
+  const page = Math.max(1, Math.floor(Number(view.get('page')) || 1)) - 1;
+  return { text: view.get('search') ?? '', state, page };
+}
+
+/** Writes what {@link placeOf} reads; what is as usual is left out. */
+export function viewOf({ text, state, page }: ReturnType<typeof placeOf>): URLSearchParams {
+  const view = new URLSearchParams();
+  if (text !== '') view.set('search', text);
+  if (state !== 'all') view.set('state', state);
+  if (page > 0) view.set('page', String(page + 1));
+  return view;
+}
 
 export function filterBar({ text, state: chosen }: Filter, onFilter: (filter: Filter) => void) {
   return html`
@@ -168,8 +185,7 @@ export function deleteDialog(session: Session, dialog: Dialog, onDelete: () => v
 }
 
 export function emptyList() {
-  const server = new URL('.', document.baseURI).href.replace(/\/$/, '');
-  const command = `cager encode --server ${server} --rest rest.obj --frames frames.npy -o capture.cager`;
+  const command = `cager encode --server ${serviceAddress()} --rest rest.obj --frames frames.npy -o capture.cager`;
   const copy = (event: Event) => {
     const button = event.currentTarget as HTMLElement;
     void navigator.clipboard.writeText(command).then(() => button.setAttribute('aria-label', 'Copied'));

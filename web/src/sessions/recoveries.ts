@@ -53,7 +53,7 @@ export class Recoveries extends LitElement {
           (recovery) =>
             html`<li>
               <a href="#/recovery/${encodeURIComponent(recovery.id)}"
-                >${recovery.name ?? `Recovery ${recovery.id.slice(0, 8)}`}</a
+                >${recovery.name ?? `Recovery ${recovery.id.slice(-8)}`}</a
               >
               <span class="muted figures">${progressOf(recovery)}</span>
             </li>`,

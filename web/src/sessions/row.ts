@@ -50,8 +50,9 @@ export const tableHead = html`
   </thead>
 `;
 
+/** Identifiers begin with the time: their ends tell them apart. */
 export function nameOf(session: Session): string {
-  return session.name ?? `Session ${session.id.slice(0, 8)}`;
+  return session.name ?? `Session ${session.id.slice(-8)}`;
 }
 
 /** The rows of one session, in a `tbody` of its own. Roles are given, since narrow screens do not lay it out as a table. */
@@ -101,7 +102,7 @@ function facts(session: Session): string {
   const parts = [
     session.points === null ? null : text.counted(session.points, 'point'),
     session.cage_vertices === null ? null : `cage of ${text.count(session.cage_vertices)}`,
-    session.coordinates === 'mvc' ? null : session.coordinates,
+    session.coordinates === 'mvc' ? null : text.SYSTEM_NAMES[session.coordinates],
   ];
   return parts.filter((part) => part !== null).join(' · ');
 }

@@ -234,6 +234,24 @@ export const controls = css`
     min-width: 0;
   }
 
+  /* Fades at an end behind which there is more. */
+  .scrolls {
+    animation: ends linear;
+    animation-timeline: scroll(self);
+  }
+  @keyframes ends {
+    from {
+      mask: linear-gradient(#000 calc(100% - 44px), transparent);
+    }
+    1%,
+    99% {
+      mask: linear-gradient(transparent, #000 44px calc(100% - 44px), transparent);
+    }
+    to {
+      mask: linear-gradient(transparent, #000 44px);
+    }
+  }
+
   /* Boxes. */
   :is(.card, .glass) {
     border: 1px solid var(--cager-line);

@@ -1,6 +1,6 @@
 import { css } from 'lit';
 
-/** Panels over the picture: beside the model in a wide one, above the timeline in a narrow one; the viewer says how high that is. */
+/** Panels over the picture: beside the model in a wide one, above the timeline in a narrow one; the viewer says how high that is. In a low one all of a panel scrolls. */
 export const picturePanelStyle = css`
   :host {
     position: absolute;
@@ -37,11 +37,28 @@ export const picturePanelStyle = css`
     padding: var(--cager-space-2) var(--cager-space-3) var(--cager-space-3);
     min-height: 0;
   }
-  @container (max-width: 680px) {
+  @container (max-width: 680px) and (max-aspect-ratio: 4/3) {
     :host {
       inset: auto var(--cager-space-2) calc(var(--deck-height, 120px) + var(--cager-space-2));
       width: auto;
       height: 37%;
+    }
+  }
+  @container (max-height: 480px) {
+    .panel {
+      display: block;
+      overflow: hidden auto;
+    }
+    .panel > header {
+      position: sticky;
+      top: 0;
+      z-index: 1;
+      background: var(--cager-surface);
+    }
+  }
+  @container (max-height: 480px) and (min-aspect-ratio: 4/3) {
+    :host {
+      top: var(--cager-space-3);
     }
   }
 `;

@@ -1,5 +1,6 @@
 import { LitElement, html, nothing } from 'lit';
 import { customElement, state } from 'lit/decorators.js';
+import { listAddress } from '../routes';
 import { ServiceProblem, problemBehind, sentenceOf } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
@@ -81,7 +82,7 @@ export class Upload extends LitElement {
     return html`
       <main class="page" @dragover=${this.dragOver} @dragleave=${() => (this.isOver = false)} @drop=${this.drop}>
         <header>
-          <a class="button back" href="#/" aria-label="All sessions" title="All sessions">${glyphs.back}</a>
+          <a class="button back" href=${listAddress()} aria-label="All sessions" title="All sessions">${glyphs.back}</a>
           <h1>Upload a capture</h1>
         </header>
         ${job ? jobView(job, this.furthest, () => void this.discard(), this.startOver) : html`${this.interruptedCards()}${dropZone(this.isOver, this.items.length === 0, (files) => void this.take(files), this.startOver)}${this.chosen()}`}

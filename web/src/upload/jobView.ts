@@ -1,5 +1,6 @@
 import { html, nothing } from 'lit';
 import { glyphs } from '../style/glyphs';
+import { retryNow } from '../service/backoff';
 import type { Figures } from '../sessions/figures';
 import { count, counted, percent, perSecond, ratio as times, size, span } from '../text';
 import { sampledFrames } from './motionCage';
@@ -32,6 +33,7 @@ export function jobView(job: UploadJob, furthest: Stage, discard: () => void, st
   const name = job.request.options.name ?? 'the capture';
   const steps = STEPS.filter(([step]) => step !== 'designing' || job.request.design);
   const canWatch = session !== null && session.state !== 'preparing' && session.state !== 'failed';
+  const isOver = !job.isActive;
   const at = steps.findIndex(([step]) => step === (job.isActive ? stage : furthest));
   return html`
     <section class="card" aria-labelledby="job-title">
@@ -59,7 +61,8 @@ export function jobView(job: UploadJob, furthest: Stage, discard: () => void, st
       ${
         job.trouble
           ? html`<p class=${job.isActive ? 'note' : 'note bad'} role="alert">
-              ${glyphs.alert}<span>${job.trouble}</span>
+              ${glyphs.alert}<span class="grow">${job.trouble}</span>
+              ${job.isActive ? html`<button type="button" @click=${retryNow}>Retry now</button>` : nothing}
             </p>`
           : nothing
       }
@@ -67,8 +70,10 @@ export function jobView(job: UploadJob, furthest: Stage, discard: () => void, st
       <div class="buttons">
         ${
           canWatch
-            ? html`<a class="button primary" href="#/session/${encodeURIComponent(session.id)}"
-                >${glyphs.play} ${stage === 'completed' ? 'Open in viewer' : 'Watch live'}</a
+            ? html`<a
+                class="button ${isOver && stage !== 'completed' ? '' : 'primary'}"
+                href="#/session/${encodeURIComponent(session.id)}"
+                >${glyphs.play} ${isOver ? 'Open in viewer' : 'Watch live'}</a
               >`
             : nothing
         }

@@ -1,5 +1,6 @@
 import { html, nothing } from 'lit';
 import type { CoordinateSystem } from '../capture';
+import { SYSTEM_NAMES } from '../text';
 import type { DesignOptions, SessionOptions } from '../service/messages';
 
 /** What somebody chose; empty texts are the service's defaults. */
@@ -168,7 +169,7 @@ export function optionsForm(choices: Choices, hasCage: boolean, onChange: (choic
         ${choice(
           'coordinates',
           'Coordinates',
-          { mvc: 'Mean value', harmonic: 'Harmonic', green: 'Green', 'green-free': 'Green, free normals' },
+          SYSTEM_NAMES,
           isDesigned ? 'Cages are designed for mean value coordinates.' : 'How points follow the cage.',
           { isFixed: isDesigned },
         )}

@@ -1,10 +1,10 @@
 /** What will be sent, checked as far as that goes before anything is. */
 
 import { counted } from '../text';
-import type { Item } from '../files/classify';
+import { encodeElsewhere, type Item } from '../files/classify';
 import { framesOf } from '../files/frameFiles';
 import type { FrameSource } from '../files/frameSource';
-import { pointsOf } from '../files/meshes';
+import { isAnimated, pointsOf } from '../files/meshes';
 
 export interface Plan {
   readonly rest: File;
@@ -23,13 +23,16 @@ export interface Plan {
 export async function planOf(items: readonly Item[]): Promise<Plan> {
   const having = (role: Item['role']) => items.find((item) => item.role === role);
   const [framesItem, cageItem] = [having('frames'), having('cage')];
+  const restItem = having('rest');
   if (!framesItem) {
+    // What is no such file after all is for the service to refuse.
+    if (restItem && (await isAnimated(restItem.files[0]).catch(() => false)))
+      throw new Error(`${restItem.name} is animated. ${encodeElsewhere()}`);
     throw new Error(
       'Frames are missing: add an array (.npy), a point cache (.pc2 or .mdd), or a folder with one .obj per frame.',
     );
   }
   const frames = await framesOf(framesItem.files);
-  const restItem = having('rest');
   if (!restItem && framesItem.files.length < 2)
     throw new Error('The rest pose is missing: add the undeformed mesh as .obj, .ply, .off, .stl or .glb.');
   const rest = (restItem ?? framesItem).files[0];

@@ -162,5 +162,5 @@ async function toggleFullscreen(viewer: CagerViewer) {
 
 /** What files that are saved are named after. */
 export function stem(viewer: CagerViewer): string {
-  return viewer.heading.replace(/\.cager$/i, '').replace(/[^\w.-]+/g, '-');
+  return viewer.heading.replace(/\.cager$/i, '');
 }

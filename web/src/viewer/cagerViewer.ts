@@ -9,6 +9,7 @@ import { perform, stem } from './actions';
 import { BesideMode } from './besideMode';
 import { CaptureElement } from './captureElement';
 import { divider } from './comparisonParts';
+import { deckStyle } from './deckStyle';
 import { figuresPanel } from './figuresPanel';
 import { IncomingFiles } from './incomingFiles';
 import { Layout } from './layout';
@@ -52,7 +53,7 @@ const SAID_MILLISECONDS = 2000;
  */
 @customElement('cager-viewer')
 export class CagerViewer extends CaptureElement {
-  static override styles = [tokens, controls, viewerStyle, overlayStyle];
+  static override styles = [tokens, controls, viewerStyle, deckStyle, overlayStyle];
 
   @state() private panel: 'figures' | 'views' | null = null;
   @state() private said = '';
@@ -249,6 +250,7 @@ export class CagerViewer extends CaptureElement {
       ${deck(player, act, {
         besideErrors: this.pair.errors,
         range: this.editing.range,
+        edited: this.editing.hasEdits ? (frame) => this.editing.changes(frame) : null,
       })}
     `;
   }
@@ -299,7 +301,9 @@ export class CagerViewer extends CaptureElement {
   }
 
   private writePlace() {
-    if (this.player) writeReadout(this.renderRoot, this.player, (frame) => this.editing.changes(frame));
+    const { player } = this;
+    const isChanged = (frame: number) => player?.playback.shape !== null || this.editing.changes(frame);
+    if (player) writeReadout(this.renderRoot, player, isChanged);
   }
 
   applyColors() {

@@ -67,14 +67,19 @@ export function rangeChoice(player: Player) {
   return segments('Colour range (99th percentile)', RANGES, range, (each) => player.setHeat(kind, each));
 }
 
-function errorFigures({ heatMap, stage, comparison }: Player, { worst, largest, l2 }: MeasuredFrame) {
-  const { diagonal, precision } = stage.decoder;
-  const more = heatMap.largest < largest ? '≥ ' : '';
+/** The colours of the heat map from 0 to the warmest, in percent of the diagonal and in the unit of the files. */
+export function colorScale({ heatMap: { largest }, stage }: Player, more: string) {
   return html`<div class="bar" .style=${`background: ${HEAT.gradient}`}></div>
     <div class="spread muted figures">
       <span>0</span
-      ><span>${more}${percent(heatMap.largest)} of the diagonal (${threeDigits(heatMap.largest * diagonal)})</span>
-    </div>
+      ><span>${more}${percent(largest)} of the diagonal (${threeDigits(largest * stage.decoder.diagonal)})</span>
+    </div>`;
+}
+
+function errorFigures(player: Player, { worst, largest, l2 }: MeasuredFrame) {
+  const { heatMap, stage, comparison } = player;
+  const { diagonal, precision } = stage.decoder;
+  return html`${colorScale(player, heatMap.largest < largest ? '≥ ' : '')}
     <dl class="pairs">
       <dt>Worst point, ${count(worst)}</dt>
       <dd>${percent(largest)} (${threeDigits(largest * diagonal)})</dd>

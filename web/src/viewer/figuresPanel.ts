@@ -1,14 +1,7 @@
 import { html, nothing } from 'lit';
 import { iconButton } from '../style/parts';
 import type { Player } from './player';
-import { bitrate, count, percent } from '../text';
-
-const SYSTEM_NAMES = {
-  mvc: 'mean value',
-  harmonic: 'harmonic',
-  green: 'Green',
-  'green-free': 'Green, free normals',
-} as const;
+import { bitrate, count, percent, SYSTEM_NAMES } from '../text';
 
 export function figuresPanel(player: Player, close: () => void) {
   const { static: part, frames, frameBytes } = player.capture;
@@ -41,7 +34,7 @@ export function figuresPanel(player: Player, close: () => void) {
     </dl>
     <h2>Bandwidth</h2>
     <dl class="pairs">
-      ${fileRate === null ? nothing : row('This file', bitrate(fileRate))}
+      ${fileRate === null ? nothing : row('This file, frames alone', bitrate(fileRate))}
       ${row('Cages, uncompressed', bitrate(cageRate))} ${row('All points, uncompressed', bitrate(rawRate))}
     </dl>
     ${

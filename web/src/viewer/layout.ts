@@ -1,7 +1,7 @@
 import type { Player } from './player';
 
-/** CSS pixels up to which the tools cover what matters; the styles say the same. */
-const NARROW = 680;
+/** A picture that is no wider than this in CSS pixels, and than this part of its height, has panels below the model; the styles say the same. */
+const [NARROW, NARROW_ASPECT] = [680, 4 / 3];
 /** A finer picture than this costs more than it shows. */
 const FINEST_PIXEL_RATIO = 2;
 /** Two pictures stand side by side in a viewer that is wider than this part of its height, else one above the other. */
@@ -67,7 +67,8 @@ export class Layout {
   }
 
   private get isNarrow(): boolean {
-    return this.host.clientWidth <= NARROW;
+    const { clientWidth, clientHeight } = this.host;
+    return clientWidth <= NARROW && clientWidth <= NARROW_ASPECT * clientHeight;
   }
 
   private get toolsWidth(): number {

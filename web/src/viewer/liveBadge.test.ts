@@ -1,15 +1,16 @@
 import { expect, test } from 'vitest';
 import type { LiveStatus } from '../capture';
-import { liveFrame, livePlace } from './liveBadge';
-import { standing } from './transport';
+import { livePlace } from './liveBadge';
+import { liveFrame, standing } from './transport';
 
 const following: LiveStatus = {
   state: 'following',
   retryAt: null,
   latencySeconds: null,
+  missingFrame: null,
   behindFrames: 0,
   bitsPerSecond: 0,
-  framesPerSecond: 0,
+  framesPerSecond: 10,
   lateFrames: 0,
   droppedFrames: 0,
 };
@@ -20,6 +21,13 @@ test('a_picture_is_live_while_it_plays_within_seconds_of_the_newest_frame', () =
   expect(livePlace(following, { ...playing, position: 9 }, 0)).toEqual({ kind: 'behind', behind: 3 });
   expect(livePlace({ ...following, behindFrames: 30 }, playing, 0)).toEqual({ kind: 'behind', behind: 3.4 });
   expect(livePlace(following, { ...playing, playing: false }, 0).kind).toBe('behind');
+});
+
+test('a_picture_waits_at_the_newest_frame_where_none_come', () => {
+  const quiet = { ...following, framesPerSecond: 0 };
+  expect(livePlace(quiet, playing, 0)).toEqual({ kind: 'waiting', missing: null });
+  expect(livePlace({ ...quiet, missingFrame: 40 }, playing, 0)).toEqual({ kind: 'waiting', missing: 40 });
+  expect(livePlace(quiet, { ...playing, position: 9 }, 0)).toEqual({ kind: 'behind', behind: 3 });
 });
 
 test('nothing_is_live_while_the_service_does_not_answer', () => {

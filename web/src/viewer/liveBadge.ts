@@ -2,16 +2,15 @@ import { html, type TemplateResult } from 'lit';
 import type { LiveStatus } from '../capture';
 import type { Player } from './player';
 import { threeDigits } from '../text';
-import { sought, started, type Transport } from './transport';
+import { liveAgain, type Transport } from './transport';
 
 /** What is shown counts as live while it is no more seconds than this behind the newest frame. */
 const LIVE_SECONDS = 2;
-/** Frames and seconds that playing keeps from the newest frame, the fewer of both, so that it does not wait for every one. */
-const [MARGIN_FRAMES, MARGIN_SECONDS] = [15, 1];
 
-/** Where the picture of a running session stands; `behind` and `retry` are seconds. */
+/** Where the picture of a running session stands; `behind` and `retry` are seconds. `waiting`: the newest frame is shown, and none have come for some seconds. */
 export type LivePlace =
   | { readonly kind: 'live' }
+  | { readonly kind: 'waiting'; readonly missing: number | null }
   | { readonly kind: 'behind'; readonly behind: number }
   | { readonly kind: 'reconnecting'; readonly retry: number }
   | { readonly kind: 'signed-out' };
@@ -23,12 +22,8 @@ export function livePlace(live: LiveStatus | null, transport: Transport, now: nu
     return { kind: 'reconnecting', retry: Math.max(0, Math.ceil(((live.retryAt ?? now) - now) / 1000)) };
   const frames = Math.max(0, transport.frames - 1 - transport.position) + (live?.behindFrames ?? 0);
   const behind = frames / transport.rate;
+  if (live?.framesPerSecond === 0 && behind <= LIVE_SECONDS) return { kind: 'waiting', missing: live.missingFrame };
   return transport.playing && behind <= LIVE_SECONDS ? { kind: 'live' } : { kind: 'behind', behind };
-}
-
-/** The frame from which a running session is played live. */
-export function liveFrame({ frames, rate }: Transport): number {
-  return Math.max(0, frames - 1 - Math.min(MARGIN_FRAMES, Math.floor(MARGIN_SECONDS * rate)));
 }
 
 export class LiveBadge {
@@ -39,7 +34,7 @@ export class LiveBadge {
 
   template(player: Player): TemplateResult {
     const place = livePlace(player.capture.live ?? null, player.transport, Date.now());
-    const goLive = () => (player.transport = started(sought(player.transport, liveFrame(player.transport))));
+    const goLive = () => (player.transport = liveAgain(player.transport));
     const signIn = () => this.host.dispatchEvent(new CustomEvent('signin', { bubbles: true, composed: true }));
     this.stop();
     if (place.kind === 'reconnecting') this.timer = window.setTimeout(() => this.host.requestUpdate(), 1000);
@@ -63,6 +58,10 @@ function liveBadge(place: LivePlace, goLive: () => void, signIn: () => void): Te
   switch (place.kind) {
     case 'live':
       return html`<span class="live" role="status">LIVE</span>`;
+    case 'waiting':
+      return html`<span class="live behind" role="status"
+        >${place.missing === null ? 'Waiting for frames' : `Waiting for frame ${place.missing}`}</span
+      >`;
     case 'behind':
       return html`<button
         class="live behind"

@@ -114,7 +114,7 @@ export const overlayStyle = css`
   }
   .legend {
     left: var(--cager-space-3);
-    width: min(260px, 60%);
+    width: min(300px, calc(100% - 84px));
     font-size: var(--cager-size-small);
   }
   .legend .bar {
@@ -126,7 +126,6 @@ export const overlayStyle = css`
     gap: 0;
   }
   .legend.comparison {
-    width: min(300px, calc(100% - 84px));
     padding: var(--cager-space-3);
     z-index: 1;
   }
@@ -234,7 +233,12 @@ export const overlayStyle = css`
       right: calc(2 * var(--cager-space-3) + 148px);
     }
   }
-  @container (max-width: 680px) {
+  @container (max-height: 480px) and (min-width: 700px) {
+    .panel {
+      right: calc(2 * var(--cager-control) + 20px + var(--cager-space-3));
+    }
+  }
+  @container (max-width: 680px) and (max-aspect-ratio: 4/3) {
     .panel {
       inset: auto calc(var(--cager-control) + 18px + var(--cager-space-2)) var(--above-deck) var(--cager-space-2);
       width: auto;
@@ -243,7 +247,9 @@ export const overlayStyle = css`
     .legend.comparison {
       left: var(--cager-space-2);
     }
-    :is(.legend.beside, .mark b) {
+  }
+  @container (max-width: 680px) {
+    :is(.legend.beside, .panel ~ .legend, .mark b) {
       display: none;
     }
   }

@@ -1,8 +1,7 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import type { FrameErrors } from '../capture';
-import { HEAT } from '../render/colorMap';
 import type { FrameRange } from '../editing/cageEdit';
-import { comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
+import { colorScale, comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
 import { numberAt, numberText } from './frameNumbers';
 import { glyphs } from '../style/glyphs';
 import type { Player } from './player';
@@ -29,13 +28,14 @@ export function titleBox(heading: string, { capture }: Player, isEdited: boolean
   </div>`;
 }
 
-/** What the timeline shows beside the capture's own errors: those of a second capture, the range of an edit. */
+/** What the timeline shows beside the capture's own errors: those of a second capture, the range of an edit, and which frames are edited. */
 interface TimelineParts {
   readonly besideErrors: FrameErrors | null;
   readonly range: FrameRange | null;
+  readonly edited: ((frame: number) => boolean) | null;
 }
 
-export function deck(player: Player, act: Act, { besideErrors, range }: TimelineParts) {
+export function deck(player: Player, act: Act, { besideErrors, range, edited }: TimelineParts) {
   const { capture, transport } = player;
   const figures = capture.tracking ? scoreFigure : capture.errors.linf.some(Number.isFinite) ? errorFigures : null;
   return html`<div class="deck glass">
@@ -47,6 +47,7 @@ export function deck(player: Player, act: Act, { besideErrors, range }: Timeline
       .tracking=${capture.tracking}
       .frameNumbers=${capture.frameNumbers}
       .range=${range}
+      .edited=${edited}
       .played=${transport.range}
       .position=${transport.position}
       @seek=${(event: CustomEvent<number>) => (player.transport = sought(player.transport, event.detail))}
@@ -87,7 +88,9 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
           </option>`,
       )}
     </select>
-    <div class="place row figures"><span data-place></span><span class="clock muted" data-clock></span></div>
+    <div class="place row figures">
+      <span data-place title="Frame / last frame"></span><span class="clock muted" data-clock></span>
+    </div>
     ${figures ?? nothing}
   </div>`;
 }
@@ -120,16 +123,7 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
   const isMotion = heatMap.kind === 'motion';
   const compares = !isMotion || comparison.isOpen;
   return html`<div class="legend glass ${compares ? 'comparison' : ''} ${beside ? 'beside' : ''}">
-    ${
-      isMotion
-        ? html`Motion between frames
-            <div class="bar" .style=${`background: ${HEAT.gradient}`}></div>
-            <div class="spread muted figures">
-              <span>0</span><span>≥ ${percent(heatMap.largest)} of the diagonal</span>
-            </div>
-            ${rangeChoice(player)}`
-        : nothing
-    }
+    ${isMotion ? html`Motion between frames ${colorScale(player, '≥ ')}${rangeChoice(player)}` : nothing}
     ${compares ? comparisonPanel(player, acts) : nothing}
   </div>`;
 }
@@ -137,7 +131,7 @@ export function legend(player: Player, acts: ComparisonActs, beside: boolean) {
 /**
  * Writes frame, time and errors of the place that is shown. Rendering the template sixty times a second would cost more.
  *
- * @param isEdited whether the frame is shown with edits: what was measured is not what is shown then
+ * @param isEdited whether the frame is shown with edits, or blended: what was measured is not what is shown then
  */
 export function writeReadout(root: ParentNode, { capture, transport }: Player, isEdited: (frame: number) => boolean) {
   const write = (selector: string, text: string) => {

@@ -7,7 +7,7 @@ import { Comparison } from './comparison';
 import { blendedRows, FrameFeed, type Blend } from './frameFeed';
 import { HeatMap } from './heatMap';
 import { sentence } from '../text';
-import { framesAhead, sought, standing, USUAL_RATE, type Transport } from './transport';
+import { framesAhead, liveFrame, sought, standing, USUAL_RATE, type Transport } from './transport';
 
 /** What is shown together with a capture, in step with it. */
 export interface Companion {
@@ -30,8 +30,6 @@ export interface PlaybackListener {
 }
 
 const ORIGINALS_AHEAD = 3;
-/** Frames that a live capture is entered before its end, so that playing does not wait for every one. */
-const LIVE_MARGIN = 15;
 
 /** The place of a capture that is shown: moves on when its frames are there, fetches them, and poses the stage. */
 export class Playback {
@@ -76,16 +74,16 @@ export class Playback {
     this.comparison.onChange = () => listener.refresh();
     this.state = { ...standing(), rate: capture.static.frameRate ?? USUAL_RATE };
     this.followCapture();
-    if (!capture.complete) this.state = sought(this.state, capture.frames - LIVE_MARGIN);
+    if (!capture.complete) this.state = { ...sought(this.state, liveFrame(this.state)), live: true };
   }
 
   get transport(): Transport {
     return this.state;
   }
 
-  /** Goes to a place, and asks anew for frames that did not come before. */
+  /** Goes to a place, and asks anew for frames that did not come before. Whoever pauses a live picture leaves the newest frames. */
   go(transport: Transport) {
-    this.state = transport;
+    this.state = { ...transport, live: transport.live && (transport.playing || !this.state.playing) };
     this.feed.holes.clear();
   }
 
@@ -100,7 +98,8 @@ export class Playback {
   /** Takes note of frames that the capture has got, and of what happened to it. */
   followCapture() {
     const { frames, complete, problem, frameNumbers: numbers } = this.capture;
-    this.state = sought({ ...this.state, frames, complete, numbers }, this.state.position);
+    const { position, live } = this.state;
+    this.state = { ...sought({ ...this.state, frames, complete, numbers }, position), live: live && !complete };
     if (problem !== this.captureProblem) this.listener.problem(problem);
     this.captureProblem = problem;
     this.listener.changed();

@@ -32,6 +32,8 @@ export class Timeline extends LitElement {
   @property({ attribute: false }) tracking: Tracking | undefined;
   /** Numbers of the frames where they come from, if these are others. */
   @property({ attribute: false }) frameNumbers: FrameNumbers = null;
+  /** Tells frames that are shown with edits: what was measured is not what is shown then. */
+  @property({ attribute: false }) edited: ((frame: number) => boolean) | null = null;
   /** Frames that an edit is kept over, shown below to be dragged. */
   @property({ attribute: false }) range: FrameRange | null = null;
   /** First and last frame that are played; null for all. */
@@ -131,18 +133,22 @@ export class Timeline extends LitElement {
 
   /** L∞ and L2 of all frames, then those of a second capture, dashed. */
   private chart() {
-    const { errors, besideErrors, tracking } = this;
-    const lines: [string, Series['mark'], ArrayLike<number> | undefined][] = [
+    const { errors, besideErrors, tracking, edited } = this;
+    const own = (values: Float32Array | undefined) =>
+      edited ? values?.map((value, frame) => (edited(frame) ? NaN : value)) : values;
+    const lines: [string, Series['mark'], Float32Array | undefined][] = [
       ['cage', 'line', tracking ? undefined : errors?.linf],
       ['accent', 'line', tracking?.scores ?? errors?.l2],
       ['cage', 'dashes', besideErrors?.linf],
       ['accent', 'dashes', besideErrors?.l2],
     ];
+    // The scale stays while frames are edited.
+    const top = lines.reduce((most, [, , values]) => values?.reduce((a, b) => (b > a ? b : a), most) ?? most, 1e-9);
     const series = lines.map(([color, mark, values]): Series => {
-      const points = thinned(values ?? [], (frame) => this.shareOf(frame), COLUMNS);
+      const shown = mark === 'line' ? own(values) : values;
+      const points = thinned(shown ?? [], (frame) => this.shareOf(frame), COLUMNS);
       return { label: '', color: `var(--cager-${color})`, mark, points };
     });
-    const top = Math.max(1e-9, ...series.flatMap(({ points }) => points.map(([, value]) => value ?? 0)));
     return plot({ x: axisOf([0, 1], 0), y: axisOf([0, 1.08 * top], 2), series, text: percent });
   }
 
@@ -180,7 +186,8 @@ export class Timeline extends LitElement {
   }
 
   private description(frame: number): string {
-    const own = this.tracking ? trackingText(this.tracking, frame) : errorsText(this.errors, frame);
+    const measured = this.tracking ? trackingText(this.tracking, frame) : errorsText(this.errors, frame);
+    const own = measured !== '' && this.edited?.(frame) ? 'edited: errors are not measured' : measured;
     const texts = [own, errorsText(this.besideErrors, frame)].filter((text) => text !== '');
     return [`frame ${numberText(this.numberOf(frame))}`, ...texts].join(this.besideErrors ? ' | ' : ' · ');
   }

@@ -83,4 +83,9 @@ export const timelineStyle = css`
       display: none;
     }
   }
+  @container (max-height: 480px) {
+    .slider:has(~ cager-range-strip) :is(.chart, .needle, .hover) {
+      display: none;
+    }
+  }
 `;

@@ -60,7 +60,7 @@ export function toolbar(player: Player, act: Act, shown: Tools) {
   };
   const layers = (Object.keys(player.layers) as (keyof Layers)[]).filter((layer) => isPossible[layer] ?? true);
   const record = shown.recording ? 'Stop recording' : undefined;
-  return html`<div class="tools glass" role="toolbar" aria-label="View" aria-orientation="vertical">
+  return html`<div class="tools glass scrolls" role="toolbar" aria-label="View" aria-orientation="vertical">
     ${group('Show', [
       ...layers.map((layer) => tool(layer, layer, act, player.layers[layer])),
       tool('heat', 'heat', act, player.heatMap.kind !== 'none', HEAT_NAMES[player.heatMap.kind]),

@@ -3,6 +3,7 @@ import {
   advanced,
   framesAhead,
   framesAround,
+  liveAgain,
   ranged,
   sought,
   spedUp,
@@ -37,6 +38,15 @@ describe('transport', () => {
     const waiting = advanced({ ...playing, complete: false }, 60);
     expect(waiting).toMatchObject({ position: 9, playing: true });
     expect(advanced({ ...waiting, frames: 20 }, 0.1).position).toBeCloseTo(12);
+  });
+
+  it('stays at the newest frames of a live picture however fast they come, until somebody goes elsewhere', () => {
+    let live = liveAgain({ ...playing, complete: false, frames: 100 });
+    for (let k = 0; k < 50; k++) live = advanced({ ...live, frames: live.frames + 20 }, 0.1);
+    expect(live.frames - live.position).toBeLessThan(17);
+    const left = advanced({ ...sought(live, 500), frames: 5000 }, 0.1);
+    expect(left.position).toBeCloseTo(503);
+    expect(advanced({ ...live, speed: 0.5, frames: 5000 }, 0.1).position).toBeLessThan(live.frames);
   });
 
   it('steps whole frames, around the ends of a loop', () => {

@@ -24,6 +24,8 @@ export interface Transport {
   readonly numbers: FrameNumbers;
   /** Whether no more will come. */
   readonly complete: boolean;
+  /** Whether it stays near the newest frame while more come, until somebody pauses, or goes elsewhere. */
+  readonly live: boolean;
 }
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2, 4] as const;
@@ -43,7 +45,21 @@ export function standing(): Transport {
     frames: 0,
     numbers: null,
     complete: true,
+    live: false,
   };
+}
+
+/** Frames and seconds that playing keeps from the newest frame, the fewer of both, so that it does not wait for every one. */
+const [MARGIN_FRAMES, MARGIN_SECONDS] = [15, 1];
+
+/** The frame from which a running session is played live. */
+export function liveFrame({ frames, rate }: Transport): number {
+  return Math.max(0, frames - 1 - Math.min(MARGIN_FRAMES, Math.floor(MARGIN_SECONDS * rate)));
+}
+
+/** Plays a running session near its newest frame. */
+export function liveAgain(transport: Transport): Transport {
+  return { ...started(sought(transport, liveFrame(transport))), live: true };
 }
 
 export function playedFrames({ range, frames }: Transport): readonly [number, number] {
@@ -59,6 +75,7 @@ function repeats({ repeat, complete, range }: Transport): boolean {
 /**
  * Moves on by some seconds; numbers that are missing between two frames take their time. At the end of a capture it repeats or stops; at the end of one that is
  * still growing it waits there.
+ * Where that grows faster than it is played, a live picture goes on near the newest frame.
  */
 export function advanced(transport: Transport, seconds: number): Transport {
   if (!transport.playing || transport.frames === 0) return transport;
@@ -72,7 +89,9 @@ export function advanced(transport: Transport, seconds: number): Transport {
     direction: way,
   });
   if (!repeats(transport)) {
-    if (number < end) return at(number);
+    const { live, speed } = transport;
+    const newest = live && speed >= 1 ? numberAt(numbers, liveFrame(transport)) : begin;
+    if (number < end) return at(Math.max(number, newest));
     return { ...transport, position: last, playing: !transport.complete && transport.range === null };
   }
   if (repeat === 'ping-pong') {
@@ -100,12 +119,13 @@ export function ranged(transport: Transport, end: 'in' | 'out'): Transport {
 /** Goes to a frame, to the nearest one that exists. */
 export function sought(transport: Transport, position: number): Transport {
   const last = Math.max(0, transport.frames - 1);
-  return { ...transport, position: Math.min(last, Math.max(0, Number.isFinite(position) ? position : 0)) };
+  const place = Math.min(last, Math.max(0, Number.isFinite(position) ? position : 0));
+  return { ...transport, position: place, live: false };
 }
 
 /** Goes some whole frames on, around the ends where it loops, and stands there. */
 export function stepped(transport: Transport, frames: number): Transport {
-  const standing = { ...transport, playing: false };
+  const standing = { ...transport, playing: false, live: false };
   const to = Math.round(transport.position) + frames;
   const count = transport.frames;
   return transport.repeat !== 'once' && transport.complete && count > 0

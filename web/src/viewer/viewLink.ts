@@ -16,6 +16,7 @@ export class ViewLink {
   show(view: ViewState, player: Player, atOnce: boolean) {
     this.up = view.up;
     player.layers = view.layers;
+    if (player.heatMap.kind !== view.heat) player.setHeat(view.heat);
     player.setUp(view.up);
     player.isFollowing = view.follow;
     if (view.frame !== null) player.transport = { ...sought(player.transport, view.frame), playing: false };
@@ -41,6 +42,7 @@ export class ViewLink {
       up: this.up,
       follow: player.isFollowing,
       layers: player.layers,
+      heat: player.heatMap.kind,
     });
   }
 

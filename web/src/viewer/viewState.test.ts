@@ -10,24 +10,27 @@ describe('view in a link', () => {
       up: 'z',
       follow: true,
       layers: { ...USUAL_LAYERS, cage: true, ground: false, colors: false },
+      heat: 'motion',
     } as const;
     const read = viewFromText(viewText(view));
-    expect(read).toMatchObject({ frame: 17, up: 'z', follow: true, layers: view.layers });
+    expect(read).toMatchObject({ frame: 17, up: 'z', follow: true, layers: view.layers, heat: 'motion' });
     expect(read.camera!.distance).toBe(2.5);
     expect(read.camera!.azimuth).toBeCloseTo(0.5, 2);
   });
 
   it('says nothing where everything is as usual', () => {
-    expect(viewText({ frame: null, camera: null, up: 'y', follow: false, layers: USUAL_LAYERS })).toBe('');
+    const usual = { frame: null, camera: null, up: 'y', follow: false, layers: USUAL_LAYERS, heat: 'none' } as const;
+    expect(viewText(usual)).toBe('');
   });
 
   it('passes over what is wrong', () => {
-    expect(viewFromText('frame=-3&camera=1,2&up=q')).toEqual({
+    expect(viewFromText('frame=-3&camera=1,2&up=q&heat=wave')).toEqual({
       frame: null,
       camera: null,
       up: 'y',
       follow: false,
       layers: USUAL_LAYERS,
+      heat: 'none',
     });
     expect(viewFromText('frame=1e99').frame).toBeNull();
   });

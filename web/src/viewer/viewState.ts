@@ -1,5 +1,6 @@
 import { cameraFromText, cameraText, type CameraState } from '../render/camera';
 import type { Layers } from '../render/drawn';
+import type { Heat } from './heatMap';
 
 /** What a link says about the view: everything in it is optional. */
 export interface ViewState {
@@ -8,6 +9,7 @@ export interface ViewState {
   readonly up: 'y' | 'z';
   readonly follow: boolean;
   readonly layers: Layers;
+  readonly heat: Heat;
 }
 
 export const USUAL_LAYERS: Layers = {
@@ -31,22 +33,24 @@ const LETTERS: Readonly<Record<keyof Layers, string>> = {
 };
 const NAMES = Object.keys(LETTERS) as (keyof Layers)[];
 
-/** Reads `frame=12&camera=…&up=z&follow=1&show=mcg`; what is missing or wrong is as usual. */
+/** Reads `frame=12&camera=…&up=z&follow=1&show=mcg&heat=motion`; what is missing or wrong is as usual. */
 export function viewFromText(text: string): ViewState {
   const parameters = new URLSearchParams(text);
   const frame = Number(parameters.get('frame') ?? NaN);
   const show = parameters.get('show');
+  const heat = parameters.get('heat');
   return {
     frame: Number.isSafeInteger(frame) && frame >= 0 ? frame : null,
     camera: cameraFromText(parameters.get('camera')),
     up: parameters.get('up') === 'z' ? 'z' : 'y',
     follow: parameters.get('follow') === '1',
     layers: show === null ? USUAL_LAYERS : layersOf((name) => show.includes(LETTERS[name])),
+    heat: heat === 'motion' || heat === 'error' ? heat : 'none',
   };
 }
 
 /** Writes what {@link viewFromText} reads; what is as usual is left out. */
-export function viewText({ frame, camera, up, follow, layers }: ViewState): string {
+export function viewText({ frame, camera, up, follow, layers, heat }: ViewState): string {
   const parameters = new URLSearchParams();
   if (frame !== null) parameters.set('frame', String(frame));
   if (camera) parameters.set('camera', cameraText(camera));
@@ -56,6 +60,7 @@ export function viewText({ frame, camera, up, follow, layers }: ViewState): stri
     const shown = NAMES.filter((name) => layers[name]).map((name) => LETTERS[name]);
     parameters.set('show', shown.join(''));
   }
+  if (heat !== 'none') parameters.set('heat', heat);
   return parameters.toString().replaceAll('%2C', ',');
 }
 

@@ -1,6 +1,7 @@
 import { css, html, LitElement, nothing, type PropertyValues } from 'lit';
 import { customElement, property, query, state } from 'lit/decorators.js';
 import type { Capture } from '../capture';
+import { listAddress } from '../routes';
 import { problemBehind, ServiceProblem } from '../service/problem';
 import { Service } from '../service/service';
 import { pageToken } from '../service/token';
@@ -131,7 +132,9 @@ export class ViewerPage extends LitElement {
         @besidewanted=${this.askBeside}
         @besideclosed=${() => this.setBeside(null)}
       >
-        <a class="button back" slot="lead" href="#/" aria-label="All sessions" title="All sessions"> ${glyphs.back} </a>
+        <a class="button back" slot="lead" href=${listAddress()} aria-label="All sessions" title="All sessions">
+          ${glyphs.back}
+        </a>
       </cager-viewer>
       <cager-compare-dialog @compare=${this.compare}></cager-compare-dialog>
       ${
@@ -153,7 +156,7 @@ export class ViewerPage extends LitElement {
           : html`<p role="alert">${this.failure.message}</p>`
       }
       ${isGone ? nothing : html`<button class="primary" ?hidden=${this.failure === null} @click=${this.retry}>Try again</button>`}
-      <a class=${isGone ? 'button primary' : ''} href="#/">All sessions</a>
+      <a class=${isGone ? 'button primary' : ''} href=${listAddress()}>All sessions</a>
     </main>`;
   }
 

@@ -134,7 +134,22 @@ export const viewerStyle = css`
     gap: 2px;
     padding: 4px;
     overflow: hidden auto;
-    scrollbar-width: none;
+  }
+  @supports (animation-timeline: scroll()) {
+    .tools {
+      scrollbar-width: none;
+    }
+  }
+  @container (max-height: 480px) and (min-aspect-ratio: 4/3) {
+    .lead:has(~ :is(cager-edit-panel, cager-pose-panel)) {
+      left: calc(328px + 2 * var(--cager-space-3));
+      max-width: calc(100% - 328px - 140px);
+    }
+  }
+  @container (max-height: 480px) and (min-width: 700px) {
+    .tools > [role='group'] {
+      grid-template-columns: 1fr 1fr;
+    }
   }
   .tools > [role='group'] {
     flex: none;
@@ -168,118 +183,6 @@ export const viewerStyle = css`
     .tools .caption-text {
       font-size: 11px;
       line-height: 1.2;
-    }
-  }
-  .deck {
-    position: absolute;
-    inset: auto var(--cager-space-3) var(--cager-space-3);
-    padding: var(--cager-space-2) var(--cager-space-2) 2px;
-  }
-  .transport {
-    gap: 2px;
-    min-width: 0;
-  }
-  .play {
-    width: 42px;
-    height: 42px;
-    padding: 0;
-    margin: 0 4px;
-    border-radius: 50%;
-  }
-  .play svg {
-    width: 22px;
-    height: 22px;
-  }
-  .transport select {
-    field-sizing: content;
-    padding: 0 2px 0 8px;
-    border-color: transparent;
-    background: transparent;
-    cursor: pointer;
-  }
-  .transport select:hover {
-    background: var(--cager-hover);
-  }
-  .transport option {
-    background: var(--cager-surface);
-    color: var(--cager-text);
-  }
-  .place {
-    gap: var(--cager-space-3);
-    margin-left: var(--cager-space-2);
-    white-space: nowrap;
-  }
-  [data-place] {
-    font-weight: 600;
-  }
-  .errors {
-    margin-left: auto;
-    gap: var(--cager-space-4);
-    padding: 0 var(--cager-space-3);
-    font-size: var(--cager-size-small);
-    white-space: nowrap;
-  }
-  .errors dt {
-    color: var(--cager-muted);
-  }
-  .errors dd {
-    min-width: 4.2em;
-  }
-  @container (max-width: 680px) {
-    :is(.errors, .title .more, .caption p:has(+ p)) {
-      display: none;
-    }
-    .place {
-      margin-left: auto;
-      padding-right: var(--cager-space-2);
-    }
-    .deck {
-      inset: auto var(--cager-space-2) max(var(--cager-space-2), env(safe-area-inset-bottom));
-    }
-    .tools button {
-      min-height: 38px;
-    }
-  }
-  @container (max-width: 680px) and (max-height: 700px) {
-    .tools button {
-      min-height: 36px;
-    }
-  }
-  @container (max-width: 480px) {
-    :is(.clock, [data-action='in'], [data-action='out']) {
-      display: none;
-    }
-    .transport select {
-      width: 4.2em;
-    }
-  }
-  @container (max-width: 320px) or (max-height: 220px) {
-    :is(.tools, .title, .legend, .place, .transport select, .transport button:not(.play)) {
-      display: none;
-    }
-    .deck {
-      inset: auto 4px 4px;
-      display: flex;
-      align-items: center;
-      padding: 2px 4px;
-    }
-    cager-timeline {
-      flex: 1;
-      min-width: 0;
-    }
-    .play {
-      width: 28px;
-      height: 28px;
-      min-height: 0;
-    }
-    .play svg {
-      width: 16px;
-      height: 16px;
-    }
-  }
-  @media (pointer: coarse) {
-    .sheet .keyboard {
-      display: none;
     }
   }
 `;

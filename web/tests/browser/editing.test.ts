@@ -83,6 +83,12 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     const before = await readPositions(page, 12);
     const vertex = await dragVertex(page, 60, -40);
     const after = await readPositions(page, 12);
+    // The chart has no errors where they are those of other cages.
+    const timeline = page.getByRole('slider', { name: 'Frame', exact: true });
+    await expect.poll(() => timeline.getAttribute('aria-valuetext')).toBe('frame 12 · edited: errors are not measured');
+    const line = page.locator('cager-timeline .chart path.line').first();
+    const charted = async () => (await line.getAttribute('d'))!.match(/[ML]/g)!.length;
+    await expect.poll(charted).toBeLessThan(FRAMES / 2);
     const moved = distances(before, after);
     const place = await withViewer(page, (viewer) =>
       Promise.resolve([...viewer.editing.editor!.model.graph.cage.positions]),
@@ -96,6 +102,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     expect(near / diagonal).toBeGreaterThan(0.01);
     for (const { p } of order.slice(-order.length / 4)) expect(moved[p]).toBeLessThan(0.05 * near);
     await page.keyboard.press('Control+z');
+    await expect.poll(charted).toBe(FRAMES);
     expect(await readPositions(page, 12)).toEqual(before);
     await page.keyboard.press('Control+Shift+z');
     expect(await readPositions(page, 12)).toEqual(after);
@@ -248,7 +255,7 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     expect(await withViewer(page, ({ editing }) => Promise.resolve(editing.editor!.model.edits.length))).toBe(2);
     expect(await seriousFindings(page)).toEqual([]);
 
-    const button = page.getByRole('button', { name: '.cager', exact: true });
+    const button = page.getByRole('button', { name: 'Save .cager' });
     const [saved] = await Promise.all([page.waitForEvent('download'), button.click()]);
     const [path, output] = ['turned.cager', 'turned.npy'].map((name) => join(folder, name));
     await saved.saveAs(path);
@@ -302,7 +309,14 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
     expect(await readPositions(page, 12)).toEqual(edited);
     await kept(page);
     await reload();
+    // Nothing goes by one click.
     await page.getByRole('button', { name: 'Discard' }).click();
+    const question = page.getByRole('dialog', { name: 'Discard 2 edits?' });
+    await question.getByRole('button', { name: 'Cancel' }).click();
+    await kept(page);
+    await reload();
+    await page.getByRole('button', { name: 'Discard' }).click();
+    await question.getByRole('button', { name: 'Discard' }).click();
     await kept(page);
     await reload();
     await page.waitForTimeout(500);
@@ -395,8 +409,8 @@ describe.skipIf(missing)('editing', { timeout: 90_000 }, () => {
       const [saved] = await Promise.all([page.waitForEvent('download'), button.click()]);
       return { name: saved.suggestedFilename(), content: await readFile(await saved.path()) };
     };
-    const container = await download('.cager');
-    const positions = await download('Decoded frames');
+    const container = await download('Save .cager');
+    const positions = await download('Save positions (.npy)');
     expect([container.name, positions.name]).toEqual(['wave-edited.cager', 'wave-edited.npy']);
 
     const [path, output] = ['edited.cager', 'decoded.npy'].map((name) => join(folder, name));

@@ -181,9 +181,10 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     await expect.poll(frames, { timeout: 20_000 }).toBe(4);
     await client.post(id, capture, 4, 8);
     await expect.poll(frames).toBe(12);
-    await page.getByText('LIVE').or(page.getByText('Go live')).first().waitFor();
+    const badge = page.getByText(/^(LIVE|Go live|Waiting for frames)$/);
+    await badge.waitFor();
     await client.complete(id, 12);
-    await expect.poll(() => page.getByText('LIVE').or(page.getByText('Go live')).count()).toBe(0);
+    await expect.poll(() => badge.count()).toBe(0);
     expect(errors).toEqual([]);
     await close();
   });
@@ -194,7 +195,20 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     await client.post(id, capture, 0, 20);
     const { page, close } = await openPage(site.browser, `${site.page}#/session/${id}`, ['ERR_', '502']);
     await whenShown(page);
-    if (!(await inViewer(page, (viewer) => viewer.player!.transport.playing, null))) await page.keyboard.press('Space');
+    const transport = () => inViewer(page, (viewer) => viewer.player!.transport, null);
+    if (!(await transport()).playing) await page.keyboard.press('Space');
+    await page.getByText('Waiting for frames').waitFor();
+    // The picture stays at the newest frames, of which 60 come at once, until somebody pauses.
+    await client.post(id, capture, 20, 60);
+    await page.getByText('LIVE', { exact: true }).waitFor();
+    await expect.poll(async () => (await transport()).position).toBeGreaterThan(60);
+    await page.keyboard.press('Space');
+    await client.post(id, capture, 80, 60);
+    await page.getByRole('button', { name: 'Go live' }).click();
+    await page.getByText('LIVE', { exact: true }).waitFor();
+    await client.post(id, capture, 150, 5);
+    await page.getByText('Waiting for frame 140').waitFor({ timeout: 20_000 });
+    await client.post(id, capture, 140, 10);
     await page.getByText('LIVE', { exact: true }).waitFor();
     await site.service.kill();
     await page.getByText(/^Reconnecting/).waitFor({ timeout: 20_000 });

@@ -18,12 +18,15 @@ describe.skipIf(chromium === undefined)('poses of a capture', { timeout: 120_000
     await page.keyboard.press('n');
     const add = page.getByRole('button', { name: 'Add this frame' });
     await add.click();
+    expect(await page.locator('[data-linf]').textContent()).toMatch(/%$/);
     await page.keyboard.press('ArrowRight');
     await add.click();
     await expect.poll(() => asked.weights.at(-1)).toBe('0.5,0.5');
     expect(asked.frames).toEqual([[0, 1]]);
     // The service of this test answers with the cage at rest, as large as the first weight.
     await expect.poll(() => shown(page)).toBeCloseTo(0.5, 4);
+    // What was measured of a frame is not what is shown.
+    expect(await page.locator('[data-linf]').textContent()).toBe('–');
     const slider = page.getByRole('slider', { name: 'Blend from the first pose to the second' });
     await slider.press('ArrowRight');
     await expect.poll(() => shown(page)).toBeCloseTo(0.49, 4);

@@ -132,6 +132,9 @@ describe.skipIf(missing !== null)('reports that are opened as files', { timeout:
     await page.setViewportSize({ width: 390, height: 844 });
     await charted(page, 1);
     expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBeLessThanOrEqual(390);
+    // No section hides behind the edge.
+    const sections = page.getByRole('navigation', { name: 'Sections' });
+    expect(await sections.evaluate((nav) => nav.scrollWidth - nav.clientWidth)).toBe(0);
     expect(await seriousFindings(page)).toEqual([]);
   });
 

@@ -231,6 +231,23 @@ describe.skipIf(missing)('the list of sessions', { timeout: 120_000 }, () => {
     await page.getByRole('searchbox').fill('');
     for (let k = 0; k < 4; k += 1) await page.getByRole('button', { name: 'Older' }).click();
     await row(page, 'oldest of many').waitFor();
+
+    // The page, and what is searched, are there again after a look at a session, and after a reload.
+    await expect.poll(() => page.url()).toMatch(/#\/\?page=5$/);
+    await page.reload();
+    await row(page, 'oldest of many').waitFor();
+    await page.getByRole('searchbox').fill('newest of');
+    await page.getByRole('button', { name: 'Running' }).click();
+    await row(page, 'newest of many').getByRole('link').click();
+    await page.getByRole('link', { name: 'All sessions' }).click();
+    await row(page, 'newest of many').waitFor();
+    expect(page.url()).toMatch(/#\/\?search=newest\+of&state=running$/);
+    expect(await page.getByRole('searchbox').inputValue()).toBe('newest of');
+    expect(await page.locator('cager-sessions tbody').count()).toBe(1);
+    await page.goBack();
+    await page.goBack();
+    await row(page, 'newest of many').waitFor();
+    expect(await page.getByRole('button', { name: 'Running' }).getAttribute('aria-pressed')).toBe('true');
     expect(errors).toEqual([]);
     await close();
   });

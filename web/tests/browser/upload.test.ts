@@ -75,6 +75,28 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await close();
   });
 
+  test('animations_that_the_page_does_not_read_are_named_with_the_command_that_does', async () => {
+    const { page, close } = await openPage(site.browser, `${site.page}#/upload`);
+    const json = Buffer.from(JSON.stringify({ asset: { version: '2.0' }, animations: [{}] }).padEnd(64));
+    const head = Buffer.alloc(20);
+    head.write('glTF');
+    head.writeUInt32LE(2, 4);
+    head.writeUInt32LE(20 + json.length, 8);
+    head.writeUInt32LE(json.length, 12);
+    head.write('JSON', 16);
+    await drop(page, { 'walk.glb': Uint8Array.from(Buffer.concat([head, json])) });
+    await page
+      .getByRole('alert')
+      .getByText(/^walk\.glb is animated\. The page reads .*“cager encode --server http:\S+\/captures”\.$/)
+      .waitFor();
+    await drop(page, { 'walk.abc': 'Ogawa' });
+    await page
+      .locator('.items .remark')
+      .getByText(/^The page reads .*“cager encode --server http:/)
+      .waitFor();
+    await close();
+  });
+
   test('arrays_that_cannot_be_read_are_refused_in_words', async () => {
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`);
     const text = Buffer.from(capture.npy(2)).toString('latin1');
@@ -101,6 +123,7 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
       .getByText(/Retrying in/)
       .waitFor();
     await site.service.run();
+    await page.getByRole('button', { name: 'Retry now' }).click();
     const id = await encoded(page);
     expect((await site.client().session(id)).frames).toMatchObject({ solved: LARGE_FRAMES, missing: [] });
     expect(errors).toEqual([]);
@@ -218,6 +241,9 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await page.getByText('You can watch while it uploads').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();
     await page.getByRole('heading', { name: /Stopped/ }).waitFor();
+    // Nothing is live any more.
+    expect(await page.locator('cager-upload .primary').allInnerTexts()).toEqual(['Resume']);
+    expect(await page.getByRole('link', { name: 'Watch live' }).count()).toBe(0);
     await page.getByRole('button', { name: 'Resume' }).click();
     await page.getByText('You can watch while it uploads').waitFor();
     await page.getByRole('button', { name: 'Stop' }).click();

@@ -38,16 +38,19 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
     },
   );
 
-  it('keeps frame and camera in the address, and returns to them', async () => {
+  it('keeps frame, camera and heat map in the address, and returns to them', async () => {
     const page = await opened('definition3-mvc');
     // The first step stops the playing, which would go on from the end.
-    for (const key of ['ArrowLeft', 'End', 'ArrowLeft', 'd']) await page.keyboard.press(key);
-    await page.waitForFunction(() => /frame=\d+&camera=/.test(location.hash));
+    for (const key of ['ArrowLeft', 'End', 'ArrowLeft', 'd', 'h']) await page.keyboard.press(key);
+    await page.waitForFunction(() => /frame=\d+&camera=.*&heat=motion/.test(location.hash));
+    // In the unit of the files as well.
+    await page.getByText(/^≥ [\d.]+ % of the diagonal \([\d.e-]+\)$/).waitFor();
     const fragment = await page.evaluate(() => location.hash);
     await pages.close();
     const again = await opened('definition3-mvc', fragment);
     // As long as it takes until the address follows the view.
     await again.waitForTimeout(600);
+    await again.getByText('Motion between frames').waitFor();
     expect(await again.evaluate(() => location.hash)).toBe(fragment);
   });
 
