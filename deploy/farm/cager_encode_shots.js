@@ -10,7 +10,7 @@ const JOB_TYPE = {
         { key: "shots", type: "string", required: true, default: "1-3",
           description: "Numbers of the shots, such as 10-40 or 10,20,45" },
         { key: "shot_name", type: "string", default: "sh###",
-          description: "Name of a shot's folder, with ### for its number in three digits" },
+          description: "Name of a shot's folder, with ### for its number in three digits, wherever that is" },
         { key: "rest", type: "string", default: "rest.obj",
           description: "Rest pose, in the shot's folder; ../rest.obj is one for all" },
         { key: "frames", type: "string", default: "frames.npy",
@@ -32,7 +32,7 @@ function compileJob(job) {
         throw "shot_name: " + settings.shot_name + " is the same for all shots; give one with a number in it, such as sh###";
     }
     for (const number of frameChunker(settings.shots, 1)) {
-        const shot = settings.shot_name.replace(/#+/, (marks) => number.padStart(marks.length, "0"));
+        const shot = settings.shot_name.replace(/#+/g, (marks) => number.padStart(marks.length, "0"));
         const task = author.Task("encode-" + shot, "misc");
         task.addCommand(author.Command("exec", { exe: "{cager}", args: encodeArguments(settings, shot) }));
         job.addTask(task);

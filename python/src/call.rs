@@ -90,7 +90,9 @@ where
             let Some(result) = taken(&result) else { return Err(own_fault()) };
             result?(arguments.py())
         })?;
-        post.call1(py, (end, finish))
+        // What it gives keeps the result, and is dropped while Python is attached: elsewhere it would stay until the next call from here into Python, and
+        // with it what a result holds that nobody took, such as the turn of a follower.
+        post.call1(py, (end, finish)).map(drop)
     });
 }
 

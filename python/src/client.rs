@@ -1,5 +1,6 @@
 //! A client of the encoding service, whose calls are awaited.
 
+use crate::arguments;
 use crate::arrays::model;
 use crate::call::{Call, awaitable, blocking};
 use crate::encode::Asked;
@@ -47,8 +48,8 @@ impl Client {
         max_error: Option<f64>,
         mean_error: Option<f64>,
         on_progress: Option<Py<PyAny>>,
-        vertices: Option<usize>,
-        seed: u64,
+        #[pyo3(from_py_with = arguments::vertices)] vertices: Option<usize>,
+        #[pyo3(from_py_with = arguments::seed)] seed: u64,
         coordinates: &str,
         frame_rate: Option<f64>,
         force: bool,
@@ -61,26 +62,27 @@ impl Client {
         let asked = Asked { max_error, mean_error, vertices, seed, system, frame_rate, force };
         asked.check(mesh.is_some())?;
         let frames = KeptFrames::new(frames, "frames", rest.points.len())?;
-        let job = Encoding { client: self.client.clone(), rest, mesh, frames, asked, name, keep };
+        let (client, url) = (self.client.clone(), self.url.clone());
+        let job = Encoding { client, url, rest, mesh, frames, asked, name, keep };
         awaitable(py, move |call| encode(job, on_progress, call))
     }
 
     /// A session as it is now.
     fn session<'py>(&self, py: Python<'py>, id: String) -> Result<Bound<'py, PyAny>, Fault> {
         let client = self.client.clone();
-        told(py, async move { client.session(&id).await })
+        told(py, &self.url, async move { client.session(&id).await })
     }
 
     /// All sessions, newest first.
     fn sessions<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Fault> {
         let client = self.client.clone();
-        told(py, async move { client.sessions().await })
+        told(py, &self.url, async move { client.sessions().await })
     }
 
     /// Deletes a session with all its results.
     fn delete<'py>(&self, py: Python<'py>, id: String) -> Result<Bound<'py, PyAny>, Fault> {
         let client = self.client.clone();
-        told(py, async move { client.delete(&id).await })
+        told(py, &self.url, async move { client.delete(&id).await })
     }
 
     /// Writes the container of a completed session; it appears whole or not at all.
@@ -89,10 +91,10 @@ impl Client {
         &self,
         py: Python<'py>,
         id: String,
-        path: PathBuf,
+        #[pyo3(from_py_with = arguments::path)] path: PathBuf,
         overwrite: bool,
     ) -> Result<Bound<'py, PyAny>, Fault> {
-        let client = self.client.clone();
+        let (client, url) = (self.client.clone(), self.url.clone());
         let download = async move {
             let mut file = AtomicFile::create(if overwrite { Target::Replacing(path) } else { Target::New(path) })?;
             client.download(&id, &mut file).await.map_err(unwritten)?;
@@ -104,25 +106,27 @@ impl Client {
             .await
         };
         awaitable(py, async move |Call { mut stop, .. }: Call| {
-            stop.or(download).await?;
+            stop.or(download).await.map_err(|fault| fault.of_service(&url))?;
             Ok(|py: Python<'_>| Ok(py.None()))
         })
     }
 
     /// The cages of a session as they are solved.
     #[pyo3(signature = (id, first=0))]
-    fn follow(&self, id: &str, first: u32) -> Cages {
-        Cages::new(self.client.follow(id, first))
+    fn follow(&self, id: &str, #[pyo3(from_py_with = arguments::first)] first: u32) -> Cages {
+        Cages::new(self.client.follow(id, first), self.url.clone())
     }
 }
 
 /// What a call says, in the types of JSON.
-fn told<T: Serialize + Send + 'static>(
-    py: Python<'_>,
+fn told<'py, T: Serialize + Send + 'static>(
+    py: Python<'py>,
+    url: &str,
     work: impl Future<Output = Result<T, ClientError>> + Send + 'static,
-) -> Result<Bound<'_, PyAny>, Fault> {
+) -> Result<Bound<'py, PyAny>, Fault> {
+    let url = url.to_owned();
     awaitable(py, async move |Call { mut stop, .. }: Call| {
-        let said = stop.or(async { Ok(work.await?) }).await?;
+        let said = stop.or(async { Ok(work.await?) }).await.map_err(|fault| fault.of_service(&url))?;
         let text = serde_json::to_string(&said).map_err(|error| Fault::Told(error.to_string()))?;
         Ok(move |py: Python<'_>| Ok(py.import("json")?.call_method1("loads", (text,))?.unbind()))
     })

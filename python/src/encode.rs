@@ -1,10 +1,14 @@
 //! Encodes arrays into a container.
 
+use crate::apart::{Caller, apart};
+use crate::arguments;
 use crate::arrays::{frame_arrays, frame_views, model};
-use crate::capture::{Capture, temporary};
+use crate::capture::Capture;
 use crate::fault::{Fault, computing, of};
 use crate::frames::Frames;
 use crate::geometry::{cage, cage_mesh, design_goal, designed, of_rest, system};
+use crate::handed_frames::{HandingFrames, Next};
+use crate::own_file::{OwnFile, WorkFolder, temporary};
 use crate::watch::Watch;
 use cager_cages::{DesignOptions, Style};
 use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
@@ -13,12 +17,14 @@ use cager_capture::memory::Memory;
 use cager_capture::mismatch::cage_mismatch;
 use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::inversion::{PrepareContext, PrepareError, Solver};
-use cager_formats::{Target, Units, commit_together};
+use cager_formats::{Action, Error, Target, Units, commit_together};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use pyo3::prelude::*;
-use tempfile::TempPath;
+
+/// What is told before a cage is designed.
+const TRYING: &str = "trying cages of several sizes";
 
 /// What is asked of an encoding.
 #[derive(Clone, Copy)]
@@ -79,8 +85,8 @@ pub(crate) fn encode<'py>(
     max_error: Option<f64>,
     mean_error: Option<f64>,
     progress: Option<Py<PyAny>>,
-    vertices: Option<usize>,
-    seed: u64,
+    #[pyo3(from_py_with = arguments::vertices)] vertices: Option<usize>,
+    #[pyo3(from_py_with = arguments::seed)] seed: u64,
     coordinates: &str,
     frame_rate: Option<f64>,
     force: bool,
@@ -98,8 +104,7 @@ pub(crate) fn encode<'py>(
         let mut frames = of_rest(&mut rest, &views, &watch);
         frames.frame_rate = frame_rate;
         frames.check(&rest, force)?;
-        let path = encoded(&rest, mesh, &frames, asked, &watch)?;
-        Capture::of_encoding(path)
+        Capture::of_encoding(encoded(rest, mesh, &frames, asked, &watch)?)
     })?;
     capture.warn(py, 1)?;
     Ok(capture)
@@ -107,46 +112,62 @@ pub(crate) fn encode<'py>(
 
 /// The container, in a file that goes when nobody needs it any more.
 fn encoded(
-    rest: &Model,
+    rest: Model,
     mesh: Option<TriMesh>,
     frames: &Frames<'_>,
     asked: Asked,
     watch: &Watch,
-) -> Result<TempPath, Fault> {
-    let goal = asked.goal(mesh.is_some())?;
+) -> Result<OwnFile, Fault> {
+    let mut goal = asked.goal(mesh.is_some())?;
     let cage = match mesh {
-        Some(mesh) => cage_of(rest, mesh, frames.origin, asked.force)?,
-        None => cage(designed(rest, frames, &design_options(rest, frames, asked, goal, watch)?, watch)?)?,
+        Some(mesh) => cage_of(&rest, mesh, frames.origin, asked.force)?,
+        None => {
+            let design = designed(&rest, frames, &design_options(&rest, frames, asked, goal, watch)?, watch)?;
+            // What no cage meets is coded.
+            if design.missed {
+                goal = asked.goal(true)?;
+            }
+            cage(design.cage)?
+        }
     };
-    let path = temporary()?.into_temp_path();
-    let system = asked.system;
-    let choices = InversionChoices { is_coded: goal.is_some(), ..InversionChoices::coded(system) };
-    let total = frames.views.len().max(1) as f64;
-    let job = Job {
-        rest,
-        cage: &cage,
-        frames: &mut frames.open(),
-        output: &Target::Replacing(path.to_path_buf()),
-        system,
-        options: choices.options(system.values(&cage).unknowns()),
-        matrix: None,
-        choose: None,
-        memory: Memory::half_of_free(),
-        goal,
-        origin: frames.origin,
-        units: Units::UNKNOWN,
-        exact_rest: false,
-    };
-    let done = encode_job(job, &|now| {
-        // Reading stops where the callback has asked for it.
-        let _ = match now {
-            EncodeProgress::Preparing(step) => watch.tell(step, 0.0),
-            EncodeProgress::Frames(done) => watch.tell("encoding", done as f64 / total),
+    let folder = WorkFolder::new()?;
+    let output = Target::New(folder.path().join("capture.cager"));
+    let place = output.path().to_owned();
+    let (system, origin, total) = (asked.system, frames.origin, frames.views.len().max(1) as f64);
+    let written = folder.clone();
+    let (mut handing, handed) = HandingFrames::new(frames.open());
+    let work = move |caller: Caller<Next>| {
+        let choices = InversionChoices { is_coded: goal.is_some(), ..InversionChoices::coded(system) };
+        let job = Job {
+            rest: &rest,
+            cage: &cage,
+            frames: &mut handed(caller.clone()),
+            output: &output,
+            system,
+            options: choices.options(system.values(&cage).unknowns()),
+            matrix: None,
+            choose: None,
+            memory: Memory::half_of_free(),
+            goal,
+            origin,
+            units: Units::UNKNOWN,
+            exact_rest: false,
         };
-    });
-    let encoded = watch.unless_stopped(done.map_err(named))?;
-    commit_together(vec![encoded.container])?;
-    Ok(path)
+        let done = encode_job(job, &|now| {
+            // Reading stops where nobody waits any more.
+            let _ = match now {
+                EncodeProgress::Preparing(step) => caller.tell(step, 0.0),
+                EncodeProgress::Frames(done) => caller.tell("encoding", done as f64 / total),
+            };
+        });
+        (done, written)
+    };
+    let (done, _written) = apart(watch, "coordinates", work, |next| handing.serve(next))?;
+    commit_together(vec![done.map_err(named)?.container])?;
+    let file = OwnFile::new(temporary()?.into_temp_path());
+    let unmoved = |cause| Error::Io { path: file.path().to_owned(), action: Action::Write, cause };
+    std::fs::rename(place, file.path()).map_err(unmoved)?;
+    Ok(file)
 }
 
 /// A cage that was given, unless it looks like that of another model.
@@ -176,20 +197,25 @@ pub(crate) fn design_options(
     }
     let mut vertices = asked.vertices;
     if let (Some(goal), None) = (goal, vertices) {
-        let tell = || watch.tell("trying cages of several sizes", 0.0);
-        let context = PrepareContext { before_step: &|_| tell(), ..PrepareContext::default() };
-        let _ = tell();
         let samples = sample_frames(&mut frames.open(), CAGE_SIZE_FRAMES, true).map_err(named)?;
-        let (system, total) = (asked.system, frames.views.len());
-        let sizes = CageSizes { goal, rest, system, frames: &samples, total, memory: Memory::half_of_free() };
-        vertices = sizes.best(|cage: &Cage, rest| {
-            let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
-            Solver::prepare_with(system, cage, &rest.points, options, &context)
-        });
-        watch.unless_stopped(Ok(()))?;
+        let (system, total, rest) = (asked.system, frames.views.len(), rest.clone());
+        let work = move |caller: Caller<()>| {
+            let before_step = |_| caller.tell(TRYING, 0.0);
+            let context = PrepareContext { before_step: &before_step, ..PrepareContext::default() };
+            let sizes =
+                CageSizes { goal, rest: &rest, system, frames: &samples, total, memory: Memory::half_of_free() };
+            sizes.best(|cage: &Cage, rest| {
+                let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
+                Solver::prepare_with(system, cage, &rest.points, options, &context)
+            })
+        };
+        vertices = apart(watch, TRYING, work, |()| ())?;
     }
+    // Its normals are unknowns too, two for each vertex.
+    let is_free = asked.system.name() == Green::Free.name();
+    let points = if is_free { rest.points.len().div_ceil(3) } else { rest.points.len() };
     Ok(DesignOptions {
-        goal: design_goal(vertices, asked.mean_error, rest.points.len())?,
+        goal: design_goal(vertices, asked.mean_error, points)?,
         style: if is_mean_value { Style::Free } else { Style::Editable },
         seed: asked.seed,
         ..DesignOptions::default()

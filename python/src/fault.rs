@@ -1,7 +1,8 @@
 //! What goes wrong, as Python gets it: one exception class, whose message names what is wrong and what to do.
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
+use std::ffi::CString;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
@@ -24,6 +25,30 @@ pub(crate) enum Fault {
 /// A fault that `name` is to blame for: an argument, or a file.
 pub(crate) fn of(name: impl Display, what: impl Display) -> Fault {
     Fault::Told(format!("{name}: {what}"))
+}
+
+/// Warnings for the user, `level` frames of the stack up.
+pub(crate) fn warn(py: Python<'_>, warnings: &[String], level: i32) -> PyResult<()> {
+    warnings.iter().try_for_each(|words| {
+        let words = CString::new(words.replace('\0', ""))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &words, level)
+    })
+}
+
+/// What a service says of an address that none of its routes has, and that it does not know.
+const NO_ROUTE: &str = "the routes are listed in /openapi.json";
+
+impl Fault {
+    /// Names the address of a service where that leads nowhere.
+    pub(crate) fn of_service(self, url: &str) -> Self {
+        match self {
+            Self::Told(words) if words.contains(NO_ROUTE) => of(
+                url,
+                "a service answers there, but has no such route; correct what follows the host, or leave it out",
+            ),
+            fault => fault,
+        }
+    }
 }
 
 macro_rules! told {
@@ -59,6 +84,7 @@ impl From<Fault> for PyErr {
                         "is there already; name another file",
                         "is there already; name another file, or pass overwrite=True",
                     )
+                    .replace("take one of them (--frame K), or name a folder", "name a folder")
                     .replace("the cages that `cager decode --cages` writes", "capture.cages"),
             ),
             Fault::Raised(error) => error,

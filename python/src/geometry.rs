@@ -1,10 +1,12 @@
 //! Cages designed from a capture, and the coordinates of points in a cage.
 
+use crate::apart::interruptible;
+use crate::arguments;
 use crate::arrays::{FrameView, frame_arrays, frame_views, model};
-use crate::fault::{Fault, computing, of};
+use crate::fault::{Fault, computing, of, warn};
 use crate::frames::Frames;
 use crate::watch::Watch;
-use cager_cages::{DesignError, DesignOptions, EncloseError, Goal, Progress, Style, design};
+use cager_cages::{Design, DesignError, DesignOptions, EncloseError, Goal, Progress, Style, design};
 use cager_capture::design::{FRAMES, STYLES, default_vertices, style_by_name, style_name};
 use cager_capture::encode::sample_frames;
 use cager_capture::memory::free_bytes;
@@ -61,7 +63,7 @@ pub(crate) fn designed(
     frames: &Frames<'_>,
     options: &DesignOptions,
     watch: &Watch,
-) -> Result<TriMesh, Fault> {
+) -> Result<Design, Fault> {
     let samples = sample_frames(&mut frames.open(), FRAMES, false).map_err(|error| Fault::Told(error.to_string()))?;
     let mut tell = |now: Progress<'_>| watch.tell(now.stage, now.fraction);
     let made = design(rest, &samples, None, options, &mut tell).map_err(|error| match &error {
@@ -72,7 +74,7 @@ pub(crate) fn designed(
         DesignError::Enclose(_) => of("rest", error),
         _ => of(frames.name, error),
     });
-    Ok(watch.unless_stopped(made)?.cage)
+    watch.unless_stopped(made)
 }
 
 /// A mesh as arrays: vertices m × 3, and triangles k × 3.
@@ -103,10 +105,10 @@ pub(crate) fn design_cage<'py>(
     rest: &Bound<'py, PyAny>,
     faces: Option<&Bound<'py, PyAny>>,
     frames: &Bound<'py, PyAny>,
-    vertices: Option<usize>,
+    #[pyo3(from_py_with = arguments::vertices)] vertices: Option<usize>,
     mean_error: Option<f64>,
     style: &str,
-    seed: u64,
+    #[pyo3(from_py_with = arguments::seed)] seed: u64,
     time_limit: Option<f64>,
     force: bool,
     progress: Option<Py<PyAny>>,
@@ -122,14 +124,15 @@ pub(crate) fn design_cage<'py>(
         ..DesignOptions::default()
     };
     let watch = Watch::new(progress);
-    let mesh = computing(py, || {
+    let design = computing(py, || {
         let mut frames = of_rest(&mut rest, &views, &watch);
         frames.check(&rest, force)?;
-        let mut mesh = designed(&rest, &frames, &options, &watch)?;
-        move_from(frames.origin, &mut mesh.vertices);
-        Ok(mesh)
+        let mut design = designed(&rest, &frames, &options, &watch)?;
+        move_from(frames.origin, &mut design.cage.vertices);
+        Ok(design)
     })?;
-    mesh_arrays(py, &mesh)
+    warn(py, &design.warnings, 1)?;
+    mesh_arrays(py, &design.cage)
 }
 
 /// The frames of a rest pose, both about an origin of their own where it lies far away.
@@ -144,12 +147,29 @@ fn style(name: &str) -> Result<Style, Fault> {
         .ok_or_else(|| of("style", format!("there is no {name:?}; give one of {}", STYLES.map(style_name).join(", "))))
 }
 
+/// More than a clock counts is no limit.
 fn seconds(limit: Option<f64>) -> Result<Option<Duration>, Fault> {
-    let limit = limit.map(|limit| Duration::try_from_secs_f64(limit).ok().filter(|limit| !limit.is_zero()));
-    limit.map(|limit| limit.ok_or_else(|| of("time_limit", "give a number of seconds above 0"))).transpose()
+    match limit {
+        Some(limit) if limit > 0.0 => {
+            Ok(Duration::try_from_secs_f64(limit).ok().map(|limit| limit.max(Duration::from_nanos(1))))
+        }
+        Some(limit) => Err(of("time_limit", format!("is {limit}; give a number of seconds above 0"))),
+        None => Ok(None),
+    }
 }
 
 /// Coordinates of points in a cage: an array n × m, whose product with the vertices of the cage gives the points.
+///
+/// With kind "green" and "green-free" columns for the triangles of the cage follow those of its m vertices. They are multiplied with
+/// the triangles' unit normals, each times the root of the mean area of all triangles. Of a cage of triangles, as those of
+/// cager.design_cage and capture.cage_faces are (faces of more corners are cut into triangles from their first corner on):
+///
+///     normals = np.cross(*(cage_vertices[cage_faces[:, 1:]] - cage_vertices[cage_faces[:, :1]]).swapaxes(0, 1))
+///     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+///     points = phi @ np.vstack([cage_vertices, normals / lengths * np.sqrt(lengths.mean() / 2)])
+///
+/// To move the points with the cage, "green" takes the unit normals of the moved triangles, each also times its stretch; "green-free"
+/// takes any. docs/FORMAT.md defines both under "Coordinate systems".
 #[pyfunction]
 #[pyo3(signature = (rest, cage_vertices, cage_faces, kind="mvc"))]
 pub(crate) fn coordinates<'py>(
@@ -163,22 +183,26 @@ pub(crate) fn coordinates<'py>(
     let mut mesh = cage_mesh(cage_vertices, cage_faces)?;
     let system = system(kind, "kind")?;
     let phi = computing(py, || {
-        let origin = own_origin(&rest.points);
-        move_to(origin, &mut rest.points);
-        move_to(origin, &mut mesh.vertices);
-        let cage = cage(mesh)?;
-        reject_far_points(&cage, &rest.points).map_err(|error| of("rest", error))?;
-        let columns = system.values(&cage).columns();
-        let needed = coordinates_bytes(rest.points.len(), columns, 2).saturating_add(system.working_bytes(&cage, None));
-        if needed > free_bytes() {
-            return Err(of(
-                "rest",
-                format!("its coordinates need {:.0} GB of memory; give fewer points", 1e-9 * needed as f64),
-            ));
-        }
-        let phi = system.coordinates(&cage, &rest.points, None).map_err(|error| of("cage", error))?.phi;
-        let values = (0..phi.ncols()).flat_map(|column| phi.col(column).iter().copied()).collect();
-        Array2::from_shape_vec((phi.nrows(), phi.ncols()).f(), values).map_err(|error| Fault::Told(error.to_string()))
+        interruptible(move || {
+            let origin = own_origin(&rest.points);
+            move_to(origin, &mut rest.points);
+            move_to(origin, &mut mesh.vertices);
+            let cage = cage(mesh)?;
+            reject_far_points(&cage, &rest.points).map_err(|error| of("rest", error))?;
+            let columns = system.values(&cage).columns();
+            let needed =
+                coordinates_bytes(rest.points.len(), columns, 2).saturating_add(system.working_bytes(&cage, None));
+            if needed > free_bytes() {
+                return Err(of(
+                    "rest",
+                    format!("its coordinates need {:.0} GB of memory; give fewer points", 1e-9 * needed as f64),
+                ));
+            }
+            let phi = system.coordinates(&cage, &rest.points, None).map_err(|error| of("cage", error))?.phi;
+            let values = (0..phi.ncols()).flat_map(|column| phi.col(column).iter().copied()).collect();
+            Array2::from_shape_vec((phi.nrows(), phi.ncols()).f(), values)
+                .map_err(|error| Fault::Told(error.to_string()))
+        })
     })?;
     Ok(phi.into_pyarray(py))
 }

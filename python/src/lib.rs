@@ -1,5 +1,7 @@
 //! The Python module `cager`: captures as numpy arrays, encoded into `.cager` files and decoded from them.
 
+mod apart;
+mod arguments;
 mod arrays;
 mod call;
 mod capture;
@@ -10,8 +12,10 @@ mod fault;
 mod follow;
 mod frames;
 mod geometry;
+mod handed_frames;
 mod kept_frames;
 mod loop_progress;
+mod own_file;
 mod remote_encode;
 mod watch;
 

@@ -39,7 +39,7 @@ impl LoopProgress {
         // Where Python or the loop has ended, nobody listens.
         let _ = Python::try_attach(|py| {
             let run = PyCFunction::new_closure(py, None, None, move |arguments, _| progress.run(arguments.py()))?;
-            self.post.call1(py, (run,))
+            self.post.call1(py, (run,)).map(drop)
         });
     }
 

@@ -2,12 +2,13 @@
 
 use crate::arrays::{frame_arrays, frame_views};
 use crate::call::{Call, Stop, blocking};
-use crate::capture::{Capture, temporary};
+use crate::capture::Capture;
 use crate::encode::{Asked, cage_of, design_options};
 use crate::fault::{Fault, computing, of};
 use crate::geometry::of_rest;
 use crate::kept_frames::KeptFrames;
 use crate::loop_progress::LoopProgress;
+use crate::own_file::{OwnFile, temporary};
 use crate::watch::Watch;
 use cager_cages::{Goal, Style};
 use cager_client::cage_messages::{CageOptions, CageState, CageStyle};
@@ -33,6 +34,8 @@ const CLEAN_UP_TIMEOUT: Duration = Duration::from_secs(5);
 /// What is encoded, and how.
 pub(crate) struct Encoding {
     pub(crate) client: Client,
+    /// The address as it was given.
+    pub(crate) url: String,
     pub(crate) rest: Model,
     pub(crate) mesh: Option<TriMesh>,
     pub(crate) frames: KeptFrames,
@@ -57,9 +60,9 @@ pub(crate) async fn encode(
 ) -> Result<impl FnOnce(Python<'_>) -> Result<Py<PyAny>, Fault> + Send + 'static, Fault> {
     let Call { post, mut stop } = call;
     let progress = LoopProgress::new(callback, post);
-    let (client, keep) = (job.client.clone(), job.keep);
+    let (client, url, keep) = (job.client.clone(), job.url.clone(), job.keep);
     let mut left = Left::default();
-    let result = run(job, &mut stop, &progress, &mut left).await;
+    let result = run(job, &mut stop, &progress, &mut left).await.map_err(|fault| fault.of_service(&url));
     progress.end();
     if keep {
         left.session = None;
@@ -189,25 +192,26 @@ async fn filled(client: &Client, id: &str, frames: KeptFrames, progress: &Arc<Lo
     client.download(id, file.as_file_mut()).await?;
     blocking(move || {
         let mut container = checked(file.reopen().map_err(ClientError::Output)?)?;
-        let Some(origin) = origin else { return Capture::of_encoding(file.into_temp_path()) };
+        let Some(origin) = origin else { return Capture::of_encoding(OwnFile::new(file.into_temp_path())) };
         // The service was sent positions about an origin that it does not know.
         let placed = temporary()?;
         let out = BufWriter::new(placed.reopen().map_err(ClientError::Output)?);
-        let out = ContainerWriter::copy_placed(&mut container, (Some(origin), Units::UNKNOWN), out).map_err(damaged)?;
+        let out = ContainerWriter::copy_placed(&mut container, (Some(origin), Units::UNKNOWN), out)
+            .map_err(|error| damaged(&error))?;
         out.into_inner().map_err(|error| ClientError::Output(error.into_error()))?;
-        Capture::of_encoding(placed.into_temp_path())
+        Capture::of_encoding(OwnFile::new(placed.into_temp_path()))
     })
     .await
 }
 
 /// A container that a service has sent, unless it is damaged.
 pub(crate) fn checked(file: File) -> Result<ContainerReader<BufReader<File>>, Fault> {
-    let mut container = ContainerReader::open(BufReader::new(file)).map_err(damaged)?;
-    container.verify().map_err(damaged)?;
+    let mut container = ContainerReader::open(BufReader::new(file)).map_err(|error| damaged(&error))?;
+    container.verify().map_err(|error| damaged(&error))?;
     Ok(container)
 }
 
-fn damaged(error: container::Error) -> Fault {
+fn damaged(error: &container::Error) -> Fault {
     of(
         "the container from the service",
         format!("cannot be read ({error}); try again, and look at the service's log if that gives the same"),

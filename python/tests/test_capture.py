@@ -29,6 +29,15 @@ def test_a_mean_error_is_met(small):
     assert np.sqrt(squared.mean(axis=1)).mean() <= 2e-3 * small.diagonal
 
 
+def test_a_mean_error_that_no_cage_meets_is_met_by_coding(small):
+    frames = small.frames + 0.02 * np.random.default_rng(1).normal(size=small.frames.shape)
+    capture = cager.encode(small.rest, small.faces, frames, mean_error=1e-3)
+    squared = ((capture.decode() - frames) ** 2).sum(axis=2)
+    assert np.sqrt(squared.mean(axis=1)).mean() <= 1e-3 * small.diagonal
+    with pytest.warns(UserWarning, match="was not reached"):
+        cager.design_cage(small.rest, small.faces, frames, mean_error=1e-3)
+
+
 def test_frames_come_one_by_one_in_slices_and_all_at_once(small, coded):
     assert len(coded) == 10
     assert coded[0].shape == small.rest.shape and coded[0].dtype == np.float32

@@ -1,5 +1,8 @@
 //! Shots encoded as render farms do: where a Python with `openjd-cli` and `opencue-pyoutline` is (`make farm` makes one).
 
+#[cfg(unix)]
+mod names;
+
 use std::path::Path;
 use std::process::Command;
 
