@@ -16,3 +16,10 @@ for query in queries:
     # What Grafana puts in itself.
     promql_parser.parse(re.sub(r"\$__rate_interval", "1m", query).replace("$instance", ".*"))
 print(f"{len(queries)} queries can be parsed")
+
+# Rows of the document whose last column says what to be alarmed by.
+rows = [line.split("|") for line in (deploy.parent / "docs/OPERATIONS.md").read_text().splitlines()]
+alarming = [row[1].strip("` ") for row in rows if len(row) == 6 and row[1].startswith(" `cager_") and row[4].strip()]
+rules = " ".join(rule["expr"] for group in alerts["groups"] for rule in group["rules"])
+missing = [metric for metric in alarming if metric not in rules]
+assert alarming and not missing, f"{missing} of docs/OPERATIONS.md have no alert in deploy/prometheus/alerts.yaml"

@@ -2,6 +2,7 @@
 
 pub(crate) mod entries;
 mod error;
+mod files;
 mod flags;
 mod layers;
 mod settings;
@@ -78,7 +79,7 @@ settings! {
     /// Parts into which the tenants of a database are divided, so that several processes serve them at once; 1 for one process at a time. Needs `catalog`.
     shards: u32 = 1, SettingKind::Number { least: 1, most: cager_store::MAX_SHARDS as u64 };
     /// Address at which the other processes reach this one, `http://10.0.0.5:8080`; by default the one it listens on.
-    advertise: Option<String> = None, SettingKind::Text;
+    advertise: Option<String> = None, SettingKind::Url;
     /// File of access tokens; without one everyone on this machine is tenant `local`.
     tokens: Option<PathBuf> = None, SettingKind::File;
     /// Address of an OpenID Connect provider whose tokens are taken as well.
@@ -100,7 +101,7 @@ settings! {
     /// Names by which a service without tokens may be asked, beside `localhost` and addresses.
     allowed_hosts: Vec<String> = Vec::new(), SettingKind::List;
     /// Origins of pages that may ask, beside the service's own.
-    allowed_origins: Vec<String> = Vec::new(), SettingKind::List;
+    allowed_origins: Vec<String> = Vec::new(), SettingKind::Origins;
     /// Form of log lines: `human` or `json`.
     log: LogFormat = LogFormat::Human, SettingKind::Format;
     /// Which log lines appear: a level, or levels by module such as `info,cager_service::http=debug`.
@@ -194,6 +195,30 @@ impl ServeConfig {
         env: impl Iterator<Item = (String, String)>,
         flags: &ServeFlags,
     ) -> Result<Self, ConfigError> {
+        let config = Self::put_together(file, env, flags)?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// As [`Self::load`], for who only looks at what is stored: it is not asked who may use the service.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn load_stored(
+        file: Option<&Path>,
+        env: impl Iterator<Item = (String, String)>,
+        flags: &ServeFlags,
+    ) -> Result<Self, ConfigError> {
+        let config = Self::put_together(file, env, flags)?;
+        config.check_stored()?;
+        Ok(config)
+    }
+
+    fn put_together(
+        file: Option<&Path>,
+        env: impl Iterator<Item = (String, String)>,
+        flags: &ServeFlags,
+    ) -> Result<Self, ConfigError> {
         let mut layers = layers::Layers::default();
         let env: Vec<_> = env.filter(|(name, _)| name.starts_with(layers::ENVIRONMENT)).collect();
         let from_env = env.iter().find(|(name, _)| name == "CAGER_CONFIG").map(|(_, path)| Path::new(path));
@@ -202,9 +227,7 @@ impl ServeConfig {
         }
         layers.add_environment(&env)?;
         flags.add_to(&mut layers)?;
-        let config = layers.build()?;
-        config.check()?;
-        Ok(config)
+        layers.build()
     }
 
     /// Refuses combinations that cannot work or are not safe.
@@ -231,11 +254,9 @@ impl ServeConfig {
                 return Err(ConfigError::Half { given, missing });
             }
         }
-        if self.blobs.is_some() && self.catalog.is_none() {
-            return Err(ConfigError::Half { given: "blobs", missing: "catalog" });
-        }
+        self.check_stored()?;
         if self.shards > 1 {
-            self.check_shards()?;
+            self.check_processes()?;
         }
         if self.oidc_keys.is_some() && self.oidc_issuer.is_none() {
             return Err(ConfigError::Half { given: "oidc_keys", missing: "oidc_issuer" });
@@ -243,35 +264,37 @@ impl ServeConfig {
         Ok(())
     }
 
-    /// Refuses what several processes cannot share.
-    fn check_shards(&self) -> Result<(), ConfigError> {
+    /// Refuses places where nothing can be stored.
+    fn check_stored(&self) -> Result<(), ConfigError> {
+        if self.blobs.is_some() && self.catalog.is_none() {
+            return Err(ConfigError::Half { given: "blobs", missing: "catalog" });
+        }
+        if self.shards == 1 {
+            return Ok(());
+        }
         if self.catalog.is_none() {
             let why = "shards is set but catalog is not: name the database that the processes share by --catalog";
             return Err(ConfigError::Shards { why: why.to_owned() });
         }
-        if !self.is_guarded() {
-            let why = "shards is set but tokens is not: without tokens there is one tenant, and nothing to divide";
-            return Err(ConfigError::Shards { why: why.to_owned() });
-        }
         let path = |url: &String| url.trim_end_matches('/').splitn(4, '/').nth(3).is_some_and(|path| !path.is_empty());
-        if let Some(url) = self.blobs.as_ref().filter(|url| !path(url)) {
-            return Err(ConfigError::Shards {
+        match self.blobs.as_ref().filter(|url| !path(url)) {
+            Some(url) => Err(ConfigError::Shards {
                 why: format!(
                     "blobs: {url} names a bucket without a path, and each shard needs one of its own: write {}/cager",
                     url.trim_end_matches('/')
                 ),
-            });
-        }
-        let is_address = |url: &String| {
-            let parsed = reqwest::Url::parse(url).ok();
-            parsed.is_some_and(|url| matches!(url.scheme(), "http" | "https") && url.has_host() && url.path() == "/")
-        };
-        match self.advertise.as_ref().filter(|url| !is_address(url)) {
-            Some(url) => Err(ConfigError::Shards {
-                why: format!("advertise: {url} is no address such as http://10.0.0.5:8080 or http://[fd00::5]:8080"),
             }),
             None => Ok(()),
         }
+    }
+
+    /// Refuses what several processes cannot share.
+    fn check_processes(&self) -> Result<(), ConfigError> {
+        if self.is_guarded() {
+            return Ok(());
+        }
+        let why = "shards is set but tokens is not: without tokens there is one tenant, and nothing to divide";
+        Err(ConfigError::Shards { why: why.to_owned() })
     }
 
     /// As it is for one of its shards: the first one is where all was before it was divided. What is kept is shared out among them.

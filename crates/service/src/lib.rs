@@ -6,6 +6,7 @@ pub mod auth;
 #[doc(hidden)]
 pub mod cage_job;
 pub mod config;
+mod descriptors;
 pub mod engine;
 mod file_bodies;
 pub mod http;
@@ -15,6 +16,7 @@ mod jobs;
 pub mod local;
 mod preparation;
 pub mod problem;
+mod readiness;
 mod recovery;
 mod resources;
 pub mod serve;

@@ -73,9 +73,17 @@ kinds! {
     QUOTA_EXCEEDED INSUFFICIENT_STORAGE "quota-exceeded" "The tenant's storage quota is used up";
 }
 
+impl std::fmt::Display for ApiError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.problem.detail)
+    }
+}
+
+impl std::error::Error for ApiError {}
+
 impl From<ApiError> for std::io::Error {
     fn from(error: ApiError) -> Self {
-        Self::other(error.problem.detail)
+        Self::other(error)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::cage_job::local_designer;
 use crate::config::ServeConfig;
+use crate::descriptors;
 use crate::http::listen::{Limits, serve, tls_config};
 use crate::http::{Operated, admin, router, seen, seen_by_operators, spare, without_pages};
 use crate::resources::Resources;
@@ -27,8 +28,9 @@ const TAKEOVER_PAUSE: Duration = Duration::from_millis(250);
 ///
 /// # Errors
 /// A port, a folder or a file that cannot be used.
-pub fn run(config: ServeConfig, version: &'static str) -> Result<()> {
+pub fn run(mut config: ServeConfig, version: &'static str) -> Result<()> {
     telemetry::init_logging(config.log, &config.log_filter)?;
+    descriptors::make_room(&mut config);
     telemetry::metrics::recorder();
     metrics::gauge!("cager_build_info", "version" => version).set(1.0);
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().thread_name("serve").build()?;

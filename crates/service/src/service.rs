@@ -5,6 +5,7 @@ use crate::config::ServeConfig;
 use crate::jobs::Jobs;
 use crate::preparation::{CageMaker, Solvers};
 use crate::problem::{self, ApiError};
+use crate::readiness::Readiness;
 use crate::recovery::Recovery;
 use crate::resources::Resources;
 pub use crate::resources::StartError;
@@ -17,11 +18,8 @@ use crate::webhooks::Webhooks;
 use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 use tokio_util::sync::CancellationToken;
 
-/// How long the result of a disk probe is valid.
-const PROBE_VALIDITY: std::time::Duration = std::time::Duration::from_secs(1);
 /// How often it is looked whether another process has the database.
 const TAKEN_OVER_CHECK: std::time::Duration = std::time::Duration::from_millis(200);
 
@@ -40,8 +38,7 @@ pub struct Service {
     pub(crate) cage_maker: CageMaker,
     stop: CancellationToken,
     resumed: AtomicBool,
-    /// Time of the last successful disk probe.
-    probed: tokio::sync::Mutex<Option<Instant>>,
+    readiness: Readiness,
 }
 
 impl Deref for Service {
@@ -137,7 +134,7 @@ impl Service {
             solvers,
             stop: stop.clone(),
             resumed: AtomicBool::new(false),
-            probed: tokio::sync::Mutex::default(),
+            readiness: Readiness::default(),
             resources,
             config,
         });
@@ -243,21 +240,6 @@ impl Service {
         if !self.resumed.load(Ordering::Acquire) {
             return Err(ApiError::new(problem::BUSY, "sessions are being resumed").retry_after(1));
         }
-        // One probe serves all requests within a second.
-        let mut probed = self.probed.lock().await;
-        if probed.is_some_and(|then| then.elapsed() < PROBE_VALIDITY) {
-            return Ok(());
-        }
-        let store = self.store.clone();
-        let probe = blocking(move || store.probe()).await?;
-        *probed = probe.is_ok().then(Instant::now);
-        probe.map_err(|error| match error {
-            full @ StoreError::Full { .. } => full.into(),
-            other => {
-                tracing::error!(error = %other, "not ready");
-                ApiError::new(problem::STORAGE_FAILED, "the data folder takes no writes; the log has the reason")
-                    .retry_after(60)
-            }
-        })
+        self.readiness.look(&self.store).await
     }
 }

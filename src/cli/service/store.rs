@@ -4,7 +4,7 @@ use crate::cli::{print, tell};
 use anyhow::{Context as _, Result, bail};
 use cager_formats::{AtomicFile, Target};
 use cager_service::config::{ServeConfig, ServeFlags};
-use cager_service::store::{Kind, LocalDisk, Opened, Shard, Shared, Store, Verified};
+use cager_service::store::{Completion, Kind, LocalDisk, Opened, Shard, Shared, Store, Verified};
 use clap::{Args, Subcommand};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -52,7 +52,7 @@ pub(crate) enum StoreCommand {
     Usage,
     /// Read everything, and name what is damaged; exit status 1 if something is.
     Verify,
-    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager; damaged ones are named and left out, with exit status 1.
+    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager; those that are there are passed over, damaged ones are named and left out, with exit status 1.
     Export {
         /// Where to; it may be there.
         #[arg(value_name = "DIR")]
@@ -81,15 +81,16 @@ fn open(args: &StoreArgs) -> Result<Opened> {
         config: args.config.clone(),
         ..ServeFlags::default()
     };
-    let config = ServeConfig::load(args.config.as_deref(), std::env::vars(), &flags)?;
-    if !config.data.is_dir() && config.blobs.is_none() {
-        bail!("{}: there is no such folder; name the service's by --data", config.data.display());
-    }
+    let config = ServeConfig::load_stored(args.config.as_deref(), std::env::vars(), &flags)?;
     let shard = Shard { number: args.shard, of: config.shards };
     if shard.number >= shard.of {
         bail!("--shard {}: there are {} shards, from 0", shard.number, shard.of);
     }
     let config = config.of_shard(shard);
+    // In a bucket is all that there is.
+    if config.blobs.is_none() {
+        check_folder(&config.data)?;
+    }
     let shared = Shared {
         catalog: config.catalog.as_deref(),
         blobs: config.blobs.as_deref(),
@@ -97,6 +98,18 @@ fn open(args: &StoreArgs) -> Result<Opened> {
         shard,
     };
     Ok(Store::open(&config.data, Arc::new(LocalDisk), shared)?)
+}
+
+/// Refuses what is no service's folder, before anything is made there.
+fn check_folder(data: &Path) -> Result<()> {
+    let why = match fs::metadata(data) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => "there is no such folder",
+        Err(error) => return Err(error).with_context(|| format!("{}: cannot be looked into", data.display())),
+        Ok(there) if !there.is_dir() => "is a file, not a folder",
+        Ok(_) if !Store::is_in(data) => "no service's data is here",
+        Ok(_) => return Ok(()),
+    };
+    bail!("{}: {why}; name the service's data folder by --data", data.display())
 }
 
 /// Kind, id and tenant of all sessions and jobs, by kind, oldest first.
@@ -181,34 +194,49 @@ fn export(opened: &Opened, output: &Path, wanted: &[String]) -> Result<()> {
         bail!("there is no session {unknown}");
     }
     fs::create_dir_all(output).with_context(|| format!("{}: cannot be made", output.display()))?;
-    let (mut written, mut running, mut damaged) = (0, 0, 0);
+    let (mut written, mut there, mut running, mut left) = (0, 0, 0, 0);
     for session in opened.sessions.iter().filter(|session| wanted.is_empty() || wanted.contains(&session.id)) {
-        let damage = match store.completion(&session.id) {
+        let mark = match store.completion(&session.id) {
             Ok(None) => {
                 running += 1;
                 continue;
             }
-            Ok(Some(mark)) => store.container_damage(&session.id, &mark),
-            Err(error) => Some(error.to_string()),
+            Ok(Some(mark)) => store.container_damage(&session.id, &mark).map_or(Ok(mark), Err),
+            Err(error) => Err(error.to_string()),
         };
-        if let Some(why) = damage {
-            damaged += 1;
-            print(&format!("session {} of {}: {why}\n", session.id, session.tenant))?;
-            continue;
-        }
         let folder = output.join(&session.tenant);
-        fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-        let path = folder.join(format!("{}.cager", session.id));
-        let failed = || format!("{}: the container of session {} cannot be written", path.display(), session.id);
-        let mut container = store.open_file(&store.container_path(&session.id))?;
-        let mut file = AtomicFile::create(Target::New(path.clone())).with_context(failed)?;
-        io::copy(&mut container, &mut file).with_context(failed)?;
-        file.commit().with_context(failed)?;
-        written += 1;
+        match mark.and_then(|mark| copy(store, &session.id, &mark, &folder).map_err(|error| format!("{error:#}"))) {
+            Ok(true) => written += 1,
+            Ok(false) => there += 1,
+            Err(why) => {
+                left += 1;
+                print(&format!("session {} of {}: {why}\n", session.id, session.tenant))?;
+            }
+        }
     }
-    tell(&format!("wrote {written} containers; {running} sessions are not completed and have none\n"))?;
-    if damaged > 0 {
-        bail!("{damaged} containers are damaged or cannot be read, and were left out");
+    tell(&format!(
+        "wrote {written} containers, and {there} were there already; {running} sessions are not completed and have none\n"
+    ))?;
+    if left > 0 {
+        bail!("{left} containers were left out, for the reasons above");
     }
     Ok(())
+}
+
+/// Copies a container, unless the same is there: so that what was stopped goes on. Whether it was copied.
+fn copy(store: &Store, id: &str, mark: &Completion, folder: &Path) -> Result<bool> {
+    let path = folder.join(format!("{id}.cager"));
+    let failed = || format!("{}: the container cannot be written", path.display());
+    if path.try_exists().with_context(failed)? {
+        if mark.is_of(&path).with_context(failed)? {
+            return Ok(false);
+        }
+        bail!("{} has another content; move it away, or name another folder", path.display());
+    }
+    fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let mut container = store.open_file(&store.container_path(id))?;
+    let mut file = AtomicFile::create(Target::New(path.clone())).with_context(failed)?;
+    io::copy(&mut container, &mut file).with_context(failed)?;
+    file.commit().with_context(failed)?;
+    Ok(true)
 }

@@ -110,7 +110,10 @@ async fn while_the_database_is_away_the_service_says_so_and_it_goes_on_afterward
     let capture = Capture::small();
     let session = app.ready(capture).await;
     let path = format!("/v1/sessions/{}/frames?first=0", session.id);
+    let whole = app.completed(capture, 15).await;
     database.kill();
+    // Before the first byte, not in the middle of an answer.
+    app.get(&format!("/v1/sessions/{}/cages?first=0", whole.id)).await.problem(503, "storage-failed");
     let problem = app.post(&path, OCTETS, capture.raw(0..15)).await;
     assert!(problem.text().contains("storage-failed"), "{}", problem.text());
     assert_eq!(app.get("/readyz").await.status, 503);
@@ -119,6 +122,30 @@ async fn while_the_database_is_away_the_service_says_so_and_it_goes_on_afterward
     app.upload(&session.id, 0, capture.raw(0..40)).await;
     app.complete(&session.id, 40).await.expect(200);
     assert!(app.container(&session.id).await == capture.encoded(40));
+}
+
+#[tokio::test]
+async fn a_database_that_hangs_is_named_in_time() {
+    let Some(database) = Database::start() else { return };
+    let app = TestApp::on(&database, &[]);
+    let tables = database.sql("SELECT schemaname FROM pg_tables WHERE tablename = 'catalogue'");
+    let hanging = std::thread::spawn({
+        let (database, lock) = (database.clone(), format!("LOCK TABLE {tables}.catalogue; SELECT pg_sleep(7)"));
+        move || database.sql(&lock)
+    });
+    let clock = eventually("that it hangs", async || {
+        tokio::time::sleep(Duration::from_millis(200)).await;
+        let clock = Instant::now();
+        let reply = app.get("/readyz").await;
+        (reply.status != 200).then(|| (clock.elapsed(), reply.problem(503, "storage-failed").detail))
+    });
+    let (waited, detail) = clock.await;
+    assert!(
+        waited < Duration::from_secs(5) && detail.starts_with("the database does not answer"),
+        "{waited:?} {detail}"
+    );
+    hanging.join().expect("it ends");
+    eventually("that it is ready", async || (app.get("/readyz").await.status == 200).then_some(())).await;
 }
 
 #[tokio::test]
@@ -163,7 +190,7 @@ async fn a_database_and_a_folder_that_do_not_belong_together_are_refused() {
     let said = refused(new.path(), Some("postgres://nobody:secret@127.0.0.1:1/none"));
     assert!(said.contains("cannot be reached") && !said.contains("secret"), "{said}");
     let said = refused(new.path(), Some("mysql://somewhere"));
-    assert!(said.contains("it does not begin with postgres://"), "{said}");
+    assert!(said.contains("write the address of a database, such as postgres://"), "{said}");
     assert_eq!(app.again().session(&session.id).await.frames.solved, 0);
 }
 

@@ -21,13 +21,16 @@ async fn whatever_is_wrong_with_a_request_is_a_problem_with_its_id() {
             (Method::DELETE, "/openapi.json".to_owned(), "GET"),
         ] {
             let reply = api.send(api.request(method.clone(), &path)).await;
-            reply.problem(405, "method-not-allowed");
+            let problem = reply.problem(405, "method-not-allowed");
+            assert!(problem.detail.contains(allowed), "{}", problem.detail);
             assert!(reply.header("allow").contains(allowed), "{method} {path}: {:?}", reply.header("allow"));
         }
         let path = format!("/v1/sessions/{}/complete", session.id);
         api.post(&path, "application/json", "{\"frames\" 3}").await.problem(400, "bad-request");
         api.post(&path, "application/json", "").await.problem(400, "bad-request");
         api.get(&format!("/v1/sessions/{}/cages?first=%zz", session.id)).await.problem(400, "bad-request");
+        let wrong = api.get(&format!("/v1/sessions/{}/cages?first=x", session.id)).await.problem(400, "bad-request");
+        assert_eq!(wrong.detail, "query: first: give a whole number, 0 or more");
     }
 }
 

@@ -117,7 +117,12 @@ async fn a_damaged_container_is_found_written_again_and_counted_once() {
     let app = app.again();
     let found = async || (app.session(&session.id).await.state == SessionState::Ready).then_some(());
     eventually("that the damage is found", found).await;
+    let problem = app.session(&session.id).await.problem.expect("a problem");
+    assert!(problem.detail.contains("complete the session again"), "{}", problem.detail);
+    app.get(&format!("/v1/sessions/{}/capture.cager", session.id)).await.problem(503, "storage-failed");
+    assert_eq!(app.metric("cager_quarantined_total").await, 1.0);
     app.complete(&session.id, 40).await.expect(200);
+    assert_eq!(app.session(&session.id).await.problem, None);
     assert!(app.container(&session.id).await == expected, "the same bytes");
     assert_eq!(app.metric(stored).await, before);
 }
@@ -202,6 +207,8 @@ async fn a_session_whose_mark_of_completion_is_damaged_is_completed_again_and_hi
     app.set_bytes(&session.id, "completion", "7b7d");
     app = app.again();
     assert_eq!(app.session(&session.id).await.state, SessionState::Ready);
+    assert!(app.session(&session.id).await.problem.is_some());
+    assert_eq!(app.metric("cager_quarantined_total").await, 1.0);
     let frames = format!("/v1/sessions/{}/frames?first=15", session.id);
     app.post(&frames, OCTETS, capture.raw(15..20)).await.problem(409, "session-completed");
     app.complete(&session.id, 15).await.expect(200);

@@ -237,7 +237,7 @@ async fn who_was_there_before_it_was_divided_stays_where_the_sessions_are() {
         ),
         (
             &["--shards", "3", "--catalog", "postgres://a@b/c", "--tokens", "t", "--advertise", "a:80"],
-            "a:80 is no address",
+            "write an address such as http://10.0.0.5:8080",
         ),
     ] {
         let said = refused_with(folder().path(), flags, &[]);

@@ -38,12 +38,20 @@ async fn what_is_stored_is_counted_checked_and_copied() {
     let copies = folder();
     let copied = store(&data, &["export", &copies.path().display().to_string()]);
     assert!(copied.status.success(), "{}", said(&copied));
-    assert!(said(&copied).contains("wrote 2 containers; 1 sessions are not completed"), "{}", said(&copied));
+    assert!(
+        said(&copied).contains("wrote 2 containers, and 0 were there already; 1 sessions are"),
+        "{}",
+        said(&copied)
+    );
     let path = copies.path().join(format!("local/{whole}.cager"));
     assert!(std::fs::read(&path).expect("a copy") == container);
-    // What is there is not replaced.
+    // It may be repeated, and what is there and differs is not replaced.
+    let again = store(&data, &["export", &copies.path().display().to_string()]);
+    assert!(again.status.success() && said(&again).contains("2 were there already"), "{}", said(&again));
+    std::fs::write(&path, "mine").expect("written");
     let again = store(&data, &["export", "--session", &whole, &copies.path().display().to_string()]);
     assert!(!again.status.success() && said(&again).contains(&whole), "{}", said(&again));
+    assert_eq!(std::fs::read(&path).expect("a file"), b"mine");
     let unknown = store(&data, &["export", "--session", "x", &copies.path().display().to_string()]);
     assert!(said(&unknown).contains("there is no session x"), "{}", said(&unknown));
 
@@ -65,4 +73,13 @@ async fn what_is_stored_is_counted_checked_and_copied() {
     assert!(!copies.path().join(format!("local/{other}.cager")).exists());
     let nowhere = store(&data.join("none"), &["usage"]);
     assert!(said(&nowhere).contains("there is no such folder"), "{}", said(&nowhere));
+    let a_file = store(&data.join("catalog.db"), &["usage"]);
+    assert!(said(&a_file).contains("is a file, not a folder"), "{}", said(&a_file));
+    let empty = folder();
+    for command in [&["verify"][..], &["usage"], &["export", "copies"]] {
+        let elsewhere = store(empty.path(), command);
+        assert_eq!(elsewhere.status.code(), Some(1), "{}", said(&elsewhere));
+        assert!(said(&elsewhere).contains("no service's data is here"), "{}", said(&elsewhere));
+        assert_eq!(std::fs::read_dir(empty.path()).expect("a folder").count(), 0, "nothing is made there");
+    }
 }

@@ -61,7 +61,7 @@ impl Goal {
     /// What the size leaves for so many frames after the `written` bytes of the meshes.
     pub fn room(self, written: u64, frames: usize) -> Option<Room> {
         let Self::Size(bytes) = self else { return None };
-        let other = written + AROUND + 4 * frames as u64;
+        let other = written + around(frames);
         Some(Room { bytes: bytes.saturating_sub(other), frames, other })
     }
 
@@ -71,11 +71,19 @@ impl Goal {
     /// [`CodingError::TooSmall`].
     pub fn check_size(self, meshes: u64, frames: usize) -> Result<(), CodingError> {
         match (self, self.room(meshes, frames)) {
-            (Self::Size(asked), Some(Room { bytes: 0, other: least, .. })) => {
-                Err(CodingError::TooSmall { asked, least: least + LEAST_GROUP })
+            (Self::Size(asked), Some(Room { bytes: 0, .. })) => {
+                Err(CodingError::TooSmall { asked, least: least_size(meshes, LEAST_GROUP + around(frames)) })
             }
             _ => Ok(()),
         }
+    }
+}
+
+impl Room {
+    /// A size that is met where all frames, of which `done` are coded, take so many bytes.
+    pub(super) fn least(&self, done: usize, bytes: u64) -> u64 {
+        let around = around(done + self.frames);
+        least_size(self.other.saturating_sub(around), bytes + around)
     }
 }
 
@@ -122,6 +130,16 @@ pub(crate) const HELD: usize = 112;
 /// Most frames of a group. The same on every machine, so that files are wherever a group fits into memory.
 pub fn group_frames(points: usize, rows: usize) -> usize {
     container::group_frames(points, rows).min(MAX_HELD_BYTES / (HELD * points.max(1))).max(1)
+}
+
+/// Bytes of a file after so many frames, about.
+fn around(frames: usize) -> u64 {
+    AROUND + 4 * frames as u64
+}
+
+/// A size that is met with meshes of so many bytes and others: of a larger size the rest pose may take a third, and the cage takes about a sixth of the meshes.
+fn least_size(meshes: u64, others: u64) -> u64 {
+    (meshes + others).max(3 * others / 2 + meshes / 4)
 }
 
 /// Bytes of a group in which nothing moves, about.

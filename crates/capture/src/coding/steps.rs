@@ -233,8 +233,8 @@ impl GroupCoder {
                 let steps = (2.0 * self.diagonal, USUAL_RATIO);
                 let coarsest = self.encode(self.frames.len(), steps.0, steps.1)?;
                 if coarsest.bytes() > share {
-                    let frames = (coarsest.bytes() as f64 / part).ceil() as u64;
-                    return Err(CodingError::TooSmall { asked, least: room.other + frames });
+                    let bytes = (coarsest.bytes() as f64 / part).ceil() as u64;
+                    return Err(CodingError::TooSmall { asked, least: room.least(self.carried.frames, bytes) });
                 }
                 self.carried.chosen = Some(steps);
                 coarsest

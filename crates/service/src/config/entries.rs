@@ -51,8 +51,52 @@ pub(crate) fn read<T>(file: &Path, parse: impl FnOnce(&str) -> Result<T, Wrong>)
 /// What is wrong with it.
 pub(crate) fn document<T: DeserializeOwned>(text: &str, what: &str) -> Result<T, Wrong> {
     toml::from_str(text).map_err(|error: toml::de::Error| {
-        // Some messages quote the value at fault, which may be a secret.
-        let message = error.message().split(['`', '"']).step_by(2).collect::<Vec<_>>().join("…");
+        let message = without_values(error.message());
         (error.span().map_or(0, |span| span.start), format!("{message}; see the documentation of {what} files"))
     })
+}
+
+/// Longest name of a key that is shown.
+const NAME: usize = 24;
+
+/// A message without the values that it quotes, any of which may be a secret; names of keys stay.
+fn without_values(message: &str) -> String {
+    let (said, expected) = match message.rfind(", expected ") {
+        Some(at) => message.split_at(at),
+        None => (message, ""),
+    };
+    let unknown = said.strip_prefix("unknown field `").and_then(|rest| rest.strip_suffix('`'));
+    let is_name = |name: &str| name.len() <= NAME && name.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_');
+    if said.starts_with("missing field") || unknown.is_some_and(is_name) {
+        return message.to_owned();
+    }
+    // Whatever is between the first and the last of them: a value may have some in it.
+    let quotes = ['`', '"'];
+    match (said.find(quotes), said.rfind(quotes)) {
+        (Some(first), Some(last)) => format!("{}…{}{expected}", &said[..first], &said[last + 1..]),
+        _ => message.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_values;
+
+    #[test]
+    fn names_of_keys_are_shown_and_values_are_not() {
+        for (message, shown) in [
+            (
+                "unknown field `tenants`, expected one of `url`, `secret`",
+                "unknown field `tenants`, expected one of `url`, `secret`",
+            ),
+            ("unknown field `whsec_c2Vjc`, expected `url`", "unknown field …, expected `url`"),
+            ("missing field `url`", "missing field `url`"),
+            ("string is not closed", "string is not closed"),
+            ("unknown variant `c2Vj`, expected `low` or `high`", "unknown variant …, expected `low` or `high`"),
+            ("invalid type: string \"a, expected `c2Vj\", expected u64", "invalid type: string …, expected u64"),
+        ] {
+            assert!(without_values(message).starts_with(shown), "{}", without_values(message));
+            assert!(!without_values(message).contains("c2Vj"));
+        }
+    }
 }

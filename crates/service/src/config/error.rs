@@ -30,12 +30,12 @@ impl fmt::Display for Origin {
 #[non_exhaustive]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("{}: cannot be read: {source}; name another file with --config", file.display())]
+    #[error("{}: cannot be read: {why}; name another file with --config", file.display())]
     Read {
         /// The file.
         file: PathBuf,
         /// Why.
-        source: std::io::Error,
+        why: std::io::Error,
     },
     /// The file is not TOML.
     #[error("{}: line {line}: {why}", file.display())]

@@ -1,6 +1,6 @@
 //! How the layers of settings lie on each other.
 
-use super::settings::{is_file, names, near, read};
+use super::settings::{is_file, is_secret, names, near, read};
 use super::{ConfigError, Origin, ServeConfig};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ pub(super) struct Layers {
 
 impl Layers {
     pub(super) fn add_file(&mut self, file: &Path) -> Result<(), ConfigError> {
-        let read = |source| ConfigError::Read { file: file.to_owned(), source };
+        let read = |why| ConfigError::Read { file: file.to_owned(), why };
         let text = std::fs::read_to_string(file).map_err(read)?;
         let table: Table = text.parse().map_err(|error: toml::de::Error| {
             let line = line_of(&text, error.span().map_or(0, |span| span.start));
@@ -60,7 +60,8 @@ impl Layers {
         let value = read.map_err(|why| ConfigError::Value {
             origin: origin.clone(),
             key: key.to_owned(),
-            value: super::show::value(value),
+            // What was meant as a password is shown nowhere.
+            value: if is_secret(key) { "***".to_owned() } else { super::show::value(value) },
             why,
         })?;
         self.values.insert(key.to_owned(), value);

@@ -10,11 +10,15 @@ pub(super) enum SettingKind {
     Address,
     File,
     Text,
-    /// An address, in which a password may be.
+    /// Address of a database, in which a password may be.
     Secret,
+    /// Address of a service, without a path.
+    Url,
     Format,
     Filter,
     List,
+    /// A list of origins of pages.
+    Origins,
     Number {
         least: u64,
         most: u64,
@@ -65,10 +69,21 @@ impl SettingKind {
                 None | Some("") => Err("write the path of a file or folder, in quotation marks".to_owned()),
                 Some(text) => Ok(Value::String(text.to_owned())),
             },
-            Self::Text | Self::Secret => match text.map(str::trim) {
+            Self::Text => match text.map(str::trim) {
                 None | Some("") => Err("write a text, in quotation marks".to_owned()),
                 Some(text) => Ok(Value::String(text.to_owned())),
             },
+            Self::Secret => {
+                let is_database = |text: &&str| text.starts_with("postgres://") || text.starts_with("postgresql://");
+                let why = "write the address of a database, such as postgres://USER:PASSWORD@HOST:5432/DATABASE";
+                let text = text.map(str::trim).filter(is_database);
+                text.map(|text| Value::String(text.to_owned())).ok_or_else(|| why.to_owned())
+            }
+            Self::Url => {
+                let why = "write an address such as http://10.0.0.5:8080 or http://[fd00::5]:8080";
+                let text = text.map(str::trim).filter(|text| is_service(text));
+                text.map(|text| Value::String(text.to_owned())).ok_or_else(|| why.to_owned())
+            }
             Self::Format => match text {
                 Some("human" | "json") => Ok(value.clone()),
                 _ => Err("write \"human\" or \"json\"".to_owned()),
@@ -77,19 +92,25 @@ impl SettingKind {
                 let wrong =
                     |why: String| format!("{why}; write a level such as info, or info,cager_service::http=debug");
                 let text = text.ok_or_else(|| wrong("not a text".to_owned()))?;
+                // It would be taken for the name of a module, of which everything is logged.
+                let is_word = |part: &&str| !part.is_empty() && !part.contains(['=', ':', '[', '_']);
+                let is_level = |part: &str| part.parse::<tracing_subscriber::filter::LevelFilter>().is_ok();
+                if let Some(word) = text.split(',').map(str::trim).filter(is_word).find(|part| !is_level(part)) {
+                    return Err(wrong(format!("{word} is no level")));
+                }
                 match tracing_subscriber::EnvFilter::try_new(text) {
                     Ok(_) => Ok(value.clone()),
                     Err(error) => Err(wrong(error.to_string())),
                 }
             }
-            Self::List => {
-                let wrong = "write a list of texts, or one text with commas between them".to_owned();
-                let items: Option<Vec<String>> = match value.as_array() {
-                    Some(items) => items.iter().map(|item| item.as_str().map(str::to_owned)).collect(),
-                    None => text.map(|text| text.split(',').map(str::to_owned).collect()),
-                };
-                let items = items.ok_or(wrong)?.into_iter().map(|item| item.trim().to_owned());
-                Ok(Value::Array(items.filter(|item| !item.is_empty()).map(Value::String).collect()))
+            Self::List => Ok(Value::Array(items(value)?.into_iter().map(Value::String).collect())),
+            Self::Origins => {
+                let items = items(value)?;
+                if let Some(other) = items.iter().find(|item| !is_origin(item)) {
+                    let why = "is no origin: write one such as https://tools.studio, without a path or a slash behind";
+                    return Err(format!("{other} {why}"));
+                }
+                Ok(Value::Array(items.into_iter().map(Value::String).collect()))
             }
             Self::Number { least, most } => {
                 let number = value.as_integer().or_else(|| text?.trim().parse().ok());
@@ -108,6 +129,29 @@ impl SettingKind {
             }
         }
     }
+}
+
+/// The texts of a list.
+fn items(value: &Value) -> Result<Vec<String>, String> {
+    let items: Option<Vec<String>> = match value.as_array() {
+        Some(items) => items.iter().map(|item| item.as_str().map(str::to_owned)).collect(),
+        None => value.as_str().map(|text| text.split(',').map(str::to_owned).collect()),
+    };
+    let items = items.ok_or_else(|| "write a list of texts, or one text with commas between them".to_owned())?;
+    Ok(items.iter().map(|item| item.trim().to_owned()).filter(|item| !item.is_empty()).collect())
+}
+
+/// Whether other processes can ask a service there.
+fn is_service(text: &str) -> bool {
+    let url = reqwest::Url::parse(text).ok();
+    url.is_some_and(|url| matches!(url.scheme(), "http" | "https") && url.has_host() && url.path() == "/")
+}
+
+/// Whether a browser can say that a page has this origin.
+fn is_origin(text: &str) -> bool {
+    text.split_once("://").is_some_and(|(scheme, host)| {
+        !scheme.is_empty() && !host.is_empty() && !host.contains(|c: char| "/?#@*".contains(c) || c.is_whitespace())
+    })
 }
 
 fn in_range(number: Option<u64>, least: u64, most: u64) -> Option<Value> {

@@ -65,6 +65,16 @@ fn mistakes_name_their_place_and_what_to_do() {
         ("tokens = 3", &[], "", "tokens = 3: write the path"),
         ("log = \"xml\"", &[], "", "log = \"xml\": write \"human\" or \"json\""),
         ("log_filter = \"cager=loud\"", &[], "", "write a level such as info"),
+        ("log_filter = \"bogus\"", &[], "", "bogus is no level; write a level such as info"),
+        (
+            "catalog = \"host=db password=secret\"",
+            &[],
+            "",
+            "catalog = ***: write the address of a database, such as postgres://",
+        ),
+        ("advertise = \"10.0.0.5:8080\"", &[], "", "write an address such as http://10.0.0.5:8080"),
+        ("allowed_origins = [\"foo\"]", &[], "", "foo is no origin: write one such as https://tools.studio"),
+        ("", &[], "--set allowed_origins=https://tools.studio/", "https://tools.studio/ is no origin"),
         ("workers = 1\nworkers = 2", &[], "", "DIR/cager.toml: line 2: "),
         ("", &[("CAGER_MAX_STREAM", "1")], "", "environment CAGER_MAX_STREAM: unknown setting max_stream"),
         ("", &[("CAGER_WORKERS", "many")], "", "environment CAGER_WORKERS: workers = \"many\": write"),
@@ -77,6 +87,33 @@ fn mistakes_name_their_place_and_what_to_do() {
     }
     let error = ServeConfig::load(Some(Path::new("no/such.toml")), std::iter::empty(), &flags("")).unwrap_err();
     assert!(error.to_string().starts_with("no/such.toml: cannot be read: "), "{error}");
+    assert!(std::error::Error::source(&error).is_none(), "it would be told twice");
+}
+
+#[test]
+fn who_looks_at_what_is_stored_needs_no_tokens() {
+    let flags = flags("--listen 0.0.0.0:80 --catalog postgres://db/x --shards 12");
+    assert!(ServeConfig::load(None, std::iter::empty(), &flags).is_err());
+    assert_eq!(ServeConfig::load_stored(None, std::iter::empty(), &flags).unwrap().shards, 12);
+}
+
+#[test]
+fn files_that_are_missing_are_told_before_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = folder.path().join("tokens.toml");
+    fs::write(&good, "").unwrap();
+    let good = good.display();
+    for (line, wanted) in [
+        ("--tokens none.toml", "none.toml: cannot be read"),
+        ("--set webhooks=none.toml", "none.toml: cannot be read"),
+        ("--set audit=none/audit.jsonl", "none/audit.jsonl: cannot be written"),
+        ("--tls-certificate c.pem --tls-key k.pem", "c.pem: cannot be read"),
+    ] {
+        let error = load("", &[], line).unwrap().check_files().unwrap_err();
+        assert!(format!("{error:#}").contains(wanted), "{error:#}");
+    }
+    let config = load("", &[], &format!("--tokens {good} --set webhooks={good} --set audit={good}")).unwrap();
+    config.check_files().unwrap();
 }
 
 #[test]

@@ -140,8 +140,8 @@ struct AllSessions {
 
 /// Sessions of all tenants, newest first, a hundred at a time.
 async fn sessions(State(operated): State<Operated>, Query(query): Query<PageQuery>) -> JsonResult<AllSessions> {
-    let services = (operated.services)();
-    let pages = services.iter().flat_map(|service| service.registry.page(None, query.after.as_deref(), PAGE + 1));
+    let (services, after) = ((operated.services)(), query.after()?);
+    let pages = services.iter().flat_map(|service| service.registry.page(None, after, PAGE + 1));
     let mut found: Vec<_> = pages.collect();
     found.sort_by(|a, b| b.meta.id.cmp(&a.meta.id));
     let (page, next) = page_of(found, |session| session.meta.id.clone());

@@ -70,8 +70,8 @@ impl Form {
     }
 }
 
-/// Solved cages: m × 3 little-endian f32 each, or frame records. With `follow` the stream stays open until the session is completed, and breaks off where
-/// that is deleted. Cages of a completed session never change: they have an `ETag` and take `Range`.
+/// Solved cages: m × 3 little-endian f32 each, or frame records. With `follow` the stream stays open until the session is completed, and breaks off, without a
+/// last chunk, where that is deleted or fails. Cages of a completed session never change: they have an `ETag` and take `Range`.
 #[utoipa::path(
     get, path = "/v1/sessions/{id}/cages", operation_id = "get_cages", tag = "results", params(openapi::Id, CagesQuery, openapi::Conditions),
     responses(
@@ -137,10 +137,10 @@ pub(crate) async fn get(
         read: Arc::new(read),
     };
     if digest.is_some() {
-        return Ok(cages.respond(&headers));
+        return Ok(cages.respond_readable(&headers).await);
     }
     // More frames may follow, so the response is not cacheable.
-    let mut response = cages.respond(&HeaderMap::new());
+    let mut response = cages.respond_readable(&HeaderMap::new()).await;
     for name in [header::ETAG, header::ACCEPT_RANGES, header::CACHE_CONTROL] {
         response.headers_mut().remove(name);
     }

@@ -31,7 +31,7 @@ const MEDIA_TYPE: &str = "application/vnd.cager";
 #[into_params(parameter_in = Query)]
 pub(crate) struct ContainerQuery {
     /// Keep the stream open for frames still to come, until the session is completed. Its bytes are then those of the container, but for errors that
-    /// were measured after a frame was sent; before, every whole section can be decoded.
+    /// were measured after a frame was sent; before, every whole section can be decoded. It breaks off, without a last chunk, where the session is deleted or fails.
     #[serde(default)]
     follow: bool,
 }
@@ -56,8 +56,13 @@ pub(crate) async fn get(
 ) -> Result<Response, ApiError> {
     let mut response = match session.status().phase {
         Phase::Completed(completion) => whole(&service, &session, &tenant, completion, &headers).await?,
-        _ if query.follow || session.goal().is_some() => partial(service, session, &tenant, query.follow).await?,
+        _ if query.follow || (session.goal().is_some() && session.container_problem().is_none()) => {
+            partial(service, session, &tenant, query.follow).await?
+        }
         _ => {
+            if let Some(problem) = session.container_problem() {
+                return Err(problem);
+            }
             let detail = "the container is written when the session is completed; post {\"frames\": F} to complete, or follow=true to get frames as they come";
             return Err(ApiError::new(problem::NOT_COMPLETED, detail));
         }
@@ -69,19 +74,18 @@ pub(crate) async fn get(
 
 async fn whole(
     service: &Service,
-    session: &Session,
+    session: &Arc<Session>,
     tenant: &Tenant,
     completion: Completion,
     headers: &HeaderMap,
 ) -> Result<Response, ApiError> {
-    let (store, path) = (service.store.clone(), service.store.container_path(&session.meta.id));
-    let opened = blocking(move || store.open_file(&path)).await?;
-    let file = opened.map_err(|error| session.storage_error(error))?;
+    let (of, known) = (Arc::clone(session), completion.clone());
+    let file = blocking(move || of.open_container(&known)).await??;
     let Completion { container_bytes, container_digest, .. } = completion;
     let room = Permit::empty(&service.download_memory, &tenant.name);
     let public = !service.access.is_guarded();
     let container = Immutable::of_file(file, 0..container_bytes, container_digest, MEDIA_TYPE, room, public);
-    Ok(container.respond(headers))
+    Ok(container.respond_readable(headers).await)
 }
 
 /// What is written and not sent yet.

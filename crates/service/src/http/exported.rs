@@ -4,6 +4,7 @@ use super::extract::{Query, RequestedSession};
 use super::openapi;
 use super::ranged::{Immutable, is_known};
 use crate::admission::Permit;
+use crate::auth::Tenant;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::{Phase, Session};
@@ -100,18 +101,35 @@ pub(crate) async fn get(
     Query(ExportQuery { format }): Query<ExportQuery>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
+    file(&service, &session, &tenant, format, &headers).await
+}
+
+/// The file in this format, or what of it was asked for.
+///
+/// # Errors
+/// A session that is not completed; no room; storage errors.
+pub(super) async fn file(
+    service: &Arc<Service>,
+    session: &Arc<Session>,
+    tenant: &Tenant,
+    format: Format,
+    headers: &HeaderMap,
+) -> Result<Response, ApiError> {
     let Phase::Completed(completion) = session.status().phase else {
+        if let Some(problem) = session.container_problem() {
+            return Err(problem);
+        }
         let detail =
             "files are written of completed sessions; post {\"frames\": F} to complete, or decode cages as they come";
         return Err(ApiError::new(problem::NOT_COMPLETED, detail));
     };
     let etag = format!("{}-{}", completion.container_digest, format.extension());
-    if is_known(&headers, &format!("\"{etag}\"")) {
+    if is_known(headers, &format!("\"{etag}\"")) {
         return Ok((StatusCode::NOT_MODIFIED, [(ETAG, format!("\"{etag}\""))]).into_response());
     }
     // What it contains is called as at first, so that its bytes stay the same.
     let name = file_name(session.meta.options.name.as_deref(), format.extension());
-    let (file, length, space) = made(&service, &session, &tenant.name, &completion, (format, &name)).await?;
+    let (file, length, space) = made(service, session, &tenant.name, &completion, (format, &name)).await?;
     let read = move |range: Range<u64>| {
         // Its disk space is held while it is sent.
         let _space = &space;
@@ -127,7 +145,8 @@ pub(crate) async fn get(
         room: Permit::empty(&service.download_memory, &tenant.name),
         read: Arc::new(read),
     }
-    .respond(&headers);
+    .respond_readable(headers)
+    .await;
     let name = file_name(session.name().as_deref(), format.extension());
     let name = HeaderValue::try_from(format!("attachment; filename=\"{name}\"")).map_err(|e| ApiError::internal(&e))?;
     response.headers_mut().insert(CONTENT_DISPOSITION, name);
@@ -176,11 +195,11 @@ async fn made(
     let container = service.store.container_path(&session.meta.id);
     // What it contains is called as it is.
     let (folder, name) = (service.store.scratch(), name.to_owned());
-    let (coders, of, store) = (Arc::clone(&service.coders), Arc::clone(session), service.store.clone());
+    let (coders, of, completion) = (Arc::clone(&service.coders), Arc::clone(session), completion.clone());
     let written = blocking(move || {
         // Disk and memory are held until it is done, also where nobody waits any more.
         let _places = places;
-        store.bring(&container)?;
+        of.open_container(&completion)?;
         let written = coders.install(|| write(&container, &folder, &name)).map_err(|error| {
             tracing::error!(session = %of.meta.id, %error, "a file of its frames could not be written");
             if of.is_going() { crate::session::gone() } else { refused(&folder, &error) }

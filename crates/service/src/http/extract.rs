@@ -173,11 +173,23 @@ impl<S: Sync + Send, T: serde::de::DeserializeOwned> FromRequestParts<S> for Que
         match <axum::extract::Query<T> as FromRequestParts<S>>::from_request_parts(parts, state).await {
             Ok(axum::extract::Query(query)) => Ok(Self(query)),
             Err(QueryRejection::FailedToDeserializeQueryString(error)) => {
-                Err(ApiError::new(problem::BAD_REQUEST, format!("query: {}", error.body_text())))
+                Err(ApiError::new(problem::BAD_REQUEST, format!("query: {}", what_to_give(&error.body_text()))))
             }
             Err(other) => Err(ApiError::new(problem::BAD_REQUEST, format!("query: {other}"))),
         }
     }
+}
+
+/// What is wrong with a query, as a request to those who wrote it.
+fn what_to_give(error: &str) -> String {
+    let said = error.strip_prefix("Failed to deserialize query string: ").unwrap_or(error);
+    let told = [
+        ("invalid digit found in string", "give a whole number, 0 or more"),
+        ("cannot parse integer from empty string", "give a whole number, 0 or more"),
+        ("number too large to fit in target type", "give a smaller number"),
+        ("provided string was not `true` or `false`", "give true or false"),
+    ];
+    told.iter().fold(said.to_owned(), |said, (was, is)| said.replace(was, is))
 }
 
 /// Most bytes of a JSON body: what the router's extractors take by default.
@@ -295,6 +307,15 @@ pub(crate) fn content_type(headers: &HeaderMap) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn queries_are_told_what_to_give() {
+        assert_eq!(
+            what_to_give("Failed to deserialize query string: first: invalid digit found in string"),
+            "first: give a whole number, 0 or more"
+        );
+        assert_eq!(what_to_give("unknown field `x`"), "unknown field `x`");
+    }
 
     #[test]
     fn the_greatest_weight_decides() {

@@ -25,15 +25,18 @@ pub(super) fn accepted<W: Work>(job: &Job<W>, view: impl Serialize) -> Response 
 }
 
 /// A page of a tenant's jobs as `view` has them, and where the next one begins.
+///
+/// # Errors
+/// A place that is none.
 pub(super) fn page<W: Run, V>(
     service: &Service,
     tenant: &Tenant,
     Query(query): &Query<PageQuery>,
     view: impl Fn(&Job<W>) -> V,
-) -> (Vec<V>, Option<String>) {
-    let found = W::jobs(service).page(&tenant.name, query.after.as_deref(), PAGE + 1);
+) -> Result<(Vec<V>, Option<String>), ApiError> {
+    let found = W::jobs(service).page(&tenant.name, query.after()?, PAGE + 1);
     let (page, next) = page_of(found, |job| job.id().to_owned());
-    (page.iter().map(|job| view(job)).collect(), next)
+    Ok((page.iter().map(|job| view(job)).collect(), next))
 }
 
 /// Deletes a job.
@@ -86,7 +89,7 @@ pub(super) async fn result<W: Work>(
         bytes.as_ref().map_or(part.blake3.clone(), |range| format!("{}-{}-{}", part.blake3, range.start, range.end));
     let bytes = bytes.unwrap_or(0..part.bytes);
     let file = Immutable::of_file(opened, bytes, etag, media_type, room, !service.access.is_guarded());
-    let mut response = file.respond(headers);
+    let mut response = file.respond_readable(headers).await;
     let disposition = HeaderValue::from_str(&format!("attachment; filename=\"{name}\""));
     response.headers_mut().extend(disposition.ok().map(|value| (CONTENT_DISPOSITION, value)));
     Ok(response)

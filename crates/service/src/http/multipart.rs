@@ -1,6 +1,7 @@
 //! Parses multipart bodies: the files that a session or a recovery is made from.
 
 use super::extract::{content_type, idempotency_key};
+use super::form::Form;
 use super::metered::Metered;
 use super::waiting::{SLOWEST_BYTES_PER_SECOND, body_error, too_slow};
 use crate::admission::Permit;
@@ -9,11 +10,9 @@ use crate::config::MULTIPART_OVERHEAD_BYTES;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::NamedFile;
-use axum::body::{Body, BodyDataStream};
+use axum::extract::Request;
 use axum::extract::multipart::{Field, MultipartError};
-use axum::extract::{FromRequest, Multipart, Request};
 use cager_proto::object::Object;
-use futures_util::{StreamExt as _, stream};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -91,41 +90,22 @@ pub(super) async fn read_files<T: DeserializeOwned + Default>(
     let header = check_form_header(service, &request, sent, service.config.max_rest_bytes)?;
     let reading = async {
         let (metered, request) = Metered::new(service, tenant, request, format!("{what} have"));
-        let body = form(request).await?;
+        let body = Form::of(request).await?;
         metered.finish(read_parts(service, body, parts, what).await)
     };
     let ((files, options), room) = timeout(header.patience, reading).await.map_err(|_| too_slow())??;
     Ok(Files { files, options, idempotency_key: header.idempotency_key, room })
 }
 
-/// The form in a request's body.
-///
-/// # Errors
-/// It is no multipart form.
-pub(super) async fn form(request: Request) -> Result<Multipart, ApiError> {
-    // It gets one piece at a time: the parser (multer 3.1) buffers whatever is there, which must not be a whole capture; and it looks for the first
-    // boundary between two readings of the body, and takes one that comes to its end in the second for incomplete.
-    let pieces = |(mut pieces, is_first): (BodyDataStream, bool)| async move {
-        if !is_first {
-            tokio::task::yield_now().await;
-        }
-        pieces.next().await.map(|piece| (piece, (pieces, false)))
-    };
-    let request = request.map(|body| Body::from_stream(stream::unfold((body.into_data_stream(), true), pieces)));
-    Multipart::from_request(request, &())
-        .await
-        .map_err(|error| bad(format!("the multipart body cannot be read: {}", error.body_text())))
-}
-
 async fn read_parts<T: DeserializeOwned + Default>(
     service: &Service,
-    mut body: Multipart,
+    mut body: Form,
     parts: &[&'static str],
     what: &str,
 ) -> Result<(HashMap<&'static str, NamedFile>, T), ApiError> {
     let (mut files, mut options) = (HashMap::new(), None);
     let mut left = service.config.max_rest_bytes;
-    while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
+    while let Some(field) = body.next().await? {
         let part = field.name().unwrap_or_default().to_owned();
         let twice = || bad(format!("part {part:?} is there twice; send it once"));
         if part == "options" {
@@ -206,34 +186,4 @@ pub(super) fn broken(error: &MultipartError) -> ApiError {
         return general;
     }
     bad(format!("the multipart body cannot be read: {}", error.body_text()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bytes::Bytes;
-    use std::task::Poll;
-
-    #[tokio::test]
-    async fn a_form_that_comes_while_it_is_looked_at_is_read() {
-        let text = "--b\r\nContent-Disposition: form-data; name=\"x\"\r\n\r\n1\r\n--b--\r\n";
-        let mut polls = 0;
-        let body = stream::poll_fn(move |cx| {
-            polls += 1;
-            match polls {
-                1 => {
-                    cx.waker().wake_by_ref();
-                    Poll::Pending
-                }
-                2 => Poll::Ready(Some(Ok::<_, std::io::Error>(Bytes::from_static(text.as_bytes())))),
-                _ => Poll::Ready(None),
-            }
-        });
-        let request = Request::builder().header("content-type", "multipart/form-data; boundary=b");
-        let request = request.body(Body::from_stream(body)).expect("a request");
-        let mut form = form(request).await.expect("a form");
-        let field = form.next_field().await.expect("a whole form").expect("a part");
-        assert_eq!(field.name(), Some("x"));
-        assert_eq!(field.text().await.expect("its text"), "1");
-    }
 }

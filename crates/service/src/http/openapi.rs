@@ -284,7 +284,7 @@ fn can_answer(status: u16, guarded: bool, path: &str, operation: &Operation) -> 
         RefOr::T(response) => Some(response.content.len()),
         RefOr::Ref(_) => None,
     });
-    let is_export = takes(operation, "format");
+    let is_export = takes(operation, "format") || operation.operation_id.as_deref().is_some_and(is_capture_file);
     let negotiates = forms.max().unwrap_or(0) > 1 && !is_export;
     match status {
         // Whatever the route: a request that is broken or stalls, too many connections, a fault of the service.
@@ -302,6 +302,11 @@ fn can_answer(status: u16, guarded: bool, path: &str, operation: &Operation) -> 
         416 => takes(operation, "Range"),
         _ => false,
     }
+}
+
+/// Whether an operation is an export with an address of its own.
+fn is_capture_file(id: &str) -> bool {
+    id.starts_with("get_capture_")
 }
 
 fn takes(operation: &Operation, parameter: &str) -> bool {

@@ -1,7 +1,8 @@
 //! Another model within a session's rest cage, to be moved by its cages: the parts of a `decode` body that brings one.
 
+use super::form::Form;
 use super::metered::Metered;
-use super::multipart::{bad, broken, file_name, form};
+use super::multipart::{bad, broken, file_name};
 use crate::admission::Permit;
 use crate::auth::Tenant;
 use crate::preparation::{ValidOptions, check_model, read_part};
@@ -9,7 +10,7 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::Session;
 use crate::tasks::blocking;
-use axum::extract::{Multipart, Request};
+use axum::extract::Request;
 use bytes::Bytes;
 use cager_core::decode::Decoder;
 use cager_core::inversion::reject_far_points;
@@ -42,7 +43,7 @@ pub(super) async fn read(
     request: Request,
 ) -> Result<(UploadedModel, BoxStream<'static, Result<Bytes, ApiError>>), ApiError> {
     let (metered, request) = Metered::new(service, tenant, request, "the model has");
-    let mut body = form(request).await?;
+    let mut body = Form::of(request).await?;
     // The cages that follow wait on the disk, under a limit of their own.
     let ((name, bytes), room) = metered.finish(read_model(&mut body).await)?;
     let model = UploadedModel { name, bytes, _room: room };
@@ -56,9 +57,9 @@ pub(super) async fn read(
     Ok((model, poll_fn(move |context| receive.poll_recv(context)).boxed()))
 }
 
-async fn read_model(body: &mut Multipart) -> Result<(String, Vec<u8>), ApiError> {
+async fn read_model(body: &mut Form) -> Result<(String, Vec<u8>), ApiError> {
     let missing = || bad("part \"model\" is missing; send the model as a file, before the part \"cages\"".to_owned());
-    let mut field = body.next_field().await.map_err(|e| broken(&e))?.ok_or_else(missing)?;
+    let mut field = body.next().await?.ok_or_else(missing)?;
     if field.name() != Some("model") {
         return Err(missing());
     }
@@ -70,8 +71,8 @@ async fn read_model(body: &mut Multipart) -> Result<(String, Vec<u8>), ApiError>
 }
 
 /// Sends the bytes of the part `cages` on, until nobody wants them.
-async fn pass_on(body: &mut Multipart, send: &mpsc::Sender<Result<Bytes, ApiError>>) -> Result<(), ApiError> {
-    let field = body.next_field().await.map_err(|e| broken(&e))?;
+async fn pass_on(body: &mut Form, send: &mpsc::Sender<Result<Bytes, ApiError>>) -> Result<(), ApiError> {
+    let field = body.next().await?;
     let Some(mut field) = field.filter(|field| field.name() == Some("cages")) else {
         return Err(bad("part \"cages\" is missing; send the cages after the part \"model\"".to_owned()));
     };

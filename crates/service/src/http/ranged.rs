@@ -3,6 +3,7 @@
 use crate::admission::Permit;
 use crate::problem::{self, ApiError};
 use crate::sync::lock;
+use crate::tasks::blocking;
 use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
@@ -51,6 +52,44 @@ impl Immutable {
         Self { length, etag, media_type, public, room, read: Arc::new(read) }
     }
 
+    /// As [`Self::respond`], after the first bytes were read: what cannot be read is told by the status, not by a body that breaks off.
+    pub(crate) async fn respond_readable(mut self, headers: &HeaderMap) -> Response {
+        let sent = match self.select(headers, &format!("\"{}\"", self.etag)) {
+            Ok(Selection::All) => 0..self.length,
+            Ok(Selection::Part(range)) => range,
+            Ok(Selection::NotModified) | Err(_) => 0..0,
+        };
+        let first = sent.start..sent.end.min(sent.start + PIECE);
+        if !first.is_empty() {
+            if let Err(refusal) = self.make_room(first.end - first.start) {
+                return refusal.into_response();
+            }
+            let (read, range) = (Arc::clone(&self.read), first.clone());
+            let bytes = match blocking(move || read(range)).await {
+                Ok(Ok(bytes)) => bytes,
+                Ok(Err(error)) => return unreadable(error).into_response(),
+                Err(error) => return error.into_response(),
+            };
+            let (read, kept) = (Arc::clone(&self.read), Mutex::new(Some(bytes)));
+            self.read = Arc::new(move |range| {
+                let kept = if range == first { lock(&kept).take() } else { None };
+                kept.map_or_else(|| read(range), Ok)
+            });
+        }
+        self.respond(headers)
+    }
+
+    /// Grows the memory permit to what is sent at a time.
+    ///
+    /// # Errors
+    /// 429 or 503.
+    fn make_room(&mut self, bytes: u64) -> Result<(), ApiError> {
+        self.room.grow_to(bytes.min(PIECE), 1).map_err(|full| {
+            metrics::counter!("cager_rejections_total", "reason" => "download_memory").increment(1);
+            full.refusal("memory for downloads")
+        })
+    }
+
     /// The response to a request with these headers; 416 for a range outside the content, 429 or 503 without memory.
     pub(crate) fn respond(mut self, headers: &HeaderMap) -> Response {
         let etag = format!("\"{}\"", self.etag);
@@ -68,9 +107,8 @@ impl Immutable {
             Selection::Part(range) => range.end - range.start,
             Selection::NotModified => 0,
         };
-        if let Err(full) = self.room.grow(sent.min(PIECE)) {
-            metrics::counter!("cager_rejections_total", "reason" => "download_memory").increment(1);
-            return full.refusal("memory for downloads").into_response();
+        if let Err(refusal) = self.make_room(sent) {
+            return refusal.into_response();
         }
         let mut response = match selection {
             Selection::NotModified => StatusCode::NOT_MODIFIED.into_response(),
@@ -137,6 +175,15 @@ impl Immutable {
         // What compresses a body asks for more after its end.
         Body::from_stream(pieces.fuse())
     }
+}
+
+/// The response where the first bytes cannot be read.
+fn unreadable(error: io::Error) -> ApiError {
+    error.downcast::<ApiError>().unwrap_or_else(|error| {
+        tracing::error!(%error, "what was asked for cannot be read");
+        let detail = "the service's disk failed to read what was asked for; try again when the operator has checked it";
+        ApiError::new(problem::STORAGE_FAILED, detail).retry_after(10)
+    })
 }
 
 /// Whether the client says that it has the content with this tag.

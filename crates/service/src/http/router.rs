@@ -6,8 +6,8 @@ use super::extract::Caller;
 use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
-    cage, cage_jobs, cages, container, coordinates, decode, errors, events, exported, extract, frames, health, openapi,
-    origin, page, recoveries, sent, sessions, shape_spaces, transfers,
+    cage, cage_jobs, cages, capture_files, container, coordinates, decode, errors, events, exported, extract, frames,
+    health, methods, openapi, origin, page, recoveries, sent, sessions, shape_spaces, transfers,
 };
 use crate::problem::{self, ApiError, ProblemKind};
 use crate::service::Service;
@@ -69,7 +69,12 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
 
 /// Routes that take as long as their work.
 fn completing() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(sessions::complete)).routes(routes!(exported::get))
+    OpenApiRouter::new()
+        .routes(routes!(sessions::complete))
+        .routes(routes!(exported::get))
+        .routes(routes!(capture_files::abc))
+        .routes(routes!(capture_files::glb))
+        .routes(routes!(capture_files::usdc))
 }
 
 /// Routes that stream their request bodies.
@@ -256,12 +261,15 @@ async fn finish(request: Request, next: Next) -> Response {
     let route = response.extensions().get::<MatchedPath>().map(|p| p.as_str().to_owned()).or(route);
     traces::name(method.as_str(), route.as_deref().unwrap_or("other"));
     metrics::counter!("cager_requests_total", "status" => status.as_u16().to_string()).increment(1);
-    metrics::histogram!("cager_request_seconds", "route" => route.unwrap_or_else(|| "other".to_owned()))
+    metrics::histogram!("cager_request_seconds", "route" => route.clone().unwrap_or_else(|| "other".to_owned()))
         .record(clock.elapsed().as_secs_f64());
     if status.is_client_error() || status.is_server_error() {
         let mut error = match response.extensions_mut().remove::<ApiError>() {
             Some(error) => error,
             None if is_problem(&response) => return response,
+            None if status == StatusCode::METHOD_NOT_ALLOWED => {
+                ApiError::new(kind_of(status), methods::refusal(route.as_deref()))
+            }
             None => ApiError::new(kind_of(status), status.canonical_reason().unwrap_or("error").to_owned()),
         };
         let kind = &error.problem.kind;

@@ -63,7 +63,24 @@ pub(super) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Reque
 #[into_params(parameter_in = Query)]
 pub(crate) struct PageQuery {
     /// The `next` of the page before.
-    pub(super) after: Option<String>,
+    after: Option<String>,
+}
+
+impl PageQuery {
+    /// The id that the page follows.
+    ///
+    /// # Errors
+    /// It is none.
+    pub(super) fn after(&self) -> Result<Option<&str>, ApiError> {
+        let is_id = |id: &&str| uuid::Uuid::try_parse(id).is_ok();
+        match self.after.as_deref() {
+            Some(other) if !is_id(&other) => {
+                let detail = "query: after: give the `next` of the page before; the first page has no `after`";
+                Err(ApiError::new(problem::BAD_REQUEST, detail))
+            }
+            after => Ok(after),
+        }
+    }
 }
 
 /// A page of what was found, one more where there is one, and where the next page begins.
@@ -81,7 +98,7 @@ pub(crate) async fn list(
     Caller(tenant): Caller,
     Query(query): Query<PageQuery>,
 ) -> JsonResult<SessionList> {
-    let found = service.registry.page(Some(&tenant.name), query.after.as_deref(), PAGE + 1);
+    let found = service.registry.page(Some(&tenant.name), query.after()?, PAGE + 1);
     let (page, next) = page_of(found, |session| session.meta.id.clone());
     let mut sessions = Vec::with_capacity(page.len());
     for session in &page {

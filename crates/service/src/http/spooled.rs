@@ -1,7 +1,7 @@
 //! Forms with one large part, which is written to disk as it arrives, beside files that are kept in memory.
 
-use super::multipart::{FormHeader, NAME_CHARACTERS, bad, broken, check_form_header, file_name, form, read_options};
-use super::paced::Paced;
+use super::form::Form;
+use super::multipart::{FormHeader, NAME_CHARACTERS, bad, broken, check_form_header, file_name, read_options};
 use super::waiting::too_slow;
 use crate::admission::Permit;
 use crate::auth::Tenant;
@@ -10,8 +10,8 @@ use crate::service::Service;
 use crate::session::registry::Reserved;
 use crate::store::{NamedFile, Spool};
 use crate::tasks::blocking;
+use axum::extract::Request;
 use axum::extract::multipart::Field;
-use axum::extract::{Multipart, Request};
 use bytes::BytesMut;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -77,13 +77,12 @@ pub(super) async fn read<T: DeserializeOwned + Default>(
     let FormHeader { idempotency_key, patience } = check_form_header(service, &request, parts.sent, limit)?;
     let place = service.stream(tenant)?;
     let reading = async {
-        let (pace, request) = Paced::new(request);
-        let body = form(request).await?;
+        let body = Form::of(request).await?;
         let room = Permit::empty(&service.upload_memory, &tenant.name);
         let reserved = service.reserve(tenant, 0)?;
-        let mut receiver = Receiver { service, tenant, pace: pace.clone(), taken: 0, room, reserved };
-        let read = receiver.read(body, parts).await;
-        Ok::<_, ApiError>((pace.finish(read)?, receiver.room, receiver.reserved))
+        let mut receiver = Receiver { service, tenant, taken: 0, room, reserved };
+        let read = receiver.read(body, parts).await?;
+        Ok::<_, ApiError>((read, receiver.room, receiver.reserved))
     };
     let (read, room, reserved) = timeout(patience, reading).await.map_err(|_| too_slow())??;
     let Parts { files, many, large, options } = read;
@@ -93,7 +92,6 @@ pub(super) async fn read<T: DeserializeOwned + Default>(
 struct Receiver<'a> {
     service: &'a Arc<Service>,
     tenant: &'a Arc<Tenant>,
-    pace: Paced,
     /// Bytes in memory.
     taken: u64,
     room: Permit,
@@ -110,11 +108,11 @@ struct Parts<T> {
 impl Receiver<'_> {
     async fn read<T: DeserializeOwned + Default>(
         &mut self,
-        mut body: Multipart,
+        mut body: Form,
         parts: &FormParts<'_, T>,
     ) -> Result<Parts<T>, ApiError> {
         let (mut files, mut many, mut large, mut options) = (BTreeMap::new(), Vec::new(), None::<LargePart>, None);
-        while let Some(field) = body.next_field().await.map_err(|e| broken(&e))? {
+        while let Some(field) = body.next().await? {
             let part = field.name().unwrap_or_default().to_owned();
             let named = |names: &[&'static str]| names.iter().find(|name| **name == part).copied();
             let twice = || bad(format!("part {part:?} is there twice; send it once"));
@@ -156,7 +154,7 @@ impl Receiver<'_> {
         }
         let limit = self.service.config.max_rest_bytes;
         let mut bytes = Vec::new();
-        while let Some(chunk) = self.pace.chunk(&mut field).await? {
+        while let Some(chunk) = field.chunk().await.map_err(|e| broken(&e))? {
             self.taken += chunk.len() as u64;
             if self.taken > limit {
                 return Err(self.too_large(&format!("{what} larger than {limit} bytes; send a lighter model"), limit));
@@ -182,7 +180,7 @@ impl Receiver<'_> {
         let mut spool = blocking(move || store.spool()).await??;
         let mut waiting = BytesMut::new();
         loop {
-            let chunk = self.pace.chunk(&mut field).await?;
+            let chunk = field.chunk().await.map_err(|e| broken(&e))?;
             let ended = chunk.is_none();
             waiting.extend_from_slice(&chunk.unwrap_or_default());
             if waiting.len() < SPOOL_CHUNK_BYTES && !ended {

@@ -152,6 +152,7 @@ impl Session {
     fn completed(&self, completion: Completion) {
         self.frames().discard_from(completion.frames);
         self.keep_last_groups();
+        self.set_container_damaged(false);
         self.set_phase(Phase::Completed(completion));
     }
 

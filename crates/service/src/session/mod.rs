@@ -4,6 +4,7 @@ mod announce;
 pub(crate) mod cage_source;
 pub(crate) mod commit;
 pub(crate) mod complete;
+mod container;
 pub(crate) mod container_frames;
 pub(crate) mod create;
 pub(crate) mod facts;
@@ -80,6 +81,8 @@ pub(crate) struct Session {
     version: watch::Sender<u64>,
     /// Whether writing the completion mark failed in a way that leaves its state on disk unknown; no frames are accepted meanwhile.
     completion_unknown: AtomicBool,
+    /// The container is not as it was written.
+    container_damaged: AtomicBool,
     /// Deletion has begun, so missing files are not damage.
     deleting: AtomicBool,
     deleted: CancellationToken,
@@ -159,6 +162,7 @@ impl Session {
             completing: tokio::sync::Mutex::new(()),
             version: watch::Sender::new(0),
             completion_unknown: AtomicBool::new(false),
+            container_damaged: AtomicBool::new(false),
             deleting: AtomicBool::new(false),
             deleted: CancellationToken::new(),
         }

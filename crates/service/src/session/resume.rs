@@ -27,6 +27,7 @@ impl CompletionState {
             Ok(Some(completion)) => completion,
             Err(error @ StoreError::Damaged { .. }) => {
                 tracing::error!(session = %id, %error, "the mark of completion is damaged; complete the session again");
+                metrics::counter!("cager_quarantined_total").increment(1);
                 return Ok(Self::Damaged);
             }
             Err(error) => return Err(error),
@@ -39,6 +40,7 @@ impl CompletionState {
         });
         if there != expected {
             tracing::error!(session = %id, there, expected, "the container is incomplete; complete the session again");
+            metrics::counter!("cager_quarantined_total").increment(1);
             return Ok(Self::Damaged);
         }
         Ok(Self::Intact(completion))
@@ -69,9 +71,7 @@ impl Session {
         match self.store.container_is_whole(&self.meta.id, &completion) {
             Ok(true) => {}
             Ok(false) => {
-                tracing::error!(session = %self.meta.id, "the container is damaged; complete the session again");
-                let phase = CompletionState::Damaged.phase(&mut self.frames());
-                self.set_phase(phase);
+                self.container_is_damaged("its content does not match its checksum");
             }
             Err(error) => tracing::warn!(session = %self.meta.id, %error, "the container could not be checked"),
         }
@@ -123,7 +123,7 @@ impl Service {
         });
         if self.store.damage(Kind::Session, &meta.id)?.is_some() {
             let status = Status { phase: Phase::Failed(super::frames_are_damaged().problem), facts: None };
-            self.registry.insert(self.found(meta, status, bytes));
+            self.registry.insert(self.found(meta, status, bytes, &CompletionState::None));
             return Ok(());
         }
         let outcome = match self.store.outcome(Kind::Session, &meta.id) {
@@ -152,7 +152,7 @@ impl Service {
             Some(Outcome::Failed(problem)) if problem.word() != problem::SESSION_DELETED.word => failed(problem),
             Some(Outcome::Failed(_)) | None => match ValidOptions::of(&meta.options) {
                 Ok(valid) => {
-                    let session = self.found(meta, Status { phase: Phase::Preparing, facts: None }, bytes);
+                    let session = self.found(meta, Status { phase: Phase::Preparing, facts: None }, bytes, &mark);
                     self.registry.insert(Arc::clone(&session));
                     self.code_in_background(&session);
                     tokio::spawn(Arc::clone(self).prepare(session, valid, None, mark));
@@ -162,7 +162,7 @@ impl Service {
             },
         };
         let ready = status.facts.is_some();
-        let session = self.found(meta, status, bytes);
+        let session = self.found(meta, status, bytes, &mark);
         if ready {
             let phase = mark.phase(&mut session.frames());
             session.set_phase(phase);
@@ -172,8 +172,9 @@ impl Service {
         session.resend_undelivered();
     }
 
-    fn found(&self, meta: SessionMeta, status: Status, bytes: SessionBytes) -> Arc<Session> {
+    fn found(&self, meta: SessionMeta, status: Status, bytes: SessionBytes, mark: &CompletionState) -> Arc<Session> {
         let session = Session::new(meta, self, status, false);
+        session.set_container_damaged(matches!(mark, CompletionState::Damaged));
         session.set_bytes(bytes);
         Arc::new(session)
     }

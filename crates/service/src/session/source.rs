@@ -20,13 +20,16 @@ impl Service {
         };
         let session = self.registry.find(tenant, id).map_err(unknown)?;
         session.ensure_loaded().await?;
-        if !matches!(session.status().phase, Phase::Completed(_)) {
+        let Phase::Completed(completion) = session.status().phase else {
+            if let Some(problem) = session.container_problem() {
+                return Err(problem);
+            }
             let detail = format!(
                 "source_session: {id} is not completed; post {{\"frames\": F}} to complete, and wait until it is"
             );
             return Err(ApiError::new(problem::NOT_COMPLETED, detail).retry_after(2));
-        }
-        let (store, path) = (self.store.clone(), self.store.container_path(id));
-        blocking(move || store.bring(&path).map(|()| path)).await?.map_err(|error| session.storage_error(error))
+        };
+        let path = self.store.container_path(id);
+        blocking(move || session.open_container(&completion).map(|_| path)).await?
     }
 }

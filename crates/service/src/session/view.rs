@@ -47,7 +47,7 @@ impl Session {
         let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
         let problem = match &status.phase {
             Phase::Failed(problem) => Some((**problem).clone()),
-            _ => None,
+            _ => self.container_problem().map(|error| *error.problem),
         };
         View {
             id: self.meta.id.clone(),

@@ -13,7 +13,6 @@ use futures_util::future::try_join_all;
 use http::HeaderMap;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::time::timeout;
 
 /// A process that has not seen for so long who has which shard is not ready.
 const UNSEEN: Duration = Duration::from_secs(5);
@@ -45,16 +44,13 @@ async fn ready(State(shards): State<Arc<Shards>>) -> Result<Response, ApiError> 
     if shards.stop.is_cancelled() {
         return Err(ApiError::new(problem::STOPPING, "the process is stopping").retry_after(5));
     }
-    let away = || {
-        let detail = "the database does not answer; the log has the reason";
-        ApiError::new(problem::STORAGE_FAILED, detail).retry_after(5)
-    };
     if lock(&shards.seen_at).elapsed() > UNSEEN {
-        return Err(away());
+        let detail = "the database does not answer; the log has the reason";
+        return Err(ApiError::new(problem::STORAGE_FAILED, detail).retry_after(5));
     }
     let services = shards.services();
     let all = try_join_all(services.iter().map(|service| service.ready()));
-    timeout(UNSEEN, all).await.map_err(|_| away())??;
+    all.await?;
     Ok(health(&shards.resources).into_response())
 }
 

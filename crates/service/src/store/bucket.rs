@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Has the address of the bucket where the folder's files are in one.
-const MARKER: &str = "catalog.bucket";
+pub(super) const MARKER: &str = "catalog.bucket";
 
 /// An opened bucket, and the folder that is a cache of it.
 pub(super) struct Bucket {

@@ -92,12 +92,36 @@ struct Inner {
     catalog: Arc<dyn Catalog>,
     /// Its file, or what the database is called.
     catalog_path: PathBuf,
+    is_in_database: bool,
     /// Something that may need content could not be read at the start.
     keeps_contents: AtomicBool,
     /// Records as they were read at the start, so that each is read once.
     at_start: Mutex<HashMap<(Kind, String), Record>>,
     /// `None` where the database has the lock.
     _lock: Option<File>,
+}
+
+/// A part of what has the data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Part {
+    /// The data folder, and what is known of sessions where that is in it.
+    #[default]
+    Folder,
+    /// The bucket with the files.
+    Bucket,
+    /// The database.
+    Database,
+}
+
+impl Part {
+    /// What it is called in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Folder => "the data folder",
+            Self::Bucket => "the bucket",
+            Self::Database => "the database",
+        }
+    }
 }
 
 /// What of a store is not in its folder: one machine's is all there.
@@ -165,6 +189,14 @@ pub struct Quarantined {
 }
 
 impl Store {
+    /// Whether a service has its data in this folder, of whatever version. Changes nothing.
+    pub fn is_in(root: &Path) -> bool {
+        let is_there = |name: &str| root.join(name).exists();
+        [CATALOG, database::NUMBER, bucket::MARKER].into_iter().any(is_there)
+            // Of versions before the catalogue.
+            || ["sessions", "contents", "prepared"].into_iter().all(is_there)
+    }
+
     /// Opens the folder `root` for this process alone, creating it if it is missing, with what is elsewhere where that is given. Finishes interrupted deletions, removes temporary
     /// files, takes over what an earlier version stored, and moves objects with damaged metadata to `quarantine/`.
     ///
@@ -213,6 +245,7 @@ impl Store {
                 files,
                 catalog,
                 catalog_path,
+                is_in_database: shared.catalog.is_some(),
                 keeps_contents,
                 at_start: Mutex::default(),
                 _lock: lock,
@@ -291,14 +324,25 @@ impl Store {
         self.files().disk.bring(path).map_err(|e| StoreError::of(path, "open", e))
     }
 
-    /// Checks that the store can write and sync, files and records.
-    pub fn probe(&self) -> Result<(), StoreError> {
+    /// Checks that the store can write and sync, files and records. `part` says what is being tried, and at the end what was tried last.
+    pub fn probe(&self, part: &Mutex<Part>) -> Result<(), StoreError> {
         let files = self.files();
+        let tries = |tried| *lock_of(part) = tried;
+        let records = if self.inner.is_in_database { Part::Database } else { Part::Folder };
+        tries(Part::Folder);
         let path = files.temporary("probe");
         let written = files.write_new(&path, b"probe\n");
+        // Before a file is removed, the database is asked whose it is.
+        tries(records);
         files.discard(&path);
-        let there = || files.disk.probe().map_err(|e| StoreError::of(&files.root, "write", e));
-        written.and_then(|()| there()).and_then(|()| self.catalog().probe().map_err(|e| self.failed("write", e)))
+        tries(Part::Folder);
+        written?;
+        if files.disk.is_elsewhere() {
+            tries(Part::Bucket);
+        }
+        files.disk.probe().map_err(|e| StoreError::of(&files.root, "write", e))?;
+        tries(records);
+        self.catalog().probe().map_err(|e| self.failed("write", e))
     }
 }
 

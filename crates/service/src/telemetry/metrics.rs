@@ -36,6 +36,7 @@ pub fn recorder() -> &'static PrometheusHandle {
             tracing::warn!("another metrics recorder is installed");
         }
         describe();
+        super::zeros::begin();
         Collector::default().describe();
         handle
     })

@@ -4,6 +4,7 @@ mod logging;
 pub mod metrics;
 mod request;
 pub mod traces;
+mod zeros;
 
 pub use logging::{LogFormat, LoggingError, init_logging};
 pub use request::{RequestId, request_id};

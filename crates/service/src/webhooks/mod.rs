@@ -51,6 +51,14 @@ pub(crate) struct Webhooks {
     stop: CancellationToken,
 }
 
+/// Reads a file of receivers, and nothing more.
+///
+/// # Errors
+/// As [`Webhooks::open`], of the file.
+pub(crate) fn check(file: &Path) -> Result<(), WebhooksError> {
+    file::read(file).map(drop)
+}
+
 impl Webhooks {
     /// Reads the file; without one there are no receivers. Call within a tokio runtime, which sends the messages until `stop`.
     ///

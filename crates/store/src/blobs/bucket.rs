@@ -19,6 +19,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::runtime::{Builder, Handle, Runtime, RuntimeFlavor};
 use tokio::task::block_in_place;
+use tokio::time::timeout;
 
 /// Bytes of a part: S3 wants 5 MiB at least, and 10,000 of them at most.
 const PART: usize = 8 << 20;
@@ -26,8 +27,10 @@ const PART: usize = 8 << 20;
 const PARTS: usize = 2;
 /// How long a connection may take, and the next bytes on one.
 const CONNECT: Duration = Duration::from_secs(5);
-/// A request with its bytes counts as silence.
-const SILENCE: Duration = Duration::from_secs(60);
+/// A request with its bytes, 8 MiB at most, counts as silence.
+const SILENCE: Duration = Duration::from_secs(20);
+/// How long who looks whether a bucket is back waits for it.
+const LOOK: Duration = Duration::from_secs(5);
 /// Endpoints on this machine.
 const LOCAL: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
 /// How long a request is tried again, so that clients are answered while they wait.
@@ -49,10 +52,15 @@ pub(super) struct Bucket {
 
 impl Bucket {
     pub(super) fn connect(url: &str, environment: &[(String, String)]) -> Result<Self, BlobsError> {
+        Self::connect_within(url, environment, SILENCE)
+    }
+
+    /// As [`Self::connect`], where silence is taken for absence after so long.
+    fn connect_within(url: &str, environment: &[(String, String)], silence: Duration) -> Result<Self, BlobsError> {
         let runtime = Builder::new_multi_thread().worker_threads(1).thread_name("blobs").enable_all().build();
         let runtime =
             runtime.map_err(|error| BlobsError(format!("no thread can be started for the bucket: {error}")))?;
-        let (store, prefix) = place(url, environment)?;
+        let (store, prefix) = place(url, environment, silence)?;
         Ok(Self {
             store,
             prefix,
@@ -168,7 +176,16 @@ impl Bucket {
         self.block_on(async { self.store.copy(&self.path(from), &self.path(to)).await })
     }
 
-    /// Where it has not answered, one caller at a time tries again; the others are told at once, so that they do not all wait.
+    /// Checks that it can be written to.
+    pub(super) fn probe(&self) -> io::Result<()> {
+        self.block_on(self.write_probe())
+    }
+
+    async fn write_probe(&self) -> Result<(), object_store::Error> {
+        self.store.put(&self.path("probe"), Bytes::from_static(b"probe\n").into()).await.map(|_| ())
+    }
+
+    /// Where it has not answered, one caller at a time looks whether it does again; the others are told at once, so that they do not all wait.
     fn block_on<T>(&self, work: impl Future<Output = Result<T, object_store::Error>>) -> io::Result<T> {
         let Some(runtime) = &self.runtime else { return Err(io::ErrorKind::NotConnected.into()) };
         let known = lock(&self.away).clone();
@@ -176,6 +193,13 @@ impl Bucket {
         if let Some(error) = known.filter(|_| self.is_tried.swap(true, Ordering::SeqCst)) {
             return Err(io::Error::other(error));
         }
+        let work = async {
+            if tries {
+                // Before much is sent.
+                timeout(LOOK, self.write_probe()).await.map_err(|_| silent())??;
+            }
+            work.await
+        };
         let done = match Handle::try_current().map(|handle| handle.runtime_flavor()) {
             // Of asynchronous work, which goes on elsewhere meanwhile.
             Ok(RuntimeFlavor::MultiThread) => block_in_place(|| runtime.block_on(work)),
@@ -193,6 +217,13 @@ impl Bucket {
     }
 }
 
+fn silent() -> object_store::Error {
+    object_store::Error::Generic {
+        store: "S3",
+        source: "it does not answer; see whether it hangs or is overloaded".into(),
+    }
+}
+
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -207,7 +238,11 @@ impl Drop for Bucket {
 }
 
 /// The store at an address, and the path in it.
-fn place(url: &str, environment: &[(String, String)]) -> Result<(Arc<dyn ObjectStore>, Path), BlobsError> {
+fn place(
+    url: &str,
+    environment: &[(String, String)],
+    silence: Duration,
+) -> Result<(Arc<dyn ObjectStore>, Path), BlobsError> {
     let refused = |what: &dyn std::fmt::Display| {
         // Keys may have been written into it.
         let url = url.rsplit_once('@').map_or(url, |(_, rest)| rest);
@@ -253,7 +288,7 @@ fn place(url: &str, environment: &[(String, String)]) -> Result<(Arc<dyn ObjectS
         .with_bucket_name(bucket)
         .with_allow_http(true)
         .with_checksum_algorithm(Checksum::SHA256)
-        .with_http_connector(Connector { is_encrypted })
+        .with_http_connector(Connector { is_encrypted, silence })
         .with_retry(RetryConfig {
             backoff: BackoffConfig {
                 init_backoff: Duration::from_millis(50),
@@ -271,13 +306,14 @@ fn place(url: &str, environment: &[(String, String)]) -> Result<(Arc<dyn ObjectS
 #[derive(Debug)]
 struct Connector {
     is_encrypted: bool,
+    silence: Duration,
 }
 
 impl HttpConnector for Connector {
     fn connect(&self, _options: &ClientOptions) -> object_store::Result<HttpClient> {
         // Fails if the process has installed another provider, which serves as well.
         let _ = rustls::crypto::ring::default_provider().install_default();
-        let builder = reqwest::Client::builder().connect_timeout(CONNECT).read_timeout(SILENCE);
+        let builder = reqwest::Client::builder().connect_timeout(CONNECT).read_timeout(self.silence);
         // Where nothing is encrypted no authority has to be trusted.
         let builder = if self.is_encrypted { builder } else { builder.tls_certs_only([]) };
         let client = builder.redirect(reqwest::redirect::Policy::none()).build();
@@ -289,4 +325,30 @@ impl HttpConnector for Connector {
 /// The root cause of an error; the outer ones have addresses and say less.
 fn innermost(error: &dyn std::error::Error) -> String {
     std::iter::successors(Some(error), |&error| error.source()).last().map(ToString::to_string).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+    use std::time::Instant;
+
+    #[test]
+    fn a_bucket_that_hangs_is_given_up_and_others_are_told_at_once() {
+        // The system takes connections, and nobody answers.
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let endpoint = format!("http://{}", listener.local_addr().expect("an address"));
+        let environment = [("AWS_ENDPOINT", &endpoint[..]), ("AWS_ACCESS_KEY_ID", "a"), ("AWS_SECRET_ACCESS_KEY", "b")];
+        let environment = environment.map(|(name, value)| (name.to_owned(), value.to_owned()));
+        let silence = Duration::from_millis(100);
+        let bucket = Bucket::connect_within("s3://bucket/path", &environment, silence).expect("an address");
+        let put = || bucket.put("name", Bytes::from_static(b"bytes")).expect_err("nobody answers");
+        let clock = Instant::now();
+        put();
+        assert!(clock.elapsed() < LOOK, "{:?}", clock.elapsed());
+        bucket.is_tried.store(true, Ordering::SeqCst);
+        let clock = Instant::now();
+        put();
+        assert!(clock.elapsed() < silence, "who is not the first waits {:?}", clock.elapsed());
+    }
 }

@@ -211,7 +211,7 @@ impl Blobs {
 
     /// Checks that the bucket can be written to.
     pub fn probe(&self) -> io::Result<()> {
-        self.bucket.put("probe", "probe\n".into())
+        self.bucket.probe()
     }
 
     fn index(&self) -> MutexGuard<'_, Index> {

@@ -34,6 +34,11 @@ pub(super) struct Link {
 
 impl Link {
     pub(super) fn connect(place: &Place) -> Result<Self, CatalogError> {
+        Self::try_connect(place).map_err(|trouble| trouble.explain(&place.name))
+    }
+
+    /// As [`Self::connect`], with what is wrong where it is.
+    pub(super) fn try_connect(place: &Place) -> Result<Self, Trouble> {
         let runtime = Builder::new_current_thread().enable_io().enable_time().build();
         let runtime = runtime.map_err(|error| CatalogError::Failed(format!("{}: {error}", place.name)))?;
         let connecting = async {
@@ -56,7 +61,7 @@ impl Link {
             Ok(client) => Ok(Self { client, statements: RefCell::default(), runtime: Some(runtime) }),
             Err(trouble) => {
                 runtime.shutdown_background();
-                Err(trouble.explain(&place.name))
+                Err(trouble)
             }
         }
     }

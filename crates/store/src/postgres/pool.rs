@@ -4,7 +4,7 @@ use super::link::{Fence, Link};
 use super::place::Place;
 use super::trouble::Trouble;
 use crate::CatalogError;
-use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, Once, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// How much longer than the database a call waits, for the way there and back.
@@ -20,6 +20,8 @@ pub(super) struct Pool {
     fence: OnceLock<Fence>,
     links: Mutex<Links>,
     freed: Condvar,
+    /// That the server gives fewer connections is told once.
+    told: Once,
 }
 
 #[derive(Default)]
@@ -40,6 +42,7 @@ impl Pool {
             fence: OnceLock::new(),
             links: Mutex::new(links),
             freed: Condvar::new(),
+            told: Once::new(),
         }
     }
 
@@ -90,7 +93,13 @@ impl Pool {
     ) -> Result<Result<T, Trouble>, CatalogError> {
         let place = self.wait_for_place()?;
         let kept = if is_new { None } else { self.links().idle.pop() };
-        let link = kept.map_or_else(|| Link::connect(&self.place), Ok)?;
+        let link = match kept {
+            Some(link) => link,
+            None => match Link::try_connect(&self.place) {
+                Err(trouble) if trouble.is_full() => self.wait_for_link(trouble)?,
+                made => made.map_err(|trouble| trouble.explain(self.name()))?,
+            },
+        };
         let outcome = call(&link);
         // Dropped below, not while others wait for the lock.
         let mut dropped = Vec::new();
@@ -117,6 +126,24 @@ impl Pool {
         Ok(Taken(self))
     }
 
+    /// A connection that another call of this process gives back: the server gives no more than there are.
+    ///
+    /// # Errors
+    /// This process has none but the one that was asked for, or the others take too long.
+    fn wait_for_link(&self, trouble: Trouble) -> Result<Link, CatalogError> {
+        self.told.call_once(|| {
+            tracing::warn!(
+                "{} gives this user fewer than {} connections, so that calls wait for each other: raise its max_connections or the user's limit",
+                self.name(),
+                self.connections
+            );
+        });
+        let is_used = |links: &mut Links| links.idle.is_empty() && links.taken > 1;
+        let waited = self.freed.wait_timeout_while(self.links(), self.limit, is_used);
+        let (mut links, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        links.idle.pop().ok_or_else(|| trouble.explain(self.name()))
+    }
+
     fn links(&self) -> MutexGuard<'_, Links> {
         self.links.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -128,6 +155,7 @@ struct Taken<'a>(&'a Pool);
 impl Drop for Taken<'_> {
     fn drop(&mut self) {
         self.0.links().taken -= 1;
-        self.0.freed.notify_one();
+        // Some wait for a place, and some for a connection.
+        self.0.freed.notify_all();
     }
 }

@@ -55,6 +55,11 @@ impl Trouble {
         }
     }
 
+    /// The server gives this user no more connections.
+    pub(super) fn is_full(&self) -> bool {
+        self.code() == Some(&SqlState::TOO_MANY_CONNECTIONS)
+    }
+
     /// It took too long.
     pub(super) fn is_slow(&self) -> bool {
         matches!(self, Self::TimedOut) || self.code() == Some(&SqlState::QUERY_CANCELED)
@@ -106,7 +111,9 @@ fn explain(error: &Error, name: &str) -> CatalogError {
         "25006" => {
             "takes no writes: name the server that does (with several hosts, target_session_attrs=read-write), or end its read-only state"
         }
-        "53300" => "has no connection left: raise its max_connections, or run fewer processes",
+        "53300" => {
+            "has no connection left: raise its max_connections or this user's limit (ALTER ROLE … CONNECTION LIMIT), or run fewer processes"
+        }
         "53200" => "has not enough memory: lower its work_mem or max_connections",
         "57P01" | "57P02" | "57P03" => "is being stopped or started: it is tried again with the next call",
         "57014" => "took longer than statement_timeout: see whether it is overloaded, or a lock is held",

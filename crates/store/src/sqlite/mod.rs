@@ -212,6 +212,7 @@ impl Catalog for SqliteCatalog {
                 Ok(true)
             });
             if is_gone? {
+                self.upkeep.note_removal();
                 return Ok(());
             }
         }

@@ -23,8 +23,9 @@ const FREED_PAGES: u32 = 1024;
 const MANY_UNUSED_PAGES: u32 = 16 * FREED_PAGES;
 /// How often they are in a round on a full disk, or where they are many.
 const STEPS: u32 = 64;
-/// Bytes that are kept free for deletions.
+/// Bytes that are kept free for deletions; on a disk that has less, at least the second number.
 pub(super) const RESERVE: usize = 8 << 20;
+const LEAST: u64 = 512 << 10;
 
 /// Bytes of it that are written at a time.
 const PIECE: usize = 32 << 10;
@@ -32,6 +33,7 @@ const PIECE: usize = 32 << 10;
 /// Handle to the thread that does it, which ends with it.
 #[derive(Debug)]
 pub(super) struct Upkeep {
+    reserve: PathBuf,
     written: Arc<AtomicBool>,
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -42,10 +44,19 @@ impl Upkeep {
         let written = Arc::new(AtomicBool::new(true));
         let (reserve, log) = (beside(path, "reserve"), beside(path, "-wal"));
         let (stop, stopped) = channel::<()>();
-        let rounds = Rounds { connection, writer, log, reserve, written: Arc::clone(&written) };
+        let rounds = Rounds {
+            connection,
+            writer,
+            log,
+            reserve: reserve.clone(),
+            written: Arc::clone(&written),
+            told: AtomicBool::new(false),
+        };
         rounds.keep_reserve();
         let work = move || {
-            while matches!(stopped.recv_timeout(PAUSE), Err(RecvTimeoutError::Timeout)) {
+            while stopped.recv_timeout(PAUSE) != Err(RecvTimeoutError::Disconnected) {
+                // Several are one.
+                while stopped.try_recv().is_ok() {}
                 let done = rounds.once();
                 // On a full disk the one fails, and the other helps.
                 let done = if rounds.keep_reserve() { done } else { rounds.make_room() };
@@ -56,7 +67,18 @@ impl Upkeep {
         };
         let thread = std::thread::Builder::new().name("catalogue-upkeep".to_owned()).spawn(work);
         let thread = thread.map_err(|error| CatalogError::Failed(format!("threads cannot be started: {error}")))?;
-        Ok(Self { written, stop: Some(stop), thread: Some(thread) })
+        Ok(Self { reserve, written, stop: Some(stop), thread: Some(thread) })
+    }
+
+    /// Something was removed. Where the reserve is not whole, a round begins at once, which may have the room before others do.
+    pub(super) fn note_removal(&self) {
+        self.note_write();
+        if !is_whole(&self.reserve)
+            && let Some(thread) = &self.stop
+        {
+            // Without the thread there is nobody to tell.
+            let _ = thread.send(());
+        }
     }
 
     /// Has the next round look at the log.
@@ -85,6 +107,8 @@ struct Rounds {
     log: PathBuf,
     reserve: PathBuf,
     written: Arc<AtomicBool>,
+    /// It was told that there is no reserve.
+    told: AtomicBool,
 }
 
 impl Rounds {
@@ -137,31 +161,46 @@ impl Rounds {
         Ok(free > 0)
     }
 
-    /// Makes the reserve, unless it is there. Whether there is room for it.
+    /// Makes the reserve as large as there is room for, unless it is. Whether it is whole.
     fn keep_reserve(&self) -> bool {
-        let temporary = self.reserve.with_extension("tmp");
-        if self.reserve.exists() {
+        if is_whole(&self.reserve) {
             return true;
         }
-        // What others have room for shall not fail meanwhile.
+        let there = fs::metadata(&self.reserve).map_or(0, |reserve| reserve.len());
         let system = self.reserve.parent().and_then(|folder| rustix::fs::statvfs(folder).ok());
-        if system.is_some_and(|system| system.f_bavail.saturating_mul(system.f_frsize) < 2 * RESERVE as u64) {
+        // What others have room for shall not fail meanwhile: half is left to them.
+        let room = system.map_or(u64::MAX, |system| system.f_bavail.saturating_mul(system.f_frsize)) / 2;
+        let pieces = room.min(RESERVE as u64) / PIECE as u64;
+        let bytes = pieces * PIECE as u64;
+        if bytes < LEAST || bytes <= there {
+            if there == 0 && !self.told.swap(true, Relaxed) {
+                tracing::warn!(
+                    "the disk is so full that nothing is kept free for deletions, and sessions may not be deleted: make room"
+                );
+            }
             return false;
         }
+        let temporary = self.reserve.with_extension("tmp");
         let make = || -> std::io::Result<()> {
             let _ = fs::remove_file(&temporary);
             let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&temporary)?;
             // Not zeros, of which some file systems keep nothing.
-            (0..RESERVE / PIECE).try_for_each(|_| file.write_all(&[0xa5; PIECE]))?;
+            (0..pieces).try_for_each(|_| file.write_all(&[0xa5; PIECE]))?;
             file.sync_all()?;
             fs::rename(&temporary, &self.reserve)
         };
         let made = make();
         if made.is_err() {
             let _ = fs::remove_file(&temporary);
+        } else if self.told.swap(false, Relaxed) {
+            tracing::info!("there is room again that is kept free for deletions");
         }
-        made.is_ok()
+        made.is_ok() && bytes == RESERVE as u64
     }
+}
+
+fn is_whole(reserve: &Path) -> bool {
+    fs::metadata(reserve).is_ok_and(|reserve| reserve.len() >= RESERVE as u64)
 }
 
 /// A file beside the catalogue's.

@@ -2,7 +2,7 @@
 
 use crate::conformance::{append, bytes, cage, cages, open, session};
 use crate::support::Server;
-use cager_store::{Catalog, CatalogError, Change, Phase};
+use cager_store::{Catalog, CatalogError, Change, Phase, PostgresCatalog};
 
 #[test]
 fn two_catalogues_append_to_one_session_at_once() {
@@ -56,4 +56,18 @@ fn nothing_is_appended_after_a_deletion_was_answered() {
     });
     assert_eq!(both[1].remove(session("a")), Ok(()));
     assert_eq!(server.sql("SELECT (SELECT count(*) FROM frames), (SELECT count(*) FROM chunks)"), "0|0");
+}
+
+#[test]
+fn calls_wait_for_each_other_where_the_user_gets_few_connections() {
+    let Some(server) = Server::start() else { return };
+    server.sql("CREATE ROLE few LOGIN CONNECTION LIMIT 3");
+    server.sql("GRANT CREATE ON DATABASE postgres TO few");
+    let catalog = PostgresCatalog::open(&server.url_of("few")).expect("a catalogue");
+    catalog.claim().expect("it is its own");
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| (0..20).for_each(|_| assert_eq!(catalog.probe(), Ok(()))));
+        }
+    });
 }

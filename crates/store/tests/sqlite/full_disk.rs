@@ -120,6 +120,33 @@ fn child_with_several_deletions() {
 }
 
 #[test]
+fn a_disk_that_is_filled_after_each_deletion_takes_the_next_one() {
+    with_small_disk("full_disk::child_that_is_filled_again", DISK);
+}
+
+#[test]
+#[ignore = "another test starts it"]
+fn child_that_is_filled_again() {
+    let Some(folder) = folder_of_child() else { return };
+    let catalog = SqliteCatalog::open(&file(&folder)).expect("a catalogue");
+    let ids = ["a", "b", "c", "d"];
+    for id in ids {
+        open(&catalog, id);
+        // Less than a whole reserve.
+        append(&catalog, id, &(0..640).map(|frame| (frame, cage(frame, 350))).collect::<Vec<_>>());
+    }
+    for id in ids {
+        for other in 0.. {
+            if std::fs::write(folder.join(format!("{id}{other}")), vec![1; 64 << 10]).is_err() {
+                break;
+            }
+        }
+        delete(&catalog, id);
+        reserve_is_back(&folder);
+    }
+}
+
+#[test]
 fn room_made_by_others_is_used_without_opening_anew() {
     with_small_disk("full_disk::child_with_a_disk_that_others_fill", DISK);
 }

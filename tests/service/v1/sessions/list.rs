@@ -27,6 +27,13 @@ async fn pages_hold_every_session_once_the_newest_first() {
 async fn what_the_query_does_not_know_is_refused() {
     let app = TestApp::start();
     app.get("/v1/sessions?befor=1").await.problem(400, "bad-request");
-    let empty: SessionList = app.get("/v1/sessions?after=0").await.is(200);
+    for list in ["sessions", "cages", "recoveries", "transfers"] {
+        for after in ["", "0", "zzz"] {
+            let problem = app.get(&format!("/v1/{list}?after={after}")).await.problem(400, "bad-request");
+            assert!(problem.detail.contains("the `next` of the page before"), "{}", problem.detail);
+        }
+    }
+    // One that was deleted meanwhile is a place like any other.
+    let empty: SessionList = app.get(&format!("/v1/sessions?after={}", "0".repeat(32))).await.is(200);
     assert!(empty.sessions.is_empty() && empty.next.is_none());
 }

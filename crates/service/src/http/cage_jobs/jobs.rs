@@ -2,6 +2,7 @@
 
 use crate::cage_job::{CageDesign, CageJob};
 use crate::http::extract::{Caller, Query, Requested, RequestedJob};
+use crate::http::respond::JsonResult;
 use crate::http::sessions::PageQuery;
 use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
@@ -18,9 +19,9 @@ pub(crate) async fn list(
     State(service): State<Arc<Service>>,
     Caller(tenant): Caller,
     query: Query<PageQuery>,
-) -> Json<CageJobList> {
-    let (cages, next) = jobs::page(&service, &tenant, &query, CageJob::view);
-    Json(CageJobList { cages, next })
+) -> JsonResult<CageJobList> {
+    let (cages, next) = jobs::page(&service, &tenant, &query, CageJob::view)?;
+    Ok(Json(CageJobList { cages, next }))
 }
 
 /// A cage design.

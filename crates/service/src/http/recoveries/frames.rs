@@ -1,9 +1,9 @@
 //! `POST /v1/recoveries/{id}/frames`: surfaces, each a file.
 
 use crate::http::extract::{Query, RequestedJob};
-use crate::http::multipart::{self, FormHeader, NAME_CHARACTERS, bad, broken, file_name, form};
+use crate::http::form::Form;
+use crate::http::multipart::{self, FormHeader, NAME_CHARACTERS, bad, broken, file_name};
 use crate::http::openapi;
-use crate::http::paced::Paced;
 use crate::http::waiting::too_slow;
 use crate::problem::{self, ApiError};
 use crate::recovery::{Recovery, RecoveryJob};
@@ -45,9 +45,8 @@ pub(crate) async fn post(
     let limit = service.config.max_frames_bytes;
     let FormHeader { patience, .. } = multipart::check_form_header(&service, &request, "frame, one for each", limit)?;
     let _place = service.stream(&tenant)?;
-    let (pace, request) = Paced::new(request);
-    let mut receiver = Receiver { service, tenant, job: Arc::clone(&job), pace: pace.clone(), patience };
-    let frames = pace.finish(receiver.read(request, query.first).await)?;
+    let mut receiver = Receiver { service, tenant, job: Arc::clone(&job), patience };
+    let frames = receiver.read(request, query.first).await?;
     Ok(Json(PostedFrames { frames, received: job.view().frames.received }))
 }
 
@@ -55,7 +54,6 @@ struct Receiver {
     service: Arc<Service>,
     tenant: Arc<Tenant>,
     job: Arc<RecoveryJob>,
-    pace: Paced,
     /// How long the client may still take to send; what the service does meanwhile is its own affair.
     patience: Duration,
 }
@@ -70,9 +68,9 @@ async fn in_time<T>(patience: &mut Duration, sent: impl Future<Output = T>) -> R
 
 impl Receiver {
     async fn read(&mut self, request: Request, first: u32) -> Result<Vec<PostedFrame>, ApiError> {
-        let mut body = in_time(&mut self.patience, form(request)).await??;
+        let mut body = in_time(&mut self.patience, Form::of(request)).await??;
         let (mut frames, mut left) = (Vec::new(), self.service.config.max_frames_bytes);
-        while let Some(field) = in_time(&mut self.patience, body.next_field()).await?.map_err(|e| broken(&e))? {
+        while let Some(field) = in_time(&mut self.patience, body.next()).await?? {
             let part = field.name().unwrap_or_default();
             if part != "frame" {
                 return Err(bad(format!("part {part:?} is unknown; send frame, once for each")));
@@ -104,7 +102,7 @@ impl Receiver {
         let mut room = Permit::empty(&self.service.upload_memory, &self.tenant.name);
         let limit = self.service.config.max_rest_bytes;
         let mut bytes = Vec::new();
-        while let Some(chunk) = in_time(&mut self.patience, self.pace.chunk(&mut field)).await?? {
+        while let Some(chunk) = in_time(&mut self.patience, field.chunk()).await?.map_err(|e| broken(&e))? {
             let together = (bytes.len() + chunk.len()) as u64;
             *left = left.checked_sub(chunk.len() as u64).ok_or_else(|| {
                 let limit = self.service.config.max_frames_bytes;

@@ -1,6 +1,7 @@
 //! Listing, looking at, completing and deleting recoveries.
 
 use crate::http::extract::{Body, Caller, Query, Requested, RequestedJob};
+use crate::http::respond::JsonResult;
 use crate::http::sessions::PageQuery;
 use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
@@ -18,9 +19,9 @@ pub(crate) async fn list(
     State(service): State<Arc<Service>>,
     Caller(tenant): Caller,
     query: Query<PageQuery>,
-) -> Json<RecoveryList> {
-    let (recoveries, next) = jobs::page(&service, &tenant, &query, RecoveryJob::view);
-    Json(RecoveryList { recoveries, next })
+) -> JsonResult<RecoveryList> {
+    let (recoveries, next) = jobs::page(&service, &tenant, &query, RecoveryJob::view)?;
+    Ok(Json(RecoveryList { recoveries, next }))
 }
 
 /// A recovery.

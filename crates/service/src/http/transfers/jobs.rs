@@ -3,6 +3,7 @@
 use crate::http::extract::{Caller, Query, Requested, RequestedJob};
 use crate::http::progress::Event;
 use crate::http::progress::ProgressEvent;
+use crate::http::respond::JsonResult;
 use crate::http::sessions::PageQuery;
 use crate::http::{jobs, openapi};
 use crate::problem::ApiError;
@@ -21,9 +22,9 @@ pub(crate) async fn list(
     State(service): State<Arc<Service>>,
     Caller(tenant): Caller,
     query: Query<PageQuery>,
-) -> Json<TransferList> {
-    let (transfers, next) = jobs::page(&service, &tenant, &query, TransferJob::view);
-    Json(TransferList { transfers, next })
+) -> JsonResult<TransferList> {
+    let (transfers, next) = jobs::page(&service, &tenant, &query, TransferJob::view)?;
+    Ok(Json(TransferList { transfers, next }))
 }
 
 /// A transfer.

@@ -57,7 +57,7 @@ fn live(given: &Given, told: &mut Told) -> Result<(), ()> {
     told.complete = true;
     twice(errors, || store.delete(Kind::Session, "b"))?;
     told.deleted = true;
-    twice(errors, || store.probe())
+    twice(errors, || store.probe(&std::sync::Mutex::default()))
 }
 
 /// Opens the store and compares; gives what it showed, which counts from there on.

@@ -166,11 +166,12 @@ fn a_container_is_replaced_whole_or_not_at_all() {
 fn a_full_disk_is_not_ready() {
     let given = Given::new();
     let store = given.open().store;
-    store.probe().unwrap();
+    let part = std::sync::Mutex::default();
+    store.probe(&part).unwrap();
     assert!(store.free_bytes() > 0);
     given.disk.set_free_bytes(Some(5));
     assert_eq!(store.free_bytes(), 5);
     given.disk.fail(Some(Op::Write), 1, Fault::Error(ENOSPC));
-    assert!(matches!(store.probe(), Err(StoreError::Full { .. })));
-    store.probe().unwrap();
+    assert!(matches!(store.probe(&part), Err(StoreError::Full { .. })));
+    store.probe(&part).unwrap();
 }

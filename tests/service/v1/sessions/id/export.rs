@@ -37,6 +37,13 @@ async fn a_completed_session_is_written_in_the_formats_of_other_programs() {
         let part = app.get_with(&path, &[("range", "bytes=10-19")]).await.expect(206);
         assert_eq!(part.body, reply.body[10..20]);
         app.get_with(&path, &[("if-none-match", reply.header("etag"))]).await.expect(304);
+        if ["abc", "glb", "usdc"].contains(&format) {
+            let same = app.get(&format!("/v1/sessions/{}/capture.{format}", session.id)).await.expect(200);
+            assert!(
+                same.body == reply.body && same.header("content-type") == media_type,
+                "{format} by its own address"
+            );
+        }
     }
     let path = format!("/v1/sessions/{}/export?format=npy", session.id);
     let head = app.request(Method::HEAD, &path).header("range", "bytes=10-19");
