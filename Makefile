@@ -151,7 +151,7 @@ python: $(MODULE) ## the Python module: built, installed into target/python, and
 
 $(MODULE): Makefile
 	$(PYTHON) -m venv target/python
-	target/python/bin/pip install --quiet maturin==1.16.0 numpy pytest mypy
+	target/python/bin/pip install --quiet maturin==1.16.0 numpy pytest mypy==2.4.1
 	@touch $@
 
 soak: ## kill the service a hundred times under load; KILLS and SEED change how often and when, CAGER_TEST_CATALOG=postgres where it keeps sessions (postgres, postgres+s3)

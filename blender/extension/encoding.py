@@ -84,7 +84,7 @@ class Encoding:
             if not each.visible_get():
                 raise Refused(f"{each.name} is hidden in frame {frame}: show it in the viewport, or take off the animation that hides it.")
         problem = live.problems.get(self.thing.name_full)
-        if problem:
+        if problem and self.thing.cager.file:
             raise Refused(f"{self.name} does not play: {problem}")
         points, faces = seen(self.thing, depsgraph, with_faces=not self.frames)
         if not self.frames:

@@ -41,7 +41,7 @@ pub(crate) struct Capture {
     frames: usize,
     frame_rate: Option<f64>,
     report: String,
-    warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// Open a `.cager` file.

@@ -12,6 +12,7 @@ use crate::own_file::{OwnFile, WorkFolder, temporary};
 use crate::watch::Watch;
 use cager_cages::{DesignOptions, Style};
 use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
+use cager_capture::design::default_vertices;
 use cager_capture::encode::{EncodeError, EncodeProgress, Job, encode as encode_job, sample_frames};
 use cager_capture::memory::Memory;
 use cager_capture::mismatch::cage_mismatch;
@@ -211,11 +212,12 @@ pub(crate) fn design_options(
         };
         vertices = apart(watch, TRYING, work, |()| ())?;
     }
-    // Its normals are unknowns too, two for each vertex.
-    let is_free = asked.system.name() == Green::Free.name();
-    let points = if is_free { rest.points.len().div_ceil(3) } else { rest.points.len() };
+    if vertices.is_none() && asked.system.name() == Green::Free.name() {
+        // Its normals are unknowns too, two for each vertex.
+        vertices = Some(default_vertices(rest.points.len().div_ceil(3)));
+    }
     Ok(DesignOptions {
-        goal: design_goal(vertices, asked.mean_error, points)?,
+        goal: design_goal(vertices, asked.mean_error, rest.points.len())?,
         style: if is_mean_value { Style::Free } else { Style::Editable },
         seed: asked.seed,
         ..DesignOptions::default()

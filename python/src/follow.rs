@@ -54,6 +54,7 @@ impl Cages {
             })
         })
     }
+
     /// Ends it: what is connected is closed, and no cage follows.
     fn aclose<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Fault> {
         let stream = Arc::clone(&self.stream);

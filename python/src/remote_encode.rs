@@ -97,17 +97,20 @@ async fn run(job: Encoding, stop: &mut Stop, progress: &Arc<LoopProgress>, left:
         idempotency_key: None,
     };
     // What is created is awaited even where the call is cancelled, so that it can be deleted.
+    let mut warnings = Vec::new();
     if let Some(new) = prepared.design {
         let id = client.design_cage(&new).await?.id;
         left.design = Some(id.clone());
-        stop.or(progress.or(designed(&client, &id, progress))).await?;
+        warnings = stop.or(progress.or(designed(&client, &id, progress))).await?;
         session.options.cage = Some(CageSource { id: Some(id), ..CageSource::default() });
     }
     progress.tell("preparing", 0.0);
     let id = client.create(&session).await?.id;
     left.session = Some(id.clone());
     drop(session);
-    stop.or(progress.or(filled(&client, &id, frames, progress))).await
+    let mut capture = stop.or(progress.or(filled(&client, &id, frames, progress))).await?;
+    capture.warnings.extend(warnings);
+    Ok(capture)
 }
 
 /// What is sent.
@@ -161,8 +164,8 @@ fn prepare(job: Encoding, progress: &Arc<LoopProgress>) -> Result<Prepared, Faul
     Ok(Prepared { rest, cage, design: design.transpose()?, frames: kept })
 }
 
-/// Waits until a cage is designed.
-async fn designed(client: &Client, id: &str, progress: &Arc<LoopProgress>) -> Result<(), Fault> {
+/// Waits until a cage is designed. What the user should know of it.
+async fn designed(client: &Client, id: &str, progress: &Arc<LoopProgress>) -> Result<Vec<String>, Fault> {
     let mut events = client.cage_events(id);
     while let Some(told) = events.next().await {
         let told = told?;
@@ -172,8 +175,7 @@ async fn designed(client: &Client, id: &str, progress: &Arc<LoopProgress>) -> Re
         }
     }
     // The final state, with the reason if the design failed.
-    client.wait_cage(id, READY_TIMEOUT).await?;
-    Ok(())
+    Ok(client.wait_cage(id, READY_TIMEOUT).await?.warnings)
 }
 
 /// Sends the frames to a session, and fetches the container.

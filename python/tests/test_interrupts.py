@@ -34,6 +34,7 @@ begun, awaited = False, {awaited!r}
 cage = grid(24, 0.65, 1.2)
 try:
     {call}
+    print("too fast")
 except KeyboardInterrupt:
     print(time.monotonic() - sent)
 """
@@ -60,5 +61,7 @@ def test_an_interrupt_is_answered_at_once_and_leaves_nothing(tmp_path, awaited, 
     script = SCRIPT.format(awaited=awaited, call=call)
     surroundings = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parent)}
     done = subprocess.run([sys.executable, "-c", script], env=surroundings, capture_output=True, text=True, timeout=120)
+    if "too fast" in done.stdout:
+        pytest.skip("the work was over before the interrupt came")
     assert done.returncode == 0 and float(done.stdout) < 1, done
     assert os.listdir(tmp_path) == []

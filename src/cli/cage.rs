@@ -73,13 +73,12 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         return tell_dry_run(output, "a cage", &[targets.report.clone(), targets.picture.clone()]);
     }
     let vertices = args.vertices.map_or(default_vertices(rest.points.len()), |n| n as usize);
-    // As with frames: more than the points can tell apart are of no use.
-    let vertices = if args.general.is_none() && vertices > rest.points.len() {
-        default_vertices(rest.points.len())
-    } else {
-        vertices
-    };
     let mut warnings = Vec::new();
+    let most = if args.general.is_some() || args.frames.is_some() { vertices } else { rest.points.len().max(4) };
+    if vertices > most {
+        warnings.push(format!("--vertices: the {most} points of the model tell no more than {most} vertices apart, which the cage gets at the most"));
+    }
+    let vertices = vertices.min(most);
     let (cage, report) = match (&args.frames, args.general) {
         (Some(frames), None) => designed(args, (rest, units), frames, &mut warnings)?,
         (_, Some(shape)) => {

@@ -4,7 +4,7 @@ use super::descent::Descent;
 use super::options::{MAX_VERTICES, Progress};
 use super::run::{Best, Phase, Run};
 use super::samples::{Evaluation, evenly};
-use crate::enclose::{EncloseOptions, enclose_watched};
+use crate::enclose::{EncloseError, EncloseOptions, enclose_watched};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{BATCH, Rows, Solver, SolverOptions};
@@ -72,10 +72,17 @@ impl Run<'_> {
             if count > goal && found <= error {
                 // No more vertices could be merged without leaving points outside; a cage that is made with fewer lies farther out.
                 let options = EncloseOptions { vertices: goal, ..EncloseOptions::default() };
-                let mut watch =
-                    || (self.watch)(Progress { stage: STAGE, fraction: fraction[1], error: Some(found), better: None });
-                match enclose_watched(self.rest, &options, &mut watch) {
+                let rest = self.rest;
+                let mut watch = || {
+                    let now = Progress { stage: STAGE, fraction: fraction[1], error: Some(found), better: None };
+                    if self.is_late() { ControlFlow::Break(()) } else { (self.watch)(now) }
+                };
+                match enclose_watched(rest, &options, &mut watch) {
                     Ok(mesh) if mesh.vertices.len() < count => descent.go_back(&mesh, std::iter::empty()),
+                    Err(EncloseError::Stopped) => {
+                        ended = ControlFlow::Break(());
+                        break;
+                    }
                     _ => break,
                 }
                 continue;

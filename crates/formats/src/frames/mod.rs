@@ -36,9 +36,6 @@ use cager_geometry::units::Units;
 use crate::error::Error;
 
 pub(crate) use block::read_values;
-/// Frames per second that files hold: beyond, times are infinite, or frames no longer apart.
-pub const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
-
 pub use numbers::missing_frames;
 pub use range::FrameRange;
 pub use selection::FrameSelection;
@@ -49,6 +46,9 @@ pub use source::{
 pub(crate) use times::Times;
 pub(crate) use widen::{Scalar, half_precision};
 pub use write::{CageMesh, FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path};
+
+/// Frames per second that files hold: beyond, times are infinite, or frames no longer apart.
+pub const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
 /// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
 pub trait FrameReader: Send {
