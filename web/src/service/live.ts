@@ -6,8 +6,8 @@ import type { Source } from '../container/source';
 import { type Retry, pause, persistently } from './backoff';
 import { basisRows } from './basisRows';
 import { LiveCapture, type OpenFinished, type SessionCapture } from './liveCapture';
-import type { Session } from './messages';
-import { ServiceProblem, problemBehind, problemFrom } from './problem';
+import { type Session, throwIfFailed } from './messages';
+import { ServiceProblem, problemBehind } from './problem';
 import { openRunning } from './runningContainer';
 import { Service, sessionPath } from './service';
 import { pageToken } from './token';
@@ -58,7 +58,7 @@ async function whenPrepared(
 ): Promise<Session> {
   for (;;) {
     const session = await look();
-    if (session.problem) throw problemFrom(session.problem);
+    throwIfFailed(session);
     if (session.state !== 'preparing') return session;
     onWaiting?.('Preparing the session. Large models can take minutes.');
     await pause(PREPARING_SECONDS, signal);

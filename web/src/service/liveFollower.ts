@@ -4,8 +4,8 @@ import type { LiveStatus } from '../capture';
 import { Backoff, nextEvent, pause } from './backoff';
 import { BrokenRecord, type CageRecord, CageRecordReader, RECORDS_MEDIA_TYPE } from './frameRecords';
 import { LatencyMeter, RateMeter } from './measures';
-import { type Session, solvedFromStart } from './messages';
-import { ServiceProblem, problemBehind, problemFrom } from './problem';
+import { type Session, solvedFromStart, throwIfFailed } from './messages';
+import { ServiceProblem, problemBehind } from './problem';
 import { piecesOf } from './answers';
 import { type Service, sessionPath } from './service';
 import { pageToken } from './token';
@@ -67,7 +67,7 @@ export class LiveFollower {
       try {
         const session = await this.service.session(this.id, signal);
         this.following.looked(session);
-        if (session.problem) throw problemFrom(session.problem);
+        throwIfFailed(session);
         if (session.state === 'completed') return session;
         this.catchUp(session);
         this.latency.reset(this.next);

@@ -1,7 +1,7 @@
 /** The service's JSON bodies, as docs/openapi.json has them. Lengths are fractions of the rest pose's diagonal, times are seconds. */
 
 import type { CoordinateSystem } from '../capture';
-import type { ProblemDetails } from './problem';
+import { type ProblemDetails, problemFrom } from './problem';
 
 export type SessionState = 'preparing' | 'ready' | 'completed' | 'failed';
 
@@ -19,6 +19,7 @@ export interface Session {
   /** Only of sessions whose frames are coded in groups. */
   readonly coding?: CodedFrames;
   readonly warnings: readonly string[];
+  /** Why it failed; of a `ready` one, that its container is damaged, which completing it again writes anew. */
   readonly problem?: ProblemDetails;
 }
 
@@ -100,6 +101,11 @@ export interface SessionOptions {
   frames?: number;
   max_error?: number;
   quality?: 'preview' | 'standard' | 'master';
+}
+
+/** @throws ServiceProblem where the session failed; one that is `ready` goes on whatever its `problem` is */
+export function throwIfFailed({ state, problem }: Session) {
+  if (state === 'failed') throw problemFrom(problem ?? {});
 }
 
 /** Numbers of the frames below `end` that are not solved, as ranges `[a, b)`. */

@@ -311,7 +311,8 @@ export class Sessions extends LitElement {
   private readonly tokenChanged = () => {
     if (pageToken.token === null) forgetThumbnails();
     this.wantsToken = false;
-    this.page = 0;
+    // What another token showed has other pages; before the first one, the page is that of the address.
+    if (this.list.loaded) this.page = 0;
     this.keepView();
     this.figures.reset();
     this.list.reset();

@@ -1,7 +1,14 @@
 /** Sends a capture to the service: a cage's design, a session, its frames, its completion. Goes on over broken connections, and after being stopped. */
 
 import { Backoff, type Retry, pause, persistently } from '../service/backoff';
-import { type DesignOptions, type CageDesign, type Session, type SessionOptions, unsolved } from '../service/messages';
+import {
+  type DesignOptions,
+  type CageDesign,
+  type Session,
+  type SessionOptions,
+  throwIfFailed,
+  unsolved,
+} from '../service/messages';
 import { ServiceProblem, isAbort, problemBehind, problemFrom, sentenceOf } from '../service/problem';
 import { type Service, sessionPath } from '../service/service';
 import { RateMeter } from '../service/measures';
@@ -184,7 +191,7 @@ export class UploadJob extends EventTarget {
   private async prepared(id: string, signal: AbortSignal) {
     for (;;) {
       this.session = await this.retry(() => this.service.session(id, signal), signal);
-      if (this.session.problem) throw problemFrom(this.session.problem);
+      throwIfFailed(this.session);
       if (this.session.state !== 'preparing') break;
       this.changed();
       await pause(PREPARING_POLL_SECONDS, signal);
@@ -205,7 +212,7 @@ export class UploadJob extends EventTarget {
     // Whatever broke off, what is missing then is what the service says.
     for (;;) {
       const session = await this.retry(() => this.service.session(id, signal), signal);
-      if (session.problem) throw problemFrom(session.problem);
+      throwIfFailed(session);
       if (session.coding?.problem) throw problemFrom(session.coding.problem);
       this.session = session;
       const ranges = unsolved(session.frames, frames.frames);

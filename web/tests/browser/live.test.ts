@@ -284,6 +284,24 @@ describe.skipIf(missing)('a session as a capture', { timeout: 60_000 }, () => {
     expect(await refused).toMatch(/damaged/);
     await watched.close();
   });
+
+  test('a_session_whose_container_is_lost_is_opened_and_followed_until_it_is_completed_again', async () => {
+    const id = await client.encode(capture, { name: 'lost container' }, 6);
+    await site.service.loseContainer(id);
+    await expect(client.call(`/${id}/capture.cager`)).rejects.toThrow(/^503/);
+    const { state: now, problem } = await client.session(id);
+    expect([now, problem?.status]).toEqual(['ready', 503]);
+    const watched = await openPage(site.browser, site.server.parts);
+    await opened(watched, id);
+    await expect.poll(async () => (await state(watched)).live!.state).toBe('following');
+    expect(await state(watched)).toMatchObject({ frames: 6, complete: false, problem: null });
+    expect(await cage(watched, 5)).toEqual(await solvedCage(client, id, 5));
+    await client.complete(id, 6);
+    await eventually(watched, 'complete', true);
+    expect(await state(watched)).toMatchObject({ frames: 6, problem: null, measured: 6 });
+    expect(watched.errors).toEqual([]);
+    await watched.close();
+  });
 });
 
 describe.skipIf(missing)('a session behind tokens', { timeout: 60_000 }, () => {

@@ -265,7 +265,7 @@ describe.skipIf(missing)('a service with tokens', { timeout: 120_000 }, () => {
   test('signing_in_shows_the_tenants_own_sessions', async () => {
     const mine = await site.client(TOKEN_A).encode(capture, { name: 'mine' }, 3);
     const theirs = await site.client(TOKEN_B).encode(capture, { name: 'theirs' }, 3);
-    const { page, errors, close } = await openPage(site.browser, `${site.page}#/`, ['401']);
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/?page=2`, ['401']);
     const field = page.getByLabel('Access token');
     await field.waitFor();
     expect(await seriousFindings(page)).toEqual([]);
@@ -277,6 +277,7 @@ describe.skipIf(missing)('a service with tokens', { timeout: 120_000 }, () => {
     await row(page, 'mine').waitFor();
     expect(await row(page, 'theirs').count()).toBe(0);
     expect(page.url()).not.toContain('token');
+    expect(page.url()).toMatch(/#\/\?page=2$/);
 
     // It outlives a reload, and a download has it.
     await page.reload();
@@ -288,6 +289,7 @@ describe.skipIf(missing)('a service with tokens', { timeout: 120_000 }, () => {
 
     await page.getByRole('button', { name: 'Sign out' }).click();
     await field.waitFor();
+    expect(page.url()).toMatch(/#\/$/);
     expect(mine).not.toBe(theirs);
     await close();
   });

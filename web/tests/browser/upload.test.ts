@@ -233,6 +233,29 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
     await close();
   });
 
+  test('an_upload_whose_container_was_lost_meanwhile_goes_on_and_completes_again', async () => {
+    const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`, ['ERR_']);
+    await page.route('**/complete', (route) => route.abort());
+    await drop(page, { 'rest.obj': capture.rest, 'cage.obj': capture.cage, 'wave.npy': capture.npy(FRAMES) });
+    await page.getByText(`${FRAMES} frames of 642 points`).waitFor();
+    await encodeCages(page);
+    const link = page.getByRole('link', { name: 'Watch live' });
+    await link.waitFor();
+    const id = (await link.getAttribute('href'))!.replace('#/session/', '');
+    await page.getByText(/Retrying in/).waitFor();
+    await page.getByRole('button', { name: 'Stop' }).click();
+    await site.client().complete(id, FRAMES);
+    await site.service.loseContainer(id);
+    await expect(site.client().call(`/${id}/capture.cager`)).rejects.toThrow(/^503/);
+    expect(await site.client().session(id)).toMatchObject({ state: 'ready', problem: { status: 503 } });
+    await page.unroute('**/complete');
+    await page.getByRole('button', { name: 'Resume' }).click();
+    expect(await encoded(page)).toBe(id);
+    expect((await site.client().session(id)).state).toBe('completed');
+    expect(errors).toEqual([]);
+    await close();
+  });
+
   test('an_upload_that_was_stopped_goes_on_or_is_deleted', async () => {
     const { page, errors, close } = await openPage(site.browser, `${site.page}#/upload`);
     site.server.holdFrames(1);

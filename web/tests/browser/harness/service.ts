@@ -93,6 +93,11 @@ export class TestService {
     await this.run();
   }
 
+  /** Removes the container of this session, which is completed: the service notices when it is asked for, and the session is ready with a problem then. */
+  async loseContainer(id: string): Promise<void> {
+    await rm(join(this.folder, 'data', 'sessions', id, 'capture.cager'));
+  }
+
   /** Ends it and removes its data. */
   async close(): Promise<void> {
     await this.kill();
