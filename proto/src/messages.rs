@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub enum SessionState {
     /// Coordinates, handles and operator are being computed.
     Preparing,
-    /// Frames are accepted.
+    /// Frames are accepted. Where there is a `problem`, the session was completed, and is to be completed again.
     Ready,
     /// All frames are there and the container is written; nothing changes any more.
     Completed,
@@ -220,7 +220,7 @@ pub struct Session {
     pub seconds: PreparationSeconds,
     /// What a user should know but that did not stop the work.
     pub warnings: Vec<String>,
-    /// Why the session failed.
+    /// Why the session failed. While it is `ready`: its container is damaged, and is written again when the session is completed again.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub problem: Option<Problem>,
 }

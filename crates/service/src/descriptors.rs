@@ -26,7 +26,7 @@ pub(crate) fn make_room(config: &mut ServeConfig) {
         tracing::warn!(
             "the system allows {limit} open files, too few for max_connections = {}: {most} are served; raise the limit, as by `ulimit -n {}`",
             config.max_connections,
-            config.max_connections as u64 + OWN
+            (config.max_connections as u64).saturating_add(OWN)
         );
         config.max_connections = most;
     }
@@ -49,10 +49,11 @@ mod tests {
 
     #[test]
     fn the_limit_is_raised_and_fewer_connections_are_served_where_that_is_not_enough() {
-        let mut config = ServeConfig { max_connections: usize::MAX, ..ServeConfig::default() };
+        let wanted = 1_000_000;
+        let mut config = ServeConfig { max_connections: wanted, ..ServeConfig::default() };
         make_room(&mut config);
         let now = getrlimit(Resource::Nofile);
         assert_eq!(now.current, now.maximum);
-        assert_eq!(config.max_connections, now.current.map_or(usize::MAX, connections));
+        assert_eq!(config.max_connections, now.current.map_or(wanted, |limit| connections(limit).min(wanted)));
     }
 }

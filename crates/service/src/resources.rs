@@ -10,6 +10,7 @@ use crate::preparation::{KeptSolvers, kept_solvers};
 use crate::problem::{self, ApiError};
 use crate::session::commit::Committer;
 use crate::store::StoreError;
+use crate::telemetry::REJECTIONS;
 use crate::webhooks::WebhooksError;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -178,6 +179,7 @@ impl Resources {
 
     /// Counts a request that was turned away.
     pub(crate) fn rejected(&self, reason: &'static str) {
+        debug_assert!(REJECTIONS.contains(&reason), "{reason} does not begin at 0");
         metrics::counter!("cager_rejections_total", "reason" => reason).increment(1);
     }
 

@@ -1,6 +1,7 @@
 //! What each setting may be.
 
 use super::{GIB, KIB, MIB, SETTINGS};
+use crate::telemetry::{log_filter, parts};
 use std::net::SocketAddr;
 use toml::Value;
 
@@ -93,12 +94,10 @@ impl SettingKind {
                     |why: String| format!("{why}; write a level such as info, or info,cager_service::http=debug");
                 let text = text.ok_or_else(|| wrong("not a text".to_owned()))?;
                 // It would be taken for the name of a module, of which everything is logged.
-                let is_word = |part: &&str| !part.is_empty() && !part.contains(['=', ':', '[', '_']);
-                let is_level = |part: &str| part.parse::<tracing_subscriber::filter::LevelFilter>().is_ok();
-                if let Some(word) = text.split(',').map(str::trim).filter(is_word).find(|part| !is_level(part)) {
-                    return Err(wrong(format!("{word} is no level")));
+                if let Some((word, level)) = parts(text).find_map(|part| Some((part, meant_level(part)?))) {
+                    return Err(wrong(format!("{word} is no level, did you mean {level}?")));
                 }
-                match tracing_subscriber::EnvFilter::try_new(text) {
+                match log_filter(text) {
                     Ok(_) => Ok(value.clone()),
                     Err(error) => Err(wrong(error.to_string())),
                 }
@@ -129,6 +128,15 @@ impl SettingKind {
             }
         }
     }
+}
+
+/// The level that a word is almost.
+fn meant_level(word: &str) -> Option<&'static str> {
+    let is_level = word.parse::<tracing_subscriber::filter::LevelFilter>().is_ok();
+    let word = word.to_ascii_lowercase();
+    let is_almost =
+        |level: &&str| distance(&word, level) <= 2 || word.starts_with(*level) && word.len() <= level.len() + 3;
+    ["error", "warn", "info", "debug", "trace"].into_iter().find(is_almost).filter(|_| !is_level)
 }
 
 /// The texts of a list.

@@ -65,7 +65,9 @@ fn mistakes_name_their_place_and_what_to_do() {
         ("tokens = 3", &[], "", "tokens = 3: write the path"),
         ("log = \"xml\"", &[], "", "log = \"xml\": write \"human\" or \"json\""),
         ("log_filter = \"cager=loud\"", &[], "", "write a level such as info"),
-        ("log_filter = \"bogus\"", &[], "", "bogus is no level; write a level such as info"),
+        ("log_filter = \"inof\"", &[], "", "inof is no level, did you mean info?; write a level such as info"),
+        ("log_filter = \"hyper=warn, Warning\"", &[], "", "Warning is no level, did you mean warn?; write"),
+        ("log_filter = \"[s{a,b=info\"", &[], "", "write a level such as info"),
         (
             "catalog = \"host=db password=secret\"",
             &[],
@@ -88,6 +90,26 @@ fn mistakes_name_their_place_and_what_to_do() {
     let error = ServeConfig::load(Some(Path::new("no/such.toml")), std::iter::empty(), &flags("")).unwrap_err();
     assert!(error.to_string().starts_with("no/such.toml: cannot be read: "), "{error}");
     assert!(std::error::Error::source(&error).is_none(), "it would be told twice");
+}
+
+#[test]
+fn filters_of_the_log_may_name_crates_spans_and_their_fields() {
+    for filter in [
+        "WARN",
+        "off",
+        "3",
+        "hyper",
+        "info,hyper",
+        "info,cager_service::http=debug",
+        "[s{a,b,c}]=info",
+        "warn,h2[s{a=1,b}]",
+    ] {
+        assert_eq!(load("", &[], &format!("--log-filter {filter}")).unwrap().log_filter, filter);
+    }
+    for filter in ["", "info", "hyper", "debug,hyper=info", "hyper=info,debug,[s]=trace"] {
+        let known = tracing_subscriber::EnvFilter::try_new(filter).unwrap();
+        assert_eq!(crate::telemetry::log_filter(filter).unwrap().to_string(), known.to_string());
+    }
 }
 
 #[test]

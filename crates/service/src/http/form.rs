@@ -7,7 +7,7 @@ use axum::extract::multipart::Field;
 use axum::extract::{FromRequest, Multipart, Request};
 use futures_util::{StreamExt as _, stream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 /// Most bytes before the content of a part: its boundary and its headers. The parser (multer 3.1) looks through all of them again with each piece that comes, so that
 /// without a limit a small body that is unpacked would keep a processor busy for minutes.
@@ -16,8 +16,14 @@ const HEAD_BYTES: usize = 64 << 10;
 /// A form whose parts are still to come.
 pub(super) struct Form {
     parts: Multipart,
+    head: Arc<Head>,
+}
+
+struct Head {
     /// How many more bytes are taken before the content of a part begins.
-    head: Arc<AtomicUsize>,
+    left: AtomicUsize,
+    /// That more came, and was refused.
+    is_refused: AtomicBool,
 }
 
 impl Form {
@@ -26,21 +32,24 @@ impl Form {
     /// # Errors
     /// It is no multipart form.
     pub(super) async fn of(request: Request) -> Result<Self, ApiError> {
-        let head = Arc::new(AtomicUsize::new(HEAD_BYTES));
-        let left = Arc::clone(&head);
+        let head = Arc::new(Head { left: AtomicUsize::new(HEAD_BYTES), is_refused: AtomicBool::new(false) });
+        let shared = Arc::clone(&head);
         // It gets one piece at a time: the parser buffers whatever is there, which must not be a whole capture; and it looks for the first
         // boundary between two readings of the body, and takes one that comes to its end in the second for incomplete.
         let pieces = move |(mut pieces, is_first): (BodyDataStream, bool)| {
-            let left = Arc::clone(&left);
+            let head = Arc::clone(&shared);
             async move {
                 if !is_first {
                     tokio::task::yield_now().await;
                 }
                 let piece = pieces.next().await?;
-                let admitted = piece.and_then(|piece| match left.load(Relaxed) {
-                    0 => Err(axum::Error::new("no part begins")),
+                let admitted = piece.and_then(|piece| match head.left.load(Relaxed) {
+                    0 => {
+                        head.is_refused.store(true, Relaxed);
+                        Err(axum::Error::new("no part begins"))
+                    }
                     more => {
-                        left.store(more.saturating_sub(piece.len()), Relaxed);
+                        head.left.store(more.saturating_sub(piece.len()), Relaxed);
                         Ok(piece)
                     }
                 });
@@ -59,10 +68,10 @@ impl Form {
     /// # Errors
     /// The body broke off, or no part begins.
     pub(super) async fn next(&mut self) -> Result<Option<Field<'_>>, ApiError> {
-        self.head.store(HEAD_BYTES, Relaxed);
+        self.head.left.store(HEAD_BYTES, Relaxed);
         let found = self.parts.next_field().await;
-        let is_used_up = self.head.swap(usize::MAX, Relaxed) == 0;
-        found.map_err(|error| match is_used_up {
+        self.head.left.store(usize::MAX, Relaxed);
+        found.map_err(|error| match self.head.is_refused.load(Relaxed) {
             true => bad(format!(
                 "no part of the multipart body begins within {HEAD_BYTES} bytes; check its boundary, and send nothing before it"
             )),
@@ -101,6 +110,17 @@ mod tests {
         let field = form.next().await.expect("a whole form").expect("a part");
         assert_eq!(field.name(), Some("x"));
         assert_eq!(field.text().await.expect("its text"), "1");
+    }
+
+    #[tokio::test]
+    async fn mistakes_in_a_large_piece_are_told_as_what_they_are() {
+        let malformed = [b"--b\r\nno header\r\n\r\n".to_vec(), vec![b'x'; HEAD_BYTES]].concat();
+        let broken_off = [b"--b\r\nX-A: ".to_vec(), vec![b'x'; HEAD_BYTES]].concat();
+        for body in [malformed, broken_off] {
+            let mut form = Form::of(request(Body::from(body))).await.expect("a form");
+            let error = form.next().await.expect_err("no part");
+            assert!(!error.problem.detail.contains("check its boundary"), "{}", error.problem.detail);
+        }
     }
 
     #[tokio::test]

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::io::IsTerminal as _;
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{Directive, ParseError};
 
 /// Form of log lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, clap::ValueEnum)]
@@ -35,11 +36,29 @@ pub enum LoggingError {
         /// What was given.
         filter: String,
         /// What is wrong with it.
-        source: tracing_subscriber::filter::ParseError,
+        source: ParseError,
     },
     /// This process logs already.
     #[error("logging has begun already")]
     Twice,
+}
+
+/// The parts of a filter. Commas in braces, between the fields of a span, divide nothing.
+pub(crate) fn parts(filter: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0_i32;
+    let is_comma = move |c| {
+        depth += i32::from(matches!(c, '[' | '{')) - i32::from(matches!(c, ']' | '}'));
+        c == ',' && depth <= 0
+    };
+    filter.split(is_comma).map(str::trim).filter(|part| !part.is_empty())
+}
+
+/// What a text selects of the log.
+pub(crate) fn log_filter(text: &str) -> Result<EnvFilter, ParseError> {
+    let mut all = parts(text).map(str::parse::<Directive>);
+    let Some(first) = all.next() else { return EnvFilter::try_new("") };
+    let filter = EnvFilter::builder().with_default_directive(first?).parse("")?;
+    all.try_fold(filter, |filter, directive| Ok(filter.add_directive(directive?)))
 }
 
 /// Begins to log. Once per process.
@@ -47,8 +66,7 @@ pub enum LoggingError {
 /// # Errors
 /// A filter that cannot be understood, and a second call.
 pub fn init_logging(format: LogFormat, filter: &str) -> Result<(), LoggingError> {
-    let filter =
-        EnvFilter::try_new(filter).map_err(|source| LoggingError::Filter { filter: filter.to_owned(), source })?;
+    let filter = log_filter(filter).map_err(|source| LoggingError::Filter { filter: filter.to_owned(), source })?;
     // Where nobody reads them any more, lines are lost and nothing else: what would be said of that has nowhere to go either.
     let builder =
         tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).log_internal_errors(false);

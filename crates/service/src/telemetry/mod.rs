@@ -7,4 +7,6 @@ pub mod traces;
 mod zeros;
 
 pub use logging::{LogFormat, LoggingError, init_logging};
+pub(crate) use logging::{log_filter, parts};
 pub use request::{RequestId, request_id};
+pub(crate) use zeros::REJECTIONS;

@@ -178,11 +178,15 @@ impl Bucket {
 
     /// Checks that it can be written to.
     pub(super) fn probe(&self) -> io::Result<()> {
-        self.block_on(self.write_probe())
+        self.put("probe", Bytes::from_static(b"probe\n"))
     }
 
-    async fn write_probe(&self) -> Result<(), object_store::Error> {
-        self.store.put(&self.path("probe"), Bytes::from_static(b"probe\n").into()).await.map(|_| ())
+    /// Whether it answers, also where it takes no writes: what is refused is told by the work itself.
+    async fn look(&self) -> Result<(), object_store::Error> {
+        match self.store.head(&self.path("probe")).await {
+            Err(error @ object_store::Error::Generic { .. }) => Err(error),
+            _ => Ok(()),
+        }
     }
 
     /// Where it has not answered, one caller at a time looks whether it does again; the others are told at once, so that they do not all wait.
@@ -193,10 +197,15 @@ impl Bucket {
         if let Some(error) = known.filter(|_| self.is_tried.swap(true, Ordering::SeqCst)) {
             return Err(io::Error::other(error));
         }
+        let is_looking = AtomicBool::new(tries);
         let work = async {
             if tries {
                 // Before much is sent.
-                timeout(LOOK, self.write_probe()).await.map_err(|_| silent())??;
+                timeout(LOOK, self.look()).await.map_err(|_| silent())??;
+                // Others read meanwhile, also where this is a write that takes long to fail.
+                *lock(&self.away) = None;
+                is_looking.store(false, Ordering::SeqCst);
+                self.is_tried.store(false, Ordering::SeqCst);
             }
             work.await
         };
@@ -210,7 +219,7 @@ impl Bucket {
             Err(error @ object_store::Error::Generic { .. }) => Some(told(error)),
             _ => None,
         };
-        if tries {
+        if is_looking.into_inner() {
             self.is_tried.store(false, Ordering::SeqCst);
         }
         done.map_err(|error| io::Error::other(told(&error)))
@@ -332,6 +341,23 @@ mod tests {
     use super::*;
     use std::net::TcpListener;
     use std::time::Instant;
+
+    #[test]
+    fn a_bucket_that_takes_no_writes_is_read_all_the_same() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let bucket = Bucket::connect(&format!("file://{}", folder.path().display()), &[]).expect("an address");
+        bucket.put("name", Bytes::from_static(b"bytes")).expect("put");
+        // Where a file cannot replace it, and is not found.
+        std::fs::create_dir_all(folder.path().join("probe/full")).expect("a folder");
+        for _ in 0..2 {
+            bucket.probe().expect_err("it takes no writes");
+            assert!(lock(&bucket.away).is_some(), "it counts as away");
+            let read = tempfile::tempfile().expect("a file");
+            bucket.get("name", 5, &read, 0).expect("read");
+            assert_eq!(read.metadata().expect("its length").len(), 5);
+            assert!(lock(&bucket.away).is_none() && !bucket.is_tried.load(Ordering::SeqCst));
+        }
+    }
 
     #[test]
     fn a_bucket_that_hangs_is_given_up_and_others_are_told_at_once() {

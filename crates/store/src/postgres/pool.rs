@@ -5,14 +5,16 @@ use super::place::Place;
 use super::trouble::Trouble;
 use crate::CatalogError;
 use std::sync::{Condvar, Mutex, MutexGuard, Once, OnceLock, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How much longer than the database a call waits, for the way there and back.
 const WAY: Duration = Duration::from_secs(2);
+/// How often a connection is asked for again where the server gave none.
+const AGAIN: Duration = Duration::from_secs(1);
 
 pub(super) struct Pool {
     place: Place,
-    /// Most connections at once.
+    /// Most connections at once, and so most calls.
     connections: usize,
     /// How long a statement may take.
     limit: Duration,
@@ -27,14 +29,18 @@ pub(super) struct Pool {
 #[derive(Default)]
 struct Links {
     idle: Vec<Link>,
-    /// How many are used or being made.
+    /// Calls under way, those that wait for a connection included.
     taken: usize,
+    /// How many are used or being made.
+    used: usize,
+    /// How often some were closed, so that the server may give others.
+    closed: u64,
 }
 
 impl Pool {
     /// Begins with a connection. `limit` is how long the database lets statements take.
     pub(super) fn new(place: Place, link: Link, limit: Duration, connections: usize) -> Self {
-        let links = Links { idle: vec![link], taken: 0 };
+        let links = Links { idle: vec![link], ..Links::default() };
         Self {
             place,
             connections,
@@ -92,23 +98,17 @@ impl Pool {
         call: impl Fn(&Link) -> Result<T, Trouble>,
     ) -> Result<Result<T, Trouble>, CatalogError> {
         let place = self.wait_for_place()?;
-        let kept = if is_new { None } else { self.links().idle.pop() };
-        let link = match kept {
-            Some(link) => link,
-            None => match Link::try_connect(&self.place) {
-                Err(trouble) if trouble.is_full() => self.wait_for_link(trouble)?,
-                made => made.map_err(|trouble| trouble.explain(self.name()))?,
-            },
-        };
+        let (link, used) = self.link(is_new)?;
         let outcome = call(&link);
-        // Dropped below, not while others wait for the lock.
-        let mut dropped = Vec::new();
         if outcome.as_ref().is_err_and(Trouble::is_broken) {
-            dropped.append(&mut self.links().idle);
-            dropped.push(link);
+            // Not while others wait for the lock.
+            let idle = std::mem::take(&mut self.links().idle);
+            drop((link, idle));
+            self.links().closed += 1;
         } else {
             self.links().idle.push(link);
         }
+        drop(used);
         drop(place);
         Ok(outcome)
     }
@@ -126,11 +126,30 @@ impl Pool {
         Ok(Taken(self))
     }
 
-    /// A connection that another call of this process gives back: the server gives no more than there are.
+    /// A connection, a new one where that is wanted or none is idle.
+    fn link(&self, is_new: bool) -> Result<(Link, Used<'_>), CatalogError> {
+        let (kept, closed) = {
+            let mut links = self.links();
+            links.used += 1;
+            (if is_new { None } else { links.idle.pop() }, links.closed)
+        };
+        let used = Used(self);
+        let made = kept.map_or_else(|| Link::try_connect(&self.place), Ok);
+        match made {
+            Err(trouble) if trouble.is_full() => {
+                drop(used);
+                self.wait_for_link(trouble, closed)
+            }
+            made => made.map(|link| (link, used)).map_err(|trouble| trouble.explain(self.name())),
+        }
+    }
+
+    /// A connection that another call of this process gives back, or that the server gives after all: before, it gave none. `closed` is how often some were closed
+    /// before it was asked.
     ///
     /// # Errors
-    /// This process has none but the one that was asked for, or the others take too long.
-    fn wait_for_link(&self, trouble: Trouble) -> Result<Link, CatalogError> {
+    /// No other call has one, or they take too long.
+    fn wait_for_link(&self, mut trouble: Trouble, mut closed: u64) -> Result<(Link, Used<'_>), CatalogError> {
         self.told.call_once(|| {
             tracing::warn!(
                 "{} gives this user fewer than {} connections, so that calls wait for each other: raise its max_connections or the user's limit",
@@ -138,10 +157,25 @@ impl Pool {
                 self.connections
             );
         });
-        let is_used = |links: &mut Links| links.idle.is_empty() && links.taken > 1;
-        let waited = self.freed.wait_timeout_while(self.links(), self.limit, is_used);
-        let (mut links, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        links.idle.pop().ok_or_else(|| trouble.explain(self.name()))
+        let began = Instant::now();
+        loop {
+            let waits = |links: &mut Links| links.idle.is_empty() && links.used > 0 && links.closed == closed;
+            let waited = self.freed.wait_timeout_while(self.links(), AGAIN, waits);
+            let (mut links, _) = waited.unwrap_or_else(PoisonError::into_inner);
+            let kept = links.idle.pop();
+            let is_hopeless = links.used == 0 && links.closed == closed;
+            if kept.is_none() && (is_hopeless || began.elapsed() >= self.limit) {
+                return Err(trouble.explain(self.name()));
+            }
+            links.used += 1;
+            closed = links.closed;
+            drop(links);
+            let used = Used(self);
+            match kept.map_or_else(|| Link::try_connect(&self.place), Ok) {
+                Err(now) if now.is_full() => trouble = now,
+                made => return made.map(|link| (link, used)).map_err(|trouble| trouble.explain(self.name())),
+            }
+        }
     }
 
     fn links(&self) -> MutexGuard<'_, Links> {
@@ -149,13 +183,22 @@ impl Pool {
     }
 }
 
-/// One of the connections that there may be.
+/// One of the connections that are used or being made.
+struct Used<'a>(&'a Pool);
+
+impl Drop for Used<'_> {
+    fn drop(&mut self) {
+        self.0.links().used -= 1;
+        self.0.freed.notify_all();
+    }
+}
+
+/// One of the calls that there may be at once.
 struct Taken<'a>(&'a Pool);
 
 impl Drop for Taken<'_> {
     fn drop(&mut self) {
         self.0.links().taken -= 1;
-        // Some wait for a place, and some for a connection.
         self.0.freed.notify_all();
     }
 }

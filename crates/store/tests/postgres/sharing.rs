@@ -3,6 +3,7 @@
 use crate::conformance::{append, bytes, cage, cages, open, session};
 use crate::support::Server;
 use cager_store::{Catalog, CatalogError, Change, Phase, PostgresCatalog};
+use std::time::{Duration, Instant};
 
 #[test]
 fn two_catalogues_append_to_one_session_at_once() {
@@ -49,7 +50,7 @@ fn nothing_is_appended_after_a_deletion_was_answered() {
             }
             unreachable!()
         });
-        std::thread::sleep(std::time::Duration::from_millis(200));
+        std::thread::sleep(Duration::from_millis(200));
         assert_eq!(both[1].change(session("a"), &[Change::Phase(Phase::Deleted)]), Ok(true));
         let there = both[1].frames("a").expect("frames").len();
         assert_eq!(appending.join().expect("ended"), (there, CatalogError::Gone));
@@ -69,5 +70,56 @@ fn calls_wait_for_each_other_where_the_user_gets_few_connections() {
         for _ in 0..8 {
             scope.spawn(|| (0..20).for_each(|_| assert_eq!(catalog.probe(), Ok(()))));
         }
+    });
+}
+
+#[test]
+fn calls_are_told_at_once_that_others_have_all_connections_and_go_on_when_one_is_given_back() {
+    let Some(server) = Server::start() else { return };
+    server.sql("CREATE ROLE few LOGIN CONNECTION LIMIT 3");
+    server.sql("GRANT CREATE ON DATABASE postgres TO few");
+    let open = || PostgresCatalog::open(&server.url_of("few")).expect("a catalogue");
+    let until = |sql: &str, wanted: &str| {
+        let began = Instant::now();
+        while server.sql(sql) != wanted {
+            assert!(began.elapsed() < Duration::from_secs(5), "{sql}: {}", server.sql(sql));
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    let is_count = |wanted: &str| until("SELECT count(*) FROM pg_stat_activity WHERE usename = 'few'", wanted);
+    let catalog = open();
+    let own = server.sql("SELECT pid FROM pg_stat_activity WHERE usename = 'few'");
+    let mut others = vec![open(), open()];
+    is_count("3");
+    // This process loses its only one, and another one takes the place.
+    server.sql(&format!("SELECT pg_terminate_backend({own})"));
+    is_count("2");
+    others.push(open());
+    is_count("3");
+    std::thread::scope(|scope| {
+        let calls = [(); 6].map(|()| scope.spawn(|| (Instant::now(), catalog.probe(), Instant::now())));
+        for (began, outcome, ended) in calls.map(|call| call.join().expect("answered")) {
+            let said = outcome.expect_err("no connection").to_string();
+            assert!(said.contains("has no connection left"), "{said}");
+            assert!(ended - began < Duration::from_secs(5), "after {:?}", ended - began);
+        }
+    });
+    others.pop();
+    is_count("2");
+    assert_eq!(catalog.probe(), Ok(()));
+    // Its only one is at work for long: who waits gets what others give back meanwhile.
+    std::thread::scope(|scope| {
+        let mut others = others;
+        scope.spawn(|| server.sql("BEGIN; LOCK TABLE records; SELECT pg_sleep(6); COMMIT"));
+        until("SELECT count(*) FROM pg_locks WHERE relation = 'records'::regclass AND granted", "1");
+        let slow = scope.spawn(|| catalog.records());
+        until("SELECT count(*) FROM pg_locks WHERE relation = 'records'::regclass AND NOT granted", "1");
+        let waits = scope.spawn(|| catalog.probe());
+        std::thread::sleep(Duration::from_millis(500));
+        assert!(!waits.is_finished(), "there was a connection");
+        others.pop();
+        assert_eq!(waits.join().expect("answered"), Ok(()));
+        assert!(!slow.is_finished(), "it waited for the other call");
+        assert_eq!(slow.join().expect("answered"), Ok(Vec::new()));
     });
 }

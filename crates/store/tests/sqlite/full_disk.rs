@@ -8,6 +8,10 @@ use std::time::{Duration, Instant};
 
 /// More than the catalogue's reserve and its log need.
 const DISK: u32 = 48;
+/// Bytes of a whole reserve, of the least, and of the steps between.
+const WHOLE: u64 = 8 << 20;
+const LEAST: u64 = 512 << 10;
+const STEP: u64 = 32 << 10;
 
 /// Fills the disk with frames of sessions in turn, as fast as it can or with pauses. Gives what was acknowledged.
 fn fill(catalog: &SqliteCatalog, ids: &[&str], pause: Duration) -> Vec<(usize, FrameEntry)> {
@@ -57,10 +61,17 @@ fn is_written_again(catalog: &SqliteCatalog, id: &str) {
     }
 }
 
+/// It is whole; on a disk where that is too much, at least as large as what is left beside it.
 fn reserve_is_back(folder: &Path) {
     let began = Instant::now();
-    while !folder.join("catalogue.reserve").exists() {
-        assert!(began.elapsed() < Duration::from_secs(20), "the reserve is not made again");
+    loop {
+        let bytes = std::fs::metadata(folder.join("catalogue.reserve")).map_or(0, |reserve| reserve.len());
+        let system = rustix::fs::statvfs(folder).expect("the disk");
+        let room = system.f_bavail * system.f_frsize;
+        if bytes == WHOLE || bytes >= LEAST.max(room / 2 / STEP * STEP) {
+            return;
+        }
+        assert!(began.elapsed() < Duration::from_secs(20), "{bytes} bytes are kept free, and {room} are left");
         std::thread::sleep(Duration::from_millis(100));
     }
 }
@@ -75,6 +86,7 @@ fn deletes_and_goes_on(folder: &Path, pause: Duration) {
     is_written_again(&catalog, "a");
     delete(&catalog, "a");
     reserve_is_back(folder);
+    assert_eq!(std::fs::metadata(folder.join("catalogue.reserve")).expect("a reserve").len(), WHOLE);
     drop(catalog);
     assert_eq!(SqliteCatalog::open(&file(folder)).expect("a catalogue").records(), Ok(Vec::new()));
 }

@@ -17,7 +17,7 @@ mod tls;
 
 pub use accept::serve;
 pub use body::{BodyTimeout, is_body_timeout};
-pub(crate) use state::ConnectionHandle;
+pub(crate) use state::{ConnectionHandle, Reason};
 pub use tls::{Tls, TlsError, tls_config};
 
 use std::time::Duration;

@@ -13,46 +13,48 @@ use tokio::time::Instant;
 /// Slowest reading of a response beside pauses, as fast as bodies have to come: what waits for a reader takes memory that others want.
 const SLOWEST_READER_BYTES_PER_SECOND: f64 = 16_384.0;
 
-/// Why a connection ended; the label of `cager_connections_closed_total`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reason {
-    /// The client closed it, or the protocol said so.
-    Normal,
-    /// Reading, writing or the protocol failed.
-    Error,
-    /// The TLS handshake failed.
-    Handshake,
-    /// No whole header in time.
-    HeaderTimeout,
-    /// No request for a while.
-    Idle,
-    /// The client read nothing for a while.
-    WriteTimeout,
-    /// It had sent no request when places ran out.
-    Displaced,
-    /// It was a spare connection and has had its answer.
-    Spare,
-    /// The service stopped and the connection's requests were done.
-    Stop,
-    /// The service stopped and requests were cut off at the end of the drain time.
-    Drain,
+/// Reasons and the words that stand for them.
+macro_rules! reasons {
+    ($($(#[$meta:meta])+ $reason:ident = $label:literal,)+) => {
+        /// Why a connection ended; the label of `cager_connections_closed_total`.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum Reason {
+            $($(#[$meta])+ $reason,)+
+        }
+
+        impl Reason {
+            pub(crate) const LABELS: &[&str] = &[$($label),+];
+
+            pub(super) fn label(self) -> &'static str {
+                match self {
+                    $(Self::$reason => $label,)+
+                }
+            }
+        }
+    };
 }
 
-impl Reason {
-    pub(super) fn label(self) -> &'static str {
-        match self {
-            Self::Normal => "normal",
-            Self::Error => "error",
-            Self::Handshake => "handshake",
-            Self::HeaderTimeout => "header_timeout",
-            Self::Idle => "idle",
-            Self::WriteTimeout => "write_timeout",
-            Self::Displaced => "displaced",
-            Self::Spare => "spare",
-            Self::Stop => "stop",
-            Self::Drain => "drain",
-        }
-    }
+reasons! {
+    /// The client closed it, or the protocol said so.
+    Normal = "normal",
+    /// Reading, writing or the protocol failed.
+    Error = "error",
+    /// The TLS handshake failed.
+    Handshake = "handshake",
+    /// No whole header in time.
+    HeaderTimeout = "header_timeout",
+    /// No request for a while.
+    Idle = "idle",
+    /// The client read nothing for a while.
+    WriteTimeout = "write_timeout",
+    /// It had sent no request when places ran out.
+    Displaced = "displaced",
+    /// It was a spare connection and has had its answer.
+    Spare = "spare",
+    /// The service stopped and the connection's requests were done.
+    Stop = "stop",
+    /// The service stopped and requests were cut off at the end of the drain time.
+    Drain = "drain",
 }
 
 /// State of one connection.
