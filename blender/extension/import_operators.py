@@ -2,7 +2,7 @@
 
 import bpy
 import cager
-from bpy.props import BoolProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from . import captures, objects, paths, times
@@ -18,13 +18,7 @@ class ImportCapture(bpy.types.Operator, ImportHelper):
     filename_ext = ".cager"
     filepath: paths.file_property("File", "The .cager file to add")
     filter_glob: StringProperty(default="*.cager", options={"HIDDEN"})
-    first: IntProperty(
-        name="First frame",
-        default=1,
-        min=-times.LAST_FRAME,
-        max=times.LAST_FRAME,
-        description="Frame of the scene that shows the capture's first",
-    )
+    first: times.first_frame_property()
     y_is_up: BoolProperty(name="Y is up", description="Turn a capture of a program whose upward axis is Y, such as Maya")
     with_cage: BoolProperty(name="Cage", default=True, description="Add the cage, with a shape key for each frame to edit")
     set_range: BoolProperty(

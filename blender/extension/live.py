@@ -7,7 +7,7 @@ import cager
 import numpy as np
 from bpy.app.handlers import persistent
 
-from . import captures, keys, paths, times
+from . import captures, handlers, keys, paths, times
 from .reading import cage_seen
 
 # By the whole name of the model: what cannot be shown and why, and the place and cage that were shown last.
@@ -150,14 +150,10 @@ HANDLERS = (
 
 
 def register():
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    for name, handler in HANDLERS:
-        there = getattr(bpy.app.handlers, name)
-        if handler in there:
-            there.remove(handler)
+    handlers.remove(HANDLERS)
     problems.clear()
     _last.clear()

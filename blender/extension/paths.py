@@ -7,6 +7,8 @@ import cager
 from bpy.app.handlers import persistent
 from bpy.props import StringProperty
 
+from . import handlers
+
 # Files of objects as they were, until the .blend file is written.
 _before = {}
 
@@ -96,13 +98,9 @@ HANDLERS = (("save_pre", before_saving), ("save_post", after_saving), ("save_pos
 
 
 def register():
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    for name, handler in HANDLERS:
-        there = getattr(bpy.app.handlers, name)
-        if handler in there:
-            there.remove(handler)
+    handlers.remove(HANDLERS)
     _before.clear()

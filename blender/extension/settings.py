@@ -15,13 +15,7 @@ class CagerLink(bpy.types.PropertyGroup):
 
     file: paths.file_property("File", "The .cager file that this object shows")
     found: StringProperty(options={"HIDDEN"}, description="The whole path of the file where it was last")
-    first: IntProperty(
-        name="First frame",
-        default=1,
-        min=-times.LAST_FRAME,
-        max=times.LAST_FRAME,
-        description="Frame of the scene that shows the capture's first",
-    )
+    first: times.first_frame_property()
     cage: PointerProperty(name="Cage", type=bpy.types.Object, poll=is_mesh, description="The object that is edited")
 
 

@@ -3,8 +3,16 @@
 import math
 from contextlib import contextmanager
 
+from bpy.props import IntProperty
+
 # Blender's last frame; its first is as far below 0.
 LAST_FRAME = 1_048_574
+
+
+def first_frame_property():
+    return IntProperty(
+        name="First frame", default=1, min=-LAST_FRAME, max=LAST_FRAME, description="Frame of the scene that shows the capture's first"
+    )
 
 
 def now(scene):

@@ -51,7 +51,7 @@ export function classify(dropped: readonly Dropped[]): Item[] {
   const rows = new Map<string, File[]>();
   const visible = dropped.filter(({ path }) => !path.split('/').some((part) => part.startsWith('.')));
   for (const { file, path } of [...visible].sort((a, b) => NATURAL.compare(a.path, b.path))) {
-    // Files whose paths differ in their last number alone are frames of one row; a rest pose or a cage in each of some folders is none.
+    // Files whose paths differ in their last number alone are frames, and share a row; rest poses or cages in several folders do not.
     const isNumbered = /\d/.test(REST.test(file.name) || CAGE.test(file.name) ? file.name : path);
     const key =
       isNumbered && extensionOf(file.name) === 'obj' ? path.replace(/\d+(\D*)$/, '#$1') : `${rows.size} ${path}`;

@@ -27,7 +27,7 @@ pub(super) fn accepted<W: Work>(job: &Job<W>, view: impl Serialize) -> Response 
 /// A page of a tenant's jobs as `view` has them, and where the next one begins.
 ///
 /// # Errors
-/// A place that is none.
+/// `after` is not an id.
 pub(super) fn page<W: Run, V>(
     service: &Service,
     tenant: &Tenant,

@@ -70,7 +70,7 @@ impl PageQuery {
     /// The id that the page follows.
     ///
     /// # Errors
-    /// It is none.
+    /// What was given is not an id.
     pub(super) fn after(&self) -> Result<Option<&str>, ApiError> {
         let is_id = |id: &&str| uuid::Uuid::try_parse(id).is_ok();
         match self.after.as_deref() {
