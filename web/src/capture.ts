@@ -5,6 +5,8 @@ import type { Source } from './container/source';
 /** Coordinate systems a container can name; docs/FORMAT.md defines them. */
 export type CoordinateSystem = 'mvc' | 'harmonic' | 'green' | 'green-free';
 
+export type UpAxis = 'y' | 'z';
+
 /** A closed mesh of triangles. */
 export interface TriangleMesh {
   /** x y z of each vertex. */
@@ -36,6 +38,8 @@ export interface StaticPart {
   readonly frameRate: number | null;
   /** Figures about the encoding (`Report` in proto/src/report.rs), as far as known. */
   readonly report: Readonly<Record<string, unknown>> | null;
+  /** The axis that points up, where the file or whoever wrote it said so (`unit` in docs/FORMAT.md). */
+  readonly up?: UpAxis;
   /** Boundary elements that harmonic coordinates were solved on (`ELEM` in docs/FORMAT.md), where the file has them. */
   readonly elements?: Uint8Array;
 }
@@ -68,6 +72,18 @@ export interface Residual {
   readonly correctedPoints: Uint32Array;
   /** x y z for each of `correctedPoints`. */
   readonly correctionVectors: Float32Array;
+}
+
+/** Changes of some cage vertices over a range of frames, added to the cages as they were encoded (`EDIT` in docs/FORMAT.md). */
+export interface EditLayer {
+  readonly name: string;
+  readonly isOn: boolean;
+  readonly first: number;
+  readonly count: number;
+  /** Vertices of the cage, ascending. */
+  readonly vertices: Uint32Array;
+  /** What is added, x y z of each vertex in each frame: `count × vertices × 3`. */
+  readonly offsets: Float32Array<ArrayBuffer>;
 }
 
 /** Errors of frames as fractions of the rest pose's diagonal; NaN where not measured. */
@@ -141,6 +157,10 @@ export interface Capture {
   phi?(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array>;
   /** Point numbers of the handles, where they are known. */
   handles?(signal?: AbortSignal): Promise<Uint32Array>;
+  /** Edits that its file has; {@link block} gives frames with those that are on. */
+  readonly layers?: readonly EditLayer[];
+  /** Takes some of the layers away, or switches them; fires `replaced`. The file stays as it is. */
+  setLayers?(layers: readonly EditLayer[]): void;
   /** The container that holds the capture, for copies of it with edited cages. */
   container?(signal?: AbortSignal): Promise<Source>;
   /** Positions of some cages, decoded by the service: for each `rowsPerFrame × 3` floats of the body, points × 3. */

@@ -14,6 +14,7 @@ import {
 } from './section';
 
 const MAX_FRAMES = 2 ** 32 - 1;
+export const MAX_LAYERS = 256;
 const MIB = 2 ** 20;
 
 /** A chunk of frames, and the residual right before it. */
@@ -26,6 +27,8 @@ export interface Chunk {
 export class Layout {
   readonly chunks: Chunk[] = [];
   readonly entries: Entry[] = [];
+  /** Layers of edits. */
+  readonly layers: Entry[] = [];
   private readonly byTag = new Map<string, Entry>();
   private pendingResidual: Entry | null = null;
   /** Where the next section begins. */
@@ -34,6 +37,13 @@ export class Layout {
   get frames(): number {
     const last = this.chunks.at(-1)?.frames.fields;
     return last === undefined ? 0 : last.first + last.count;
+  }
+
+  /** Checks that all edits together take no more than one section may in a file of so many bytes. */
+  checkLayers(fileBytes: number): void {
+    const bytes = this.layers.reduce((sum, { fields }) => sum + fields.rawBytes, 0);
+    if (bytes > mostRawBytes({ tag: 'EDIT', codec: CODEC.raw }, fileBytes))
+      throw damaged(this.layers[0].offset, 'the edits declare more bytes than the file can hold');
   }
 
   /** Bytes of the sections of all frames and their residuals. */
@@ -63,6 +73,8 @@ export class Layout {
       if (first !== this.frames || count === 0 || first + count > MAX_FRAMES)
         throw damaged(entry.offset, 'the frames are not in order');
       this.chunks.push({ frames: entry, residual });
+    } else if (tag === 'EDIT') {
+      if (this.layers.push(entry) > MAX_LAYERS) throw damaged(entry.offset, `there are more than ${MAX_LAYERS} edits`);
     } else if (tag !== 'resi' && KNOWN_TAGS.has(tag)) {
       if (this.byTag.has(tag)) throw damaged(entry.offset, `the section ${tag} is there twice`);
       this.byTag.set(tag, entry);
@@ -119,6 +131,7 @@ export function checkSize(entry: Entry, head: Head, frames: number, fileBytes: n
 /** Most bytes that a section may decode to in a file of so many bytes. */
 function mostRawBytes({ tag, codec }: Pick<SectionFields, 'tag' | 'codec'>, fileBytes: number): number {
   if (tag === 'summ') return 4 * MIB + 16 * fileBytes;
+  if (tag === 'EDIT') return 8 * MIB + 16 * fileBytes;
   return isCoded(codec) ? 2 * MIB + 16 * fileBytes : 12 * MIB + 48 * fileBytes;
 }
 
@@ -138,8 +151,13 @@ function expectedSize(fields: SectionFields, head: Head, frames: number): [reado
       return [[4], 4 * (head.restFaces + head.restCorners)];
     case 'ORIG':
       return [[8], 24];
+    case 'unit':
+      return [[1], 9];
     case 'rcol':
       return [[1], 3 * head.points];
+    // What else it is to be is checked when it is decoded.
+    case 'EDIT':
+      return [[4], fields.rawBytes];
     case 'CTRI':
       return [[4], 12 * head.cageFaces];
     case 'FRAM':

@@ -1,6 +1,6 @@
 /** Model and cage from their sections. */
 
-import type { StaticPart, TriangleMesh } from '../capture';
+import type { StaticPart, TriangleMesh, UpAxis } from '../capture';
 import type { Codec } from '../codec/client';
 import { CodedDataError } from '../codec/error';
 import { NO_POLYGONS, type Polygons } from '../codec/polygons';
@@ -11,6 +11,11 @@ import { CODEC, type Entry } from './section';
 
 /** Sections before the frames that model and cage are made of. */
 export const STATIC_TAGS: readonly string[] = ['ORIG', 'RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'];
+
+/** Sections of model and cage without which they can be shown: where one is damaged, it is left out. */
+export const OPTIONAL_TAGS: readonly string[] = ['unit', 'rcol'];
+
+const AXES: readonly (UpAxis | undefined)[] = [undefined, 'y', 'z'];
 
 /** A section and its payload as it is in the file, whose checksum and sizes were checked. */
 export interface Section {
@@ -28,6 +33,8 @@ export async function decodeStatic(
   const rest = await decodePoints(sections.get('RPTS')!, polygons, head.points, codec);
   const elements = sections.get('ELEM');
   const origin = sections.get('ORIG');
+  const [unit, colors] = OPTIONAL_TAGS.map((tag) => sections.get(tag));
+  const up = unit && decodeUp(unit);
   return {
     system: head.system,
     rest,
@@ -38,6 +45,8 @@ export async function decodeStatic(
     frameRate: head.frameRate,
     report: null,
     ...(origin === undefined ? {} : { origin: decodeOrigin(origin) }),
+    ...(up && { up }),
+    ...(colors && { colors: decodePayload(colors.entry, colors.payload) }),
     ...(elements === undefined ? {} : { elements: decodePayload(elements.entry, elements.payload) }),
   };
 }
@@ -46,6 +55,12 @@ function decodeOrigin({ entry, payload }: Section): Float64Array {
   const origin = new Float64Array(decodePayload(entry, payload).slice().buffer);
   if (!origin.every(Number.isFinite)) throw damaged(entry.offset, 'the origin is not finite');
   return origin;
+}
+
+function decodeUp({ entry, payload }: Section): UpAxis | undefined {
+  const axis = decodePayload(entry, payload)[8];
+  if (axis >= AXES.length) throw damaged(entry.offset, 'the axis that points up is none');
+  return AXES[axis];
 }
 
 async function decodeModelFaces(head: Head, section: Section | undefined, codec: Codec): Promise<Polygons> {

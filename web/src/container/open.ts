@@ -1,6 +1,6 @@
 /** Captures in containers that are read at random: what is asked for is read, decoded and kept for a while. */
 
-import type { Capture, FrameBlock, FrameErrors, StaticPart } from '../capture';
+import type { Capture, EditLayer, FrameBlock, FrameErrors, StaticPart } from '../capture';
 import { type Codec, createCodec } from '../codec/client';
 import { computePhi } from '../coordinates/pool';
 import { BlockCache } from './blockCache';
@@ -9,7 +9,8 @@ import { ContainerError, damaged, isDamage, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize, type Chunk, type Layout } from './layout';
 import { decodePayload } from './codecs';
-import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
+import { decodeLayer, withLayers, withoutErrors } from './layers';
+import { decodeStatic, OPTIONAL_TAGS, type Section, STATIC_TAGS } from './meshes';
 import { readContents, readSections, scanSections } from './sectionReader';
 import { checkPrelude, CODEC, type Entry, PRELUDE_BYTES, KNOWN_TAGS } from './section';
 import { EndsCache, type Source } from './source';
@@ -50,6 +51,7 @@ export async function openContainer(source: Source, options: OpenOptions = {}): 
     const { tag } = entry.fields;
     if (KNOWN_TAGS.has(tag) && tag !== 'HEAD') checkSize(entry, head, layout.frames, source.size);
   }
+  layout.checkLayers(source.size);
   const codec = options.codec ?? createCodec();
   try {
     const { part, problem: colorProblem } = await readStatic(ends, layout, head, codec, signal);
@@ -81,7 +83,7 @@ async function readHead(source: Source, layout: Layout, signal?: AbortSignal): P
   return parseHead(decodePayload(entry, payload), entry.offset);
 }
 
-/** Model and cage; without colours where these are damaged or of a later program, and what is wrong with them then. */
+/** Model and cage; without colours and unit where one of them is damaged or of a later program, and what is wrong then. */
 async function readStatic(
   source: Source,
   layout: Layout,
@@ -94,14 +96,12 @@ async function readStatic(
     entries.sort((a, b) => a.offset - b.offset);
     const sections = new Map<string, Section>();
     for (const section of await readSections(source, entries, signal)) sections.set(section.entry.fields.tag, section);
-    const colors = sections.get('rcol');
-    const part = await decodeStatic(head, sections, codec);
-    return colors === undefined ? part : { ...part, colors: decodePayload(colors.entry, colors.payload) };
+    return decodeStatic(head, sections, codec);
   };
   try {
-    return { part: await read([...STATIC_TAGS, 'rcol']), problem: null };
+    return { part: await read([...STATIC_TAGS, ...OPTIONAL_TAGS]), problem: null };
   } catch (error) {
-    if (layout.get('rcol') === undefined || !isTolerable(error, 'rcol')) throw error;
+    if (!OPTIONAL_TAGS.some((tag) => layout.get(tag) && isTolerable(error, tag))) throw error;
     return { part: await read(STATIC_TAGS), problem: (error as Error).message };
   }
 }
@@ -112,8 +112,11 @@ class FileCapture implements ContainerCapture {
   readonly frameBytes: number;
   readonly complete = true;
   readonly events = new EventTarget();
-  errors: FrameErrors = NO_ERRORS;
+  layers: readonly EditLayer[] = [];
   frameNumbers: Float64Array | null = null;
+  private measured: FrameErrors = NO_ERRORS;
+  /** The errors that still hold: those of frames without edits. */
+  private held: FrameErrors | null = null;
   private readonly cache: BlockCache;
   private readonly blocks: BlockDecoder;
 
@@ -144,7 +147,18 @@ class FileCapture implements ContainerCapture {
     const next = first + count < this.frames ? first + count : 0;
     const before = this.layout.chunkOf(first > 0 ? first - 1 : this.frames - 1);
     if (next !== first && before && this.cache.has(before.frames.fields.first)) this.cache.prefetch(next);
-    return block;
+    return withLayers(block, this.layers, this.static.rowsPerFrame);
+  }
+
+  get errors(): FrameErrors {
+    return (this.held ??= withoutErrors(this.measured, this.layers));
+  }
+
+  setLayers(layers: readonly EditLayer[]): void {
+    this.layers = layers;
+    this.held = null;
+    this.events.dispatchEvent(new Event('replaced'));
+    this.events.dispatchEvent(new Event('change'));
   }
 
   phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
@@ -165,28 +179,32 @@ class FileCapture implements ContainerCapture {
     this.codec.close();
   }
 
-  /** Reads errors, numbers and the report; what of them is damaged stays empty. */
+  /** Reads errors, numbers, the report and edits; what of them is damaged is left out. */
   async readTail(signal?: AbortSignal): Promise<void> {
     const takeErrors = async (section: Section) => {
-      this.errors = await decodeErrors(section, this.frames, this.codec);
+      this.measured = await decodeErrors(section, this.frames, this.codec);
     };
-    await this.readOptional('ERRS', takeErrors, signal);
-    await this.readOptional('fnum', (section) => (this.frameNumbers = decodeFrameNumbers(section)), signal);
-    await this.readOptional(
-      'summ',
-      (section) => (this.static = { ...this.static, report: decodeReport(section) }),
-      signal,
-    );
+    const takeNumbers = (section: Section) => (this.frameNumbers = decodeFrameNumbers(section));
+    const takeReport = (section: Section) => (this.static = { ...this.static, report: decodeReport(section) });
+    const takeLayer = (section: Section) =>
+      (this.layers = [...this.layers, decodeLayer(section, this.head, this.frames)]);
+    await this.readOptional(this.layout.get('ERRS'), takeErrors, signal);
+    await this.readOptional(this.layout.get('fnum'), takeNumbers, signal);
+    await this.readOptional(this.layout.get('summ'), takeReport, signal);
+    for (const entry of this.layout.layers) await this.readOptional(entry, takeLayer, signal);
   }
 
-  private async readOptional(tag: string, take: (section: Section) => unknown, signal?: AbortSignal): Promise<void> {
-    const entry = this.layout.get(tag);
+  private async readOptional(
+    entry: Entry | undefined,
+    take: (section: Section) => unknown,
+    signal?: AbortSignal,
+  ): Promise<void> {
     if (entry === undefined) return;
     try {
       const [section] = await readSections(this.source, [entry], signal);
       await take(section);
     } catch (error) {
-      if (!isTolerable(error, tag)) throw error;
+      if (!isTolerable(error, entry.fields.tag)) throw error;
       this.report(error);
     }
   }

@@ -1,9 +1,8 @@
 import { describe, expect, it } from 'vitest';
-import { writeEdited } from '../editing/editedContainer';
-import { LocalCodec } from '../../tests/support/localCodec';
+import { withEdits } from './rewrite';
 import { openOriginal } from '../originals/original';
 import { bytesSource } from './source';
-import { goldenBytes, openBytes, rawPart, streamedPart, takeApart, withPart } from '../../tests/support/containers';
+import { goldenBytes, openBytes, rawPart, streamedPart, withPart } from '../../tests/support/containers';
 
 const golden = goldenBytes('definition3-mvc');
 const origin = Float64Array.of(450000, 5400000, 0.5);
@@ -24,9 +23,8 @@ describe('a capture far away', () => {
   it('keeps its origin when its cages are edited', async () => {
     const bytes = far();
     const capture = await openBytes(bytes);
-    const { container } = await writeEdited(bytesSource(bytes), capture, [], { codec: new LocalCodec() });
-    const written = new Uint8Array(await container.arrayBuffer());
-    expect(takeApart(written)[1]).toEqual(takeApart(bytes)[1]);
+    const written = new Uint8Array(await (await withEdits(bytesSource(bytes), capture.layers!)).arrayBuffer());
+    expect(written).toEqual(bytes);
     expect((await openBytes(written)).static.origin).toEqual(origin);
   });
 
@@ -40,5 +38,29 @@ describe('a capture far away', () => {
     await expect(openBytes(far(Float64Array.of(0, NaN, 0)))).rejects.toThrow(/not finite/);
     await expect(openBytes(far(Float64Array.of(0, 0)))).rejects.toThrow(/size/);
     await expect(openBytes(far(origin, 4))).rejects.toThrow(/size/);
+  });
+});
+
+describe('the axis that points up', () => {
+  const placed = (axis: number, length = 9) => {
+    const unit = new Uint8Array(length);
+    new DataView(unit.buffer).setFloat64(0, 0.01, true);
+    unit[8] = axis;
+    return withPart(golden, rawPart('unit', unit), 'HEAD');
+  };
+
+  it.each([[0, undefined] as const, [1, 'y'] as const, [2, 'z'] as const])('is %i as %s', async (axis, up) => {
+    const capture = await openBytes(placed(axis));
+    expect(capture.problem).toBeNull();
+    expect(capture.static.up).toBe(up);
+    // What is streamed has no report yet.
+    expect(await streamedPart(placed(axis), 1000)).toEqual({ ...capture.static, report: null });
+  });
+
+  it('is not known where it is none, and the capture is shown', async () => {
+    const capture = await openBytes(placed(7));
+    expect(capture.problem).toMatch(/points up/);
+    expect(capture.static.up).toBeUndefined();
+    await expect(openBytes(placed(1, 8))).rejects.toThrow(/size/);
   });
 });

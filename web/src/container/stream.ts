@@ -6,7 +6,7 @@ import { decodePayload } from './codecs';
 import { checksumDamage, damaged, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize } from './layout';
-import { decodeStatic, type Section, STATIC_TAGS } from './meshes';
+import { decodeStatic, OPTIONAL_TAGS, type Section, STATIC_TAGS } from './meshes';
 import { type Entry, HEADER_BYTES, KNOWN_TAGS } from './section';
 import { type Arrival, SectionParser } from './sectionParser';
 
@@ -26,7 +26,6 @@ export class ContainerStream {
   private readonly parser = new SectionParser();
   private readonly sections = new Map<string, Section>();
   private head: Head | null = null;
-  private colors: Uint8Array | null = null;
   private residual: StoredSection | null = null;
   /** Whether model and cage are there. */
   private isBegun = false;
@@ -57,13 +56,12 @@ export class ContainerStream {
     return this.isBegun;
   }
 
-  /** Model and cage, which are whole. Colours that are damaged, or come later, are left out. */
-  async decodeStatic(codec: Codec): Promise<StaticPart> {
+  /** Model and cage, which are whole. Colours and unit that are damaged, or come later, are left out. */
+  decodeStatic(codec: Codec): Promise<StaticPart> {
     const { layout } = this.parser;
     const head = this.headBefore(layout.end);
     layout.checkStatic(head);
-    const part = await decodeStatic(head, this.sections, codec);
-    return this.colors === null ? part : { ...part, colors: this.colors };
+    return decodeStatic(head, this.sections, codec);
   }
 
   /**
@@ -92,8 +90,8 @@ export class ContainerStream {
     if (tag === 'HEAD') checkHeadSection(entry);
     else if (KNOWN_TAGS.has(tag)) {
       checkSize(entry, this.headBefore(entry.offset), layout.frames, layout.end);
-      // Colours may be among the sections of the static part, or anywhere else.
-      this.isBegun ||= !STATIC_TAGS.includes(tag) && tag !== 'rcol';
+      // Colours and unit may be among the sections of the static part, or anywhere else.
+      this.isBegun ||= !STATIC_TAGS.includes(tag) && !OPTIONAL_TAGS.includes(tag);
     }
     if (tag === 'resi' || tag === 'FRAM')
       this.begun = { frames: first + count, bytes: this.begun.bytes + HEADER_BYTES + payloadBytes };
@@ -102,14 +100,16 @@ export class ContainerStream {
   private takeSection({ section, header, isIntact }: Arrival & { kind: 'section' }): StoredChunk | null {
     const { entry, payload } = section;
     const { tag } = entry.fields;
+    const isOptional = OPTIONAL_TAGS.includes(tag);
     try {
       if (!isIntact) throw checksumDamage(entry.offset);
-      if (tag === 'rcol') this.colors = decodePayload(entry, payload);
+      if (isOptional) decodePayload(entry, payload);
       if (tag === 'HEAD') this.head = parseHead(decodePayload(entry, payload), entry.offset);
     } catch (error) {
-      if (tag !== 'rcol' || !isTolerable(error, tag)) throw error;
+      if (!isOptional || !isTolerable(error, tag)) throw error;
+      return null;
     }
-    if (STATIC_TAGS.includes(tag)) this.sections.set(tag, section);
+    if (isOptional || STATIC_TAGS.includes(tag)) this.sections.set(tag, section);
     // Harmonic coordinates may have one more section, behind the others.
     this.isBegun ||= tag === (this.head?.system === 'harmonic' ? 'ELEM' : 'CTRI');
     const { residual } = this;

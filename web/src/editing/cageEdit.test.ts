@@ -1,6 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import type { FrameBlock } from '../capture';
-import { editedBlock, editedRows, fitted, weightAt, type CageEdit } from './cageEdit';
+import { editedRows, fitted, weightAt, type CageEdit } from './cageEdit';
 import type { Motion } from './motion';
 
 const range = { first: 4, last: 12, easeIn: 3, easeOut: 2 };
@@ -67,23 +66,5 @@ describe('edited frames', () => {
     const larger: Motion = { kind: 'scale', factors: [4, 1, 1] };
     expect(turned(larger, 8, Float32Array.of(0, 0, 0, 2, 1, 0))).toEqual([-3, 0, 0, 5, 1, 0]);
     expect(turned(larger, 12, Float32Array.of(-1, 0, 0, 1, 0, 0))[3]).toBeCloseTo(4 ** weightAt(range, 12), 5);
-  });
-
-  it('leave the block as it was, and have no residual', () => {
-    const residual = {
-      rank: 0,
-      trajectories: new Float32Array(0),
-      shapes: new Float32Array(0),
-      correctionStarts: new Uint32Array(4),
-      correctedPoints: new Uint32Array(0),
-      correctionVectors: new Float32Array(0),
-    };
-    const block: FrameBlock = { first: 3, count: 3, cages: new Float32Array(18), residual };
-    const edited = editedBlock(block, [edit], { rowsPerFrame: 2 });
-    expect(block.cages.every((x) => x === 0)).toBe(true);
-    expect(edited.residual).toBeNull();
-    for (let k = 0; k < 3; k++) expect(edited.cages[6 * k + 4]).toBeCloseTo(2 * weightAt(range, 3 + k), 6);
-    expect(editedBlock(block, [], { rowsPerFrame: 2 })).toBe(block);
-    expect(editedBlock(block, [{ ...edit, motion: { kind: 'move', by: [0, 0, 0] } }], { rowsPerFrame: 2 })).toBe(block);
   });
 });

@@ -1,4 +1,3 @@
-import type { FrameBlock, StaticPart } from '../capture';
 import { displace, type Grip } from './grip';
 import { isIdentity, type Motion } from './motion';
 
@@ -50,26 +49,6 @@ export function editedRows(rows: Float32Array, frame: number, edits: readonly Ca
     if (weight > 0) displace((edited ??= Float64Array.from(rows)), grip, motion, weight);
   }
   return edited === null ? rows : Float32Array.from(edited);
-}
-
-/**
- * A block whose cages are edited; the block itself stays as it is. A residual belongs to the cages as they were captured, so that a capture
- * with edits has none in any frame, as `cager edit` writes it.
- */
-export function editedBlock(
-  block: FrameBlock,
-  edits: readonly CageEdit[],
-  { rowsPerFrame }: Pick<StaticPart, 'rowsPerFrame'>,
-): FrameBlock {
-  if (!edits.some(counts)) return block;
-  const cages = block.cages.slice();
-  const width = 3 * rowsPerFrame;
-  for (let k = 0; k < block.count; k++) {
-    const rows = block.cages.subarray(k * width, (k + 1) * width);
-    const edited = editedRows(rows, block.first + k, edits);
-    if (edited !== rows) cages.set(edited, k * width);
-  }
-  return { ...block, cages, residual: null };
 }
 
 export function counts({ enabled, motion }: CageEdit): boolean {

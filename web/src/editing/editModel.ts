@@ -1,4 +1,4 @@
-import type { StaticPart } from '../capture';
+import type { EditLayer, StaticPart } from '../capture';
 import { fitted, weightAt, type CageEdit, type FrameRange } from './cageEdit';
 import { CageGraph, type FalloffMeasure } from './falloff';
 import { gripOf, weightsOf, type Grip } from './grip';
@@ -22,13 +22,19 @@ const EASE_FRAMES = 12;
 /** Least share of vertices with a partner at which a cage counts as symmetric. */
 const SYMMETRIC = 0.5;
 
+/** Edits of this session, and those that the capture's file has. */
+interface Edits {
+  readonly edits: readonly CageEdit[];
+  readonly layers: readonly EditLayer[];
+}
+
 /** Edits of one capture's cages: chosen vertices, settings, the edits and their history. Knows nothing of pictures and pointers. */
 export class EditModel {
   onChange: () => void = () => undefined;
   readonly graph: CageGraph;
   /** Planes across which the cage is symmetric, by their axes. */
   readonly mirrors: ReadonlyMap<Axis, Mirror>;
-  private readonly history = new History<readonly CageEdit[]>([]);
+  private readonly history: History<Edits>;
   private chosen: readonly number[] = [];
   private choices: EditSettings = { radius: 0.12, measure: 'surface', symmetry: null, reach: 'around' };
   private shownId: number | null = null;
@@ -42,14 +48,29 @@ export class EditModel {
   constructor(
     part: Pick<StaticPart, 'cage'>,
     readonly diagonal: number,
+    layers: readonly EditLayer[] = [],
   ) {
+    this.history = new History<Edits>({ edits: [], layers });
     this.graph = new CageGraph(part.cage);
     const mirrors = AXES.map((axis) => [axis, mirrorOf(this.graph, axis)] as const);
     this.mirrors = new Map(mirrors.filter(([, { share }]) => share >= SYMMETRIC));
   }
 
   get edits(): readonly CageEdit[] {
-    return this.history.present;
+    return this.history.present.edits;
+  }
+
+  /** Edits of the file that are still there. */
+  get layers(): readonly EditLayer[] {
+    return this.history.present.layers;
+  }
+
+  switchLayer(layer: EditLayer): void {
+    this.replaceAll({ layers: this.layers.map((each) => (each === layer ? { ...each, isOn: !each.isOn } : each)) });
+  }
+
+  removeLayer(layer: EditLayer): void {
+    this.replaceAll({ layers: this.layers.filter((each) => each !== layer) });
   }
 
   get canUndo(): boolean {
@@ -153,7 +174,7 @@ export class EditModel {
 
   /** Takes all edits away; that can be undone as well. */
   reset(): void {
-    if (this.edits.length > 0) this.change([], null);
+    if (this.edits.length + this.layers.length > 0) this.replaceAll({ edits: [], layers: [] });
   }
 
   undo(): boolean {
@@ -172,7 +193,11 @@ export class EditModel {
   }
 
   private change(edits: readonly CageEdit[], step: string | null): void {
-    this.history.change(edits, step);
+    this.replaceAll({ edits }, step);
+  }
+
+  private replaceAll(part: Partial<Edits>, step: string | null = null): void {
+    this.history.change({ ...this.history.present, ...part }, step);
     this.onChange();
   }
 

@@ -4,7 +4,7 @@ import { glyphs } from '../style/glyphs';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/controls';
 import { sentence } from '../text';
-import { editNotes, mouseAndKeys, editRow } from './editParts';
+import { editNotes, mouseAndKeys, editRow, layerRow } from './editParts';
 import { editPanelStyle } from './editPanelStyle';
 import type { CageEditor } from './editor';
 import type { EditSettings, Reach } from './editModel';
@@ -61,13 +61,14 @@ export class EditPanel extends LitElement {
 
   override render() {
     const { model, said } = this.editor;
-    const { edits } = model;
+    const { edits, layers } = model;
+    const count = edits.length + layers.length;
     return html`<section class="panel glass" aria-label="Edit cage" @keydown=${this.keepKey}>
       <header>
         <h2 class="grow">Edit cage</h2>
         ${this.action('undo', 'Undo (Ctrl Z)', !model.canUndo, () => model.undo())}
         ${this.action('redo', 'Redo (Ctrl Shift Z)', !model.canRedo, () => model.redo())}
-        ${this.action('reset', 'Remove all edits', edits.length === 0, () => model.reset())}
+        ${this.action('reset', 'Remove all edits', count === 0, () => model.reset())}
         ${iconButton('close', 'Done', () => this.leave(), 'Done (E)')}
       </header>
       <p class="visually-hidden" role="status">${said}</p>
@@ -75,9 +76,10 @@ export class EditPanel extends LitElement {
         ${this.selectionRow()} ${this.toolRow()} ${this.settingRows(model.settings)}
         <h3 class="setting fine">Edits</h3>
         ${
-          edits.length === 0
+          count === 0
             ? html`<p class="muted">No edits yet: drag a vertex of the cage.</p>`
             : html`<ul>
+                ${layers.map((layer, k) => layerRow(model, layer, k))}
                 ${edits.map((edit) => editRow(this.editor, edit))}
               </ul>`
         }

@@ -40,6 +40,12 @@ export const editPanelStyle = css`
   li .name {
     justify-content: space-between;
   }
+  li .layer {
+    display: flex;
+    gap: var(--cager-space-2);
+    min-width: 0;
+    padding: 0 var(--cager-space-2);
+  }
   .range {
     display: grid;
     grid-template-columns: repeat(4, 1fr);

@@ -3,15 +3,16 @@ import type { CageEdit, FrameRange } from './cageEdit';
 import { iconButton } from '../style/parts';
 import type { CageEditor } from './editor';
 import { angleOf, type Motion, degrees, timesAs } from './motion';
-import type { StaticPart } from '../capture';
+import type { EditLayer, StaticPart } from '../capture';
+import { nameOf } from './editLayers';
+import type { EditModel } from './editModel';
 import type { Keeping } from './keptEdits';
 
 /** An edit in the list: whether it counts, its vertices and frames; of the one that is worked on, fields for its range. */
 export function editRow(editor: CageEditor, edit: CageEdit) {
   const { model } = editor;
-  const { id, grip, motion, range, enabled } = edit;
-  const { chosen } = grip;
-  const name = chosen.length === 1 ? `Vertex ${chosen[0]}` : `${chosen.length} vertices`;
+  const { id, motion, range, enabled } = edit;
+  const name = nameOf(edit);
   const isActive = model.active?.id === id;
   const activate = () => model.activate(isActive ? null : id);
   return html`<li class=${isActive ? 'active' : nothing}>
@@ -24,13 +25,37 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
       />
       <button class="quiet name grow" aria-expanded=${isActive} @click=${activate}>
         <span>${name}<span class="muted">${amountOf(motion)}</span></span>
-        <span class="muted figures">${range.first === range.last ? range.first : `${range.first}–${range.last}`}</span>
+        <span class="muted figures">${framesText(range.first, range.last)}</span>
       </button>
       ${iconButton('trash', `Remove edit of ${name}`, () => model.remove(id), 'Remove')}
     </div>
     ${isActive ? rangeFields(editor, edit) : nothing}
   </li>`;
 }
+
+/** An edit that the file has, with this place among them. */
+export function layerRow(model: EditModel, layer: EditLayer, place: number) {
+  const { first, count, isOn } = layer;
+  const name = layer.name || `Edit ${place + 1}`;
+  const last = first + count - 1;
+  return html`<li>
+    <div class="row">
+      <input
+        type="checkbox"
+        aria-label=${`Enable ${name} of the file, frames ${first} to ${last}`}
+        .checked=${isOn}
+        @change=${() => model.switchLayer(layer)}
+      />
+      <span class="name layer grow">
+        <span class="clip">${name}<span class="muted"> · saved</span></span>
+        <span class="muted figures">${framesText(first, last)}</span>
+      </span>
+      ${iconButton('trash', `Remove ${name} of the file`, () => model.removeLayer(layer), 'Remove')}
+    </div>
+  </li>`;
+}
+
+const framesText = (first: number, last: number) => (first === last ? String(first) : `${first}–${last}`);
 
 /** How far an edit rotates or scales; nothing of one that moves. */
 function amountOf(motion: Motion): string {
@@ -64,7 +89,6 @@ function rangeFields({ model, player }: CageEditor, { id, range }: CageEdit) {
 
 /** What somebody who edits a capture has to know: whether the edits are kept, and what they do not change. */
 export function editNotes(part: StaticPart, keeping: Keeping) {
-  const isCoded = (part.report?.coding as { residual_step?: number } | undefined)?.residual_step !== undefined;
   return html`${
     keeping === 'kept'
       ? nothing
@@ -85,13 +109,6 @@ export function editNotes(part: StaticPart, keeping: Keeping) {
           Normals of this cage are stored beside its vertices and stay as they were captured: the model follows a moved
           vertex, but does not turn or swell with the faces around it. Encode with
           <code>--coordinates green</code> for that.
-        </p>`
-      : nothing
-  }
-  ${
-    isCoded
-      ? html`<p class="muted">
-          Fine detail cannot follow edits and is left out of an edited capture, here and in exports.
         </p>`
       : nothing
   }`;

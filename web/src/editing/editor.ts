@@ -42,7 +42,7 @@ export class CageEditor extends EventTarget {
   ) {
     super();
     const { decoder } = player.stage;
-    this.model = new EditModel(player.capture.static, decoder.diagonal);
+    this.model = new EditModel(player.capture.static, decoder.diagonal, player.capture.layers);
     this.model.onChange = () => this.changed();
     this.canvas.setAttribute('aria-hidden', 'true');
     // Pointers go through to the picture below, which the camera is turned on.
@@ -199,7 +199,9 @@ export class CageEditor extends EventTarget {
   }
 
   private changed() {
-    const { edits } = this.model;
+    const { edits, layers } = this.model;
+    const { capture } = this.player;
+    if (capture.layers && capture.layers !== layers) capture.setLayers?.(layers);
     this.player.setFrameEdit(edits.some(counts) ? (frame, rows) => editedRows(rows, frame, edits) : null);
     this.dispatchEvent(new Event('change'));
     this.draw();

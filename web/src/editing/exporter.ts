@@ -1,7 +1,11 @@
-import type { Capture } from '../capture';
+import type { Capture, FrameBlock } from '../capture';
 import { save } from '../save';
-import type { CageEdit } from './cageEdit';
-import { writeEdited, chunksOf } from './editedContainer';
+import { bodyOf } from '../service/answers';
+import { addResidual } from '../codec/residual';
+import { MAX_LAYERS } from '../container/layout';
+import { type RewriteOptions, withEdits } from '../container/rewrite';
+import { editedRows, type CageEdit } from './cageEdit';
+import { framesOf, layersOf } from './editLayers';
 
 export type ExportKind = 'container' | 'frames';
 
@@ -25,16 +29,34 @@ export async function exportEdited(
     save(await decodedFrames(capture, edits, options), `${name}-edited.npy`);
     return;
   }
-  const source = await capture.container!(options.signal);
-  const { container } = await writeEdited(source, capture, edits, options);
-  save(container, `${name}-edited.cager`);
+  save(await withNewEdits(capture, edits, options), `${name}-edited.cager`);
 }
 
-/** Bytes of cages in one request; services limit what they take at once. */
+/**
+ * The container of a capture with its layers as they are now, and a new one for each edit: all that was encoded stays as it is, byte for byte.
+ *
+ * @throws {ContainerError} where the container is damaged
+ */
+export async function withNewEdits(
+  capture: Capture,
+  edits: readonly CageEdit[],
+  options: RewriteOptions = {},
+): Promise<Blob> {
+  const { signal, onProgress } = options;
+  const part = (share: number, from: number) => (fraction: number) => onProgress?.(from + share * fraction);
+  const added = await layersOf(capture, edits, { ...options, onProgress: part(0.5, 0) });
+  const layers = [...(capture.layers ?? []), ...added];
+  if (layers.length > MAX_LAYERS)
+    throw new Error(`A file has at most ${MAX_LAYERS} edits, and these would be ${layers.length}; remove some.`);
+  return withEdits(await capture.container!(signal), layers, { ...options, onProgress: part(0.5, 0.5) });
+}
+
+/** Bytes of cages in one request, and of positions in its answer; services limit what they take at once. */
 const REQUEST_BYTES = 4 * 2 ** 20;
 
 /**
- * All frames with their edits as positions, decoded by the service, in a NumPy file: frames × points × 3 in single precision.
+ * All frames with their edits as positions in a NumPy file, frames × points × 3 in single precision: cages are decoded by the service, and what is coded beside them is
+ * added here.
  *
  * @param onProgress hears the part that has arrived, 0 to 1
  * @throws ServiceProblem where the service refuses; its message is a sentence to show
@@ -42,35 +64,35 @@ const REQUEST_BYTES = 4 * 2 ** 20;
 export async function decodedFrames(
   capture: Capture,
   edits: readonly CageEdit[],
-  { signal, onProgress }: { signal?: AbortSignal; onProgress?: (fraction: number) => void } = {},
+  { signal, onProgress }: RewriteOptions = {},
 ): Promise<Blob> {
   const { frames } = capture;
   const { rest, rowsPerFrame } = capture.static;
-  const points = rest.length / 3;
+  const { length } = rest;
   // Blobs may leave memory; arrays of all frames would not.
-  const pieces: Blob[] = [new Blob([npyHeader([frames, points, 3])])];
-  const chunkFrames = Math.max(1, Math.floor(REQUEST_BYTES / (12 * rowsPerFrame)));
-  for await (const { first, count, rows } of chunksOf(capture, frames, edits, signal, chunkFrames)) {
-    const response = await capture.decode!(new Blob([rows]), signal);
-    const expected = 12 * points * count;
-    let received = 0;
-    const counter = new TransformStream<Uint8Array, Uint8Array>({
-      transform(piece, controller) {
-        received += piece.length;
-        onProgress?.((first + (count * received) / expected) / frames);
-        controller.enqueue(piece);
-      },
+  const pieces: Blob[] = [new Blob([npyHeader([frames, length / 3, 3])])];
+  let batch: { readonly block: FrameBlock; readonly frame: number; readonly rows: Float32Array }[] = [];
+  const decode = async () => {
+    const cages = new Float32Array(batch.length * 3 * rowsPerFrame);
+    batch.forEach(({ rows }, k) => cages.set(rows, k * 3 * rowsPerFrame));
+    const answer = await bodyOf(await capture.decode!(new Blob([cages]), signal), signal);
+    if (answer.byteLength !== 4 * length * batch.length)
+      throw new Error('The service sent too few frames. Export again.');
+    const positions = new Float32Array(answer);
+    batch.forEach(({ block, frame }, k) => {
+      if (block.residual)
+        addResidual(block.residual, frame - block.first, positions.subarray(k * length, (k + 1) * length));
     });
-    let positions: Blob;
-    try {
-      positions = await new Response(response.body!.pipeThrough(counter)).blob();
-    } catch (error) {
-      signal?.throwIfAborted();
-      throw new Error('The connection was lost. Export again.', { cause: error });
-    }
-    if (received !== expected) throw new Error('The service sent too few frames. Export again.');
-    pieces.push(positions);
+    pieces.push(new Blob([positions]));
+    onProgress?.((batch.at(-1)!.frame + 1) / frames);
+    batch = [];
+  };
+  const most = Math.max(1, Math.floor(REQUEST_BYTES / (12 * Math.max(rowsPerFrame, length / 3))));
+  for await (const { frame, block, rows } of framesOf(capture, 0, frames, signal)) {
+    batch.push({ block, frame, rows: editedRows(rows, frame, edits) });
+    if (batch.length === most) await decode();
   }
+  if (batch.length > 0) await decode();
   return new Blob(pieces, { type: 'application/octet-stream' });
 }
 

@@ -29,7 +29,7 @@ export class FrameStore {
   /** Called when frames that are loaded ahead do not come: `frame` and those that are read together with it. */
   onFailure: (frame: number, error: unknown) => void = () => undefined;
   onBlock: (block: FrameBlock) => void = () => undefined;
-  /** Changes frames as they are taken out; null leaves them as they are. Edited ones have no offsets, which belong to cages as they were captured. */
+  /** Changes cages as they are taken out, which have the same offsets; null leaves them as they are. */
   edit: FrameEdit | null = null;
   /** In the order of their last use. */
   private readonly blocks = new Set<FrameBlock>();
@@ -167,10 +167,8 @@ export class FrameStore {
   private dataOf({ first, cages, residual }: FrameBlock, frame: number): FrameData | null {
     const width = 3 * this.capture.static.rowsPerFrame;
     const rows = cages.subarray((frame - first) * width, (frame - first + 1) * width);
-    if (this.edit) return { rows: this.edit(frame, rows), offsets: null };
-    if (!residual) return { rows, offsets: null };
-    const offsets = this.offsets.get(frame);
-    return offsets ? { rows, offsets } : null;
+    const offsets = residual ? this.offsets.get(frame) : null;
+    return offsets === undefined ? null : { rows: this.edit?.(frame, rows) ?? rows, offsets };
   }
 
   private loadAhead(frame: number) {
