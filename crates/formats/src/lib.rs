@@ -7,6 +7,7 @@ mod alembic;
 pub mod atomic;
 pub mod biovision;
 mod colors;
+mod dropped;
 mod error;
 mod faces;
 pub mod frames;
@@ -24,6 +25,7 @@ mod vat;
 
 pub use atomic::{AtomicDir, AtomicFile, ScratchDir, Target, commit_together, remove_temporaries};
 pub use cager_geometry::units::{Units, Up};
+pub use dropped::Dropped;
 pub use error::{Action, Error};
 pub use frames::{
     CacheFormat, CageMesh, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence,
@@ -33,7 +35,7 @@ pub use frames::{
 pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{
-    MeshFormat, model_bytes, obj_bytes, read_model, read_model_bytes, read_model_bytes_with_units,
+    MeshFormat, ReadModel, model_bytes, obj_bytes, read_mesh, read_mesh_bytes, read_model, read_model_bytes,
     read_model_with_note, read_prim_with_note, read_prim_with_units, write_model,
 };
 pub use signature::Signature;

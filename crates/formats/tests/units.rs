@@ -5,7 +5,7 @@ mod support;
 use std::path::Path;
 
 use cager_formats::{
-    FrameOptions, MeshFormat, MorphOptions, Units, Up, create_frames, open_frames, read_model_bytes_with_units,
+    FrameOptions, MeshFormat, MorphOptions, Units, Up, create_frames, open_frames, read_mesh_bytes,
     read_prim_with_units,
 };
 use support::polygons;
@@ -101,7 +101,7 @@ fn files_that_say_nothing_say_nothing() {
     }
     let text =
         b"#usda 1.0\n(upAxis = \"Z\")\ndef Mesh \"m\" { point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)] }\n";
-    let said = |text: &[u8]| read_model_bytes_with_units(MeshFormat::Usda, Path::new("a.usda"), text).unwrap().1;
+    let said = |text: &[u8]| read_mesh_bytes(MeshFormat::Usda, Path::new("a.usda"), text).unwrap().units;
     assert_eq!(said(text), Units::new(Up::Z, 0.01), "a centimetre, as USD has it where only the axis is said");
     let none = text.iter().copied().skip(25).collect::<Vec<u8>>();
     assert_eq!(said(&[b"#usda 1.0\n".as_slice(), &none].concat()), Units::UNKNOWN);

@@ -1,5 +1,6 @@
 //! The frames of one mesh of an archive.
 
+use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::path::Path;
 
@@ -10,13 +11,19 @@ use super::mesh::Mesh;
 use super::objects::Archive;
 use super::ogawa::{Block, damaged};
 use super::properties::Property;
+use super::sampling::Sampling;
 use super::timing::timing;
-use super::transform::{Chain, Moment};
+use super::transform::Chain;
+use super::unread;
+use crate::dropped::Dropped;
 use crate::error::{Error, Fault};
 use crate::frames::{FrameReader, Times};
 use crate::scene::{
     self, Animation, Faces, Failure, MOST_REPEATED, Matrix, check_held, determinant, placed, topology_changes,
 };
+
+/// Frames per second where an archive does not say them.
+const USUAL_RATE: f64 = 24.0;
 
 /// Opens the frames of a mesh in an archive of `length` bytes; `prim` chooses one of several.
 pub(crate) fn open_frames<'a>(
@@ -36,8 +43,10 @@ pub(crate) fn read_model(
     source: impl Read + Seek + Send,
     length: u64,
     prim: Option<&str>,
+    dropped: &mut Dropped,
 ) -> Result<(Model, usize), Error> {
-    let mesh = MeshFrames::open(source, length, prim).map_err(|failure| failure.at(path))?;
+    let mut mesh = MeshFrames::open(source, length, prim).map_err(|failure| failure.at(path))?;
+    unread::add(&mut mesh.archive, mesh.object, dropped).map_err(|failure| failure.at(path))?;
     let (left_out, points, mut values) = (mesh.faces.left_out, mesh.points, Vec::new());
     let mut reader = scene::open(path, mesh, points)?;
     reader.read_next(&mut values)?;
@@ -45,8 +54,52 @@ pub(crate) fn read_model(
     Ok((Model { points: values.as_chunks().0.to_vec(), faces, ..Model::default() }, left_out))
 }
 
+/// The times of all that moves, how many these are, and whether they are those of what has none.
+fn moments<R: Read + Seek>(
+    archive: &Archive<R>,
+    mesh: &Mesh,
+    chain: &Chain,
+) -> Result<(Sampling, usize, bool), Failure> {
+    let moving = Some(&mesh.positions).filter(|positions| !positions.is_constant());
+    // Of each table of times as many as are used.
+    let mut most: BTreeMap<usize, usize> = BTreeMap::new();
+    for property in moving.into_iter().chain(chain.animated()) {
+        let samples = most.entry(property.sampling).or_default();
+        *samples = property.samples.max(*samples);
+    }
+    if most.is_empty() {
+        most.insert(mesh.positions.sampling, mesh.positions.samples);
+    }
+    let all: Vec<(&Sampling, usize)> =
+        most.iter().map(|(&sampling, &samples)| (&archive.samplings[sampling], samples)).collect();
+    if let Some((_, frames)) = all.iter().find(|(sampling, samples)| !sampling.covers(*samples)) {
+        return Err(damaged(&format!("it promises {frames} frames, of which not all can be there")).into());
+    }
+    if let [(sampling, frames)] = all.as_slice() {
+        return Ok(((*sampling).clone(), *frames, most.contains_key(&0)));
+    }
+    let total = all.iter().fold(0_usize, |total, (_, samples)| total.saturating_add(*samples));
+    check_held(total, (total as u64).saturating_mul(4) <= archive.container.length())?;
+    let (sampling, frames) = Sampling::union(&all);
+    Ok((sampling, frames, false))
+}
+
+/// A note of a transform that turns or travels far between two samples, where a scene shows it on its way.
+fn sparse(sampling: &Sampling, frames: usize, told: Option<f64>) -> Option<String> {
+    let gaps = (1..frames).map(|frame| sampling.time(frame) - sampling.time(frame - 1));
+    let longest = gaps.fold(0.0, f64::max);
+    let frame = 1.0 / told.unwrap_or(USUAL_RATE).min(USUAL_RATE);
+    (longest > 1.01 * frame).then(|| {
+        format!(
+            "its transforms have samples up to {longest:.4} s apart, and the motion between them is not read; export it with a sample of each frame"
+        )
+    })
+}
+
 struct MeshFrames<R> {
     archive: Archive<R>,
+    /// Index of the mesh among the objects.
+    object: usize,
     mesh: Mesh,
     chain: Chain,
     /// Whether the transforms turn the inside out.
@@ -55,12 +108,15 @@ struct MeshFrames<R> {
     faces: Faces,
     /// Where faces are stored that are equal to these, the last ones first.
     equal: [[Block; 2]; 2],
-    /// Index of the times of the frames.
-    sampling: usize,
+    /// The times of the frames.
+    sampling: Sampling,
     times: Times,
     points: usize,
     frames: usize,
     block: Vec<u8>,
+    /// The points of the next sample, where a frame lies between two.
+    next: Vec<f64>,
+    notes: Vec<String>,
 }
 
 impl<R: Read + Seek> MeshFrames<R> {
@@ -70,13 +126,7 @@ impl<R: Read + Seek> MeshFrames<R> {
         archive.container.allow(4);
         let mesh = Mesh::open(&mut archive, object)?;
         let chain = Chain::of(&mut archive, object)?;
-        // What moves tells the frames: the points, or else a transform.
-        let moving = Some(&mesh.positions).filter(|positions| !positions.is_constant());
-        let driver = moving.or_else(|| chain.animated()).unwrap_or(&mesh.positions);
-        let (frames, sampling) = (driver.samples, driver.sampling);
-        if !archive.samplings[sampling].covers(frames) {
-            return Err(damaged(&format!("it promises {frames} frames, of which not all can be there")).into());
-        }
+        let (sampling, frames, is_default) = moments(&archive, &mesh, &chain)?;
         let (points, first) = mesh.points(&mut archive.container, 0)?;
         let points = usize::try_from(points).unwrap_or(usize::MAX);
         if points == 0 {
@@ -85,32 +135,42 @@ impl<R: Read + Seek> MeshFrames<R> {
             );
         }
         check_held(frames, first.length.saturating_mul(frames as u64) / 2 <= archive.container.length())?;
-        let times = timing(&archive.samplings[sampling], frames, archive.frame_rate, sampling == 0)?;
+        let times = timing(&sampling, frames, archive.frame_rate, is_default)?;
+        let sparse = chain.animated().next().and_then(|_| sparse(&sampling, frames, archive.frame_rate));
+        let notes = sparse.into_iter().chain(unread::visibility(&mut archive, object)?).collect();
         let Archive { container, samplings, .. } = &mut archive;
-        let moment = |sample| Moment { sample, sampling, seconds: samplings[sampling].time(sample) };
         let mut mirrored = false;
         // What is not there yet is often scaled to nothing.
         for frame in 0..frames.min(MOST_REPEATED) {
-            let scale = chain.matrix(container, samplings, moment(frame))?.as_ref().map_or(1.0, determinant);
+            let scale = chain.matrix(container, samplings, sampling.time(frame))?.as_ref().map_or(1.0, determinant);
             mirrored = scale < 0.0;
             if scale != 0.0 {
                 break;
             }
         }
-        let samples = [&mesh.indices, &mesh.counts].map(|faces| moment(0).of(faces, samplings).0);
+        let samples = [&mesh.indices, &mesh.counts].map(|faces| faces.find(sampling.time(0), samplings).0);
         let (faces, blocks) = mesh.faces(container, samples, points, mirrored)?;
-        let (block, equal) = (Vec::new(), [blocks; 2]);
-        Ok(Self { archive, mesh, chain, mirrored, faces, equal, sampling, times, points, frames, block })
-    }
-
-    fn moment(&self, frame: usize) -> Moment {
-        let seconds = self.archive.samplings[self.sampling].time(frame);
-        Moment { sample: frame, sampling: self.sampling, seconds }
+        let (block, next, equal) = (Vec::new(), Vec::new(), [blocks; 2]);
+        Ok(Self {
+            archive,
+            object,
+            mesh,
+            chain,
+            mirrored,
+            faces,
+            equal,
+            sampling,
+            times,
+            points,
+            frames,
+            block,
+            next,
+            notes,
+        })
     }
 
     fn matrix(&mut self, frame: usize) -> Result<Option<Matrix>, Failure> {
-        let moment = self.moment(frame);
-        self.chain.matrix(&mut self.archive.container, &self.archive.samplings, moment)
+        self.chain.matrix(&mut self.archive.container, &self.archive.samplings, self.sampling.time(frame))
     }
 
     /// Refuses a frame whose faces are others than those of the first.
@@ -122,8 +182,8 @@ impl<R: Read + Seek> MeshFrames<R> {
         if self.mesh.indices.is_constant() && self.mesh.counts.is_constant() {
             return Ok(());
         }
-        let moment = self.moment(frame);
-        let sample = |faces: &Property| moment.of(faces, &self.archive.samplings).0;
+        let seconds = self.sampling.time(frame);
+        let sample = |faces: &Property| faces.find(seconds, &self.archive.samplings).0;
         let samples = [sample(&self.mesh.indices), sample(&self.mesh.counts)];
         let container = &mut self.archive.container;
         let blocks =
@@ -157,13 +217,29 @@ impl<R: Read + Seek + Send> Animation for MeshFrames<R> {
         &self.faces.polygons
     }
 
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
-        let (points, Block { start, .. }) = self.mesh.points(&mut self.archive.container, frame)?;
+        let (sample, share) = self.mesh.positions.find(self.sampling.time(frame), &self.archive.samplings);
+        let (points, Block { start, .. }) = self.mesh.points(&mut self.archive.container, sample)?;
         self.check_faces(frame, points)?;
         let matrix = self.matrix(frame)?;
         // Every value is overwritten below.
         out.resize(3 * self.points, 0.0);
-        let finite = self.archive.container.read_values(start, self.mesh.scalar, &mut self.block, out)?;
+        let mut finite = self.archive.container.read_values(start, self.mesh.scalar, &mut self.block, out)?;
+        if share > 0.0 {
+            let (following, Block { start, .. }) = self.mesh.points(&mut self.archive.container, sample + 1)?;
+            // Where the number of points changes, those before hold.
+            if following == points {
+                self.next.resize(out.len(), 0.0);
+                let (scalar, next) = (self.mesh.scalar, &mut self.next);
+                finite &= self.archive.container.read_values(start, scalar, &mut self.block, next)?;
+                out.iter_mut().zip(next).for_each(|(value, next)| *value += share * (*next - *value));
+                finite &= out.iter().all(|x| x.is_finite());
+            }
+        }
         Ok(placed(matrix.as_ref(), out, finite))
     }
 }

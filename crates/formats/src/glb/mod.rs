@@ -19,6 +19,7 @@ mod write;
 
 use cager_geometry::mesh::Model;
 
+use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::faces::Contents;
 use crate::scene::Failure;
@@ -30,9 +31,10 @@ use scene::Scene;
 pub(crate) use write::{LARGEST_SIDE, Morphs, Scene as MorphScene, Wanted};
 
 /// The meshes of the default scene at rest as one, or the one of several that `prim` names.
-pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prim: Option<&str>) -> Result<Model, Fault> {
+pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prim: Option<&str>) -> Result<(Model, Dropped), Fault> {
     let buffers = Buffers::open(bytes, source)?;
     let scene = Scene::of(&buffers.root)?;
     let chosen = choice::choose(&buffers.root, &scene, prim).map_err(Failure::of_bytes)?;
-    Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen])
+    let model = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen])?;
+    Ok((model, Dropped::default()))
 }

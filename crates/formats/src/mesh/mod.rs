@@ -5,6 +5,7 @@ mod off;
 mod parsed;
 mod ply;
 mod stl;
+mod unread;
 mod write;
 
 use std::fs::{self, File};
@@ -15,6 +16,7 @@ use cager_geometry::mesh::{Model, Polygons};
 use cager_geometry::units::Units;
 
 use crate::alembic;
+use crate::dropped::Dropped;
 use crate::error::{Error, Fault};
 use crate::faces::Contents;
 use crate::glb;
@@ -131,6 +133,55 @@ pub(crate) fn extensions(formats: &[MeshFormat]) -> String {
     list.join(" ")
 }
 
+/// A model from a file, and what is to be known of it.
+#[derive(Clone, Debug)]
+pub struct ReadModel {
+    /// Points in the order of the file, polygons as they are.
+    pub model: Model,
+    /// The unit and the upward axis of the points, as far as the file says them.
+    pub units: Units,
+    /// Faces that were left out, in words.
+    pub note: Option<String>,
+    /// What else the file holds, which is not read.
+    pub dropped: Dropped,
+}
+
+impl ReadModel {
+    fn of(parsed: Parsed, path: &Path) -> Self {
+        let Parsed { model, left_out, units, dropped } = parsed;
+        let faces = if left_out == 1 { "face" } else { "faces" };
+        let note =
+            format!("{}: left out {left_out} {faces} of fewer than three corners, which have no area", path.display());
+        Self { model, units, note: (left_out > 0).then_some(note), dropped }
+    }
+
+    /// What an output loses that keeps no colours of points.
+    #[must_use]
+    pub fn dropped_with_colors(&self) -> Dropped {
+        let mut dropped = self.dropped.clone();
+        if !self.model.colors.is_empty() {
+            dropped.add_colors();
+        }
+        dropped
+    }
+}
+
+/// Reads a model from a file, of a scene (Alembic, USD, glTF) the mesh that `prim` names by its path or name, where it has several.
+///
+/// # Errors
+/// As [`read_model`]; no such mesh, or several of that name.
+pub fn read_mesh(path: &Path, prim: Option<&str>) -> Result<ReadModel, Error> {
+    parse_file(path, prim).map(|parsed| ReadModel::of(parsed, path))
+}
+
+/// As [`read_model_bytes`], with what is to be known of it.
+///
+/// # Errors
+/// As [`read_model_bytes`].
+pub fn read_mesh_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<ReadModel, Error> {
+    read_bytes(format, name, bytes, Contents::PointsAndFaces, None).map(|parsed| ReadModel::of(parsed, name))
+}
+
 /// Reads a model from a file, its points in the order of the file and its polygons as they are.
 ///
 /// # Errors
@@ -160,11 +211,7 @@ pub fn read_prim_with_note(path: &Path, prim: Option<&str>) -> Result<(Model, Op
 /// # Errors
 /// As [`read_prim_with_note`].
 pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>, Units), Error> {
-    let Parsed { model, left_out, units } = parse_file(path, prim)?;
-    let faces = if left_out == 1 { "face" } else { "faces" };
-    let note =
-        format!("{}: left out {left_out} {faces} of fewer than three corners, which have no area", path.display());
-    Ok((model, (left_out > 0).then_some(note), units))
+    read_mesh(path, prim).map(|ReadModel { model, note, units, .. }| (model, note, units))
 }
 
 /// Reads a model from the bytes of a file; `name` is the path in error messages.
@@ -177,16 +224,7 @@ pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, O
 /// that are not read, [`Error::Invalid`] for a coordinate that is not finite, a face with a vertex
 /// that does not exist, and a file without points. Faces of fewer than three corners are left out.
 pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<Model, Error> {
-    read_model_bytes_with_units(format, name, bytes).map(|(model, _)| model)
-}
-
-/// As [`read_model_bytes`], with the unit and the upward axis of the points, as far as the file says them.
-///
-/// # Errors
-/// As [`read_model_bytes`].
-pub fn read_model_bytes_with_units(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<(Model, Units), Error> {
-    let Parsed { model, units, .. } = read_bytes(format, name, bytes, Contents::PointsAndFaces, None)?;
-    Ok((model, units))
+    read_bytes(format, name, bytes, Contents::PointsAndFaces, None).map(|parsed| parsed.model)
 }
 
 /// The faces of the file of a frame, and the text that they are in: most frames have the same ones, which are then not parsed again.
@@ -194,7 +232,7 @@ pub fn read_model_bytes_with_units(format: MeshFormat, name: &Path, bytes: &[u8]
 pub(crate) struct FrameFaces {
     pub(crate) faces: Polygons,
     /// From the first face of an `.obj` file on; empty for other formats.
-    text: Vec<u8>,
+    pub(crate) text: Vec<u8>,
 }
 
 /// A frame of a capture: its points, and its faces where nothing is wrong with them, since a frame needs none. They are taken from `known` where they
@@ -242,13 +280,14 @@ fn read_scene(
         let kind = glb::Source { is_text: true, folder };
         return finished(format, name, &bytes, glb::read(&bytes, &kind, prim).map(Parsed::of_gltf));
     }
+    let mut dropped = Dropped::default();
     let (model, left_out, units) = if format == MeshFormat::Abc {
-        let (model, left_out) = alembic::read_model(name, source, length, prim)?;
+        let (model, left_out) = alembic::read_model(name, source, length, prim, &mut dropped)?;
         (model, left_out, Units::UNKNOWN)
     } else {
-        usd::read_model(name, source, length, prim)?
+        usd::read_model(name, source, length, prim, &mut dropped)?
     };
-    Ok(Parsed { model, left_out, units })
+    Ok(Parsed { model, left_out, units, dropped })
 }
 
 fn read_bytes(
@@ -265,7 +304,7 @@ fn read_bytes(
             MeshFormat::Obj => obj::read(bytes, contents),
             MeshFormat::Ply => ply::read(bytes, contents),
             MeshFormat::Off => off::read(bytes, contents),
-            MeshFormat::Stl => stl::read(bytes).map(Parsed::from),
+            MeshFormat::Stl => stl::read(bytes),
             MeshFormat::Glb => glb::read(bytes, &glb::Source::default(), prim).map(Parsed::of_gltf),
             scene => return read_scene(scene, name, Cursor::new(bytes), bytes.len() as u64, (prim, None)),
         }

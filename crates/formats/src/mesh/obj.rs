@@ -3,6 +3,7 @@
 use cager_geometry::mesh::Model;
 
 use super::parsed::Parsed;
+use super::unread::Unread;
 use crate::colors::{Colors, Scale};
 use crate::error::Fault;
 use crate::faces::{Contents, no_such_vertex};
@@ -22,7 +23,8 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
 /// One pass over the file; with `points`, stops at the first face that names a later vertex.
 fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parsed, Fault> {
     let (mut model, mut colors, mut left_out) = (Model::default(), Colors::default(), 0);
-    let mut face = Vec::new();
+    let (mut face, mut unread) = (Vec::new(), Unread::default());
+    let mut colored = 0;
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next() {
         let number = lines.number();
@@ -34,9 +36,15 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
             b"vn" if contents == Contents::PointsAndFaces && model.faces.is_empty() => {
                 let mut words = words(&line[keyword.len()..]);
                 model.normals.extend(point(&mut words, String::new).ok());
+                unread.note(keyword, line);
                 continue;
             }
-            _ => continue,
+            _ => {
+                if contents == Contents::PointsAndFaces {
+                    unread.note(keyword, line);
+                }
+                continue;
+            }
         };
         let joined;
         let line = if line.ends_with(b"\\") {
@@ -54,6 +62,7 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
                 && let [Some(red), Some(green), Some(blue), None] = [(); 4].map(|()| words.next().map(text::number))
                 && let (Some(red), Some(green), Some(blue)) = (red, green, blue)
             {
+                colored += 1;
                 colors.push([red, green, blue].map(|x| x as f32));
             }
         } else {
@@ -74,7 +83,12 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
         model.normals.clear();
     }
     model.colors = colors.finish(model.points.len(), Scale::Unsaid);
-    Ok(Parsed { left_out, ..model.into() })
+    let mut parsed = Parsed { left_out, ..model.into() };
+    if colored > 0 && parsed.model.colors.is_empty() {
+        parsed.dropped.add("vertex colours, which not all points have");
+    }
+    unread.tell(&mut parsed);
+    Ok(parsed)
 }
 
 /// A line and those that continue it after a backslash.

@@ -3,13 +3,14 @@
 use cager_geometry::mesh::Model;
 
 use super::parsed::Parsed;
+use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::faces::{Contents, check_face};
 use crate::text::{Lines, integer, point, quoted, words};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
     let mut lines = ContentLines(Lines::new(bytes));
-    let (points, faces) = counts(&mut lines)?;
+    let (points, faces, mut dropped) = counts(&mut lines)?;
     let (mut model, mut left_out) = (Model::default(), 0);
     // A vertex takes at least six bytes: three digits and three separators.
     model.points.reserve_exact(points.min(lines.0.rest().len() / 6 + 1));
@@ -18,8 +19,12 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
             return Err(truncated("vertices", k, points));
         };
         let number = lines.0.number();
-        let point = point(&mut words(line), || format!("line {number}"))?;
+        let mut words = words(line);
+        let point = point(&mut words, || format!("line {number}"))?;
         model.points.push(point);
+        if words.next().is_some() && dropped.is_empty() {
+            dropped.add("numbers behind the positions of vertices");
+        }
     }
     if contents == Contents::Points {
         return Ok(Parsed { left_out, ..model.into() });
@@ -30,7 +35,9 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
             return Err(truncated("faces", k, faces));
         };
         let number = lines.0.number();
-        read_face(line, &mut lines, &mut face)?;
+        if read_face(line, &mut lines, &mut face)? {
+            dropped.add_on_faces("colours of faces");
+        }
         check_face(&face, points, || format!("line {number}"))?;
         if face.len() >= 3 {
             model.faces.push(&face);
@@ -38,7 +45,7 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
             left_out += 1;
         }
     }
-    Ok(Parsed { left_out, ..model.into() })
+    Ok(Parsed { left_out, dropped, ..model.into() })
 }
 
 /// The lines that say something, without comments.
@@ -55,8 +62,9 @@ impl<'a> Iterator for ContentLines<'a> {
     }
 }
 
-/// Numbers of vertices and faces, from the line of the keyword or those after it.
-fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize), Fault> {
+/// Numbers of vertices and faces, from the line of the keyword or those after it, and what the keyword promises beside positions.
+fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize, Dropped), Fault> {
+    let mut dropped = Dropped::default();
     let mut line = lines.next().unwrap_or_default();
     let keyword = words(line).next().unwrap_or_default();
     // Some files have no space between the keyword and the numbers.
@@ -70,6 +78,13 @@ fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize), Fault> {
                 quoted(keyword)
             )));
         }
+        for (letter, phrase) in
+            [(b'S', "texture coordinates (STOFF)"), (b'C', "vertex colours (COFF)"), (b'N', "normals (NOFF)")]
+        {
+            if keyword[..end - 3].contains(&letter) {
+                dropped.add(phrase);
+            }
+        }
         line = line[end..].trim_ascii();
         if line.eq_ignore_ascii_case(b"BINARY") {
             return Err(Fault::unsupported("is a binary OFF file; convert it to ASCII OFF or to PLY"));
@@ -82,15 +97,15 @@ fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize), Fault> {
     let mut found = words(line).map(integer);
     let points = found.next().flatten();
     let faces = found.next().or_else(|| words(lines.next()?).map(integer).next()).flatten();
-    points.zip(faces).ok_or_else(|| {
+    points.zip(faces).map(|(points, faces)| (points, faces, dropped)).ok_or_else(|| {
         Fault::damaged(format!(
             "line {number}: the numbers of vertices and faces are missing, so this is not an OFF file; export the mesh again"
         ))
     })
 }
 
-/// A number of corners and as many vertices, which may go on over several lines; what follows on the last one is a colour.
-fn read_face(line: &[u8], lines: &mut ContentLines<'_>, face: &mut Vec<u32>) -> Result<(), Fault> {
+/// A number of corners and as many vertices, which may go on over several lines; gives whether a colour follows on the last one.
+fn read_face(line: &[u8], lines: &mut ContentLines<'_>, face: &mut Vec<u32>) -> Result<bool, Fault> {
     let start = lines.0.number();
     let unreadable = |word: &[u8], number: usize| {
         Fault::damaged(format!(
@@ -103,11 +118,12 @@ fn read_face(line: &[u8], lines: &mut ContentLines<'_>, face: &mut Vec<u32>) -> 
     face.clear();
     let mut line = &line[first.len()..];
     loop {
-        for word in words(line).take(corners - face.len()) {
+        let mut words = words(line);
+        for word in words.by_ref().take(corners - face.len()) {
             face.push(integer(word).ok_or_else(|| unreadable(word, lines.0.number()))?);
         }
         if face.len() == corners {
-            return Ok(());
+            return Ok(words.next().is_some());
         }
         line = lines.next().ok_or_else(|| {
             Fault::damaged(format!(

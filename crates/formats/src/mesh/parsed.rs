@@ -3,18 +3,22 @@
 use cager_geometry::mesh::Model;
 use cager_geometry::units::Units;
 
+use crate::dropped::Dropped;
+
 /// What a file gave.
 pub(super) struct Parsed {
     pub(super) model: Model,
     /// Faces of fewer than three corners, which are edges and points.
     pub(super) left_out: usize,
     pub(super) units: Units,
+    /// What else the file has.
+    pub(super) dropped: Dropped,
 }
 
 impl Parsed {
     /// Of glTF, which is in metres with Y up.
-    pub(super) fn of_gltf(model: Model) -> Self {
-        Self { units: Units::METRES, ..Self::from(model) }
+    pub(super) fn of_gltf((model, dropped): (Model, Dropped)) -> Self {
+        Self { units: Units::METRES, dropped, ..Self::from(model) }
     }
 
     /// Faces tell the normals of a mesh.
@@ -28,6 +32,6 @@ impl Parsed {
 
 impl From<Model> for Parsed {
     fn from(model: Model) -> Self {
-        Self { model, left_out: 0, units: Units::UNKNOWN }
+        Self { model, left_out: 0, units: Units::UNKNOWN, dropped: Dropped::default() }
     }
 }

@@ -4,13 +4,14 @@ use std::collections::HashMap;
 
 use cager_geometry::mesh::{Model, Point};
 
+use super::parsed::Parsed;
 use crate::error::Fault;
 use crate::text::{Lines, point, quoted, words};
 
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
-pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
+pub(super) fn read(bytes: &[u8]) -> Result<Parsed, Fault> {
     let mut shared = Shared::default();
     let mut face = Vec::new();
     scan(bytes, |corners| {
@@ -18,7 +19,18 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model, Fault> {
         face.extend(corners.iter().map(|&point| shared.index(point)));
         shared.model.faces.push(&face);
     })?;
-    Ok(shared.model)
+    let mut parsed = Parsed::from(shared.model);
+    if has_colors(bytes) {
+        parsed.dropped.add_on_faces("colours of triangles (attribute bytes)");
+    }
+    Ok(parsed)
+}
+
+/// Whether a binary file has something in the two bytes behind each triangle, where programs write colours.
+fn has_colors(bytes: &[u8]) -> bool {
+    let triangles = || promised_size(bytes).and_then(|end| bytes.get(HEADER..usize::try_from(end).ok()?));
+    let mut triangles = triangles().unwrap_or_default().chunks_exact(TRIANGLE);
+    triangles.any(|triangle| triangle[TRIANGLE - 2..] != [0; 2])
 }
 
 /// Calls `each` with the corners of every face.

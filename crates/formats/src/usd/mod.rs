@@ -11,6 +11,7 @@ mod package;
 mod text;
 mod timing;
 mod transform;
+mod unread;
 mod write;
 
 use std::io::{Read, Seek};
@@ -19,6 +20,7 @@ use std::path::Path;
 use cager_geometry::mesh::Model;
 use cager_geometry::units::Units;
 
+use crate::dropped::Dropped;
 use crate::error::{Error, Fault};
 use crate::frames::FrameReader;
 use crate::scene::{self, Animation, Failure};
@@ -41,15 +43,17 @@ pub(crate) fn open_frames<'a>(
     scene::open(path, open().map_err(|failure: Failure| failure.at(path))?, expected_points)
 }
 
-/// A mesh as it is without a time, or else in its first frame, how many of its faces were left out, and its units.
+/// The first frame of a mesh, how many of its faces were left out, and its units.
 pub(crate) fn read_model(
     path: &Path,
     source: impl Read + Seek + Send,
     length: u64,
     prim: Option<&str>,
+    dropped: &mut Dropped,
 ) -> Result<(Model, usize, Units), Error> {
     let open = || MeshFrames::open(open_layer(source, length)?, prim, true);
-    let mesh = open().map_err(|failure: Failure| failure.at(path))?;
+    let mut mesh = open().map_err(|failure: Failure| failure.at(path))?;
+    mesh.add_unread(dropped).map_err(|failure| failure.at(path))?;
     let (points, left_out, units, mut values) = (mesh.points(), mesh.left_out(), mesh.units(), Vec::new());
     let mut reader = scene::open(path, mesh, points)?;
     reader.read_next(&mut values)?;

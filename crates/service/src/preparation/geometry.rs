@@ -9,7 +9,7 @@ use cager_capture::origin::move_to;
 use cager_codec::CodedMesh;
 use cager_core::cage::{Cage, CageError};
 use cager_core::regularize::Regularizer;
-use cager_formats::{MeshFormat, Units, read_matrix_bytes, read_model_bytes_with_units};
+use cager_formats::{MeshFormat, Units, read_matrix_bytes, read_mesh_bytes};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use std::path::Path;
@@ -117,7 +117,8 @@ pub(crate) fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, A
 pub(crate) fn read_part_with_units(part: &str, name: &str, bytes: &[u8]) -> Result<(Model, Units), ApiError> {
     let path = Path::new(name);
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
-    read_model_bytes_with_units(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))
+    let read = read_mesh_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))?;
+    Ok((read.model, read.units))
 }
 
 pub(super) fn geometry(detail: String) -> ApiError {

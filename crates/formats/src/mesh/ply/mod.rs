@@ -1,6 +1,7 @@
 //! Polygon File Format: ASCII, binary little-endian and binary big-endian.
 
 mod header;
+mod unread;
 mod values;
 
 use cager_geometry::mesh::Model;
@@ -46,6 +47,9 @@ fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values:
             }
             _ => skip(element, &mut values)?,
         }
+    }
+    if faces {
+        unread::tell(header, &mut parsed);
     }
     Ok(parsed)
 }

@@ -1,0 +1,116 @@
+//! What models do not keep of their files: told once, in one sentence, by the names that formats have for it.
+
+use std::path::Path;
+
+/// Names that a list shows, and characters of each.
+const LISTED: usize = 4;
+const SHOWN: usize = 40;
+
+/// What the file of a mesh holds that is not read.
+///
+/// A reader adds a phrase for each kind, with the word of the format in brackets: [`Self::add`] for what belongs to points
+/// or to the whole, such as `normals (NORMAL)`, and [`Self::add_on_faces`] for what belongs to faces and their corners, such as
+/// `texture coordinates (vt)`. Phrases that begin with a number come from [`counted`], lists of names of any length
+/// from [`listed`]. A phrase that is added twice is told once. Commands tell [`Self::sentence`].
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    phrases: Vec<String>,
+    is_on_faces: bool,
+}
+
+impl Dropped {
+    pub(crate) fn add(&mut self, phrase: impl Into<String>) {
+        let phrase = phrase.into();
+        if !self.phrases.contains(&phrase) {
+            self.phrases.push(phrase);
+        }
+    }
+
+    pub(crate) fn add_on_faces(&mut self, phrase: impl Into<String>) {
+        self.is_on_faces = true;
+        self.add(phrase);
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.phrases.is_empty()
+    }
+
+    /// The colours of points, for outputs that have none.
+    pub fn add_colors(&mut self) {
+        self.add("vertex colours");
+    }
+
+    /// `rest.obj: texture coordinates (vt) and 3 materials (usemtl) are not kept`; none where nothing is lost. `is_reordered` where faces are stored in an order of
+    /// their own, so that what belongs to them cannot be put back by their numbers.
+    pub fn sentence(&self, path: &Path, is_reordered: bool) -> Option<String> {
+        let (last, others) = self.phrases.split_last()?;
+        let all = if others.is_empty() { last.clone() } else { format!("{} and {last}", others.join(", ")) };
+        let are = if others.is_empty() && last.starts_with("1 ") { "is" } else { "are" };
+        let order = if is_reordered && self.is_on_faces {
+            ", nor is the order of faces and of their corners; --exact-rest keeps that order, for putting them back"
+        } else {
+            ""
+        };
+        Some(format!("{}: {all} {are} not kept{order}", path.display()))
+    }
+}
+
+/// `1 material`, `3 materials`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+/// The first names and how many there are beside them: `a, b and 7 more`.
+pub(crate) fn listed<'a>(names: impl IntoIterator<Item = &'a [u8]>) -> String {
+    let mut names = names.into_iter();
+    let mut words: Vec<String> = names.by_ref().take(LISTED).map(shown).collect();
+    match (names.count(), words.len()) {
+        (0, 0 | 1) => words.concat(),
+        (0, _) => {
+            let last = words.pop().unwrap_or_default();
+            format!("{} and {last}", words.join(", "))
+        }
+        (more, _) => format!("{} and {more} more", words.join(", ")),
+    }
+}
+
+/// A name from a file as a sentence has it.
+fn shown(name: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&name[..name.len().min(4 * SHOWN)]);
+    let mut escaped = text.chars().flat_map(char::escape_debug);
+    let start: String = escaped.by_ref().take(SHOWN).collect();
+    if escaped.next().is_some() { start + "…" } else { start }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_sentence_names_each_kind_once() {
+        let told = |dropped: &Dropped| dropped.sentence(Path::new("a.obj"), true);
+        let mut dropped = Dropped::default();
+        assert_eq!(told(&dropped), None);
+        dropped.add(counted(1, "material"));
+        assert_eq!(told(&dropped).unwrap(), "a.obj: 1 material is not kept");
+        dropped.add(counted(1, "material"));
+        dropped.add("normals (vn)");
+        assert_eq!(told(&dropped).unwrap(), "a.obj: 1 material and normals (vn) are not kept");
+        dropped.add_on_faces("texture coordinates (vt)");
+        let sentence = told(&dropped).unwrap();
+        assert!(
+            sentence.starts_with("a.obj: 1 material, normals (vn) and texture coordinates (vt) are not kept, nor ")
+        );
+        assert!(sentence.contains("--exact-rest"));
+        assert!(!dropped.sentence(Path::new("a.obj"), false).unwrap().contains("order"));
+    }
+
+    #[test]
+    fn lists_of_names_have_an_end() {
+        let list = |names: &[&str]| listed(names.iter().map(|name| name.as_bytes()));
+        assert_eq!(list(&["a"]), "a");
+        assert_eq!(list(&["a", "b"]), "a and b");
+        assert_eq!(list(&["a", "b", "c", "d", "e", "f"]), "a, b, c, d and 2 more");
+        assert!(list(&["x".repeat(1 << 20).as_str(), "\u{1b}[1m"]).chars().count() < 60);
+    }
+}
