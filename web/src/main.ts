@@ -48,7 +48,10 @@ async function show(anew = false) {
     const message = document.createElement('p');
     message.className = 'failure';
     message.setAttribute('role', 'alert');
-    message.textContent = 'Part of the page could not be loaded. Check your connection and reload.';
+    const reload = document.createElement('button');
+    reload.textContent = 'Reload';
+    reload.addEventListener('click', () => location.reload());
+    message.append('Part of the page could not be loaded. Check your connection and reload. ', reload);
     if (shown === wanted) document.body.replaceChildren(message);
   }
 }

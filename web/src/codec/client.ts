@@ -66,9 +66,8 @@ class WorkerCodec implements Codec {
   }
 
   private start(): Worker {
-    const worker = moduleWorker(workerAddress);
+    const worker = moduleWorker(workerAddress, (error) => this.fail(error));
     worker.onmessage = ({ data }: MessageEvent<Answer>) => this.answer(data);
-    worker.onerror = () => this.fail(new Error('The decoder stopped. Reload the page.'));
     return worker;
   }
 

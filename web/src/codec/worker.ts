@@ -1,5 +1,6 @@
 /** Runs a {@link GroupDecoder} beside the page: each message is a call of one of its methods. */
 
+import '../workerStarted';
 import { CodedDataError } from './error';
 import { GroupDecoder } from './groupDecoder';
 import type { Answer, Call } from './messages';

@@ -51,9 +51,11 @@ export async function computePhi(
     return phi;
   }
   const count = Math.min(MAX_WORKERS, slices, Math.max(1, navigator.hardwareConcurrency));
-  const workers = Array.from({ length: count }, startWorker);
+  let failed: (error: Error) => void = () => undefined;
+  const workers = Array.from({ length: count }, () => moduleWorker(workerAddress, (error) => failed(error)));
   try {
     await new Promise<void>((resolve, reject) => {
+      failed = reject;
       let [sent, done, reported] = [0, 0, performance.now()];
       const sendNext = (worker: Worker) => {
         if (sent >= slices) return;
@@ -89,7 +91,6 @@ export async function computePhi(
           if (done === slices) taking.then(resolve, reject);
           else sendNext(worker);
         };
-        worker.onerror = () => reject(new Error('Computing the coordinates failed in this browser; reload the page.'));
         send(worker, { kind: 'cage', system, cage, isExact: onRows !== undefined });
         // Two slices each, so that no worker waits for its next one.
         sendNext(worker);
@@ -100,10 +101,6 @@ export async function computePhi(
     for (const worker of workers) worker.terminate();
   }
   return phi;
-}
-
-function startWorker(): Worker {
-  return moduleWorker(workerAddress);
 }
 
 function send(worker: Worker, message: ToWorker) {

@@ -1,3 +1,4 @@
+import '../workerStarted';
 import { columnsOf, rowsOf } from './compute';
 import { sentence } from '../text';
 import type { RowOf } from './meanValue';

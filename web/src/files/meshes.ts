@@ -1,6 +1,6 @@
 /** What can be said of mesh files without sending them: their points, and those of `.obj` files themselves. */
 
-import { type FrameSource, UnusableFile } from './frameSource';
+import { type FrameSource, readPart, UnusableFile } from './frameSource';
 
 const HEAD_BYTES = 1 << 16;
 
@@ -33,7 +33,7 @@ export async function isAnimated(file: File): Promise<boolean> {
 
 /** Positions of the `v` lines of a Wavefront file, x y z each. */
 export async function objPoints(file: File): Promise<Float32Array> {
-  const text = await file.text();
+  const text = new TextDecoder().decode(await readPart(file, 0, file.size));
   const values: number[] = [];
   for (let at = 0; at < text.length;) {
     const found = text.indexOf('\n', at);

@@ -23,7 +23,12 @@ export type Answer = Observed | { readonly problem: string };
 
 /** The surfaces that a capture was recovered from, a file each, read in a worker when they are wanted. */
 export class ObservedSurfaces {
-  private readonly worker = moduleWorker(workerAddress);
+  private failure: Error | null = null;
+  private fail: (error: Error) => void = () => undefined;
+  private readonly worker = moduleWorker(workerAddress, (error) => {
+    this.failure = error;
+    this.fail(error);
+  });
   private last: Promise<unknown> = Promise.resolve();
 
   /** @param files of each frame of the capture; undefined where there is none */
@@ -55,7 +60,8 @@ export class ObservedSurfaces {
         if ('problem' in data) reject(new Error(data.problem));
         else resolve(data);
       };
-      this.worker.onerror = () => reject(new Error('Reading surfaces failed in this browser; reload the page.'));
+      this.fail = reject;
+      if (this.failure) reject(this.failure);
       this.worker.postMessage({ frame, file, places } satisfies Asked);
     });
   }

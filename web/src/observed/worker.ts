@@ -1,3 +1,4 @@
+import '../workerStarted';
 import { readSurface, NearestSurface } from './surface';
 import { sentence } from '../text';
 import type { Asked, Answer } from './surfaces';

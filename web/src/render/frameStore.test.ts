@@ -34,7 +34,17 @@ function captureOf(points: number, frames: number, block: (frame: number) => Pro
 /** Node has no web workers: this one answers later. */
 class AnsweringWorker {
   static frames = 0;
+  static last: AnsweringWorker;
   onmessage: ((event: { data: unknown }) => void) | null = null;
+  onFailure: () => void = () => undefined;
+
+  constructor() {
+    AnsweringWorker.last = this;
+  }
+
+  addEventListener(type: string, listener: () => void) {
+    if (type === 'error') this.onFailure = listener;
+  }
 
   postMessage(message: ToResidualWorker) {
     if (message.kind !== 'frame') return;
@@ -46,6 +56,12 @@ class AnsweringWorker {
   terminate() {
     this.onmessage = null;
   }
+}
+
+function stubWorkers() {
+  vi.stubGlobal('Worker', AnsweringWorker);
+  vi.stubGlobal('document', { baseURI: 'http://localhost/' });
+  vi.stubGlobal('location', { origin: 'http://localhost' });
 }
 
 afterEach(() => vi.unstubAllGlobals());
@@ -75,9 +91,7 @@ test('blocks of another source replace all that are there, and those on their wa
 });
 
 test('a paused picture of a large model comes to rest, and a far frame can be read meanwhile', async () => {
-  vi.stubGlobal('Worker', AnsweringWorker);
-  vi.stubGlobal('document', { baseURI: 'http://localhost/' });
-  vi.stubGlobal('location', { origin: 'http://localhost' });
+  stubWorkers();
   const cages = new Float32Array(3 * 200);
   const block = { first: 0, count: 200, cages, residual: NO_RESIDUAL };
   const store = new FrameStore(captureOf(500_000, 200, () => Promise.resolve(block)));
@@ -97,9 +111,7 @@ test('a paused picture of a large model comes to rest, and a far frame can be re
 });
 
 test('preliminary frames are shown until their final ones can be', async () => {
-  vi.stubGlobal('Worker', AnsweringWorker);
-  vi.stubGlobal('document', { baseURI: 'http://localhost/' });
-  vi.stubGlobal('location', { origin: 'http://localhost' });
+  stubWorkers();
   let answer: (() => void) | null = null;
   const [solved, coded] = [new Float32Array(3 * 8).fill(1), new Float32Array(3 * 6).fill(2)];
   const preliminary = { first: 0, count: 8, cages: solved, residual: null, isPreliminary: true };
@@ -163,4 +175,24 @@ test('frames are loaded ahead also while others read some', async () => {
   store.prefetch([0, 1]);
   await settled();
   expect(asked).toEqual([2, 0]);
+});
+
+test('whoever waits for offsets hears that their script did not come, and edits keep the offsets', async () => {
+  stubWorkers();
+  const cages = Float32Array.of(1, 2, 3, 4, 5, 6);
+  const store = new FrameStore(
+    captureOf(1, 2, () => Promise.resolve({ first: 0, count: 2, cages, residual: NO_RESIDUAL })),
+  );
+  store.edit = (_, rows) => rows.map((x) => 10 * x);
+  const { rows, offsets } = await store.frame(0);
+  expect([...rows]).toEqual([10, 20, 30]);
+  expect(offsets).not.toBeNull();
+  const waiting = store.frame(1);
+  await Promise.resolve();
+  await Promise.resolve();
+  AnsweringWorker.last.onmessage = null;
+  AnsweringWorker.last.onFailure();
+  await expect(waiting).rejects.toThrow('could not be loaded. Reload the page.');
+  await expect(store.load(1)).rejects.toThrow('Reload the page.');
+  store.close();
 });

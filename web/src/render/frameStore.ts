@@ -46,6 +46,8 @@ export class FrameStore {
   private waiting: (() => void)[] = [];
   private readonly stop = new AbortController();
   private worker: Worker | null = null;
+  /** Why there are no more offsets. */
+  private lost: Error | null = null;
   /** How often the source of blocks was replaced. */
   private generation = 0;
   /** Frames whose offsets are needed next, the one that is shown first. */
@@ -81,7 +83,9 @@ export class FrameStore {
     const block = await this.read(frame);
     if (frame < block.first || frame >= block.first + block.count)
       throw new Error(`Frame ${frame} is not where the capture says; load it again.`);
-    if (block.residual && !this.offsets.has(frame)) this.requestOffsets(block, block.residual, frame);
+    if (!block.residual || this.offsets.has(frame)) return;
+    if (this.lost) throw this.lost;
+    this.requestOffsets(block, block.residual, frame);
   }
 
   /** The frame, once all of it is here. */
@@ -241,13 +245,20 @@ export class FrameStore {
   }
 
   private requestOffsets(block: FrameBlock, residual: Residual, frame: number) {
-    if (this.asked.has(frame) || frame < block.first || frame >= block.first + block.count) return;
+    if (this.lost || this.asked.has(frame) || frame < block.first || frame >= block.first + block.count) return;
     this.asked.add(frame);
     if (!this.atWorker.has(block.first)) {
       this.atWorker.add(block.first);
       this.send({ kind: 'block', block: block.first, points: this.capture.static.rest.length / 3, residual });
     }
     this.send({ kind: 'frame', block: block.first, index: frame - block.first });
+  }
+
+  /** The worker does not answer any more: whoever waits for offsets hears it. */
+  private lose(error: Error) {
+    this.lost = error;
+    this.asked.clear();
+    this.arrived();
   }
 
   private receive({ block, index, offsets }: FromResidualWorker) {
@@ -281,8 +292,11 @@ export class FrameStore {
 
   private send(message: ToResidualWorker) {
     if (!this.worker) {
-      this.worker = moduleWorker(residualWorkerAddress);
-      this.worker.onmessage = ({ data }: MessageEvent<FromResidualWorker>) => this.receive(data);
+      const worker = moduleWorker(residualWorkerAddress, (error) => {
+        if (this.worker === worker) this.lose(error);
+      });
+      worker.onmessage = ({ data }: MessageEvent<FromResidualWorker>) => this.receive(data);
+      this.worker = worker;
     }
     this.worker.postMessage(message);
   }

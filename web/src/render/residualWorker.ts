@@ -1,4 +1,5 @@
 import type { Residual } from '../capture';
+import '../workerStarted';
 import { addResidual } from '../codec/residual';
 
 /** What the page sends: the residual of a block, frames of it to compute, and when it is needed no more. */

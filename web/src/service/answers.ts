@@ -1,13 +1,13 @@
 /** Answers of the service and their bodies: what breaks off is a `ServiceProblem`. */
 
-import { problemBehind } from './problem';
+import { networkProblem } from './problem';
 
 /** The answer to a request, whatever its status. */
 export async function fetched(url: string, init: RequestInit): Promise<Response> {
   try {
     return await fetch(url, init);
   } catch (error) {
-    throw problemBehind(error, init.signal);
+    throw networkProblem(error, init.signal);
   }
 }
 
@@ -15,8 +15,12 @@ export async function bodyOf(response: Response, signal: AbortSignal | undefined
   try {
     return await response.arrayBuffer();
   } catch (error) {
-    throw problemBehind(error, signal);
+    throw networkProblem(error, signal);
   }
+}
+
+export async function textOf(response: Response, signal: AbortSignal | undefined): Promise<string> {
+  return new TextDecoder().decode(await bodyOf(response, signal));
 }
 
 /** The pieces of an answer's body as they arrive; what breaks off is a problem like any other, and an abort of the request's signal has its reason. */
@@ -33,7 +37,7 @@ export async function* piecesOf(
       yield value;
     }
   } catch (error) {
-    throw problemBehind(error, signal);
+    throw networkProblem(error, signal);
   } finally {
     // Whoever stops reading ends the request; of a body that ended this does nothing.
     await reader.cancel().catch(() => undefined);

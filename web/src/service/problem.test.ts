@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { ServiceProblem, isAbort, problemBehind, problemOf, sentenceOf } from './problem';
+import { ServiceProblem, isAbort, networkProblem, problemBehind, problemOf, sentenceOf } from './problem';
 import { piecesOf } from './answers';
 
 function answer(status: number, body: unknown, headers: Record<string, string> = {}): Response {
@@ -42,7 +42,7 @@ test('answers_of_proxies_and_broken_networks_are_sentences_too', async () => {
     new Response('{', { status: 500, headers: { 'Content-Type': 'application/problem+json' } }),
   );
   expect(lying.message).toContain('status 500');
-  expect(problemBehind(new TypeError('Failed to fetch'))).toMatchObject({ word: 'unreachable', passes: true });
+  expect(networkProblem(new TypeError('Failed to fetch'))).toMatchObject({ word: 'unreachable', passes: true });
   expect(sentenceOf(new Error('the file has no points'))).toBe('The file has no points.');
   expect(sentenceOf(new Error('walk.npy has 3 points'))).toBe('walk.npy has 3 points.');
   expect(sentenceOf(new ServiceProblem('unreachable', 0))).toContain('Cannot reach');
@@ -51,11 +51,11 @@ test('answers_of_proxies_and_broken_networks_are_sentences_too', async () => {
 test('an_aborted_request_failed_for_the_reason_of_its_abort_whatever_the_browser_says', async () => {
   const said = new DOMException('BodyStreamBuffer was aborted', 'AbortError');
   const silent = new ServiceProblem('unreachable', 0);
-  expect(problemBehind(said, AbortSignal.abort(silent))).toBe(silent);
+  expect(networkProblem(said, AbortSignal.abort(silent))).toBe(silent);
   const late = AbortSignal.abort(new DOMException('signal timed out', 'TimeoutError'));
-  expect(problemBehind(said, late)).toMatchObject({ word: 'unreachable', passes: true });
-  expect(problemBehind(said, new AbortController().signal)).toBe(said);
-  expect(isAbort(problemBehind(said, AbortSignal.abort()))).toBe(true);
+  expect(networkProblem(said, late)).toMatchObject({ word: 'unreachable', passes: true });
+  expect(networkProblem(said, new AbortController().signal)).toBe(said);
+  expect(isAbort(networkProblem(said, AbortSignal.abort()))).toBe(true);
 
   const left = new AbortController();
   const body = new ReadableStream({
@@ -64,4 +64,14 @@ test('an_aborted_request_failed_for_the_reason_of_its_abort_whatever_the_browser
   const read = piecesOf(new Response(body), left.signal).next();
   left.abort(silent);
   await expect(read).rejects.toBe(silent);
+});
+
+test('what_is_no_network_is_not_taken_for_one', () => {
+  const mistake = new TypeError('x is undefined');
+  expect(problemBehind(mistake)).toBe(mistake);
+  const file = new DOMException('The requested file could not be read', 'NotReadableError');
+  for (const problem of [problemBehind(file), networkProblem(file)]) {
+    expect(problem).not.toBeInstanceOf(ServiceProblem);
+    expect(problem.message).toBe('A file changed or was removed after it was added. Add it again.');
+  }
 });

@@ -1,5 +1,7 @@
 /** What a service refused, or that it could not be reached, as one sentence for people and a word for programs. */
 
+import { CHANGED_FILE } from '../files/frameSource';
+
 /** Problem details as the service sends them (RFC 9457); docs/OPERATIONS.md lists the types. */
 export interface ProblemDetails {
   readonly type?: string;
@@ -15,6 +17,9 @@ const PASSING = new Set([0, 408, 425, 429, 502, 503, 504]);
 
 /** Conflicts that end when the service has done what it is doing. */
 const PASSING_WORDS = new Set(['not-ready', 'idempotency-key-in-use']);
+
+/** How reading files fails that somebody chose and that are not what they were. */
+const FILE_ERRORS = new Set(['NotReadableError', 'NotFoundError']);
 
 /** What to say instead of the service's detail, which is written for those who write programs. */
 const INSTEAD: Readonly<Record<string, string>> = {
@@ -87,11 +92,18 @@ export function problemFrom(details: ProblemDetails, status = details.status ?? 
  *
  * @param signal of the request. Where it was aborted its reason counts: browsers differ in the error that reading a body ends with then.
  */
-export function problemBehind(failure: unknown, signal?: AbortSignal | null): Error {
-  const error: unknown = signal?.aborted ? signal.reason : failure;
-  if (error instanceof ServiceProblem || isAbort(error)) return error as Error;
+export function networkProblem(failure: unknown, signal?: AbortSignal | null): Error {
+  const behind = problemBehind(signal?.aborted ? signal.reason : failure);
   // Browsers report every failure of the network as a TypeError without a stable text.
-  if (error instanceof TypeError || error instanceof DOMException) return new ServiceProblem('unreachable', 0);
+  const isNetwork = behind instanceof TypeError || (behind instanceof DOMException && !isAbort(behind));
+  return isNetwork ? new ServiceProblem('unreachable', 0) : behind;
+}
+
+/** The same of anything else that failed, which says nothing about the network. */
+export function problemBehind(error: unknown): Error {
+  if (error instanceof DOMException && error.name === 'TimeoutError') return new ServiceProblem('unreachable', 0);
+  if (error instanceof DOMException && FILE_ERRORS.has(error.name))
+    return new Error(`A file ${CHANGED_FILE}`, { cause: error });
   return error instanceof Error ? error : new Error(String(error));
 }
 

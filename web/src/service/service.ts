@@ -5,7 +5,7 @@ import { bodyOf, fetched, piecesOf } from './answers';
 import { persistently } from './backoff';
 import { httpSource } from './httpSource';
 import type { FrameResult, Session, SessionPage } from './messages';
-import { ServiceProblem, problemBehind, problemOf } from './problem';
+import { ServiceProblem, networkProblem, problemBehind, problemOf } from './problem';
 import { pageToken } from './token';
 
 export interface Coordinates {
@@ -66,7 +66,7 @@ export class Service {
     try {
       return (await response.json()) as T;
     } catch (error) {
-      throw problemBehind(error, init.signal);
+      throw networkProblem(error, init.signal);
     }
   }
 

@@ -1,6 +1,7 @@
-import { expect, test } from 'vitest';
+import { describe, expect, it, test } from 'vitest';
 import { ObjFrames, pointsOf } from '../files/meshes';
-import { mddFrames, npyFrames, pc2Frames } from '../files/frameFiles';
+import { framesOf, mddFrames, npyFrames, pc2Frames } from '../files/frameFiles';
+import { checkReadable } from '../files/frameSource';
 import { planOf } from './plan';
 import { classify } from '../files/classify';
 
@@ -108,4 +109,17 @@ test('a_plan_names_what_is_missing', async () => {
   await expect(planOf(classify([array, file('rest.obj', 'v 0 0 0')]))).rejects.toThrow('4 points in each frame');
   const plan = await planOf(classify([array, file('rest.obj', 'v 0 0 0\n'.repeat(4))]));
   expect(plan.cage).toBeNull();
+});
+
+describe('a file that is no longer what was added', () => {
+  it.each([
+    ['cannot be read', () => Promise.reject(new DOMException('It could not be read.', 'NotReadableError'))],
+    ['is shorter', () => Promise.resolve(new ArrayBuffer(4))],
+  ])('%s, and is named', async (_, arrayBuffer) => {
+    const file = new File(['v 0 0 0\nv 1 1 1\n'], 'frame_7.obj');
+    file.slice = () => ({ arrayBuffer }) as unknown as Blob;
+    const sentence = 'frame_7.obj: it changed or was removed after it was added. Add it again.';
+    await expect(framesOf([file])).rejects.toThrow(sentence);
+    await expect(checkReadable([null, file])).rejects.toThrow(sentence);
+  });
 });

@@ -1,8 +1,9 @@
 /** Posts frames in batches of a size that suits the connection, two at a time so that the service never waits for the page. */
 
 import type { FrameResult } from '../service/messages';
-import { type ProblemDetails, problemBehind, problemFrom } from '../service/problem';
+import { type ProblemDetails, ServiceProblem, problemBehind, problemFrom } from '../service/problem';
 import type { Service } from '../service/service';
+import { textOf } from '../service/answers';
 import type { FrameSource } from '../files/frameSource';
 
 const AT_ONCE = 2;
@@ -20,6 +21,8 @@ export interface Heard {
 
 export class FrameSender {
   private batchBytes = FIRST_BYTES;
+  /** Less than {@link MAX_BYTES} where something on the way takes no larger bodies. */
+  private mostBytes = MAX_BYTES;
 
   /** @param path of the session's frames */
   constructor(
@@ -35,7 +38,7 @@ export class FrameSender {
     const either = AbortSignal.any([signal, failed.signal]);
     const batches = this.batches(ranges);
     const work = async () => {
-      for (const [first, count] of batches) await this.post(first, count, either);
+      for (const [first, count] of batches) await this.postSplit(first, count, either);
     };
     const failures: Error[] = [];
     const note = (error: unknown) => {
@@ -62,6 +65,20 @@ export class FrameSender {
     return 12 * this.source.points;
   }
 
+  /** Posts frames, fewer at a time where a proxy refuses so many. */
+  private async postSplit(first: number, count: number, signal: AbortSignal): Promise<void> {
+    try {
+      await this.post(first, count, signal);
+    } catch (error) {
+      if (!(error instanceof ServiceProblem && error.status === 413) || count === 1) throw error;
+      const half = Math.ceil(count / 2);
+      this.mostBytes = Math.min(this.mostBytes, half * this.frameBytes);
+      this.batchBytes = Math.min(this.batchBytes, this.mostBytes);
+      await this.postSplit(first, half, signal);
+      await this.postSplit(first + half, count - half, signal);
+    }
+  }
+
   private async post(first: number, count: number, signal: AbortSignal) {
     const body = await this.source.read(first, count);
     const began = performance.now();
@@ -71,7 +88,7 @@ export class FrameSender {
       body: body as Float32Array<ArrayBuffer>,
       signal,
     });
-    for (const line of (await response.text()).split('\n')) {
+    for (const line of (await textOf(response, signal)).split('\n')) {
       if (line === '') continue;
       const result = JSON.parse(line) as FrameResult | ProblemDetails;
       // An error after the first result has no status of its own; it is the last line.
@@ -85,7 +102,7 @@ export class FrameSender {
   private adapt(bytes: number, seconds: number) {
     const wanted = (bytes / Math.max(seconds, 0.01)) * BATCH_SECONDS;
     // Half of the way, so that one slow answer does not change much.
-    const next = (this.batchBytes + Math.min(MAX_BYTES, wanted)) / 2;
+    const next = (this.batchBytes + Math.min(this.mostBytes, wanted)) / 2;
     this.batchBytes = Math.max(this.frameBytes, Math.min(2 * this.batchBytes, next));
   }
 }

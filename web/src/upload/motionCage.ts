@@ -4,7 +4,8 @@ import { pause } from '../service/backoff';
 import type { CageDesign, DesignOptions } from '../service/messages';
 import { ServiceProblem, problemBehind, problemFrom } from '../service/problem';
 import { type Service, patiently } from '../service/service';
-import type { FrameSource } from '../files/frameSource';
+import { checkReadable, type FrameSource } from '../files/frameSource';
+import { bodyOf } from '../service/answers';
 import type { KeptUpload } from './keptUpload';
 
 /** A design looks at no more frames. */
@@ -117,6 +118,7 @@ async function beginDesign(
     signal.throwIfAborted();
     pieces.push(new Blob([(await frames.read(frame, 1)) as Float32Array<ArrayBuffer>]));
   }
+  await checkReadable([rest]);
   const body = new FormData();
   body.append('options', JSON.stringify({ ...options, frames: numbers.length }));
   body.append('rest', rest);
@@ -135,7 +137,7 @@ function answered(signal: AbortSignal): AbortSignal {
 
 async function bestCage(service: Service, id: string, signal: AbortSignal): Promise<File> {
   const response = await service.request(`${pathOf(id)}/cage.obj`, { cache: 'no-store', signal });
-  return new File([await response.blob()], 'cage.obj');
+  return new File([await bodyOf(response, signal)], 'cage.obj');
 }
 
 export function readDesign(service: Service, id: string, signal?: AbortSignal): Promise<CageDesign> {

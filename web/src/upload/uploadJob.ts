@@ -13,6 +13,7 @@ import { ServiceProblem, isAbort, problemBehind, problemFrom, sentenceOf } from 
 import { type Service, sessionPath } from '../service/service';
 import { RateMeter } from '../service/measures';
 import { type Figures, containerFigures } from '../sessions/figures';
+import { checkReadable } from '../files/frameSource';
 import { FrameSender } from './frameSender';
 import { type KeptUpload, newKey } from './keptUpload';
 import { MotionCage } from './motionCage';
@@ -180,6 +181,7 @@ export class UploadJob extends EventTarget {
     const body = new FormData();
     const { key, design } = this.kept.present;
     const cage = this.cage.file ?? this.plan.cage;
+    await checkReadable([this.plan.rest, cage]);
     const designed = cage === null && design !== null ? { cage: { id: design } } : {};
     body.append('options', JSON.stringify({ ...this.request.options, ...designed }));
     body.append('rest', this.plan.rest);

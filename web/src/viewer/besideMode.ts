@@ -153,6 +153,7 @@ export class BesideMode {
     player.onProblem = (problem) => {
       if (problem !== null) this.host.report(`${player.capture.name}: ${problem}`);
     };
+    player.onRecovery = (problem) => this.host.recover(`${player.capture.name}: ${problem}`);
     player.onState = () => this.host.requestUpdate();
     player.controls.onGrab = () => lead.controls.onGrab();
     this.marks = new PointMarks(pane);

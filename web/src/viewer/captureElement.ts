@@ -75,6 +75,11 @@ export abstract class CaptureElement extends LitElement {
     if (problem !== null) this.tell('problem', problem);
   }
 
+  /** Takes a sentence away that still stands there. */
+  recover(problem: string) {
+    if (this.problem === problem) this.report(null);
+  }
+
   /** What is written above the picture, and in file names. */
   get heading(): string {
     return this.name ?? this.player?.capture.name ?? this.opener.name ?? 'Capture';
@@ -163,6 +168,7 @@ export abstract class CaptureElement extends LitElement {
     this.player = player;
     this.wasReady = false;
     player.onProblem = (problem) => this.report(problem);
+    player.onRecovery = (problem) => this.recover(problem);
     player.onState = () => {
       this.requestUpdate();
       this.announceReady(player);

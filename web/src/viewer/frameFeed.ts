@@ -1,5 +1,7 @@
-import type { Capture } from '../capture';
+import type { Capture, FrameBlock } from '../capture';
 import type { FrameData, FrameStore } from '../render/frameStore';
+import { Backoff, pause } from '../service/backoff';
+import { ServiceProblem } from '../service/problem';
 import { sentence } from '../text';
 import { framesAhead, framesAround, type Transport } from './transport';
 
@@ -14,17 +16,29 @@ export interface Blend {
   readonly there: FrameData | null;
 }
 
-/** Frames of a capture for whoever plays it: loads them ahead and leaves out those that do not come. */
+export interface FeedListener {
+  /** What comes next has changed: frames did not come, or may be asked for again. */
+  changed(): void;
+  /** Frames are asked for again by themselves, in one sentence. */
+  troubled(problem: string): void;
+  /** What was said of frames is over: they came. */
+  recovered(problem: string): void;
+}
+
+/** Frames of a capture for whoever plays it: loads them ahead, waits for those that may still come, and leaves out those that do not. */
 export class FrameFeed {
   /** Frames that could not be loaded: they are not asked for again until somebody plays or seeks. */
   readonly holes = new Holes();
-  private isClosed = false;
+  private readonly stop = new AbortController();
+  private readonly backoff = new Backoff();
+  /** Why nothing is asked for just now, or came of it the last time. */
+  private trouble: string | null = null;
+  private isPausing = false;
 
-  /** @param onFailure called when frames did not come */
   constructor(
     private readonly capture: Capture,
     private readonly store: FrameStore,
-    private readonly onFailure: () => void,
+    private readonly listener: FeedListener,
   ) {
     store.onFailure = (frame, error) => this.fail(frame, error);
   }
@@ -38,10 +52,12 @@ export class FrameFeed {
   }
 
   prefetch(transport: Transport) {
+    if (this.isPausing) return;
     this.store.prefetch([...framesAhead(transport, AHEAD)].filter((frame) => !this.holes.at(frame)));
   }
 
   load(frame: number) {
+    if (this.isPausing) return;
     this.store.load(frame).catch((error: unknown) => this.fail(frame, error));
   }
 
@@ -54,16 +70,37 @@ export class FrameFeed {
     return false;
   }
 
+  /** To be called with every block that came, whoever asked for it. */
+  arrived({ first, count }: FrameBlock) {
+    for (const problem of this.holes.fill(first, count)) this.listener.recovered(problem);
+    this.backoff.reset();
+    if (this.trouble !== null) this.listener.recovered(this.trouble);
+    this.trouble = null;
+  }
+
   close() {
-    this.isClosed = true;
+    this.stop.abort();
     this.store.close();
   }
 
   private fail(frame: number, error: unknown) {
-    if (this.isClosed) return;
+    if (this.stop.signal.aborted || this.isPausing) return;
+    if (error instanceof ServiceProblem && error.passes) {
+      void this.pause(error);
+      return;
+    }
     const { first, count } = this.capture.readTogether?.(frame) ?? { first: frame, count: 1 };
     this.holes.add({ first, count, problem: sentence(error) });
-    this.onFailure();
+    this.listener.changed();
+  }
+
+  private async pause({ message, retryAfter }: ServiceProblem) {
+    this.isPausing = true;
+    if (this.trouble !== message) this.listener.troubled(message);
+    this.trouble = message;
+    await pause(this.backoff.next(retryAfter), this.stop.signal).catch(() => undefined);
+    this.isPausing = false;
+    if (!this.stop.signal.aborted) this.listener.changed();
   }
 
   /** Frames to blend; the one before a hole stands until it is over. */
@@ -93,6 +130,15 @@ export class Holes {
 
   add(hole: Hole) {
     if (!this.at(hole.first)) this.holes.set(hole.first, hole);
+  }
+
+  /** Forgets holes whose frames came after all; what was said of them. */
+  fill(first: number, count: number): string[] {
+    const filled = [...this.holes.values()].filter(
+      (hole) => hole.first < first + count && first < hole.first + hole.count,
+    );
+    for (const hole of filled) this.holes.delete(hole.first);
+    return filled.filter((hole) => this.told.delete(hole)).map(({ problem }) => problem);
   }
 
   at(frame: number): Hole | null {

@@ -19,4 +19,5 @@ export interface ViewerHost extends HTMLElement {
   openFiles(files: readonly Dropped[], beside?: boolean): Promise<void>;
   fail(error: unknown): void;
   report(problem: string): void;
+  recover(problem: string): void;
 }

@@ -1,13 +1,20 @@
-import { html, type TemplateResult } from 'lit';
+import { html, nothing, type TemplateResult } from 'lit';
 import type { Dropped } from '../files/classify';
 import { pickFiles } from '../files/drop';
 import { glyphs } from '../style/glyphs';
 import { iconButton } from '../style/parts';
 
+/** Loads the page anew, where a sentence says that this helps. */
+function reloadButton(problem: string) {
+  return problem.endsWith('Reload the page.')
+    ? html`<button @click=${() => location.reload()}>Reload</button>`
+    : nothing;
+}
+
 export function notice(problem: string, close: () => void): TemplateResult {
   return html`<div class="toast glass row" role="alert">
     <span>${problem}</span>
-    ${iconButton('close', 'Dismiss', close)}
+    ${reloadButton(problem)} ${iconButton('close', 'Dismiss', close)}
   </div>`;
 }
 
@@ -66,7 +73,8 @@ export function emptyState(
     ${
       failure === null
         ? html`<p>A .cager file plays in this page and is not uploaded.</p>`
-        : html`<p class="notice" role="alert">${failure}</p>`
+        : html`<p class="notice" role="alert">${failure}</p>
+            ${reloadButton(failure)}`
     }
     <button class="primary" @click=${() => pickFiles(choose, { accept: '.cager,.json' })}>
       ${glyphs.file} Choose file

@@ -27,6 +27,8 @@ export interface PlaybackListener {
   changed(): void;
   /** Something went wrong, in one sentence; null when it is over. */
   problem(problem: string | null): void;
+  /** What this sentence said is over. */
+  recovered(problem: string): void;
 }
 
 const ORIGINALS_AHEAD = 3;
@@ -62,8 +64,15 @@ export class Playback {
     this.store = new FrameStore(capture);
     this.store.onArrival = () => listener.wake();
     this.store.onReplaced = () => this.replaceFrames();
-    this.store.onBlock = (block) => listener.arrived(block);
-    this.feed = new FrameFeed(capture, this.store, () => listener.wake());
+    this.feed = new FrameFeed(capture, this.store, {
+      changed: () => listener.wake(),
+      troubled: (problem) => listener.problem(problem),
+      recovered: (problem) => listener.recovered(problem),
+    });
+    this.store.onBlock = (block) => {
+      this.feed.arrived(block);
+      listener.arrived(block);
+    };
     this.heatMap = new HeatMap(stage, this.store, motion);
     this.heatMap.onChange = () => {
       listener.changed();

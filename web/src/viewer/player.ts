@@ -34,6 +34,8 @@ export class Player {
   onState: () => void = () => undefined;
   /** Called when something went wrong, with one sentence; with null when it is over. */
   onProblem: (problem: string | null) => void = () => undefined;
+  /** Called when what a sentence said is over. */
+  onRecovery: (problem: string) => void = () => undefined;
   readonly stage: Stage;
   readonly controls: CameraControls;
   readonly resolution: Resolution;
@@ -86,6 +88,7 @@ export class Player {
       refresh: () => this.refresh(),
       changed: () => this.onState(),
       problem: (problem) => this.onProblem(problem),
+      recovered: (problem) => this.onRecovery(problem),
     });
     this.heatMap = this.playback.heatMap;
     this.comparison = this.playback.comparison;

@@ -1,0 +1,5 @@
+/** Imported by every worker: tells the page that its script has come. */
+
+import { STARTED } from './moduleWorker';
+
+self.postMessage(STARTED);
