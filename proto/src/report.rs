@@ -357,6 +357,25 @@ pub struct Errors {
     pub per_frame: Vec<FrameError>,
 }
 
+impl Errors {
+    /// Makes the errors of these frames, and with them those of all together, not measured.
+    pub fn forget(&mut self, frames: &[bool]) {
+        let unknown = f64::NAN;
+        for (error, _) in self.per_frame.iter_mut().zip(frames).filter(|(_, forgotten)| **forgotten) {
+            *error = FrameError { l2: unknown, linf: unknown };
+        }
+        for all in [
+            &mut self.l2_mean,
+            &mut self.l2_max,
+            &mut self.linf_mean,
+            &mut self.linf_max,
+            &mut self.kg_percent,
+        ] {
+            *all = unknown;
+        }
+    }
+}
+
 /// The largest error of a capture.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
 pub struct WorstError {

@@ -1,6 +1,7 @@
 //! Which sections a container has: the table of contents, or the headers of a cut file one after another; and whether they are as many and as large as the header says.
 
 use super::codec::{self, CODED};
+use super::edits::MAX_LAYERS;
 use super::reader::ContainerReader;
 use super::section::{Entry, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
 use super::units::UNITS_BYTES;
@@ -102,6 +103,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         if 8 * self.frames as u64 > SectionHeader::most_raw_bytes(tag::ERRORS, codec::RAW, self.file_bytes) {
             return Err(Error::corrupt(0, "the file counts more frames than it can hold"));
         }
+        self.check_layers(whole)?;
         let most_faces = usize::from(self.header.rest_faces > 0);
         if most_faces == 0 && self.header.rest_corners > 0 {
             return Err(Error::corrupt(0, "the header counts corners of a model without faces".to_owned()));
@@ -140,13 +142,31 @@ impl<R: Read + Seek> ContainerReader<R> {
             };
             let width_fits = match s.tag {
                 tag::REST_POINTS | tag::CAGE_VERTICES => s.width == 4 || s.width == 8,
-                tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS => s.width == 4,
+                tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES | tag::ERRORS | tag::EDIT => s.width == 4,
                 tag::ORIGIN | tag::NUMBERS => s.width == 8,
                 tag::UNITS | tag::REST_COLORS | tag::ELEMENTS | tag::RESIDUAL => s.width == 1,
                 _ => s.width > 0,
             };
             if expected != Some(s.raw_bytes) || !width_fits {
                 return Err(Error::corrupt(entry.offset, "a section does not have the size that the header gives it"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Layers of edits are few, small, and about frames that are there; of a cut file, those before its end.
+    fn check_layers(&self, whole: bool) -> Result<(), Error> {
+        let (mut count, mut raw_bytes) = (0, 0_u64);
+        for entry in self.sections_of(tag::EDIT) {
+            let header = entry.header;
+            let end = u64::from(header.first) + u64::from(header.count);
+            if header.count == 0 || whole && end > self.frames as u64 {
+                return Err(Error::corrupt(entry.offset, "a layer of edits is about frames that are not there"));
+            }
+            (count, raw_bytes) = (count + 1, raw_bytes.saturating_add(header.raw_bytes));
+            let most = SectionHeader::most_raw_bytes(tag::EDIT, codec::RAW, self.file_bytes);
+            if count > MAX_LAYERS || raw_bytes > most {
+                return Err(Error::corrupt(entry.offset, "the file has more layers of edits than it can hold"));
             }
         }
         Ok(())

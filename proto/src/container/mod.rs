@@ -5,16 +5,20 @@
 mod codec;
 mod coded;
 mod contents;
+mod edits;
 mod error;
 mod groups;
 mod reader;
+mod rewrite;
 mod section;
 mod units;
 mod writer;
 
 pub use coded::most_residual_numbers;
+pub use edits::{EditLayer, LayerBuilder, MAX_LAYER_NAME, MAX_LAYERS};
 pub use error::Error;
 pub use reader::{ContainerReader, SectionInfo};
+pub use rewrite::LayerSource;
 pub use writer::{ContainerWriter, colors_bytes};
 
 use cager_geometry::mesh::Point;
@@ -111,7 +115,8 @@ pub(crate) mod tag {
     pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
     pub(crate) const REPORT: [u8; 4] = *b"summ";
     pub(crate) const RESIDUAL: [u8; 4] = *b"resi";
-    pub(crate) const KNOWN: [[u8; 4]; 15] = [
+    pub(crate) const EDIT: [u8; 4] = *b"EDIT";
+    pub(crate) const KNOWN: [[u8; 4]; 16] = [
         HEADER,
         ORIGIN,
         UNITS,
@@ -127,5 +132,6 @@ pub(crate) mod tag {
         NUMBERS,
         REPORT,
         RESIDUAL,
+        EDIT,
     ];
 }

@@ -1,6 +1,7 @@
 //! Reading a container: validated before use, with random access to frames.
 
 use super::codec::{self, CODED};
+use super::edits::Layers;
 use super::groups::Groups;
 use super::section::{self, Entry, FOOTER_BYTES, HEADER_BYTES, PRELUDE_BYTES, SectionHeader};
 use super::{Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag, units};
@@ -40,6 +41,7 @@ pub struct ContainerReader<R: Read + Seek> {
     /// The chunk decoded last, by its offset.
     cached: Option<(u64, Vec<u8>)>,
     pub(super) groups: Groups,
+    pub(super) layers: Layers,
     /// Most bytes that the coordinates which coded cages need may take.
     pub(super) coordinates_bytes: u64,
     /// The last chunk that [`Self::is_intact`] could not read.
@@ -76,6 +78,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// See [`Error`]: a file without a whole model and cage.
     pub fn open_cut(input: R) -> Result<Self, Error> {
         let mut reader = Self::begin(input)?;
+        reader.layers.passes_over_damage = true;
         reader.scan()?;
         reader.read_header()?;
         reader.check_sizes(false)?;
@@ -88,6 +91,11 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// Whether what follows the last frame is missing, as of a file that was cut: frames after it may have been there.
     pub fn lacks_end(&self) -> bool {
         self.entry(tag::ERRORS).is_err()
+    }
+
+    /// Whether the file was read from its beginning on, as far as it is there: layers of edits at its end may be missing.
+    pub fn was_cut(&self) -> bool {
+        self.layers.passes_over_damage
     }
 
     /// Whether a frame can be read, with its residual where `residual` asks for it.
@@ -124,6 +132,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             rest: None,
             cached: None,
             groups: Groups::default(),
+            layers: Layers::default(),
             coordinates_bytes: COORDINATES_BYTES,
             damaged_chunk: None,
         })
@@ -243,11 +252,20 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.chunks.get(chunk.checked_sub(1)?).filter(|_| frame < self.frames).copied()
     }
 
-    /// The stored rows of one frame, rows × 3. In any order; consecutive frames are fastest.
+    /// The rows of one frame, rows × 3, with the [`layers`](Self::layers) of edits that are on. In any order; consecutive frames are fastest.
     ///
     /// # Errors
     /// A frame that does not exist; damage.
     pub fn read_frame(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), Error> {
+        self.read_frame_unedited(frame, out)?;
+        self.apply_layers(frame, out)
+    }
+
+    /// The same without layers of edits.
+    ///
+    /// # Errors
+    /// As [`Self::read_frame`].
+    pub fn read_frame_unedited(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), Error> {
         let entry = self.chunk_of(frame)?;
         if self.cached.as_ref().is_none_or(|(cached, _)| *cached != entry.offset) {
             self.cached = None;
@@ -265,7 +283,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(())
     }
 
-    /// Errors of all frames.
+    /// Errors of all frames, as they were measured before any edit; [`Self::report`] has those of the frames as they are.
     ///
     /// # Errors
     /// Damage; a file that was cut before them.
@@ -315,6 +333,11 @@ impl<R: Read + Seek> ContainerReader<R> {
             report.frame_numbers = Vec::new();
         }
         report.error.per_frame = self.errors()?;
+        report.hold_errors_to_bound();
+        let edited = self.edited_frames()?;
+        if edited.contains(&true) {
+            report.error.forget(&edited);
+        }
         report.error.worst = WorstError::of_frames(&report.error.per_frame, report.diagonal);
         report.bytes.capture = self.header.capture_bytes(self.frames);
         report.set_output(self.file_bytes);
@@ -338,6 +361,7 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// The first damage found.
     pub fn verify(&mut self) -> Result<(), Error> {
         self.cage()?;
+        self.layers()?;
         self.colors()?;
         self.elements()?;
         self.report()?;

@@ -25,6 +25,10 @@ pub(crate) struct SectionHeader {
 }
 
 impl SectionHeader {
+    /// What all layers of edits may decode to together: so much more than so many times the file's length.
+    pub(crate) const LAYERS_TIMES: u64 = 16;
+    pub(crate) const LAYERS_MORE: u64 = 8 << 20;
+
     pub(crate) fn to_bytes(self) -> [u8; HEADER_BYTES] {
         let mut out = [0; HEADER_BYTES];
         out[0..4].copy_from_slice(&self.tag);
@@ -73,6 +77,7 @@ impl SectionHeader {
             _ if codec::is_coded(codec) => (16, 2 << 20),
             // Two bytes of JSON may become an empty text of 24 bytes.
             tag::REPORT => (16, 4 << 20),
+            tag::EDIT => (Self::LAYERS_TIMES, Self::LAYERS_MORE),
             _ => (48, 12 << 20),
         };
         file_bytes.saturating_mul(times).saturating_add(more)

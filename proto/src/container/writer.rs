@@ -1,7 +1,6 @@
 //! Writing a container, frame by frame.
 
 use super::codec::{self, CODED, CODED_STATIC, DIFFERENCE, PLANES, RAW};
-use super::reader::ContainerReader;
 use super::section::{self, HEADER_BYTES, SectionHeader};
 use super::{CHUNK_FRAMES, Error, Header, MAX_HEADER_BYTES, counted_from_zero, tag, units};
 use crate::report::Report;
@@ -9,7 +8,7 @@ use crate::wire;
 use cager_codec::{CodedMesh, encode_errors};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::units::Units;
-use std::io::{Read, Seek, Write};
+use std::io::Write;
 
 /// Writes one container to anything that takes bytes. The same input gives the same bytes.
 ///
@@ -100,7 +99,7 @@ impl<W: Write> ContainerWriter<W> {
         Ok(writer)
     }
 
-    fn empty(out: W, header: Header) -> Self {
+    pub(super) fn empty(out: W, header: Header) -> Self {
         Self {
             out,
             offset: 0,
@@ -111,32 +110,6 @@ impl<W: Write> ContainerWriter<W> {
             is_coded: false,
             contents: Vec::new(),
         }
-    }
-
-    /// Writes a container again with another origin and other units; everything else keeps its bytes.
-    ///
-    /// # Errors
-    /// Damage; an output that refuses.
-    pub fn copy_placed<R: Read + Seek>(
-        from: &mut ContainerReader<R>,
-        (origin, units): (Option<Point>, Units),
-        out: W,
-    ) -> Result<W, Error> {
-        let mut writer = Self::empty(out, Header { origin, units, ..from.header().clone() });
-        writer.put(&section::prelude())?;
-        for k in 0..from.entries.len() {
-            let entry = from.entries[k];
-            if [tag::ORIGIN, tag::UNITS].contains(&entry.header.tag) {
-                continue;
-            }
-            let payload = from.payload(entry)?;
-            let SectionHeader { tag, codec, width, first, count, raw_bytes, .. } = entry.header;
-            writer.payload((tag, codec, width), &payload, raw_bytes as usize, (first, count))?;
-            if tag == tag::HEADER {
-                writer.write_placement()?;
-            }
-        }
-        writer.end()
     }
 
     /// The header, with the counts of the meshes.
@@ -212,7 +185,13 @@ impl<W: Write> ContainerWriter<W> {
     /// # Errors
     /// Numbers that readers would refuse; an output that refuses.
     pub fn add_frame_numbers(&mut self, numbers: &[f64]) -> Result<(), Error> {
-        if numbers.len() != self.errors.len() / 8 || !super::are_frame_numbers(numbers) {
+        // After the frames, where they are put into files that are there, too.
+        self.flush_chunk()?;
+        self.number(numbers, self.errors.len() / 8)
+    }
+
+    pub(super) fn number(&mut self, numbers: &[f64], frames: usize) -> Result<(), Error> {
+        if numbers.len() != frames || !super::are_frame_numbers(numbers) {
             return Err(Error::Invalid("frame numbers that are not one for each frame, ascending".to_owned()));
         }
         if counted_from_zero(numbers) {
@@ -230,15 +209,18 @@ impl<W: Write> ContainerWriter<W> {
     pub fn finish(mut self, report: Option<&Report>) -> Result<W, Error> {
         self.flush_chunk()?;
         self.write_errors()?;
-        if let Some(report) = report {
-            let text = report.stored().map_err(|e| Error::Invalid(e.to_string()))?;
-            self.section(tag::REPORT, PLANES, 1, 0, &text)?;
-        }
+        self.write_report(report)?;
         self.end()
     }
 
+    pub(super) fn write_report(&mut self, report: Option<&Report>) -> Result<(), Error> {
+        let Some(report) = report else { return Ok(()) };
+        let text = report.stored().map_err(|e| Error::Invalid(e.to_string()))?;
+        self.section(tag::REPORT, PLANES, 1, 0, &text)
+    }
+
     /// Writes the table of contents and the footer.
-    fn end(mut self) -> Result<W, Error> {
+    pub(super) fn end(mut self) -> Result<W, Error> {
         let contents_offset = self.offset;
         let contents = std::mem::take(&mut self.contents);
         self.section(tag::CONTENTS, RAW, 1, 0, &contents)?;
@@ -248,7 +230,7 @@ impl<W: Write> ContainerWriter<W> {
     }
 
     /// Writes what positions mean and where they are, as far as there is anything to say.
-    fn write_placement(&mut self) -> Result<(), Error> {
+    pub(super) fn write_placement(&mut self) -> Result<(), Error> {
         if let Some(origin) = self.header.origin {
             let raw: Vec<u8> = origin.iter().flat_map(|x| x.to_le_bytes()).collect();
             self.section(tag::ORIGIN, RAW, 8, 0, &raw)?;
@@ -295,11 +277,18 @@ impl<W: Write> ContainerWriter<W> {
         self.section(tag, PLANES, width, 0, &raw)
     }
 
-    fn section(&mut self, tag: [u8; 4], codec: u8, width: usize, stride: usize, raw: &[u8]) -> Result<(), Error> {
+    pub(super) fn section(
+        &mut self,
+        tag: [u8; 4],
+        codec: u8,
+        width: usize,
+        stride: usize,
+        raw: &[u8],
+    ) -> Result<(), Error> {
         self.chunk(tag, codec, width, stride, raw, (0, 0))
     }
 
-    fn chunk(
+    pub(super) fn chunk(
         &mut self,
         tag: [u8; 4],
         codec: u8,
@@ -327,7 +316,7 @@ impl<W: Write> ContainerWriter<W> {
         self.payload((tag, codec, width), payload, raw_bytes, frames)
     }
 
-    fn payload(
+    pub(super) fn payload(
         &mut self,
         (tag, codec, width): ([u8; 4], u8, u8),
         payload: &[u8],
@@ -351,7 +340,7 @@ impl<W: Write> ContainerWriter<W> {
         self.put(payload)
     }
 
-    fn put(&mut self, bytes: &[u8]) -> Result<(), Error> {
+    pub(super) fn put(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.out.write_all(bytes)?;
         self.offset += bytes.len() as u64;
         Ok(())
