@@ -115,6 +115,8 @@ export interface LiveStatus {
   readonly latencySeconds: number | null;
   /** The first frame that later ones wait for, as it has not come to the service; null where none is missing. */
   readonly missingFrame: number | null;
+  /** How many frames are compressed, from the first on; null where frames are kept as they were solved. */
+  readonly codedFrames: number | null;
   /** Frames that are solved and not here yet. */
   readonly behindFrames: number;
   /** Bits and frames that arrived in the last seconds, per second. */
@@ -165,6 +167,11 @@ export interface Capture {
   container?(signal?: AbortSignal): Promise<Source>;
   /** Positions of some cages, decoded by the service: for each `rowsPerFrame × 3` floats of the body, points × 3. */
   decode?(cages: Blob, signal?: AbortSignal): Promise<Response>;
+  /** What a service saves the capture as: the programs by the endings of files for them, its container beside these. */
+  downloads?: {
+    readonly formats: Readonly<Record<string, string>>;
+    readonly save: (ending: string, name: string, onProgress: (part: number) => void) => Promise<void>;
+  };
   /** How frames arrive, of a session that was running when it was opened. */
   readonly live?: LiveStatus | null;
   /** The frames that are read together with this one, and fail together with it; the frame alone where that is not known. */

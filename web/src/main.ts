@@ -1,12 +1,14 @@
 import { fragmentOf, keepView, parseFragment, type Route } from './routes';
 import { page, tokens } from './style/tokens';
 import { isContainer, type Dropped } from './files/classify';
-import { pickedFiles } from './files/drop';
+import { droppedFiles, pickedFiles } from './files/drop';
 
 document.adoptedStyleSheets = [tokens.styleSheet!, page.styleSheet!];
 
 /** What was dropped on the page last, for the route `#/file`. */
 let dropped: readonly Dropped[] = [];
+/** What is to be uploaded, for the route `#/upload`. */
+let added: readonly Dropped[] = [];
 /** The route that is shown: a change of the view alone does not load it anew. */
 let shown = '';
 
@@ -23,9 +25,13 @@ async function elementOf(route: Route, view: string): Promise<HTMLElement> {
       else [element.kind, element.job] = [route.page, route.id];
       return element;
     }
-    case 'upload':
-      await import('./upload/cagerUpload');
-      return document.createElement('cager-upload');
+    case 'upload': {
+      const { Upload } = await import('./upload/cagerUpload');
+      const element = new Upload();
+      if (added.length > 0) void element.take(added);
+      added = [];
+      return element;
+    }
     case 'sessions':
       await import('./sessions/cagerSessions');
       return document.createElement('cager-sessions');
@@ -41,6 +47,7 @@ async function show(anew = false) {
     return;
   }
   shown = wanted;
+  document.title = route.page === 'upload' ? 'Upload – CageR' : 'CageR';
   try {
     const element = await elementOf(route, view.toString());
     if (shown === wanted) document.body.replaceChildren(element);
@@ -56,12 +63,21 @@ async function show(anew = false) {
   }
 }
 
-/** A capture that is dropped anywhere plays; other files are for the page that is shown. */
+/** A capture that is dropped anywhere plays; other files are for the page that is shown, those on the list to be uploaded. */
 function dropCapture(event: DragEvent) {
-  const files = pickedFiles(event.dataTransfer?.files ?? []);
-  if (event.defaultPrevented || files.length === 0) return;
+  const { dataTransfer } = event;
+  const files = pickedFiles(dataTransfer?.files ?? []);
+  if (event.defaultPrevented || !dataTransfer || files.length === 0) return;
   event.preventDefault();
   if (files.some(isContainer)) openFiles(files);
+  else if (parseFragment(location.hash).route.page === 'sessions') void droppedFiles(dataTransfer).then(upload);
+}
+
+/** Goes to the page of uploads with files. */
+function upload(files: readonly Dropped[]) {
+  added = files;
+  history.pushState(null, '', fragmentOf({ page: 'upload' }));
+  void show(true);
 }
 
 /** Goes to the page of files; what was shown is closed. */
@@ -85,6 +101,7 @@ addEventListener('hashchange', () => void show());
 addEventListener('dragover', (event) => event.preventDefault());
 addEventListener('drop', dropCapture);
 document.addEventListener('filechosen', (event) => chooseFiles(event as CustomEvent<readonly Dropped[]>));
+document.addEventListener('uploadwanted', (event) => upload((event as CustomEvent<readonly Dropped[]>).detail));
 document.addEventListener('viewchange', (event) => {
   const { page } = parseFragment(location.hash).route;
   if (page !== 'sessions' && page !== 'upload') keepView(new URLSearchParams((event as CustomEvent<string>).detail));

@@ -96,7 +96,7 @@ export function withoutErrors(errors: FrameErrors, layers: readonly EditLayer[])
 }
 
 /**
- * The layer that leads from some cages to others, both of the frames from `first` on, vertices x y z each; null where they are the same but for rounding. It has the
+ * The layer that leads from some cages to others, both of the frames from `first` on, vertices x y z each, more of them before or not; null where they are the same but for rounding. It has the
  * frames from the first to the last that differ, and the vertices that do.
  *
  * @throws Error with one sentence for a person where a difference does not fit into single precision
@@ -109,8 +109,8 @@ export function layerBetween(
 ): EditLayer | null {
   const changes = before.map((rows, k) => {
     const found = new Map<number, number>();
-    rows.forEach((x, at) => {
-      const difference = differenceOf(x, after[k][at]);
+    after[k].forEach((x, at) => {
+      const difference = differenceOf(rows[at], x);
       if (!Number.isFinite(difference))
         throw new Error(`A vertex of frame ${first + k} is too far away to be stored; move it closer.`);
       if (difference !== 0) found.set(at, difference);

@@ -14,6 +14,11 @@ export function isContainer({ path }: Dropped): boolean {
   return /\.cager$/i.test(path);
 }
 
+/** Whether there is something among files that an upload takes. */
+export function isUploadable(files: readonly Dropped[]): boolean {
+  return classify(files).some(({ role }) => role !== 'unused');
+}
+
 export type Role = 'rest' | 'cage' | 'frames' | 'unused';
 
 /** A file, or a row of mesh files that are one frame each, and what it is taken for. */

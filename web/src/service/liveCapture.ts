@@ -56,6 +56,7 @@ export class LiveCapture implements SessionCapture {
   private lastProblem: string | null = null;
   private late = 0;
   private missingFrame: number | null = null;
+  private coded = 0;
   /** What the errors were fetched for, and when: coding a group changes them, and frames passed over bring none. */
   private errorsFetched = { coded: -1, skipped: -1, at: -Infinity };
 
@@ -74,12 +75,14 @@ export class LiveCapture implements SessionCapture {
     this.follower = new LiveFollower(service, session.id, part.rowsPerFrame, this.frames, {
       record: (record) => {
         this.store.put(record.frame, record.rows);
-        this.measured.putRecord(record);
+        // Those of frames that are still to be coded are not those that they end with.
+        if (!this.groups) this.measured.putRecord(record);
         this.frames = record.frame + 1;
       },
       skipped: (end) => (this.frames = end),
       looked: (look) => {
         this.missingFrame = look.frames.missing[0]?.[0] ?? null;
+        this.coded = look.coding?.frames ?? 0;
         this.groups?.looked(look);
         void this.fetchErrors(look);
       },
@@ -116,6 +119,7 @@ export class LiveCapture implements SessionCapture {
       retryAt: isOver ? null : follower.retryAt,
       latencySeconds: follower.latency.seconds,
       missingFrame: this.missingFrame,
+      codedFrames: this.groups && this.coded,
       behindFrames: isOver ? 0 : follower.behind,
       bitsPerSecond: 8 * follower.bytes.perSecond(),
       framesPerSecond: follower.frames.perSecond(),
@@ -251,7 +255,7 @@ export class LiveCapture implements SessionCapture {
     this.errorsFetched = { coded, skipped, at: now };
     try {
       for (const { frame, l2, linf } of await this.service.errors(this.id, this.closing.signal)) {
-        this.measured.put(frame, l2, linf);
+        if (!session.coding || frame < coded) this.measured.put(frame, l2, linf);
       }
       this.changed();
     } catch (error) {

@@ -88,7 +88,9 @@ function isOver(session: Session): boolean {
 }
 
 async function frameFigures(service: Service, session: Session): Promise<Figures> {
-  const frames = await service.errors(session.id);
+  // Of frames that are to be compressed nobody knows the errors that they end with.
+  const final = session.coding?.frames ?? Infinity;
+  const frames = (await service.errors(session.id)).filter(({ frame }) => frame < final);
   let [sum, measured, worst] = [0, 0, 0];
   for (const { l2, linf } of frames) {
     if (l2 === null || linf === null) continue;

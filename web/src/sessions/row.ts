@@ -73,9 +73,7 @@ export function row(row: Row): TemplateResult {
         <td role="cell" class="number" data-label="Mean error">
           ${figures ? text.percent(figures.meanL2, 2) : nothing}
         </td>
-        <td role="cell" class="number" data-label="Worst error">
-          ${figures ? text.percent(figures.worst, 2) : nothing}
-        </td>
+        <td role="cell" class="number" data-label="Worst error">${figures ? worstError(session, figures) : nothing}</td>
         <td role="cell" class="number" data-label="Size">${sizes(session, figures)}</td>
         <td role="cell" class="number">
           <time
@@ -143,6 +141,11 @@ function frames(session: Session) {
     ${solved === known ? nothing : html`<progress aria-label="Frames solved" max=${known} value=${solved}></progress>`}
     ${remarks.length > 0 ? html`<div class="fine">${remarks.join(' · ')}</div>` : nothing}
   `;
+}
+
+function worstError({ coding, state }: Session, { worst }: Figures) {
+  if (worst !== null || !coding || state === 'completed' || state === 'failed') return text.percent(worst, 2);
+  return html`<span class="muted" title="Errors are known when frames are compressed">compressing</span>`;
 }
 
 function sizes(session: Session, figures: Figures | null) {

@@ -208,7 +208,8 @@ export class Upload extends LitElement {
     void this.take(droppedFiles(event.dataTransfer));
   };
 
-  private async take(files: Dropped[] | Promise<Dropped[]>) {
+  /** Takes files beside those that were taken before. */
+  async take(files: readonly Dropped[] | Promise<readonly Dropped[]>) {
     try {
       const taken = await files;
       const paths = new Set(taken.map(({ path }) => path));

@@ -66,7 +66,7 @@ export function jobView(job: UploadJob, furthest: Stage, discard: () => void, st
             </p>`
           : nothing
       }
-      ${errorChart(job.measured, session?.coding && !job.isMeasuredAsCoded ? ' before fine detail is added' : '')}
+      ${errorChart(job.measured, session?.coding !== undefined && !job.isMeasuredAsCoded)}
       <div class="buttons">
         ${
           canWatch
@@ -123,8 +123,8 @@ function containerFacts(figures: Figures | null) {
   `;
 }
 
-/** @param when which errors these are, where it is not all that is to be known */
-export function errorChart(measured: Measured, when = '') {
+/** @param isPreliminary whether the errors are those before frames are compressed: how large they are says nothing about the file */
+export function errorChart(measured: Measured, isPreliminary = false) {
   const top = measured.linf.reduce((most, value) => (value > most ? value : most), 0);
   if (top === 0) return html``;
   const series = (values: Float32Array, color: string): Series => ({
@@ -134,17 +134,16 @@ export function errorChart(measured: Measured, when = '') {
     points: thinned(values, (frame) => (frame + 0.5) / values.length),
   });
   const lines = [series(measured.linf, 'cage'), series(measured.l2, 'accent')];
+  const scale = isPreliminary
+    ? 'before compression, which makes them smaller'
+    : `up to ${percent(top, 2)} of the diagonal`;
   return html`
     <figure class="errors">
       <figcaption class="row fine">
         <span class="key linf"></span>Worst point <span class="key"></span>RMS of all points
-        <span class="scale figures">up to ${percent(top, 2)} of the diagonal${when}</span>
+        <span class="scale figures">${scale}</span>
       </figcaption>
-      <div
-        class="area"
-        role="img"
-        aria-label="Errors of the frames: worst point ${percent(top, 2)} of the diagonal${when}"
-      >
+      <div class="area" role="img" aria-label="Errors of the frames: ${scale}">
         ${plot({ x: axisOf([0, 1], 0), y: axisOf([0, 1.05 * top], 0), series: lines })}
       </div>
     </figure>

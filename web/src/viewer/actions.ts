@@ -5,7 +5,6 @@ import { numberAt, numberText } from './frameNumbers';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
 import { save } from '../save';
-import { recordTurntable } from './recording';
 import type { Action } from './shortcuts';
 import { sentence } from '../text';
 import { ranged, REPEATS, sought, spedUp, started, stepped, worstFrame, type Transport } from './transport';
@@ -36,7 +35,7 @@ export function perform(action: Action, viewer: CagerViewer) {
     worst: () => goToWorst(player),
     frame: () => player.frameAll(),
     home: () => player.goHome(),
-    follow: () => (player.isFollowing = !player.isFollowing),
+    follow: () => player.chooseFollowing(!player.isFollowing),
     turnLeft: () => turn(-TURN, 0),
     turnRight: () => turn(TURN, 0),
     turnUp: () => turn(0, TURN),
@@ -57,6 +56,7 @@ export function perform(action: Action, viewer: CagerViewer) {
     turntable: () => void toggleRecording(viewer, player),
     fullscreen: () => void toggleFullscreen(viewer),
     figures: () => viewer.togglePanel('figures'),
+    export: () => viewer.togglePanel('export'),
     views: () => viewer.togglePanel('views'),
     link: () => void copyLink(viewer),
     edit: () => void viewer.toggleEditing(),
@@ -130,6 +130,8 @@ async function toggleRecording(viewer: CagerViewer, player: Player) {
       player.progress = { doing: 'Recording turntable', fraction };
       viewer.requestUpdate();
     };
+    // What writes videos is loaded when it is wanted.
+    const { recordTurntable } = await import('./recording');
     const { video, ending } = await recordTurntable(player, recording.signal, showProgress);
     save(video, `${stem(viewer)}.${ending}`);
   } catch (error) {

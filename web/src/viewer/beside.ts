@@ -7,7 +7,7 @@ import type { Transport } from './transport';
 /** A number this far from that of a frame is its number. */
 const SAME = 1e-6;
 
-/** A capture beside another one: at the frame of the same number, from the same side, with the same layers and colours. */
+/** A capture beside another one: at the frame of the same number, from the same side, with the same layers and colours; which axis points up is its own. */
 export class Beside implements Companion {
   readonly player: Player;
   private aligned: { readonly of: FrameErrors; readonly frames: number; readonly errors: FrameErrors } | null = null;
@@ -60,7 +60,6 @@ export class Beside implements Companion {
     const { lead, player } = this;
     if (player.controls.destination !== lead.controls.destination) player.controls.go(lead.controls.destination, true);
     if (player.layers !== lead.layers) player.layers = lead.layers;
-    if (player.up !== lead.up) player.setUp(lead.up);
     const { kind, range } = lead.heatMap;
     if (player.heatMap.kind !== kind || player.heatMap.range !== range) player.setHeat(kind, range);
     player.follow(lead, { ...this.transportAt(lead.transport), playing: false });

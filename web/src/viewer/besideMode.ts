@@ -1,5 +1,5 @@
 import { html, nothing } from 'lit';
-import type { Capture, FrameErrors } from '../capture';
+import type { Capture, FrameErrors, UpAxis } from '../capture';
 import type { Dropped } from '../files/classify';
 import { Beside } from './beside';
 import { numberAt, numberText } from './frameNumbers';
@@ -10,6 +10,8 @@ import { PointMarks } from './pointMarks';
 import { percent, sentence } from '../text';
 import { boundsOf } from '../coordinates/topology';
 import type { ViewerHost } from './host';
+import { upButton } from './toolbar';
+import { usualUp } from './upright';
 
 /** A second capture in the viewer, beside the first one: its picture, its name and its errors. */
 export class BesideMode {
@@ -46,7 +48,7 @@ export class BesideMode {
     this.unload();
     this.closeFile();
     if (!this.host.beside) return;
-    this.host.beside = null;
+    this.host.beside = this.host.besideUp = null;
     this.host.dispatchEvent(new CustomEvent('besideclosed', { bubbles: true, composed: true }));
   }
 
@@ -129,9 +131,15 @@ export class BesideMode {
           >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
           <span data-beside ?hidden=${Boolean(progress)}></span>
         </p>
+        ${pair ? upButton(pair.player.up, (up) => this.setUp(up)) : nothing}
         ${this.isPainted ? html`<p class="fine">Matching colours mark corresponding points</p>` : nothing}
       </section>
     </div>`;
+  }
+
+  /** Takes the axis that points up, the capture's own where none was chosen. */
+  settleUp() {
+    this.player?.setUp(this.host.besideUp ?? usualUp(this.player.capture.static));
   }
 
   /** To be called after every picture. */
@@ -142,6 +150,13 @@ export class BesideMode {
     const place = host.renderRoot.querySelector('[data-beside]');
     const text = figures(pair, host.player!);
     if (place && place.textContent !== text) place.textContent = text;
+  }
+
+  private setUp(up: UpAxis) {
+    const { player } = this;
+    if (!player) return;
+    this.host.besideUp = up === usualUp(player.capture.static) ? null : up;
+    this.settleUp();
   }
 
   private closeFile() {
@@ -156,6 +171,7 @@ export class BesideMode {
     player.onRecovery = (problem) => this.host.recover(`${player.capture.name}: ${problem}`);
     player.onState = () => this.host.requestUpdate();
     player.controls.onGrab = () => lead.controls.onGrab();
+    this.settleUp();
     this.marks = new PointMarks(pane);
     this.marks.follow(player.stage.canvas, player);
     if (lead.comparison.isOpen) void this.openOriginal(lead.comparison.files);

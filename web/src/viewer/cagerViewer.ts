@@ -1,4 +1,4 @@
-import type { Capture } from '../capture';
+import type { Capture, UpAxis } from '../capture';
 import { html, nothing, type PropertyValues } from 'lit';
 import { customElement, property, query, state } from 'lit/decorators.js';
 import { EditMode } from '../editing/editMode';
@@ -10,6 +10,7 @@ import { BesideMode } from './besideMode';
 import { CaptureElement } from './captureElement';
 import { divider } from './comparisonParts';
 import { deckStyle } from './deckStyle';
+import { exportPanel } from './exports';
 import { figuresPanel } from './figuresPanel';
 import { IncomingFiles } from './incomingFiles';
 import { Layout } from './layout';
@@ -21,7 +22,6 @@ import { deck, legend, titleBox, writeReadout } from './parts';
 import type { Player } from './player';
 import { PointMarks } from './pointMarks';
 import { PoseMode } from './poseMode';
-import { canRecord } from './recording';
 import { correspondenceOf, readReport, trackingOf } from './reports';
 import { actionOfKey, type Action } from './shortcuts';
 import { followLooks, stageColors } from './stageColors';
@@ -30,6 +30,8 @@ import type { Timeline } from './timeline';
 import { toolbar } from './toolbar';
 import { viewsPanel } from './viewsPanel';
 import { viewerStyle } from './viewerStyle';
+
+type Panel = 'figures' | 'views' | 'export';
 
 /** How long what was done is said. */
 const SAID_MILLISECONDS = 2000;
@@ -49,19 +51,24 @@ const SAID_MILLISECONDS = 2000;
  * @fires filechosen with files that somebody dropped or chose, a container among them; whoever cancels it sees to them
  * @fires besidewanted when somebody wants to see another capture beside this one; whoever cancels it sets `beside`, else a file is asked for
  * @fires besideclosed when somebody wants to see this capture alone again
+ * @fires uploadwanted with files that are no capture yet, when somebody wants to upload them; offered where `uploads` is set
  * @fires signin when somebody wants to sign in, to follow a session on
  */
 @customElement('cager-viewer')
 export class CagerViewer extends CaptureElement {
   static override styles = [tokens, controls, viewerStyle, deckStyle, overlayStyle];
 
-  @state() private panel: 'figures' | 'views' | null = null;
+  @state() private panel: Panel | null = null;
   @state() private said = '';
   @state() recording: AbortController | null = null;
   @query('cager-timeline') private readonly timeline!: Timeline | null;
   @query('dialog.sheet') private readonly sheet!: HTMLDialogElement;
   /** Whether the address of the page leads back to what is shown. */
   @property({ type: Boolean }) linkable = false;
+  /** Whether the page around it takes files to upload: `uploadwanted`. */
+  @property({ type: Boolean }) uploads = false;
+  /** Files that were dropped and are no capture yet. */
+  @state() private uploadable: readonly Dropped[] | null = null;
   /** A second capture to show beside the first; whoever sets it closes it. */
   @property({ attribute: false }) beside: Capture | null = null;
   readonly editing = new EditMode(this);
@@ -146,7 +153,7 @@ export class CagerViewer extends CaptureElement {
     await this.poses.toggle();
   }
 
-  togglePanel(panel: 'figures' | 'views') {
+  togglePanel(panel: Panel) {
     this.panel = this.panel === panel ? null : panel;
   }
 
@@ -155,9 +162,37 @@ export class CagerViewer extends CaptureElement {
     setTimeout(() => (this.said = ''), SAID_MILLISECONDS);
   }
 
+  override goTo(text: string) {
+    super.goTo(text);
+    this.pair.settleUp();
+  }
+
+  get besideUp(): UpAxis | null {
+    return this.link.besideUp;
+  }
+
+  set besideUp(up: UpAxis | null) {
+    this.link.besideUp = up;
+    this.link.touch();
+  }
+
   /** The view as `viewchange` tells it. */
   get viewText(): string {
     return this.player ? this.link.textOf(this.player) : '';
+  }
+
+  override fail(error: unknown) {
+    this.uploadable = null;
+    super.fail(error);
+  }
+
+  offerUpload(files: readonly Dropped[]) {
+    const { name } = files[0].file;
+    const what = files.length === 1 ? `${name} is` : `${name} and ${files.length - 1} more are`;
+    this.fail(
+      new Error(`${what} not encoded yet. ${this.uploads ? 'Upload to play it.' : 'Encode with “cager encode”.'}`),
+    );
+    this.uploadable = files;
   }
 
   openHelp() {
@@ -203,20 +238,32 @@ export class CagerViewer extends CaptureElement {
         // A capture that is edited has the viewer for itself.
         player && !this.editing.isOn ? this.pair.template() : nothing
       }
-      ${player ? this.overlay(player) : emptyState(opener.name, opener.failure, (files) => void this.files.choose(files))}
+      ${
+        player
+          ? this.overlay(player)
+          : emptyState(
+              opener.name,
+              opener.failure,
+              (files) => void this.files.choose(files),
+              this.uploads && opener.failure !== null && this.uploadable ? this.upload : null,
+            )
+      }
       ${helpSheet(() => this.sheet.close())} ${this.files.template()}
     `;
   }
+
+  private readonly upload = () => this.tell('uploadwanted', this.uploadable);
 
   private overlay(player: Player) {
     const { capture, progress } = player;
     const act = (action: Action) => perform(action, this);
     const opening = this.opener.name;
+    const isEdited = this.editing.hasEdits || capture.layers?.some(({ isOn }) => isOn) === true;
     const close = () => (this.panel = null);
     return html`
       <div class="lead corner">
         <slot name="lead"></slot>
-        ${titleBox(this.heading, player, this.editing.hasEdits)}
+        ${titleBox(this.heading, player, isEdited, (up) => (this.up = up))}
         ${capture.complete ? nothing : this.live.template(player)}
       </div>
       ${toolbar(player, act, {
@@ -228,12 +275,13 @@ export class CagerViewer extends CaptureElement {
         beside: this.beside !== null,
         poses: this.poses.isOn,
         recording: this.recording !== null,
-        recordable: canRecord(),
+        exports: this.panel === 'export',
         linkable: this.linkable,
       })}
       ${this.editing.panel(stem(this))} ${this.poses.panel()}
       ${this.panel === 'figures' ? figuresPanel(player, close) : nothing}
       ${this.panel === 'views' ? viewsPanel(player, this, close) : nothing}
+      ${this.panel === 'export' ? exportPanel(player, this, close) : nothing}
       ${legend(player, this.comparisonActs, this.panelShare > 0)}
       ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
       ${

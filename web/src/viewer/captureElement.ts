@@ -1,6 +1,6 @@
 import { LitElement, type PropertyValues } from 'lit';
 import { property, query, state } from 'lit/decorators.js';
-import type { Capture } from '../capture';
+import type { Capture, UpAxis } from '../capture';
 import { Opener } from './opener';
 import { Player } from './player';
 import { sentence } from '../text';
@@ -52,12 +52,11 @@ export abstract class CaptureElement extends LitElement {
   }
 
   /** Which axis of the capture points up. */
-  get up(): 'y' | 'z' {
-    return this.link.up;
+  get up(): UpAxis {
+    return this.player?.up ?? 'y';
   }
 
-  set up(axis: 'y' | 'z') {
-    this.link.up = axis;
+  set up(axis: UpAxis) {
     this.player?.setUp(axis);
     if (this.player?.isHome) this.player.goHome();
     else this.player?.frameAll();

@@ -44,6 +44,10 @@ export const deckStyle = css`
   [data-place] {
     font-weight: 600;
   }
+  .rate {
+    padding-right: var(--cager-space-2);
+    white-space: nowrap;
+  }
   .errors {
     margin-left: auto;
     gap: var(--cager-space-4);
@@ -92,15 +96,23 @@ export const deckStyle = css`
     .transport :is(.clock, [data-action='in'], [data-action='out']) {
       order: 2;
     }
+    .transport .icon {
+      width: 38px;
+      padding: 0;
+    }
     .transport select {
-      width: 4.2em;
+      padding: 0;
+    }
+    .transport .rate {
+      display: none;
     }
     .place {
       display: contents;
     }
     [data-place] {
       margin-left: auto;
-      padding-right: var(--cager-space-2);
+      padding-right: 4px;
+      font-size: var(--cager-size-small);
     }
     /* Beside the others, however long its figures are. */
     .errors {

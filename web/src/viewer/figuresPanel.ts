@@ -44,6 +44,7 @@ export function figuresPanel(player: Player, close: () => void) {
               ${row('Latency', live.latencySeconds === null ? '–' : `${live.latencySeconds.toFixed(2)} s`)}
               ${row('Download rate', bitrate(live.bitsPerSecond / 8))}
               ${row('Frames received per second', live.framesPerSecond.toFixed(1))}
+              ${live.codedFrames === null ? nothing : row('Frames compressed', count(live.codedFrames))}
               ${row('Frames pending', count(live.behindFrames))} ${row('Stalls', count(live.lateFrames))}
               ${row('Skipped frames', count(live.droppedFrames))}
             </dl>`

@@ -1,4 +1,4 @@
-import type { Capture } from '../capture';
+import type { Capture, UpAxis } from '../capture';
 import type { Dropped } from '../files/classify';
 import type { Player } from './player';
 
@@ -11,6 +11,8 @@ export interface ViewerHost extends HTMLElement {
   readonly isOpening: boolean;
   /** The present view, as links have it. */
   readonly viewText: string;
+  /** Which axis of the second capture points up, where that was chosen. */
+  besideUp: UpAxis | null;
   /** The second capture, where the page set one. */
   beside: Capture | null;
   requestUpdate(): void;
@@ -18,6 +20,8 @@ export interface ViewerHost extends HTMLElement {
   goTo(view: string): void;
   openFiles(files: readonly Dropped[], beside?: boolean): Promise<void>;
   fail(error: unknown): void;
+  /** Says that files are no capture yet, and how they become one. */
+  offerUpload(files: readonly Dropped[]): void;
   report(problem: string): void;
   recover(problem: string): void;
 }

@@ -1,5 +1,5 @@
 import { html, nothing } from 'lit';
-import { isContainer, type Dropped } from '../files/classify';
+import { isContainer, isUploadable, type Dropped } from '../files/classify';
 import { droppedFiles, pickFiles } from '../files/drop';
 import { dropHint, dropQuestion } from './messages';
 import { checkContainer } from './opener';
@@ -36,6 +36,10 @@ export class IncomingFiles {
     try {
       const files = await chosen;
       const container = files.find(isContainer) ?? (host.isShowing ? undefined : files.at(0));
+      if (container && !isContainer(container) && isUploadable(files)) {
+        host.offerUpload(files);
+        return;
+      }
       if (container) await checkContainer(container.file);
       if (!host.isShowing) await this.openInstead(files);
       else if (container) this.asked = files;

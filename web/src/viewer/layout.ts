@@ -76,15 +76,16 @@ export class Layout {
   }
 
   /**
-   * How far tools and panels reach into the picture. In a wide one without panels tools and title stand beside the model anyway; in a narrow one panels lie
-   * below it.
+   * How far tools and panels reach into the picture. In a wide one the title stands beside the model anyway; in a narrow one panels lie below it.
    */
   private measureSides() {
     if (this.isNarrow) return { left: 0, right: this.toolsWidth };
     const { left, right } = this.host.getBoundingClientRect();
     const boxOf = (part: string) => this.host.renderRoot.querySelector(part)?.getBoundingClientRect();
     const editor = boxOf('cager-edit-panel, cager-pose-panel');
-    const inner = (boxOf('.panel') ?? (editor && boxOf('.tools')))?.left;
+    const tools = boxOf('.tools');
+    // What is not shown has no box.
+    const inner = (boxOf('.panel') ?? (tools && tools.width > 0 ? tools : undefined))?.left;
     const sides = { left: Math.round((editor?.right ?? left) - left), right: Math.round(right - (inner ?? right)) };
     if (right - left - sides.left - sides.right < LEAST_FREE * (right - left))
       sides[sides.left > sides.right ? 'left' : 'right'] = 0;

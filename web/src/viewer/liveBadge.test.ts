@@ -8,6 +8,7 @@ const following: LiveStatus = {
   retryAt: null,
   latencySeconds: null,
   missingFrame: null,
+  codedFrames: null,
   behindFrames: 0,
   bitsPerSecond: 0,
   framesPerSecond: 10,

@@ -59,6 +59,7 @@ export function emptyState(
   opening: string | null,
   failure: string | null,
   choose: (files: readonly Dropped[]) => void,
+  upload: (() => void) | null,
 ): TemplateResult {
   if (opening !== null && failure === null) {
     return html`<div class="empty" role="status">
@@ -69,14 +70,15 @@ export function emptyState(
   return html`<div class="empty">
     <div class="lead"><slot name="lead"></slot></div>
     ${glyphs.cage}
-    <h1>${failure === null ? 'Drop a capture here' : 'Could not open'}</h1>
+    <h1>${failure === null ? 'Drop a capture here' : upload ? 'No capture yet' : 'Could not open'}</h1>
     ${
       failure === null
         ? html`<p>A .cager file plays in this page and is not uploaded.</p>`
         : html`<p class="notice" role="alert">${failure}</p>
             ${reloadButton(failure)}`
     }
-    <button class="primary" @click=${() => pickFiles(choose, { accept: '.cager,.json' })}>
+    ${upload ? html`<button class="primary" @click=${upload}>${glyphs.upload} Upload</button>` : nothing}
+    <button class=${upload ? '' : 'primary'} @click=${() => pickFiles(choose, { accept: '.cager,.json' })}>
       ${glyphs.file} Choose file
     </button>
   </div>`;

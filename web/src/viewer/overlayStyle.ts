@@ -23,6 +23,10 @@ export const overlayStyle = css`
   .panel p {
     margin-top: 6px;
   }
+  .exports li button {
+    width: 100%;
+    font-weight: 500;
+  }
   .panel > h2 {
     margin: var(--cager-space-3) 0 4px;
   }

@@ -1,5 +1,5 @@
 import { html, nothing, type TemplateResult } from 'lit';
-import type { FrameErrors } from '../capture';
+import type { FrameErrors, UpAxis } from '../capture';
 import type { FrameRange } from '../editing/cageEdit';
 import { colorScale, comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
 import { numberAt, numberText } from './frameNumbers';
@@ -9,10 +9,10 @@ import { isLost } from './reports';
 import { keyLabel } from './shortcuts';
 import { count, percent, threeDigits, clock } from '../text';
 import './timeline';
-import { tool, type Act } from './toolbar';
+import { tool, upButton, type Act } from './toolbar';
 import { sought, SPEEDS, type Repeat, type Transport } from './transport';
 
-export function titleBox(heading: string, { capture }: Player, isEdited: boolean) {
+export function titleBox(heading: string, { capture, up }: Player, isEdited: boolean, setUp: (up: UpAxis) => void) {
   const { static: part, frames, tracking, frameNumbers } = capture;
   // Frames are counted from 0 unless they have numbers of their own: the place beside the timeline is one of these.
   const [first, last] = [0, Math.max(0, frames - 1)].map((frame) => numberText(numberAt(frameNumbers, frame)));
@@ -25,6 +25,7 @@ export function titleBox(heading: string, { capture }: Player, isEdited: boolean
         >, cage of ${count(part.cage.positions.length / 3)} vertices</span
       >${lost > 0 ? html`, <span class="lost">${count(lost)} lost</span>` : nothing}
     </p>
+    ${upButton(up, setUp)}
   </div>`;
 }
 
@@ -81,13 +82,9 @@ function transportBar(player: Player, act: Act, onSpeed: (speed: number) => void
       title="Speed"
       @change=${(event: Event) => onSpeed(Number((event.target as HTMLSelectElement).value))}
     >
-      ${SPEEDS.map(
-        (speed) =>
-          html`<option value=${speed} .selected=${speed === transport.speed}>
-            ${speed}×&emsp;${threeDigits(speed * transport.rate)} fps
-          </option>`,
-      )}
+      ${SPEEDS.map((speed) => html`<option value=${speed} .selected=${speed === transport.speed}>${speed}×</option>`)}
     </select>
+    <span class="rate muted figures">${threeDigits(transport.speed * transport.rate)} fps</span>
     <div class="place row figures">
       <span data-place title="Frame / last frame"></span><span class="clock muted" data-clock></span>
     </div>

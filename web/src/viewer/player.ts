@@ -1,4 +1,4 @@
-import type { Capture, FrameBlock } from '../capture';
+import type { Capture, FrameBlock, UpAxis } from '../capture';
 import { canCompute } from '../coordinates/compute';
 import { computePhi } from '../coordinates/pool';
 import { framed, HOME, nearlySame, shifted, zoomed, type CameraState } from '../render/camera';
@@ -23,6 +23,10 @@ export interface Progress {
 
 /** Longest step of the clock: a tab that was hidden goes on where it was. */
 const LONGEST_STEP = 0.1;
+/** A camera that sees all of the motion is no more times as far as one that follows the model; else it begins to follow. */
+const FARTHEST = 2.5;
+/** Between looks whether frames have come that a picture needs. */
+const WAIT_MILLISECONDS = 20;
 /** Seconds before and after a frame over which the way of a camera that follows is smoothed. */
 const FOLLOW_SECONDS = 0.5;
 
@@ -49,6 +53,8 @@ export class Player {
   private fitsFromHome = false;
   private fitsRest = true;
   private follows = false;
+  /** Whether somebody chose that the camera follows the model, or that it does not; null where the motion decides. */
+  followChoice: boolean | null = null;
   private isSurveyed = false;
   private readonly stop = new AbortController();
   private shownLayers = USUAL_LAYERS;
@@ -58,7 +64,7 @@ export class Player {
   /** Whether Φ is there, or will never be. */
   private isPrepared = false;
   private readonly quality: Quality;
-  private upAxis: 'y' | 'z' = 'y';
+  private upAxis: UpAxis = 'y';
 
   /**
    * Throws one sentence for a person where the browser cannot draw the capture.
@@ -79,6 +85,7 @@ export class Player {
     this.motion = new Motion(rowsPerFrame, cage.positions.length / 3, rest, this.stage.decoder);
     this.motion.onGrowth = () => {
       this.stage.layGround(...this.motion.lowest);
+      this.followTravel();
       this.refit();
       this.heatMap.grow();
     };
@@ -124,11 +131,11 @@ export class Player {
     this.refresh();
   }
 
-  get up(): 'y' | 'z' {
+  get up(): UpAxis {
     return this.upAxis;
   }
 
-  setUp(axis: 'y' | 'z') {
+  setUp(axis: UpAxis) {
     this.upAxis = axis;
     this.stage.setUp(axis);
     this.refresh();
@@ -155,19 +162,24 @@ export class Player {
 
   /** Frames the model in all frames that are known, from the side the camera is on; relative to its middle where the camera follows it. */
   frameAll(from: CameraState = this.controls.destination, atOnce = false) {
-    const { clientWidth, clientHeight } = this.stage.canvas;
-    const { top, right, bottom, left } = this.resolution.covered;
-    const free = Math.max(1, clientHeight - top - bottom);
     this.fitsRest = this.motion.isEmpty;
-    const corners = this.fitsRest
-      ? this.stage.restCorners()
-      : this.stage.inScene(this.motion.corners(this.follows ? this.followReach : null));
-    const fitting = framed(from, corners, Math.max(1, clientWidth - right - left) / free);
-    const camera = zoomed(fitting, clientHeight / free);
+    const camera = this.framing(from, this.follows);
     this.fitsFromHome = false;
     if (this.fitted && this.controls.destination === this.fitted && nearlySame(camera, this.fitted)) return;
     this.fitted = camera;
     this.controls.go(camera, atOnce);
+  }
+
+  /** The camera that frames all motion, seen from the side of another camera. */
+  private framing(from: CameraState, follows: boolean): CameraState {
+    const { clientWidth, clientHeight } = this.stage.canvas;
+    const { top, right, bottom, left } = this.resolution.covered;
+    const free = Math.max(1, clientHeight - top - bottom);
+    const corners = this.motion.isEmpty
+      ? this.stage.restCorners()
+      : this.stage.inScene(this.motion.corners(follows ? this.followReach : null));
+    const fitting = framed(from, corners, Math.max(1, clientWidth - right - left) / free);
+    return zoomed(fitting, clientHeight / free);
   }
 
   /** Looks with perspective or without it from where the camera is. */
@@ -179,6 +191,7 @@ export class Player {
   goHome(atOnce = false) {
     this.frameAll(HOME, atOnce);
     this.fitsFromHome = true;
+    this.followTravel();
   }
 
   /** Whether the camera frames the motion from the usual side, as nobody has moved it. */
@@ -190,7 +203,21 @@ export class Player {
     return this.follows;
   }
 
-  set isFollowing(follows: boolean) {
+  /** Has the camera follow the model or not; null where the motion is to decide. */
+  chooseFollowing(choice: boolean | null) {
+    this.followChoice = choice;
+    this.setFollowing(choice ?? false);
+    this.followTravel();
+  }
+
+  /** Begins to follow a model that goes so far that little could be seen of it, unless somebody has chosen otherwise, or moved the camera. */
+  private followTravel() {
+    if (this.follows || this.followChoice !== null || this.lead || !this.isHome || this.motion.isEmpty) return;
+    const [all, near] = [false, true].map((follows) => this.framing(HOME, follows).distance);
+    if (all > FARTHEST * near) this.setFollowing(true);
+  }
+
+  private setFollowing(follows: boolean) {
     if (follows === this.follows) return;
     const wasFitted = this.controls.destination === this.fitted;
     const { isHome } = this;
@@ -231,6 +258,18 @@ export class Player {
     const positions = this.stage.decoder.readPositions();
     this.refresh();
     return positions;
+  }
+
+  /** Shows a place exactly, as soon as its frames are here; the picture is drawn by {@link drawn}. */
+  async stand(place: Transport, signal: AbortSignal) {
+    for (;;) {
+      this.playback.follow({ ...place, playing: false });
+      if (!this.playback.buffering) break;
+      await new Promise((resolve) => setTimeout(resolve, WAIT_MILLISECONDS));
+      signal.throwIfAborted();
+      this.stop.signal.throwIfAborted();
+    }
+    if (!this.motion.isEmpty) this.stage.moveGround(this.centre());
   }
 
   /** The canvas with its picture, which lasts until the browser shows it. */

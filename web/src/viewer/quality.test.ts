@@ -7,6 +7,13 @@ function after(quality: Quality, seconds: number, picture: number): number {
 }
 
 describe('Quality', () => {
+  it('knows no rate before something was drawn', () => {
+    const quality = new Quality();
+    expect(quality.picturesPerSecond).toBe(0);
+    quality.measure(0.05);
+    expect(quality.picturesPerSecond).toBeCloseTo(20, 5);
+  });
+
   it('stays at the finest where pictures come in time', () => {
     expect(after(new Quality(), 5, 1 / 60)).toBe(1);
   });

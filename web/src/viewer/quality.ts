@@ -15,7 +15,8 @@ const NOTHING: Covered = { top: 0, right: 0, bottom: 0, left: 0 };
 export class Quality {
   private step: number;
   private waited = 0;
-  private rate = 60;
+  /** Of the last pictures; 0 before there were any. */
+  private rate = 0;
 
   /** @param isSlow whether pictures are known to take long, so that the first ones are coarse */
   constructor(isSlow = false) {
@@ -34,7 +35,7 @@ export class Quality {
   measure(seconds: number) {
     if (seconds <= 0) return;
     const weight = Math.min(1, seconds / 0.4);
-    this.rate += (1 / seconds - this.rate) * weight;
+    this.rate += (1 / seconds - this.rate) * (this.rate === 0 ? 1 : weight);
     this.waited += seconds;
     if (this.waited < PATIENCE) return;
     if (this.rate < SLOW && this.step < STEPS.length - 1) this.change(1);

@@ -4,6 +4,7 @@ import { type Service, sessionPath, patiently } from '../service/service';
 import { pause, persistently } from '../service/backoff';
 import type { Recovery, Transfer } from '../service/messages';
 import { problemFrom } from '../service/problem';
+import { download, FORMATS, type Format } from '../sessions/download';
 import { counted } from '../text';
 import { correspondenceOf, trackingOf } from './reports';
 
@@ -22,6 +23,10 @@ export async function sessionCapture(
     return service.request(below('decode'), { method: 'POST', headers, body: cages, signal: until ?? null });
   };
   capture.handles = (until) => service.handles(id, until);
+  capture.downloads = {
+    formats: FORMATS,
+    save: (ending, name, onProgress) => download(service, id, name, ending as Format, onProgress),
+  };
   capture.session = id;
   capture.identity = `session ${service.address(sessionPath(id))}`;
   return capture;

@@ -1,4 +1,5 @@
 import { html, nothing, type TemplateResult } from 'lit';
+import type { UpAxis } from '../capture';
 import type { Layers } from '../render/drawn';
 import { glyphs, type GlyphName } from '../style/glyphs';
 import type { Heat } from './heatMap';
@@ -39,6 +40,18 @@ export function tool(action: Action, name: GlyphName, act: Act, pressed?: boolea
   </button>`;
 }
 
+/** Says which axis of a capture points up, and has the other one do so. */
+export function upButton(up: UpAxis, choose: (up: UpAxis) => void) {
+  const other = up === 'y' ? 'z' : 'y';
+  return html`<button
+    class="up"
+    title=${`Up axis: ${up.toUpperCase()}. Click for ${other.toUpperCase()} (${keyLabel('up')})`}
+    @click=${() => choose(other)}
+  >
+    Up: ${up.toUpperCase()}
+  </button>`;
+}
+
 export interface Tools {
   readonly colors: boolean;
   readonly figures: boolean;
@@ -47,7 +60,7 @@ export interface Tools {
   readonly beside: boolean;
   readonly poses: boolean;
   readonly recording: boolean;
-  readonly recordable: boolean;
+  readonly exports: boolean;
   /** Whether its address leads back here. */
   readonly linkable: boolean;
 }
@@ -78,8 +91,9 @@ export function toolbar(player: Player, act: Act, shown: Tools) {
       player.capture.container ? tool('poses', 'poses', act, shown.poses) : nothing,
     ])}
     ${group('Export', [
+      tool('export', 'download', act, shown.exports),
       tool('picture', 'camera', act),
-      shown.recordable ? tool('turntable', 'turntable', act, shown.recording, record) : nothing,
+      tool('turntable', 'turntable', act, shown.recording, record),
       shown.linkable ? tool('link', 'link', act) : nothing,
     ])}
     ${group('Learn', [tool('help', 'help', act)])}

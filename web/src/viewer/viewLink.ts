@@ -1,12 +1,15 @@
+import type { UpAxis } from '../capture';
 import type { Player } from './player';
 import { sought } from './transport';
+import { usualUp } from './upright';
 import { viewFromText, viewText, type ViewState } from './viewState';
 
 /** How long the view must rest before it is told to whoever keeps links. */
 const REST_MILLISECONDS = 300;
 
 export class ViewLink {
-  up: 'y' | 'z' = 'y';
+  /** The axis that points up of the capture beside, where a link or somebody chose it. */
+  besideUp: UpAxis | null = null;
   private timer = 0;
 
   /** @param onRest called when the view has rested for a while */
@@ -14,11 +17,11 @@ export class ViewLink {
 
   /** Goes to a view; one that names a frame stands there. */
   show(view: ViewState, player: Player, atOnce: boolean) {
-    this.up = view.up;
+    this.besideUp = view.besideUp;
     player.layers = view.layers;
     if (player.heatMap.kind !== view.heat) player.setHeat(view.heat);
-    player.setUp(view.up);
-    player.isFollowing = view.follow;
+    player.setUp(view.up ?? usualUp(player.capture.static));
+    player.chooseFollowing(view.follow);
     if (view.frame !== null) player.transport = { ...sought(player.transport, view.frame), playing: false };
     if (view.camera) player.controls.go(view.camera, atOnce);
     else player.goHome(atOnce);
@@ -39,8 +42,10 @@ export class ViewLink {
       frame: playing || frame === 0 ? null : frame,
       // The usual camera is that of the capture, which no link needs to name.
       camera: player.isHome ? null : player.controls.destination,
-      up: this.up,
-      follow: player.isFollowing,
+      up: player.up === usualUp(player.capture.static) ? null : player.up,
+      besideUp: this.besideUp,
+      // A camera that is not the usual one stands beside a model that is followed.
+      follow: player.followChoice ?? (player.isFollowing && !player.isHome ? true : null),
       layers: player.layers,
       heat: player.heatMap.kind,
     });

@@ -8,18 +8,34 @@ describe('view in a link', () => {
       frame: 17,
       camera: { target: [0.1, 0.2, -0.3], azimuth: 0.5, elevation: -0.25, distance: 2.5 },
       up: 'z',
+      besideUp: 'y',
       follow: true,
       layers: { ...USUAL_LAYERS, cage: true, ground: false, colors: false },
       heat: 'motion',
     } as const;
     const read = viewFromText(viewText(view));
-    expect(read).toMatchObject({ frame: 17, up: 'z', follow: true, layers: view.layers, heat: 'motion' });
+    expect(read).toMatchObject({
+      frame: 17,
+      up: 'z',
+      besideUp: 'y',
+      follow: true,
+      layers: view.layers,
+      heat: 'motion',
+    });
     expect(read.camera!.distance).toBe(2.5);
     expect(read.camera!.azimuth).toBeCloseTo(0.5, 2);
   });
 
   it('says nothing where everything is as usual', () => {
-    const usual = { frame: null, camera: null, up: 'y', follow: false, layers: USUAL_LAYERS, heat: 'none' } as const;
+    const usual = {
+      frame: null,
+      camera: null,
+      up: null,
+      besideUp: null,
+      follow: null,
+      layers: USUAL_LAYERS,
+      heat: 'none',
+    } as const;
     expect(viewText(usual)).toBe('');
   });
 
@@ -27,8 +43,9 @@ describe('view in a link', () => {
     expect(viewFromText('frame=-3&camera=1,2&up=q&heat=wave')).toEqual({
       frame: null,
       camera: null,
-      up: 'y',
-      follow: false,
+      up: null,
+      besideUp: null,
+      follow: null,
       layers: USUAL_LAYERS,
       heat: 'none',
     });

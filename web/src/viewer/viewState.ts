@@ -1,3 +1,4 @@
+import type { UpAxis } from '../capture';
 import { cameraFromText, cameraText, type CameraState } from '../render/camera';
 import type { Layers } from '../render/drawn';
 import type { Heat } from './heatMap';
@@ -6,8 +7,12 @@ import type { Heat } from './heatMap';
 export interface ViewState {
   readonly frame: number | null;
   readonly camera: CameraState | null;
-  readonly up: 'y' | 'z';
-  readonly follow: boolean;
+  /** Null for the capture's own. */
+  readonly up: UpAxis | null;
+  /** The same of the capture beside it. */
+  readonly besideUp: UpAxis | null;
+  /** Null where the motion decides. */
+  readonly follow: boolean | null;
   readonly layers: Layers;
   readonly heat: Heat;
 }
@@ -33,35 +38,42 @@ const LETTERS: Readonly<Record<keyof Layers, string>> = {
 };
 const NAMES = Object.keys(LETTERS) as (keyof Layers)[];
 
-/** Reads `frame=12&camera=…&up=z&follow=1&show=mcg&heat=motion`; what is missing or wrong is as usual. */
+/** Reads `frame=12&camera=…&up=z&besideUp=z&follow=1&show=mcg&heat=motion`; what is missing or wrong is as usual. */
 export function viewFromText(text: string): ViewState {
   const parameters = new URLSearchParams(text);
   const frame = Number(parameters.get('frame') ?? NaN);
   const show = parameters.get('show');
   const heat = parameters.get('heat');
+  const follow = parameters.get('follow');
   return {
     frame: Number.isSafeInteger(frame) && frame >= 0 ? frame : null,
     camera: cameraFromText(parameters.get('camera')),
-    up: parameters.get('up') === 'z' ? 'z' : 'y',
-    follow: parameters.get('follow') === '1',
+    up: axisFrom(parameters.get('up')),
+    besideUp: axisFrom(parameters.get('besideUp')),
+    follow: follow === '1' ? true : follow === '0' ? false : null,
     layers: show === null ? USUAL_LAYERS : layersOf((name) => show.includes(LETTERS[name])),
     heat: heat === 'motion' || heat === 'error' ? heat : 'none',
   };
 }
 
 /** Writes what {@link viewFromText} reads; what is as usual is left out. */
-export function viewText({ frame, camera, up, follow, layers, heat }: ViewState): string {
+export function viewText({ frame, camera, up, besideUp, follow, layers, heat }: ViewState): string {
   const parameters = new URLSearchParams();
   if (frame !== null) parameters.set('frame', String(frame));
   if (camera) parameters.set('camera', cameraText(camera));
-  if (up === 'z') parameters.set('up', up);
-  if (follow) parameters.set('follow', '1');
+  if (up) parameters.set('up', up);
+  if (besideUp) parameters.set('besideUp', besideUp);
+  if (follow !== null) parameters.set('follow', follow ? '1' : '0');
   if (NAMES.some((name) => layers[name] !== USUAL_LAYERS[name])) {
     const shown = NAMES.filter((name) => layers[name]).map((name) => LETTERS[name]);
     parameters.set('show', shown.join(''));
   }
   if (heat !== 'none') parameters.set('heat', heat);
   return parameters.toString().replaceAll('%2C', ',');
+}
+
+function axisFrom(text: string | null): UpAxis | null {
+  return text === 'y' || text === 'z' ? text : null;
 }
 
 function layersOf(shown: (name: keyof Layers) => boolean): Layers {

@@ -121,6 +121,7 @@ export class ViewerPage extends LitElement {
     return html`<main>
       <cager-viewer
         autoplay
+        uploads
         ?linkable=${this.job !== null}
         ?inert=${this.wantsToken}
         .capture=${this.capture}
@@ -128,7 +129,7 @@ export class ViewerPage extends LitElement {
         .view=${this.view}
         @signin=${this.tokenWanted}
         @viewchange=${this.tellView}
-        @ready=${this.keepThumbnail}
+        @ready=${this.whenReady}
         @besidewanted=${this.askBeside}
         @besideclosed=${() => this.setBeside(null)}
       >
@@ -175,14 +176,19 @@ export class ViewerPage extends LitElement {
     this.tellLink();
   };
 
+  private readonly whenReady = () => {
+    if (this.viewer) document.title = `${this.viewer.heading} – CageR`;
+    this.keepThumbnail();
+  };
+
   /** Keeps a picture of the session for the list, some time after the model can be seen. */
-  private readonly keepThumbnail = () => {
+  private keepThumbnail() {
     const { capture, viewer } = this;
     setTimeout(() => {
       const session = capture && capture === this.capture ? capture.session : undefined;
       if (session !== undefined && viewer?.player) keepThumbnail(session, viewer.player.drawn());
     }, THUMBNAIL_MILLISECONDS);
-  };
+  }
 
   private tellLink() {
     const view = new URLSearchParams(this.shownView);

@@ -65,19 +65,30 @@ export const viewerStyle = css`
     pointer-events: auto;
   }
   .title {
+    display: grid;
+    grid-template-columns: minmax(0, 1fr) auto;
     min-width: 0;
-    padding: 7px var(--cager-space-3) 8px;
+    padding: 7px 6px 8px var(--cager-space-3);
+  }
+  .up {
+    grid-area: 1 / 2 / span 2;
+    align-self: center;
+    margin-left: var(--cager-space-3);
+    padding: 0 8px;
+    border-color: var(--cager-line-strong);
+    font-size: var(--cager-size-small);
+    white-space: nowrap;
   }
   .title .lost {
     color: var(--cager-bad);
   }
   .caption {
     display: grid;
-    grid-template-columns: minmax(0, 1fr) auto;
+    grid-template-columns: minmax(0, 1fr) auto auto;
     padding: 7px 4px 8px var(--cager-space-3);
   }
-  .caption button {
-    grid-row: span 2;
+  .caption .icon {
+    grid-area: 1 / 3 / span 2;
     margin-left: var(--cager-space-2);
   }
   .dashes {
