@@ -1,3 +1,4 @@
+import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { allBlocks, goldenBytes, openBytes, putTogether, rawPart, takeApart } from '../../tests/support/containers';
 import { encodeLayer, layerBetween } from './layers';
@@ -87,4 +88,27 @@ describe('the layer between cages', () => {
   it('is none where nothing differs', () => {
     expect(layerBetween([rows(0, 0, 0)], [rows(0, -0, 5e-45)], 0, '')).toBeNull();
   });
+
+  interface Case {
+    readonly what: string;
+    readonly name: string;
+    readonly old: readonly number[][];
+    readonly new: readonly number[][];
+    readonly first: number | null;
+    readonly count: number | null;
+    readonly raw: string | null;
+  }
+  const { cases } = JSON.parse(
+    readFileSync(new URL('../../../tests/golden/edit-layer.json', import.meta.url), 'utf8'),
+  ) as { cases: readonly Case[] };
+
+  it.each(cases)(
+    'has the same bytes as that of the program: $what',
+    ({ name, old, new: edited, first, count, raw }) => {
+      const [before, after] = [old, edited].map((frames) => frames.map((frame) => Float32Array.from(frame)));
+      const found = layerBetween(before, after, 0, name);
+      expect(found && [found.first, found.count]).toEqual(first === null ? null : [first, count]);
+      expect(found && Buffer.from(encodeLayer(found)).toString('hex')).toBe(raw);
+    },
+  );
 });
