@@ -8,7 +8,7 @@ use std::process::Command;
 
 use cager_formats::{
     CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, create_frames, frame_files, mesh_sequence,
-    open_frames, open_frames_bytes, open_selected_frames, read_model, read_prim_with_note,
+    open_frames, open_frames_bytes, open_selected_frames, read_mesh, read_model, read_prim_with_note,
 };
 use cager_geometry::mesh::Polygons;
 use support::archive::*;
@@ -201,6 +201,94 @@ fn frame_numbers_follow_the_times_of_samples() {
 }
 
 #[test]
+fn samples_of_transforms_between_and_behind_those_of_points_are_frames() {
+    // As Blender writes them with five samples of transforms and one of points.
+    let fine = (1.0 / 120.0, &[1.0 / 24.0][..]);
+    let values: Vec<Vec<f64>> = (0..16).map(|k| vec![f64::from(k * k), 0.0, 0.0]).collect();
+    let bytes = archive("_ai_DCC_FPS=24", &[EVEN, fine], &[transform("move", &[0x10], 2, &values, vec![triangle(3)])]);
+    let mut reader = open(&bytes, 3).unwrap();
+    assert_eq!((reader.frame_rate(), reader.frames(), reader.number(5), reader.number(15)), (Some(24.0), 16, 2.0, 4.0));
+    for (k, frame) in all(&mut *reader).iter().enumerate() {
+        let (x, y) = ((k * k) as f64, (k as f64 / 5.0).min(2.0));
+        assert!((frame[0] - x).abs() < 1e-9 && (frame[1] - y).abs() < 1e-5, "{k}: {frame:?}");
+    }
+    // At times that are no even part of a frame.
+    let own = (ACYCLIC, &[1.0 / 24.0, 2.5 / 24.0][..]);
+    let still = [vec![0.0; 3], vec![3.0, 0.0, 0.0]];
+    let bytes = archive("_ai_DCC_FPS=24", &[EVEN, own], &[transform("move", &[0x10], 2, &still, vec![triangle(3)])]);
+    let mut reader = open(&bytes, 3).unwrap();
+    assert_eq!(numbers(&*reader), [1.0, 2.0, 2.5, 3.0]);
+    let places: Vec<[f64; 2]> = all(&mut *reader).iter().map(|frame| [frame[0], frame[1]]).collect();
+    assert!(
+        places
+            .iter()
+            .zip([[0.0, 0.0], [2.0, 1.0], [3.0, 1.5], [3.0, 2.0]])
+            .all(|(found, wanted)| { (found[0] - wanted[0]).abs() < 1e-9 && (found[1] - wanted[1]).abs() < 1e-9 })
+    );
+    // Samples that no file of this size holds take no memory.
+    let mut long = transform("move", &[0x10], 2, &still, vec![triangle(3)]);
+    long.properties[1].changes = Some([1 << 30, 1, 2]);
+    assert!(message(open(&archive("", &[EVEN, fine], &[long]), 3)).contains("promises 1073741827 frames"));
+}
+
+#[test]
+fn transforms_turn_between_their_samples_and_say_where_these_are_sparse() {
+    // Half a turn but for 8 degrees, as a matrix: half of it is in the middle.
+    let turned = |degrees: f64| {
+        let (s, c) = degrees.to_radians().sin_cos();
+        let mut matrix = IDENTITY.to_vec();
+        (matrix[0], matrix[1], matrix[4], matrix[5]) = (c, s, -s, c);
+        matrix
+    };
+    let slow = (1.0 / 12.0, &[1.0 / 24.0][..]);
+    let turn = |sampling| transform("turn", &[0x30], sampling, &[turned(0.0), turned(172.0)], vec![triangle(3)]);
+    let bytes = archive("", &[EVEN, slow], &[turn(2)]);
+    let mut reader = open(&bytes, 3).unwrap();
+    assert_eq!(reader.notes(), Vec::<String>::new());
+    let frame = &all(&mut *reader)[1];
+    let edge = [frame[3] - frame[0], frame[4] - frame[1]];
+    let (s, c) = 86_f64.to_radians().sin_cos();
+    assert!((edge[0] - c).abs() < 1e-9 && (edge[1] - s).abs() < 1e-9, "{edge:?}");
+    // Two samples a second apart.
+    let bytes = archive("", &[(1.0, &[0.0])], &[turn(1)]);
+    assert!(open(&bytes, 3).unwrap().notes()[0].contains("its transforms have samples up to 1.0000 s apart"));
+}
+
+#[test]
+fn what_is_not_read_of_a_mesh_is_named() {
+    let mut node = triangle(1);
+    for (name, extent) in [("uv", 2), ("N", 3), (".velocities", 3)] {
+        node.properties.push(array(name, (F32, extent), 0, &[vec![0.5_f32; 6]], f32::to_le_bytes));
+    }
+    let set = Node {
+        name: "skin",
+        metadata: "schema=AbcGeom_FaceSet_v1",
+        compound: ".faceset",
+        properties: vec![],
+        children: vec![],
+    };
+    node.children = vec![set];
+    let (_folder, path) = saved(&archive("", &[EVEN], &[node]));
+    let sentence = read_mesh(&path, None).unwrap().dropped.sentence(&path, false).unwrap();
+    let what = "texture coordinates (uv), normals (N), velocities and 1 set of faces (skin) are not kept";
+    assert!(sentence.ends_with(what), "{sentence}");
+    let (_folder, path) = written(&rising(1), &polygons(&[&[0, 1, 2]]), &FrameOptions::default());
+    assert_eq!(read_mesh(&path, None).unwrap().dropped.sentence(&path, false), None);
+}
+
+#[test]
+fn rates_of_television_stay_fractions() {
+    let fps = 24_000.0 / 1001.0;
+    for (information, step) in
+        [("", 1001.0 / 24_000.0), ("_ai_DCC_FPS=23.976", 1001.0 / 24_000.0), ("FramesPerTimeUnit=23.976", 1.0 / 23.976)]
+    {
+        let bytes = archive(information, &[(step, &[0.0])], &[triangle(3)]);
+        let reader = open(&bytes, 3).unwrap();
+        assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(fps), vec![0.0, 1.0, 2.0]), "{information}");
+    }
+}
+
+#[test]
 fn repeated_samples_are_frames() {
     let mut node = triangle(3);
     // Of seven samples the first two are the same, and the last three.
@@ -355,7 +443,7 @@ fn archives_beside_other_captures_are_no_captures() {
     let scene = put("scene.abc", &archive("", &[EVEN], &[triangle(3)]));
     assert_eq!((without(&[]).unwrap(), without(std::slice::from_ref(&scene)).unwrap()), (3, 3));
     let rest = put("rest.abc", &archive("", &[EVEN], &[triangle(1)]));
-    assert!(message(without(&[])).contains("has 2 captures; name one of them"));
+    assert!(message(without(&[])).contains("has 2 captures, such as scene.abc of 3 frames; name one of them"));
     assert_eq!(without(&[rest]).unwrap(), 3);
     let mut array = b"\x93NUMPY\x01\0\x76\0".to_vec();
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 3), }";

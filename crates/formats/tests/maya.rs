@@ -74,6 +74,75 @@ fn caches_come_back_as_they_were_written() {
 }
 
 #[test]
+fn rates_come_back_exactly_and_those_of_television_from_ticks() {
+    for fps in [24_000.0 / 1001.0, 30_000.0 / 1001.0, 59.94, 24.0, 12.5, 100.0 / 3.0] {
+        let options = FrameOptions { fps, numbers: (1001..1041).map(f64::from).collect(), ..FrameOptions::default() };
+        let rate = if fps == 59.94 { 60_000.0 / 1001.0 } else { fps };
+        for name in ["a.mcx", "a.mc"] {
+            let (_folder, path) = written(name, &frames(40), &options);
+            let reader = open_frames(&path, 3).unwrap();
+            assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(rate), options.numbers.clone()));
+            // As Maya writes the text, which says whole ticks.
+            let text = fs::read_to_string(path.with_extension("xml")).unwrap();
+            let (before, behind) = text.split_once("  <extra>frames per second ").unwrap();
+            fs::write(path.with_extension("xml"), format!("{before}{}", behind.split_once('\n').unwrap().1)).unwrap();
+            let reader = open_frames(&path, 3).unwrap();
+            if fps < 59.0 && fps != 100.0 / 3.0 {
+                assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(rate), options.numbers.clone()), "{fps}");
+            }
+        }
+    }
+}
+
+/// A frame of a cache with a file for each, which has its time in the header.
+fn frame_of_maya(is_wide: bool, tick: i32, value: f32) -> Vec<u8> {
+    let group: &[u8; 4] = if is_wide { b"FOR8" } else { b"FOR4" };
+    let part = |tag, payload: &[u8]| chunk(is_wide, tag, payload);
+    let time = tick.to_be_bytes();
+    let head = [&b"CACH"[..], &part(b"VRSN", b"0.1\0"), &part(b"STIM", &time), &part(b"ETIM", &time)].concat();
+    let values: Vec<u8> = [value; 9].iter().flat_map(|x| x.to_be_bytes()).collect();
+    let channel = |name: &[u8]| [part(b"CHNM", name), part(b"SIZE", &[0, 0, 0, 3]), part(b"FVCA", &values)].concat();
+    [part(group, &head), part(group, &[&b"MYCH"[..], &channel(b"bodyShape\0"), &channel(b"hatShape\0")].concat())]
+        .concat()
+}
+
+#[test]
+fn caches_with_a_file_for_each_frame_are_read_by_the_frames_and_ticks_of_their_names() {
+    let prim = FrameSelection { prim: Some("hatShape".to_owned()), ..FrameSelection::default() };
+    for extension in ["mcx", "mc"] {
+        let folder = tempdir().unwrap();
+        let text =
+            "<Autodesk_Cache_File><cacheType Type=\"OneFilePerFrame\"/><cacheTimePerFrame TimePerFrame=\"250\"/>";
+        fs::write(folder.path().join("walk.xml"), text).unwrap();
+        for tick in (-250_i32..=500).step_by(125) {
+            let (frame, rest) = (tick.div_euclid(250), tick.rem_euclid(250));
+            let ticks = if rest == 0 { String::new() } else { format!("Tick{rest}") };
+            let name = format!("walkFrame{frame}{ticks}.{extension}");
+            fs::write(folder.path().join(name), frame_of_maya(extension == "mcx", tick, tick as f32)).unwrap();
+        }
+        for source in [folder.path().to_owned(), folder.path().join(format!("walkFrame*.{extension}"))] {
+            let mut reader = open_selected_frames(&source, 3, &prim).unwrap();
+            assert_eq!(
+                (reader.frame_rate(), numbers(&*reader)),
+                (Some(24.0), vec![-1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0])
+            );
+            let values: Vec<f64> = all(&mut *reader).iter().map(|frame| frame[0]).collect();
+            assert_eq!(values, [-250.0, -125.0, 0.0, 125.0, 250.0, 375.0, 500.0]);
+        }
+        // One alone is one frame, and says what it belongs to.
+        let path = folder.path().join(format!("walkFrame1Tick125.{extension}"));
+        let reader = open_selected_frames(&path, 3, &prim).unwrap();
+        assert_eq!((reader.frames(), reader.number(0)), (1, 1.5));
+        assert!(reader.notes()[0].contains(&format!("walkFrame*.{extension}'")), "{:?}", reader.notes());
+        let said = message(open_frames(folder.path().join("walk.xml"), 3).map(|_| ()));
+        assert!(
+            said.contains("describes a cache of Maya; give the .mcx or .mc file beside it, or the pattern"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
 fn cache_and_text_appear_together_or_not_at_all() {
     let (folder, path) = written("a.mcx", &frames(2), &FrameOptions::default());
     fs::remove_file(&path).unwrap();
@@ -181,8 +250,9 @@ fn what_is_no_whole_cache_is_refused_in_words_that_say_what_to_do() {
             bytes[at..at + 4].copy_from_slice(b"tIME");
             bytes
         };
+        // The other frames have none either.
         let said = message(opened(&no_time, 3).map(|_| ()));
-        assert!(said.contains("one frame of a cache with a file for each; export it again as one file"), "{said}");
+        assert!(said.contains("frame 0 has no time"), "{said}");
         let said = message(opened(&as_of_maya(is_wide, &[("a_normals", 3)], &[0]), 3).map(|_| ()));
         assert!(said.contains("0 channels of positions"), "{said}");
         let none = message(opened(&as_of_maya(is_wide, &[], &[]), 3).map(|_| ()));

@@ -297,8 +297,9 @@ fn what_a_layer_is_composed_of_is_named() {
     ] {
         for kind in KINDS {
             let error = message(take(name, kind, None));
-            let cure = ", which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc";
-            assert!(error.contains(&format!("{what}{cure}")), "{error}");
+            let cure =
+                ", which are not read; write all into one file in Python (pip install usd-core): from pxr import Usd";
+            assert!(error.contains(&format!("{what}{cure}")) && error.contains("SetInstanceable(False)"), "{error}");
         }
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use cager_formats::{
     CacheFormat, Error, FrameReader, MeshFormat, Units, Up, create_frames, open_frames, open_frames_bytes,
-    read_model_bytes, read_prim_with_units,
+    read_mesh_bytes, read_model_bytes, read_prim_with_units,
 };
 use cager_geometry::mesh::Polygons;
 use support::{all, message, numbers, polygons};
@@ -141,6 +141,84 @@ fn what_cannot_be_read_names_its_line_or_a_way_out() {
         let error = message(read);
         assert!(error.starts_with("a.usda: ") && error.contains(what) && error.len() < 600, "{error}\nnot: {what}");
     }
+}
+
+/// A mesh with this inside, of three points at `x`.
+fn mesh_at(name: &str, x: u32, inside: &str) -> String {
+    format!(
+        "def Mesh \"{name}\" {{\nint[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\n\
+         point3f[] points = [({x}, 0, 0), (1, 0, 0), (0, 1, 0)]\n{inside}\n}}\n"
+    )
+}
+
+#[test]
+fn prototypes_of_instancers_are_not_in_the_scene() {
+    let instancer =
+        |inside: &str| format!("def PointInstancer \"trees\" {{\ndef Scope \"protos\" {{\n{inside}\n}}\n}}\n");
+    let text = format!("#usda 1.0\n{}", instancer(&mesh_at("tree", 7, "")));
+    let error = message(open(&text, 3));
+    let what = "has its meshes as prototypes of /trees, a PointInstancer, whose instances are not read; make them real";
+    assert!(error.contains(what), "{error}");
+    let text = format!("#usda 1.0\n{}{}", instancer(&mesh_at("tree", 7, "")), mesh_at("body", 3, ""));
+    let mut reader = open(&text, 3).unwrap();
+    assert_eq!(all(&mut *reader)[0][0], 3.0);
+    assert!(reader.notes()[0].contains("the instances of /trees, a PointInstancer, are not read"));
+}
+
+#[test]
+fn purposes_are_inherited_and_the_innermost_counts() {
+    let below = |purpose: &str, inside: &str| {
+        format!(
+            "def Xform \"{purpose}\" {{\nuniform token purpose = \"{purpose}\"\ndef Scope \"s\" {{\n{inside}\n}}\n}}\n"
+        )
+    };
+    let shown = mesh_at("body", 3, "");
+    for hidden in [below("guide", &mesh_at("cage", 7, "")), below("proxy", &mesh_at("box", 7, ""))] {
+        let text = format!("#usda 1.0\n{hidden}{shown}");
+        let mut reader = open(&text, 3).unwrap();
+        assert_eq!(all(&mut *reader)[0][0], 3.0);
+    }
+    let other = below("guide", &mesh_at("hat", 7, "uniform token purpose = \"render\""));
+    assert!(message(open(&format!("#usda 1.0\n{other}{shown}"), 3)).contains("holds 2 meshes"));
+}
+
+#[test]
+fn the_rest_pose_is_the_first_frame_whatever_the_defaults() {
+    let moved = "double3 xformOp:translate = (100, 0, 0)\n\
+        double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 2: (0, 1, 0) }\n\
+        uniform token[] xformOpOrder = [\"xformOp:translate\"]\n\
+        point3f[] points.timeSamples = { 1: [(5, 0, 0), (1, 0, 0), (0, 1, 0)] }";
+    let text = format!("#usda 1.0\n{}", mesh_at("body", 3, moved));
+    let model = read_model_bytes(MeshFormat::Usda, Path::new(NAME), text.as_bytes()).unwrap();
+    assert_eq!((model.points[0], &all(&mut *open(&text, 3).unwrap())[0][..3]), ([5.0, 0.0, 0.0], &[5.0, 0.0, 0.0][..]));
+}
+
+#[test]
+fn what_is_not_read_of_a_mesh_is_named() {
+    let inside = "normal3f[] normals = [(0, 0, 1)]\n\
+        texCoord2f[] primvars:st = [(0, 0)] ( interpolation = \"faceVarying\" )\nint[] primvars:st:indices = [0, 0, 0]\n\
+        color3f[] primvars:displayColor = [(1, 0, 0)]\nfloat[] primvars:age = [1]\n\
+        uniform token subdivisionScheme = \"catmullClark\"\nrel material:binding = </m>\n\
+        def GeomSubset \"skin\" { uniform token familyName = \"materialBind\" }\n\
+        token visibility.timeSamples = { 1: \"inherited\", 4: \"invisible\" }";
+    let text = format!("#usda 1.0\n{}", mesh_at("body", 3, inside));
+    let read = read_mesh_bytes(MeshFormat::Usda, Path::new(NAME), text.as_bytes()).unwrap();
+    let sentence = read.dropped.sentence(Path::new(NAME), false).unwrap();
+    assert_eq!(
+        sentence,
+        "a.usda: texture coordinates (primvars:st), normals (normals), colours (primvars:displayColor), primvars (primvars:age), \
+         the subdivision scheme (catmullClark), materials (material:binding) and 1 set of faces (GeomSubset) are not kept"
+    );
+    assert!(open(&text, 3).unwrap().notes()[0].contains("its visibility is animated, which is not kept"));
+    let plain =
+        read_mesh_bytes(MeshFormat::Usda, Path::new(NAME), format!("#usda 1.0\n{}", mesh_at("a", 3, "")).as_bytes());
+    assert_eq!(plain.unwrap().dropped.sentence(Path::new(NAME), false), None);
+}
+
+#[test]
+fn rates_of_television_are_fractions() {
+    let text = format!("#usda 1.0\n(timeCodesPerSecond = 23.976)\n{}", mesh_at("body", 3, ""));
+    assert_eq!(open(&text, 3).unwrap().frame_rate(), Some(24_000.0 / 1001.0));
 }
 
 #[test]

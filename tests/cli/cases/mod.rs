@@ -6,6 +6,7 @@ mod frame_names;
 mod gltf;
 mod meshes;
 mod numpy;
+mod one_file_each;
 mod origin;
 mod pointers;
 mod words;

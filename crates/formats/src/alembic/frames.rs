@@ -46,7 +46,9 @@ pub(crate) fn read_model(
     dropped: &mut Dropped,
 ) -> Result<(Model, usize), Error> {
     let mut mesh = MeshFrames::open(source, length, prim).map_err(|failure| failure.at(path))?;
-    unread::add(&mut mesh.archive, mesh.object, dropped).map_err(|failure| failure.at(path))?;
+    mesh.archive.container.allow(4);
+    // What cannot be named is no reason to refuse a mesh.
+    unread::add(&mut mesh.archive, mesh.object, dropped).unwrap_or_default();
     let (left_out, points, mut values) = (mesh.faces.left_out, mesh.points, Vec::new());
     let mut reader = scene::open(path, mesh, points)?;
     reader.read_next(&mut values)?;
@@ -137,7 +139,7 @@ impl<R: Read + Seek> MeshFrames<R> {
         check_held(frames, first.length.saturating_mul(frames as u64) / 2 <= archive.container.length())?;
         let times = timing(&sampling, frames, archive.frame_rate, is_default)?;
         let sparse = chain.animated().next().and_then(|_| sparse(&sampling, frames, archive.frame_rate));
-        let notes = sparse.into_iter().chain(unread::visibility(&mut archive, object)?).collect();
+        let notes = sparse.into_iter().chain(unread::visibility(&mut archive, object).unwrap_or_default()).collect();
         let Archive { container, samplings, .. } = &mut archive;
         let mut mirrored = false;
         // What is not there yet is often scaled to nothing.

@@ -13,6 +13,7 @@ mod properties;
 mod sampling;
 mod timing;
 mod transform;
+mod unread;
 mod write;
 
 pub(crate) use frames::{open_frames, read_model};

@@ -6,6 +6,7 @@ use super::fields::Fields;
 use super::ogawa::{Container, DATA, damaged};
 use super::sampling::Sampling;
 use crate::error::Fault;
+use crate::frames::nominal;
 use crate::scene::Failure;
 
 /// Objects of an archive, and how deep they nest; programs write far fewer.
@@ -24,6 +25,8 @@ pub(super) enum Kind {
     Transform,
     /// Another object once more.
     Instance,
+    /// Faces of a mesh, for a material of their own.
+    FaceSet,
     Other,
 }
 
@@ -38,6 +41,7 @@ impl Kind {
             _ if value(b"isInstance") == Some(b"1") => Self::Instance,
             _ if schema.starts_with(b"AbcGeom_PolyMesh_") || schema.starts_with(b"AbcGeom_SubD_") => Self::Mesh,
             _ if schema.starts_with(b"AbcGeom_Xform_") => Self::Transform,
+            _ if schema.starts_with(b"AbcGeom_FaceSet_") => Self::FaceSet,
             _ => Self::Other,
         }
     }
@@ -152,5 +156,5 @@ fn frame_rate(information: &[u8]) -> Option<f64> {
     let text = String::from_utf8_lossy(information);
     let value = |key: &str| text.split(';').find_map(|entry| entry.trim().strip_prefix(key)?.strip_prefix('='));
     let told = ["_ai_DCC_FPS", "FramesPerTimeUnit"].into_iter().find_map(value)?;
-    told.trim().parse().ok().filter(|rate: &f64| (1e-3..1e6).contains(rate))
+    told.trim().parse().ok().filter(|rate: &f64| (1e-3..1e6).contains(rate)).map(nominal)
 }

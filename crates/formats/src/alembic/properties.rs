@@ -5,6 +5,7 @@ use std::io::{Read, Seek};
 use super::fields::Fields;
 use super::objects::{Archive, INLINE};
 use super::ogawa::{Block, Container, DATA, DIGEST, damaged};
+use super::sampling::Sampling;
 use crate::scene::Failure;
 
 /// Types of numbers, as headers tell them.
@@ -47,6 +48,11 @@ impl Property {
     /// Whether all samples are the same.
     pub(super) fn is_constant(&self) -> bool {
         self.samples < 2 || (self.first, self.last) == (0, 0)
+    }
+
+    /// The sample at a time in seconds, and how far that is on its way to the next.
+    pub(super) fn find(&self, seconds: f64, samplings: &[Sampling]) -> (usize, f64) {
+        samplings[self.sampling].find(seconds, self.samples)
     }
 
     /// Where a sample lies among those that are stored: repetitions at the beginning and the end are not.
@@ -106,7 +112,12 @@ impl<R: Read + Seek> Archive<R> {
     /// The properties in an object's compound of this name, `.geom` or `.xform`; none where it has no such.
     pub(super) fn schema(&mut self, object: usize, name: &str) -> Result<Vec<Property>, Failure> {
         let all = self.top_properties(object)?;
-        find(&all, name, Kind::Compound).map_or(Ok(Vec::new()), |compound| self.properties(compound.group))
+        self.within(&all, name)
+    }
+
+    /// The properties in a compound among these; none where there is no such.
+    pub(super) fn within(&mut self, all: &[Property], name: &str) -> Result<Vec<Property>, Failure> {
+        find(all, name, Kind::Compound).map_or(Ok(Vec::new()), |compound| self.properties(compound.group))
     }
 
     fn properties(&mut self, group: u64) -> Result<Vec<Property>, Failure> {

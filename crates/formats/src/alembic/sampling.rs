@@ -12,7 +12,7 @@ pub(super) const ACYCLIC: f64 = f64::MAX / 32.0;
 const NEAR: f64 = 1e-6;
 
 /// The times of the samples of a property, in seconds.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sampling {
     /// Seconds after which the stored times repeat.
     cycle: f64,
@@ -37,6 +37,33 @@ impl Sampling {
             found.push(Self { cycle, stored });
         }
         Ok(found)
+    }
+
+    /// The times of all that has samples, of each so many; and how many these are.
+    pub(super) fn union(all: &[(&Self, usize)]) -> (Self, usize) {
+        let Some(&(most, count)) = all.iter().max_by_key(|(_, samples)| *samples) else {
+            return (Self { cycle: ACYCLIC, stored: vec![0.0] }, 1);
+        };
+        if all.iter().all(|(other, _)| *other == most) {
+            return (most.clone(), count);
+        }
+        let mut times: Vec<f64> =
+            all.iter().flat_map(|(sampling, samples)| (0..*samples).map(|sample| sampling.time(sample))).collect();
+        times.sort_by(f64::total_cmp);
+        let length = times.last().unwrap_or(&0.0) - times[0];
+        let near = NEAR * length / times.len() as f64;
+        times.dedup_by(|later, earlier| *later - *earlier <= near);
+        // As they are stored where others are at the same times.
+        if times.len() == count {
+            return (most.clone(), count);
+        }
+        let (step, start) = (length / (times.len() - 1).max(1) as f64, times[0]);
+        let is_even = |(k, time): (usize, &f64)| (time - start - step * k as f64).abs() <= NEAR * step;
+        let count = times.len();
+        if count > 1 && times.iter().enumerate().all(is_even) {
+            return (Self { cycle: step, stored: vec![start] }, count);
+        }
+        (Self { cycle: ACYCLIC, stored: times }, count)
     }
 
     fn is_acyclic(&self) -> bool {
@@ -108,6 +135,21 @@ mod tests {
         assert_eq!(acyclic.find(2.5, 3), (1, 0.5));
         assert_eq!((acyclic.find(-7.0, 3), acyclic.find(7.0, 3)), ((0, 0.0), (2, 0.0)));
         assert_eq!(even.find(1.0 + 1e-9, 1), (0, 0.0));
+    }
+
+    #[test]
+    fn a_union_has_all_times_once() {
+        let all = [table(0.2, &[1.0]), table(1.0, &[1.0]), table(ACYCLIC, &[1.0, 1.5, 4.0])].concat();
+        let [fine, coarse, own] = &Sampling::table(&all).unwrap()[..] else { panic!("three samplings") };
+        assert_eq!(Sampling::union(&[(fine, 11), (coarse, 3)]), (fine.clone(), 11));
+        assert_eq!(Sampling::union(&[(coarse, 3), (coarse, 2)]), (coarse.clone(), 3));
+        let times = |all: &[(&Sampling, usize)]| {
+            let (sampling, count) = Sampling::union(all);
+            (0..count).map(|sample| sampling.time(sample)).collect::<Vec<_>>()
+        };
+        assert_eq!(times(&[(coarse, 2), (own, 3)]), [1.0, 1.5, 2.0, 4.0]);
+        // Those behind the points as well.
+        assert_eq!(times(&[(fine, 3), (coarse, 3)]), [1.0, 1.2, 1.4, 2.0, 3.0]);
     }
 
     #[test]

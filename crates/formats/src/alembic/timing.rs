@@ -2,7 +2,7 @@
 
 use super::sampling::Sampling;
 use crate::error::Fault;
-use crate::frames::Times;
+use crate::frames::{Times, nominal};
 
 /// Samples between two frames that a frame rate is still that of the program by.
 const MOST_BETWEEN: f64 = 64.0;
@@ -33,14 +33,16 @@ pub(super) fn timing(sampling: &Sampling, samples: usize, told: Option<f64>, is_
         let what = format!("has samples {step} s apart from {start} s on; export it again with times in seconds");
         return Err(Fault::invalid(what));
     }
-    let own = told.filter(|told| (told * step - 1.0).abs() < EQUAL).unwrap_or_else(|| rounded(own, 1e3, 1e-6));
+    let own =
+        told.filter(|told| (told * step - 1.0).abs() < EQUAL).unwrap_or_else(|| nominal(rounded(own, 1e3, 1e-6)));
     // A program that writes several samples a frame, or one for several frames, counts in frames all the same.
     let frames = told.map(|told| rounded(told * step, 1.0, NEAR)).filter(|&frames| {
         let is_whole = |x: f64| x >= 1.0 && (x - x.round()).abs() < NEAR * x;
         frames != 1.0 && (is_whole(frames) || is_whole(1.0 / frames) && 1.0 / frames <= MOST_BETWEEN)
     });
+    let seconds = step;
     let (frame_rate, step) = told.zip(frames).unwrap_or((own, 1.0));
-    let first = rounded(rounded(start * frame_rate, 1.0, NEAR), 1e6, 1e-3);
+    let first = rounded(rounded(start / seconds * step, 1.0, NEAR), 1e6, 1e-3);
     Ok(Times { frame_rate: Some(frame_rate), first, step, ..Times::default() })
 }
 

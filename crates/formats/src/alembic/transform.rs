@@ -7,8 +7,10 @@ use super::ogawa::{Container, damaged};
 use super::properties::{BOOL, F64, Kind, Property, U8, find};
 use super::sampling::Sampling;
 use crate::error::Fault;
-use crate::scene::{Failure, IDENTITY, Matrix, Objects, multiply, rotation};
+use crate::scene::{Failure, IDENTITY, Matrix, Objects, between, multiply, rotation};
 
+/// The kind of an operation that is a matrix.
+const MATRIX: u8 = 3;
 /// Programs write a handful.
 const MOST_OPERATIONS: usize = 256;
 /// Operations of all animated transforms above a mesh, which are done for every frame.
@@ -28,25 +30,6 @@ struct Link {
     values: Property,
     /// The matrix, where it does not change.
     fixed: Option<Matrix>,
-}
-
-/// A moment at which a transform is wanted: a time, which is that of a sample of some property.
-#[derive(Clone, Copy)]
-pub(super) struct Moment {
-    pub(super) sample: usize,
-    /// Index of the times of that property.
-    pub(super) sampling: usize,
-    pub(super) seconds: f64,
-}
-
-impl Moment {
-    /// The sample of another property at this moment, and how far the moment is on its way to the next.
-    pub(super) fn of(self, property: &Property, samplings: &[Sampling]) -> (usize, f64) {
-        if property.sampling == self.sampling {
-            return (self.sample.min(property.samples.saturating_sub(1)), 0.0);
-        }
-        samplings[property.sampling].find(self.seconds, property.samples)
-    }
 }
 
 impl Chain {
@@ -70,24 +53,23 @@ impl Chain {
         Ok(Self { links })
     }
 
-    /// The property that changes most often, if any does.
-    pub(super) fn animated(&self) -> Option<&Property> {
-        let moving = self.links.iter().filter(|link| link.fixed.is_none());
-        moving.map(|link| &link.values).max_by_key(|values| values.samples)
+    /// The properties that change.
+    pub(super) fn animated(&self) -> impl Iterator<Item = &Property> {
+        self.links.iter().filter(|link| link.fixed.is_none()).map(|link| &link.values)
     }
 
-    /// The product of all transforms at a moment; none for the identity.
+    /// The product of all transforms at a time in seconds; none for the identity.
     pub(super) fn matrix<R: Read + Seek>(
         &self,
         container: &mut Container<R>,
         samplings: &[Sampling],
-        moment: Moment,
+        seconds: f64,
     ) -> Result<Option<Matrix>, Failure> {
         let mut product: Option<Matrix> = None;
         for link in &self.links {
             let matrix = match link.fixed {
                 Some(fixed) => fixed,
-                None => link.at(container, moment.of(&link.values, samplings))?,
+                None => link.at(container, link.values.find(seconds, samplings))?,
             };
             product = Some(product.map_or(matrix, |inner| multiply(&inner, &matrix)));
         }
@@ -130,7 +112,7 @@ fn inherits<R: Read + Seek>(container: &mut Container<R>, properties: &[Property
 }
 
 impl Link {
-    /// The matrix at a sample, or on the way to the next one, where each number is interpolated.
+    /// The matrix at a sample, or on the way to the next one, where each number is interpolated, and matrices as the rotations that they are.
     fn at<R: Read + Seek>(
         &self,
         container: &mut Container<R>,
@@ -143,6 +125,10 @@ impl Link {
         let mut values = read(sample)?;
         if share > 0.0 {
             let next = read(sample + 1)?;
+            if matches!(self.operations.as_slice(), [operation] if operation >> 4 == MATRIX) {
+                let [from, to] = [&values, &next].map(|values| matrix(&self.operations, values));
+                return Ok(between(&from?, &to?, share));
+            }
             values.iter_mut().zip(next).for_each(|(value, next)| *value += share * (next - *value));
         }
         Ok(matrix(&self.operations, &values)?)
@@ -157,7 +143,7 @@ fn matrix(operations: &[u8], mut values: &[f64]) -> Result<Matrix, Fault> {
         let count = match kind {
             0 | 1 => 3,
             2 => 4,
-            3 => 16,
+            MATRIX => 16,
             4..=6 => 1,
             _ => return Err(Fault::unsupported("has a transform of an unknown kind; bake it into the points")),
         };
@@ -168,7 +154,7 @@ fn matrix(operations: &[u8], mut values: &[f64]) -> Result<Matrix, Fault> {
             (0, _) => (0..3).for_each(|k| step[k][k] = taken[k]),
             (1, _) => step[3][..3].copy_from_slice(taken),
             (2, &[x, y, z, degrees]) => step = rotation([x, y, z], degrees),
-            (3, _) => step.as_flattened_mut().copy_from_slice(taken),
+            (MATRIX, _) => step.as_flattened_mut().copy_from_slice(taken),
             _ => step = rotation([4, 5, 6].map(|axis| f64::from(u8::from(kind == axis))), taken[0]),
         }
         product = multiply(&step, &product);

@@ -1,21 +1,27 @@
 //! Maya's geometry cache in one file, `.mcx` or the older `.mc`: a header, then a block for each frame with its time in ticks and the arrays of its
 //! channels, all big-endian. Chunks of `.mcx` count their bytes in 64 bits and end at multiples of eight. The text beside it says how long a frame is.
+//! Maya's default is a file for each frame, `walkFrame12.mcx`, whose header has the time.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::Polygons;
 
 use super::FrameReader;
 use super::block::read_values;
-use super::times::Times;
+use super::numbers;
+use super::times::{Times, near_whole};
 use super::widen::Scalar;
 use crate::error::{Error, Fault};
 use crate::scene::{self, Animation, Failure, shown};
 
 /// Ticks of a second.
 pub(super) const TICKS: f64 = 6000.0;
+/// Before the exact frame rate, in the text beside a cache of this library.
+pub(super) const EXACT_RATE: &str = "<extra>frames per second ";
+/// Frames per second where no text says them.
+const USUAL: f64 = 24.0;
 /// Bytes of the text beside a cache that are looked at, and of the name of a channel.
 const MOST_TEXT: u64 = 1 << 16;
 const MOST_NAME: u64 = 1 << 10;
@@ -32,19 +38,80 @@ pub(super) fn open<'a>(
     expected_points: usize,
     (prim, folder): (Option<&str>, Option<&Path>),
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
-    let told = folder.and_then(|_| frame_rate(&path.with_extension("xml")));
-    let cache = Cache::open(source, length, prim, told);
-    scene::open(path, cache.map_err(|failure| failure.at(path))?, expected_points)
+    let told = folder.and_then(|_| frame_rate(path));
+    let mut cache = Cache::open(source, length, prim, told).map_err(|failure| failure.at(path))?;
+    if let Some((base, _)) = FrameName::of(path).filter(|_| cache.is_one_frame) {
+        let all = path.with_file_name(base + "Frame*").with_extension(path.extension().unwrap_or_default());
+        let what = format!(
+            "it is one frame of a cache with a file for each; for all of them give the pattern '{}'",
+            all.display()
+        );
+        cache.times.note = Some(what);
+    }
+    scene::open(path, cache, expected_points)
+}
+
+/// The numbers of files that are called as Maya calls those of a cache with a file for each frame; none where other files are among them, or several
+/// caches.
+pub(super) fn numbers_of(files: &[PathBuf]) -> Option<Vec<f64>> {
+    let ticks = TICKS / files.first().and_then(|file| frame_rate(file)).unwrap_or(USUAL);
+    let names: Vec<_> = files.iter().map(|file| FrameName::of(file)).collect::<Option<_>>()?;
+    let (base, _) = names.first()?;
+    let folder = files.first()?.parent();
+    let is_one = names.iter().zip(files).all(|((other, _), file)| other == base && file.parent() == folder);
+    let numbers = names.iter().map(|(_, name)| name.frame + name.tick / ticks).collect::<Vec<f64>>();
+    (is_one && numbers::distinct(&numbers)).then_some(numbers)
+}
+
+/// What the name of a file says of its frame, as in `walkFrame12.mcx` and `walkFrame12Tick125.mcx`.
+struct FrameName {
+    frame: f64,
+    /// Behind the frame, where a cache has several samples of each.
+    tick: f64,
+}
+
+impl FrameName {
+    /// The name without it, and what it says.
+    fn of(path: &Path) -> Option<(String, Self)> {
+        let (base, numbers) = path.file_stem()?.to_str()?.rsplit_once("Frame")?;
+        let whole = |digits: &str| digits.parse().ok().map(|number: i32| f64::from(number));
+        let (frame, tick) = numbers.split_once("Tick").unwrap_or((numbers, "0"));
+        Some((base.to_owned(), Self { frame: whole(frame)?, tick: whole(tick)? }))
+    }
+}
+
+/// Whether a text is what Maya writes beside a cache.
+pub(super) fn is_description(path: &Path) -> bool {
+    text(path).is_some_and(|text| text.contains("<Autodesk_Cache_File>"))
+}
+
+/// The beginning of a text.
+fn text(path: &Path) -> Option<String> {
+    let mut text = Vec::new();
+    File::open(path).ok()?.take(MOST_TEXT).read_to_end(&mut text).ok()?;
+    Some(String::from_utf8_lossy(&text).into_owned())
 }
 
 /// The frame rate that the text beside a cache says, where there is one that does.
 fn frame_rate(path: &Path) -> Option<f64> {
-    let mut text = Vec::new();
-    File::open(path).ok()?.take(MOST_TEXT).read_to_end(&mut text).ok()?;
-    let text = String::from_utf8_lossy(&text);
-    let (_, behind) = text.split_once("TimePerFrame=\"")?;
-    let ticks: f64 = behind.split('"').next()?.parse().ok()?;
-    (1.0..=1e6).contains(&ticks).then_some(TICKS / ticks)
+    let beside = || text(&path.with_extension("xml"));
+    let text = beside().or_else(|| text(&path.with_file_name(FrameName::of(path)?.0 + ".xml")))?;
+    let number =
+        |before: &str, behind: char| -> Option<f64> { text.split_once(before)?.1.split(behind).next()?.parse().ok() };
+    // Ticks are whole, which television's rates are not.
+    let exact = number(EXACT_RATE, '<').filter(|rate| super::RATES.contains(rate));
+    let ticks = || number("TimePerFrame=\"", '"').filter(|ticks| (1.0..=1e6).contains(ticks));
+    exact.or_else(|| ticks().map(|ticks| TICKS / ticks))
+}
+
+/// The rate at which these times in ticks are those of whole frames: the one that is told in ticks, or that of television next to it.
+fn fitting(ticks: &[i32], told: f64) -> f64 {
+    let is_off = |rate: f64| {
+        let off = |&tick: &i32| ((f64::from(tick) * rate / TICKS).round() * TICKS / rate - f64::from(tick)).abs();
+        ticks.iter().map(off).fold(0.0, f64::max)
+    };
+    let television = told * 1000.0 / 1001.0;
+    if ticks.len() > 2 && is_off(told) > 1e-3 && is_off(television) < 1.0 { television } else { told }
 }
 
 struct Cache<R> {
@@ -53,6 +120,8 @@ struct Cache<R> {
     frames: Vec<Array>,
     faces: Polygons,
     block: Vec<u8>,
+    /// Whether other frames are in files of their own.
+    is_one_frame: bool,
 }
 
 /// Where the positions of a frame are.
@@ -68,16 +137,18 @@ type Channel = (Vec<u8>, Array);
 impl<R: Read + Seek> Cache<R> {
     fn open(source: R, length: u64, prim: Option<&str>, told: Option<f64>) -> Result<Self, Failure> {
         let mut chunks = Chunks::open(source, length)?;
-        // Behind the header.
-        let mut at = chunks.chunk(0, length)?.end;
-        let (mut frames, mut times, mut name) = (Vec::new(), Vec::new(), None);
+        let header = chunks.chunk(0, length)?;
+        let start = chunks.start_time(header)?;
+        let mut at = header.end;
+        let (mut frames, mut ticks, mut name, mut is_one_frame) = (Vec::new(), Vec::new(), None, false);
         while at < length {
             let group = chunks.chunk(at, length)?;
             at = group.end;
             let (time, channels) = chunks.frame(group)?;
-            let Some(time) = time else {
-                let what = "is one frame of a cache with a file for each; export it again as one file";
-                return Err(Fault::unsupported(what).into());
+            // The only block of a file may have its time in the header.
+            is_one_frame = time.is_none() && frames.is_empty() && at >= length;
+            let Some(time) = time.or(start.filter(|_| is_one_frame)) else {
+                return Err(damaged(&format!("frame {} has no time", frames.len())));
             };
             let found = match &name {
                 None => Some(choose(channels, prim)?),
@@ -96,12 +167,18 @@ impl<R: Read + Seek> Cache<R> {
             }
             name = Some(chosen);
             frames.push(array);
-            times.push(f64::from(time) / TICKS);
+            ticks.push(time);
         }
         if frames.is_empty() {
             return Err(Fault::invalid("holds no frames; export the cache again").into());
         }
-        Ok(Self { chunks, times: Times::of(&times, told)?, frames, faces: Polygons::new(), block: Vec::new() })
+        let told = told.map(|told| fitting(&ticks, told));
+        let seconds: Vec<f64> = ticks.iter().map(|&tick| f64::from(tick) / TICKS).collect();
+        let mut times = Times::of(&seconds, told)?;
+        if let (true, Some(rate)) = (is_one_frame, told) {
+            (times.frame_rate, times.first) = (told, near_whole(rate * seconds[0]));
+        }
+        Ok(Self { chunks, times, frames, faces: Polygons::new(), block: Vec::new(), is_one_frame })
     }
 }
 
@@ -200,6 +277,24 @@ impl<R: Read + Seek> Chunks<R> {
         }
     }
 
+    /// The time of the first frame in ticks, where the header says it.
+    fn start_time(&mut self, header: Chunk) -> Result<Option<i32>, Failure> {
+        let mut at = header.start + 4;
+        while at < header.end {
+            let Chunk { tag, start, end } = self.chunk(at, header.end)?;
+            if tag == *b"STIM" {
+                return Ok(Some(i32::from_be_bytes(self.bytes(start, end)?)));
+            }
+            at = self.behind(start, end);
+        }
+        Ok(None)
+    }
+
+    /// Where the chunk after one begins.
+    fn behind(&self, start: u64, end: u64) -> u64 {
+        start + (end - start).next_multiple_of(if self.is_wide { 8 } else { 4 })
+    }
+
     /// The time of a block in ticks, where it says one, and its channels of vectors.
     fn frame(&mut self, group: Chunk) -> Result<(Option<i32>, Vec<Channel>), Failure> {
         if self.bytes::<4>(group.start, group.end)? != *b"MYCH" {
@@ -231,7 +326,7 @@ impl<R: Read + Seek> Chunks<R> {
                 }
                 _ => {}
             }
-            at = start + size.next_multiple_of(if self.is_wide { 8 } else { 4 });
+            at = self.behind(start, end);
         }
         Ok((time, channels))
     }

@@ -43,7 +43,7 @@ pub use source::{
     MeshSequence, frame_files, frame_numbers, mesh_sequence, open_frames, open_frames_bytes, open_frames_in,
     open_raw_frames, open_selected_frames,
 };
-pub(crate) use times::Times;
+pub(crate) use times::{Times, nominal};
 pub(crate) use widen::{Scalar, half_precision};
 pub use write::{CageMesh, FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path};
 

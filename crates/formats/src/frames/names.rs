@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use super::maya;
 use super::numbers;
 use super::pieces::{Names, Pieces};
 use super::several::several;
@@ -23,6 +24,9 @@ impl Sequence {
     /// Files of several sequences, or several files with one number: what was found, and patterns that pick some of them.
     pub(super) fn of(mut files: Vec<PathBuf>) -> Result<Self, String> {
         sort_naturally(&mut files);
+        if let Some(numbers) = maya::numbers_of(&files) {
+            return Ok(Self::sorted(files, Some(numbers)));
+        }
         let names = Names::of(&files);
         let labels: Vec<&str> = names.labels.iter().map(String::as_str).collect();
         let numbers = match numbers::of_names(&labels) {

@@ -10,7 +10,9 @@ use super::FrameReader;
 use super::cache;
 use super::layout::Layout;
 use super::npy::{self, Place};
+use super::numbers;
 use super::packed::{Entry, Unpacked};
+use super::times::nominal;
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
 
@@ -23,11 +25,14 @@ const MAX_ARRAYS: usize = 4096;
 /// Deflate packs no more bytes than these into one; what announces more is no archive.
 const MAX_DEFLATE_RATIO: u64 = 1032;
 
-/// Opens the one array of an archive that can be frames of so many points, as it is packed.
+/// Opens the array of an archive that can be frames of so many points, as it is packed: the one that `prim` names, or the only one. `is_frame` where
+/// the archive is one of many, each of which has a frame.
 pub(super) fn open<'a>(
     path: &Path,
     mut source: impl Read + Seek + Send + 'a,
     expected_points: usize,
+    prim: Option<&str>,
+    is_frame: bool,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let length = source.seek(SeekFrom::End(0)).map_err(|cause| Error::read(path, cause))?;
     let mut start = Vec::new();
@@ -47,7 +52,7 @@ pub(super) fn open<'a>(
         let mut unpacked = Unpacked::new(source, entry).map_err(read)?;
         let head = beginning(&mut unpacked).map_err(read)?;
         if RATES.iter().any(|rate| name.eq_ignore_ascii_case(rate)) {
-            fps = npy::single_number(&head).filter(|rate| rate.is_finite() && *rate > 0.0);
+            fps = npy::single_number(&head).filter(|rate| rate.is_finite() && *rate > 0.0).map(nominal);
         }
         let layout = npy::layout(&head, expected_points as u64, Place { name: Some(name) });
         found.push(Array {
@@ -60,7 +65,8 @@ pub(super) fn open<'a>(
         let Some(back) = unpacked.into_inner() else { return Err(Fault::damaged("cannot be read").at(path)) };
         source = back;
     }
-    let Array { entry, layout, .. } = chosen(found, &arrays, expected_points as u64, path)?;
+    let wanted = Wanted { points: expected_points as u64, prim, is_frame };
+    let Array { entry, layout, .. } = chosen(found, &arrays, &wanted, path)?;
     let mut layout = layout.map_err(|fault| fault.at(path))?;
     layout.times.frame_rate = fps;
     let unpacked = Unpacked::new(source, entry).map_err(|cause| Error::read(path, cause))?;
@@ -77,8 +83,24 @@ struct Array<'a> {
     layout: Result<Layout, Fault>,
 }
 
-/// The only array that fits, or the only one of several frames among those that do.
-fn chosen<'a>(mut found: Vec<Array<'a>>, arrays: &Arrays, points: u64, path: &Path) -> Result<Array<'a>, Error> {
+/// What an archive is opened for.
+struct Wanted<'a> {
+    points: u64,
+    prim: Option<&'a str>,
+    is_frame: bool,
+}
+
+/// The array that is named, or the only one that fits, or the only one of several frames among those that do.
+fn chosen<'a>(
+    mut found: Vec<Array<'a>>,
+    arrays: &Arrays,
+    wanted: &Wanted<'_>,
+    path: &Path,
+) -> Result<Array<'a>, Error> {
+    let points = wanted.points;
+    if let Some(place) = found.iter().position(|array| Some(array.name) == wanted.prim) {
+        return Ok(found.swap_remove(place));
+    }
     let frames = |array: &Array<'_>| array.layout.as_ref().map_or(0, |layout| layout.frames);
     let fits = |array: &Array<'_>| array.layout.as_ref().is_ok_and(|layout| layout.points == points);
     let only = |wanted: &dyn Fn(&Array<'_>) -> bool| {
@@ -106,17 +128,26 @@ fn chosen<'a>(mut found: Vec<Array<'a>>, arrays: &Arrays, points: u64, path: &Pa
     } else if found.iter().any(moving) {
         let moving: Vec<&str> = found.iter().filter(|array| moving(array)).map(|array| array.name).collect();
         format!(
-            "has {} arrays that can be the frames ({}); save one of them in Python, as with numpy.save(\"converted.npy\", {file}[{:?}])",
+            "has {} arrays that can be the frames ({}); {}",
             moving.len(),
             listed(moving.iter().map(|name| (*name).to_owned())),
-            moving[0]
+            named(moving[0])
         )
     } else if names.len() > 1 {
+        // Arrays such as `arr_0`, `arr_1` are the frames of one capture; a posed body and a canonical one are not.
+        let join = if !wanted.is_frame && numbers::of_names(&names).is_some() {
+            format!(
+                ", or join them in Python with a = {file}; numpy.save(\"converted.npy\", [a[k] for k in sorted(a.files, key=lambda k: (len(k), k)) if a[k].shape == a[{:?}].shape])",
+                names[0]
+            )
+        } else {
+            String::new()
+        };
         format!(
-            "has {} arrays of one frame each ({}); join them in Python with a = {file}; numpy.save(\"converted.npy\", [a[k] for k in sorted(a.files, key=lambda k: (len(k), k)) if a[k].shape == a[{:?}].shape])",
+            "has {} arrays of one frame each ({}); {}{join}",
             names.len(),
             listed(names.iter().map(|name| (*name).to_owned())),
-            names[0]
+            named(names[0])
         )
     } else {
         let all = found.iter().map(|array| format!("{}: {}", array.name, array.described));
@@ -127,6 +158,14 @@ fn chosen<'a>(mut found: Vec<Array<'a>>, arrays: &Arrays, points: u64, path: &Pa
         )
     };
     Err(Fault::unsupported(what).at(path))
+}
+
+/// How one of several arrays is taken.
+fn named(name: &str) -> String {
+    // Names of arrays are any text.
+    let is_plain = name.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-./".contains(&b));
+    let shown = if is_plain { name.to_owned() } else { format!("{name:?}") };
+    format!("name the one that is meant, as with --prim {shown}, where the command has it")
 }
 
 fn listed(names: impl ExactSizeIterator<Item = String>) -> String {

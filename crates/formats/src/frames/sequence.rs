@@ -1,4 +1,4 @@
-//! A capture with each frame in a file of its own: meshes, or arrays of one frame.
+//! A capture with each frame in a file of its own: meshes, arrays, or scenes and caches of one frame.
 
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,11 @@ pub(super) struct SequenceReader {
     sequence: Sequence,
     points: usize,
     notes: Vec<String>,
+    /// The array or the mesh that is read of each file, where it has several.
+    prim: Option<String>,
+    /// What the first file says of all.
+    frame_rate: Option<f64>,
+    units: Units,
     next: usize,
     /// Whether the last line of the text read last has an end, with its frame and file.
     before: Option<(bool, usize, PathBuf)>,
@@ -26,11 +31,29 @@ pub(super) struct SequenceReader {
 
 impl SequenceReader {
     /// `notes` are what the user should know of the choice of these files.
-    pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>) -> Self {
-        Self { sequence, points, notes, next: 0, before: None, faces: FrameFaces::default(), merged: Merged::default() }
+    pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>, prim: Option<&str>) -> Self {
+        let prim = prim.map(str::to_owned);
+        let (faces, merged) = (FrameFaces::default(), Merged::default());
+        let (frame_rate, units) = (None, Units::UNKNOWN);
+        let mut opened =
+            Self { sequence, points, notes, prim, frame_rate, units, next: 0, before: None, faces, merged };
+        let first = opened.sequence.files.first();
+        // All files are of one format. What is wrong with one is said when it is read.
+        match first.map(|path| (MeshFormat::guess(path), opened.open(path))) {
+            Some((Some(MeshFormat::Glb), _)) => opened.units = Units::METRES,
+            Some((None, Ok(reader))) => (opened.frame_rate, opened.units) = (reader.frame_rate(), reader.units()),
+            _ => {}
+        }
+        opened
     }
 
-    fn read_array(&self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
+    /// Opens a file that is no mesh.
+    fn open(&self, path: &Path) -> Result<Box<dyn FrameReader>, Error> {
+        let selection = FrameSelection { prim: self.prim.clone(), ..FrameSelection::default() };
+        single::open_cache(path, self.points, &selection, true)
+    }
+
+    fn read_capture(&mut self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
         let frame = self.next;
         let named = |error: Error| match error {
             Error::PointCount { path, expected, found, .. } => {
@@ -39,15 +62,31 @@ impl SequenceReader {
             Error::NonFinite { path, point, .. } => Error::NonFinite { path, frame, point },
             other => other.in_frame(frame),
         };
-        let mut reader = single::open_cache(path, self.points, &FrameSelection::default()).map_err(named)?;
+        let mut reader = self.open(path).map_err(named)?;
         if reader.frames() != 1 {
+            let cure = if single::is_array(path) {
+                "join the arrays in Python with numpy.concatenate"
+            } else {
+                "export one frame to each file"
+            };
             let what = format!(
-                "frame {frame}: has {} frames, where a folder of arrays has one in each; name this file alone, or join the arrays in Python with numpy.concatenate",
+                "frame {frame}: has {} frames, where a folder of several files has one in each; name this file alone, or {cure}",
                 reader.frames()
             );
             return Err(Fault::unsupported(what).at(path));
         }
-        reader.read_next(out).map(drop).map_err(named)
+        if reader.units() != self.units {
+            let what = format!(
+                "frame {frame}: says another unit or upward axis than {}; export all frames alike",
+                self.sequence.files[0].display()
+            );
+            return Err(Fault::invalid(what).at(path));
+        }
+        reader.read_next(out).map_err(named)?;
+        let faces = reader.mesh().map(|(_, faces)| faces.clone()).unwrap_or_default();
+        self.faces = FrameFaces::default();
+        self.faces.faces = faces;
+        Ok(())
     }
 
     fn read_mesh(&mut self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
@@ -99,10 +138,12 @@ impl FrameReader for SequenceReader {
         self.notes.clone()
     }
 
+    fn frame_rate(&self) -> Option<f64> {
+        self.frame_rate
+    }
+
     fn units(&self) -> Units {
-        // All files are of one format.
-        let format = self.sequence.files.first().and_then(|path| MeshFormat::guess(path));
-        if format == Some(MeshFormat::Glb) { Units::METRES } else { Units::UNKNOWN }
+        self.units
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {
@@ -117,8 +158,7 @@ impl FrameReader for SequenceReader {
         if MeshFormat::guess(&path).is_some() {
             self.read_mesh(&path, out)?;
         } else {
-            self.read_array(&path, out)?;
-            self.faces = FrameFaces::default();
+            self.read_capture(&path, out)?;
         }
         self.next += 1;
         Ok(true)

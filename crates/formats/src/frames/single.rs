@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 
-use super::{CacheFormat, FrameReader, FrameSelection, cache, npz};
+use super::{CacheFormat, FrameReader, FrameSelection, cache, maya, npz};
 use crate::error::{Error, Fault};
 use crate::glb;
 use crate::mesh::{MeshFormat, extensions};
@@ -31,16 +31,18 @@ pub(super) fn is_animated(path: &Path) -> Result<bool, Error> {
     Ok(glb::is_animated(&fs::read(path).map_err(|cause| Error::read(path, cause))?))
 }
 
-/// Opens a point cache, or the frames in an archive of arrays.
+/// Opens a point cache, or the frames in an archive of arrays; `is_frame` where it is one of many files of a frame each.
 pub(super) fn open_cache(
     path: &Path,
     expected_points: usize,
     selection: &FrameSelection,
+    is_frame: bool,
 ) -> Result<Box<dyn FrameReader>, Error> {
     let read = |cause| Error::read(path, cause);
     let open = || File::open(path).map_err(read);
     if is_archive(path) {
-        return npz::open(path, BufReader::new(open()?), expected_points);
+        let prim = selection.prim.as_deref();
+        return npz::open(path, BufReader::new(open()?), expected_points, prim, is_frame);
     }
     let Some(format) = CacheFormat::from_path(path) else { return Err(unknown(path)) };
     let file = open()?;
@@ -63,6 +65,12 @@ pub(super) fn unknown(path: &Path) -> Error {
 /// How to get at the frames of a scene of another program.
 pub(super) fn way_out(path: &Path) -> Option<String> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    if extension == "xml" && maya::is_description(path) {
+        let pattern = path.with_extension("").display().to_string() + "*.mcx";
+        return Some(format!(
+            "describes a cache of Maya; give the .mcx or .mc file beside it, or the pattern '{pattern}'"
+        ));
+    }
     let kind = match extension.as_str() {
         "fbx" => "an FBX scene",
         "dae" => "a Collada scene",

@@ -16,8 +16,8 @@ use crate::mesh::{MeshFormat, extensions};
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2`, `.mdd`, `.mcx`, `.abc`, `.usd` or animated `.glb` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of `.npy` files of
-/// one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
+/// `source` is a `.npy`, `.pc2`, `.mdd`, `.mcx`, `.abc`, `.usd` or animated `.glb` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of any other of these
+/// with one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
 /// `10.obj` and `1.5.obj` before `2.obj`; other files, and in a folder hidden ones, are passed over. In a pattern every part of the path may be a glob
 /// or have `%04d` or `####` in place of a number; what is there by that name is no pattern.
 ///
@@ -148,9 +148,9 @@ pub fn open_raw_frames<'a>(
 fn open_file(path: &Path, expected_points: usize, selection: &FrameSelection) -> Result<Box<dyn FrameReader>, Error> {
     if MeshFormat::guess(path).is_some() && !single::is_animated(path)? {
         let sequence = Sequence::of_all(vec![path.to_owned()]);
-        return Ok(Box::new(SequenceReader::new(sequence, expected_points, Vec::new())));
+        return Ok(Box::new(SequenceReader::new(sequence, expected_points, Vec::new(), None)));
     }
-    single::open_cache(path, expected_points, selection)
+    single::open_cache(path, expected_points, selection, false)
 }
 
 /// Opens what a folder holds or a pattern matches: meshes where there are any, else caches.
@@ -166,7 +166,7 @@ fn open_files(
     if let [only] = frames.as_slice()
         && single::is_animated(only)?
     {
-        return single::open_cache(only, expected_points, selection);
+        return single::open_cache(only, expected_points, selection, false);
     }
     if !frames.is_empty() {
         one_format(&frames).map_err(|fault| fault.at(source))?;
@@ -175,12 +175,51 @@ fn open_files(
     let (caches, notes) = without(caches, &selection.no_frames, true);
     match caches.as_slice() {
         [] => Err(no_frames_in(source, &others)),
-        [cache] => single::open_cache(cache, expected_points, selection),
-        several if several.iter().all(|path| single::is_array(path)) => {
+        [cache] => single::open_cache(cache, expected_points, selection, false),
+        several => {
+            if !several.iter().all(|path| single::is_array(path)) {
+                check_frames(several, expected_points, selection).map_err(|fault| fault.at(source))?;
+            }
             open_sequence(source, caches, notes, expected_points, selection)
         }
-        several => Err(Fault::invalid(format!("has {} captures; name one of them", several.len())).at(source)),
     }
+}
+
+/// Refuses files that are several captures instead of the frames of one, or may be.
+fn check_frames(files: &[PathBuf], points: usize, selection: &FrameSelection) -> Result<(), Fault> {
+    let mut files = files.to_vec();
+    files.sort();
+    let count = files.len();
+    let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
+    for extension in files.iter().filter_map(|path| path.extension()) {
+        *kinds.entry(extension.to_string_lossy().to_lowercase()).or_default() += 1;
+    }
+    if kinds.len() > 1 {
+        let list: Vec<_> = kinds.iter().map(|(extension, count)| format!("{count} .{extension}")).collect();
+        let most = kinds.iter().max_by_key(|(_, count)| **count).map_or("", |(extension, _)| extension.as_str());
+        return Err(Fault::invalid(format!(
+            "has {count} captures of several kinds ({}); name one of them, or where each is one frame, pick these with a pattern such as '*.{most}'",
+            list.join(", ")
+        )));
+    }
+    let frames = |path: &PathBuf| single::open_cache(path, points, selection, true).ok().map(|found| found.frames());
+    let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    // Files of frames are alike, and there may be thousands.
+    if let Some((path, many)) = files.iter().take(2).find_map(|path| Some((path, frames(path).filter(|&n| n > 1)?))) {
+        let path = name(path);
+        return Err(Fault::invalid(format!(
+            "has {count} captures, such as {path} of {many} frames; name one of them, or export one frame to each file"
+        )));
+    }
+    let has_numbers = Sequence::of(files.clone()).map_or(true, |sequence| sequence.numbers.is_some());
+    if !has_numbers && !selection.join_sequences {
+        return Err(Fault::invalid(format!(
+            "has {count} captures of one frame each, such as {} and {}, whose names have no numbers that tell the order; name one of them, number them as the frames of one capture, or take them by name with --all-files",
+            name(&files[0]),
+            name(&files[1])
+        )));
+    }
+    Ok(())
 }
 
 /// Captures among files; scenes where there is nothing else, as the scene often lies beside what was exported from it.
@@ -203,7 +242,7 @@ fn open_sequence(
     } else {
         Sequence::of(files).map_err(|what| Error::SeveralSequences { path: source.to_owned(), what })?
     };
-    Ok(Box::new(SequenceReader::new(sequence, expected_points, notes)))
+    Ok(Box::new(SequenceReader::new(sequence, expected_points, notes, selection.prim.as_deref())))
 }
 
 /// Files without the rest pose and the cage, however they are spelled, and what to say of it. One that is called as the others are stays, as the first

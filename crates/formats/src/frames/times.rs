@@ -6,6 +6,8 @@ use crate::error::Fault;
 const EVEN: f64 = 0.05;
 /// Seconds by which they may be off: some programs round times to thousandths.
 const ROUNDED: f64 = 1e-3;
+/// Rates that television has 1,000/1,001 of.
+const TELEVISION: [f64; 6] = [24.0, 30.0, 48.0, 60.0, 120.0, 240.0];
 
 /// When frames are: by default numbered from 0, at a rate that is not known.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +36,12 @@ impl Times {
         told.copied().unwrap_or(self.first + self.step * frame as f64)
     }
 
+    /// Numbers frames by another one for what was 0.
+    pub(crate) fn begin_at(&mut self, number: f64) {
+        self.first += number;
+        self.numbers.iter_mut().flatten().for_each(|told| *told += number);
+    }
+
     /// By the times of all frames in seconds; `told` is the frame rate of the program that wrote them, where it is known.
     ///
     /// Times that are not evenly spaced are kept as numbers that are not: a number over the frame rate is its frame's time.
@@ -52,13 +60,14 @@ impl Times {
                 times[k - 1]
             )));
         }
+        let told = told.map(nominal);
         let step = (last - first) / (times.len() - 1) as f64;
         let slack = (EVEN * step).max(ROUNDED).min(step / 4.0);
         let off = |(k, time): (usize, &f64)| (time - first - step * k as f64).abs() > slack;
         if !times.iter().enumerate().any(off) {
             found.frame_rate = told.filter(|told| (told * step - 1.0).abs() < 1e-3).or_else(|| rate(step));
             if let Some(rate) = found.frame_rate {
-                let number = (1000.0 * rate * first).round() / 1000.0;
+                let number = near_whole(rate * first);
                 found.first = if number.abs() < 1e9 { number } else { 0.0 };
             }
             return Ok(found);
@@ -85,7 +94,7 @@ impl Times {
 }
 
 /// A number to its thousandths, and a whole one where it is that but for rounded times.
-fn near_whole(number: f64) -> f64 {
+pub(super) fn near_whole(number: f64) -> f64 {
     let whole = number.round();
     if (number - whole).abs() < 0.02 { whole } else { (1000.0 * number).round() / 1000.0 }
 }
@@ -93,5 +102,36 @@ fn near_whole(number: f64) -> f64 {
 /// Times of single precision tell thousandths of a frame per second at the most.
 fn rate(step: f64) -> Option<f64> {
     let rate = (1000.0 / step).round() / 1000.0;
-    (rate.is_finite() && rate > 0.0).then_some(rate)
+    (rate.is_finite() && rate > 0.0).then(|| nominal(rate))
+}
+
+/// A rate of television where it is one but for its digits: 24,000/1,001 for 23.976.
+pub(crate) fn nominal(rate: f64) -> f64 {
+    let whole = (1.001 * rate).round();
+    let exact = whole * 1000.0 / 1001.0;
+    if TELEVISION.contains(&whole) && (rate - exact).abs() <= 2e-6 * exact { exact } else { rate }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_of_television_are_fractions_and_others_stay() {
+        for (told, rate) in [
+            (23.976, 24_000.0 / 1001.0),
+            (f64::from(23.976_f32), 24_000.0 / 1001.0),
+            (29.97, 30_000.0 / 1001.0),
+            (59.94, 60_000.0 / 1001.0),
+            (119.88, 120_000.0 / 1001.0),
+        ] {
+            assert_eq!(nominal(told), rate);
+            let at = |k: i32| f64::from((f64::from(k) / rate) as f32);
+            let times: Vec<f64> = (0..40).map(at).collect();
+            assert_eq!(Times::of(&times, None).unwrap().frame_rate, Some(rate));
+        }
+        for rate in [24.0, 23.98, 25.0, 12.5, 29.9, 1e-3, 1e6] {
+            assert_eq!(nominal(rate), rate);
+        }
+    }
 }

@@ -9,5 +9,5 @@ mod reader;
 pub(crate) use choice::{Objects, choose, list, named, shown, shown_path};
 pub(crate) use faces::{Faces, most_corners, topology_changes};
 pub(crate) use failure::Failure;
-pub(crate) use matrix::{IDENTITY, Matrix, determinant, inverse, multiply, rotation};
+pub(crate) use matrix::{IDENTITY, Matrix, between, determinant, inverse, multiply, rotation, rows_of, slerp};
 pub(crate) use reader::{Animation, MOST_REPEATED, check_held, open, placed};

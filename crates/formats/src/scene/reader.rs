@@ -40,6 +40,11 @@ pub(crate) trait Animation: Send {
         Units::UNKNOWN
     }
 
+    /// What the user should know of how it is read, beside its times.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+
     /// Reads a frame; gives whether all is finite.
     fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure>;
 }
@@ -93,7 +98,8 @@ impl<A: Animation> FrameReader for Reader<A> {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.mesh.times().note.iter().map(|note| format!("{}: {note}", self.path.display())).collect()
+        let all = self.mesh.times().note.iter().chain(self.mesh.notes());
+        all.map(|note| format!("{}: {note}", self.path.display())).collect()
     }
 
     fn units(&self) -> Units {

@@ -1,22 +1,35 @@
 //! Which mesh of a layer is meant.
 
-use super::layer::{Layer, Prim, composed};
+use super::layer::{Kind, Layer, Prim, composed};
 use crate::error::Fault;
 use crate::scene::{Failure, Objects, choose as choose_object, named, shown_path};
 
-/// The mesh that `prim` names, or the only one.
-pub(super) fn choose<'a>(layer: &mut Box<dyn Layer + 'a>, prim: Option<&str>) -> Result<u32, Failure> {
+/// The mesh that `prim` names, or the only one, and what the user should know of others.
+pub(super) fn choose<'a>(
+    layer: &mut Box<dyn Layer + 'a>,
+    prim: Option<&str>,
+) -> Result<(u32, Option<String>), Failure> {
     let is_there = |&k: &usize| layer.ancestry(k).all(|k| layer.prims()[k].is_there);
     let there: Vec<usize> = (0..layer.prims().len()).filter(is_there).collect();
-    let mut meshes: Vec<usize> = there.iter().copied().filter(|&k| layer.prims()[k].is_mesh).collect();
+    let is_a = |k: usize, kind: Kind| layer.prims()[k].kind == kind;
+    let instancer = there.iter().copied().find(|&k| is_a(k, Kind::PointInstancer));
+    // Those below an instancer are shown where its points are, and not where they are themselves.
+    let is_placed = |&k: &usize| !layer.ancestry(k).any(|above| is_a(above, Kind::PointInstancer));
+    let mut meshes: Vec<usize> = there.iter().copied().filter(|&k| is_a(k, Kind::Mesh)).collect();
+    let is_none = meshes.is_empty();
+    meshes.retain(is_placed);
     if prim.is_none() && meshes.len() > 1 {
         meshes = shown(layer, meshes)?;
     }
     let first_composed = |prims: &[Prim], among: &[usize]| among.iter().find_map(|&k| Some((k, prims[k].composed?)));
     if meshes.is_empty() {
-        return Err(match first_composed(layer.prims(), &there) {
-            Some((prim, of)) => composed(&shown_path(layer, prim), of),
-            None => Fault::unsupported("holds no polygon mesh; export the mesh itself as USD"),
+        return Err(match (first_composed(layer.prims(), &there), instancer) {
+            (Some((prim, of)), _) => composed(&shown_path(layer, prim), of),
+            (None, Some(instancer)) if !is_none => Fault::unsupported(format!(
+                "has its meshes as prototypes of {}, a PointInstancer, whose instances are not read; make them real where it is exported, or export the mesh alone",
+                shown_path(layer, instancer)
+            )),
+            _ => Fault::unsupported("holds no polygon mesh; export the mesh itself as USD"),
         }
         .into());
     }
@@ -25,32 +38,40 @@ pub(super) fn choose<'a>(layer: &mut Box<dyn Layer + 'a>, prim: Option<&str>) ->
     let is_named = prim.is_some_and(|prim| !named(layer, &[chosen], prim).is_empty());
     let above: Vec<usize> = layer.ancestry(chosen).collect();
     let looked_at = if is_named { above } else { there };
-    match first_composed(layer.prims(), &looked_at) {
-        Some((prim, of)) => Err(composed(&shown_path(layer, prim), of).into()),
-        None => Ok(chosen as u32),
+    if let Some((prim, of)) = first_composed(layer.prims(), &looked_at) {
+        return Err(composed(&shown_path(layer, prim), of).into());
     }
+    let note = instancer
+        .map(|instancer| format!("the instances of {}, a PointInstancer, are not read", shown_path(layer, instancer)));
+    Ok((chosen as u32, note))
 }
 
-/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides, and what is switched off is invisible.
+/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides or stand in for what is rendered, and what is switched
+/// off is invisible.
 fn shown<'a>(layer: &mut Box<dyn Layer + 'a>, meshes: Vec<usize>) -> Result<Vec<usize>, Failure> {
     let mut rendered = Vec::new();
     for &mesh in &meshes {
-        let mut is_hidden = says(layer, mesh, "purpose", "guide")?;
+        let (mut purpose, mut is_hidden) = (None, false);
         for prim in layer.ancestry(mesh).collect::<Vec<_>>() {
-            is_hidden = is_hidden || says(layer, prim, "visibility", "invisible")?;
+            // The innermost purpose counts.
+            purpose = match purpose {
+                None => constant(layer, prim, "purpose")?,
+                known => known,
+            };
+            is_hidden = is_hidden || constant(layer, prim, "visibility")?.as_deref() == Some("invisible");
         }
-        if !is_hidden {
+        if !is_hidden && !matches!(purpose.as_deref(), Some("guide" | "proxy")) {
             rendered.push(mesh);
         }
     }
     Ok(if rendered.is_empty() { meshes } else { rendered })
 }
 
-/// Whether an attribute of a prim is this token at all times.
-fn says<'a>(layer: &mut Box<dyn Layer + 'a>, prim: usize, name: &str, token: &str) -> Result<bool, Failure> {
+/// The token that an attribute of a prim is at all times.
+fn constant<'a>(layer: &mut Box<dyn Layer + 'a>, prim: usize, name: &str) -> Result<Option<String>, Failure> {
     let said = layer.attribute(prim as u32, name)?;
     let value = said.still().filter(|_| said.times.len() < 2);
-    Ok(value.map_or(Ok(Vec::new()), |value| layer.tokens(value, 1))? == [token])
+    Ok(value.map_or(Ok(Vec::new()), |value| layer.tokens(value, 1))?.pop())
 }
 
 impl Objects for Box<dyn Layer + '_> {

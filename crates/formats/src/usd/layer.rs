@@ -20,6 +20,28 @@ pub(super) const COMPOSED: [(&str, &str); 9] = [
     ("clipSets", "value clips"),
 ];
 
+/// What a prim is, as far as it matters here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Mesh,
+    /// Faces of a mesh, for a material of their own.
+    Subset,
+    /// What shows the prims below it many times, and not where they are.
+    PointInstancer,
+    Other,
+}
+
+impl Kind {
+    pub(super) fn of(type_name: &[u8]) -> Self {
+        match type_name {
+            b"Mesh" => Self::Mesh,
+            b"GeomSubset" => Self::Subset,
+            b"PointInstancer" => Self::PointInstancer,
+            _ => Self::Other,
+        }
+    }
+}
+
 /// A prim of the tree.
 #[derive(Clone, Debug)]
 pub(super) struct Prim {
@@ -31,7 +53,7 @@ pub(super) struct Prim {
     pub(super) spec: u32,
     /// Index of its name.
     pub(super) name: u32,
-    pub(super) is_mesh: bool,
+    pub(super) kind: Kind,
     /// Whether it, without regard to what it lies below, is there: defined and active.
     pub(super) is_there: bool,
     /// What it is composed of beside what is told here, in words.
@@ -62,12 +84,12 @@ impl Attribute {
         self.default.or_else(|| self.values.first().copied())
     }
 
-    /// The value at a time code, the next one, and how far the time is on its way there; for no time the still one. Before the first and after the last
-    /// they hold.
-    pub(super) fn at(&self, time: Option<f64>) -> Option<(Value, Value, f64)> {
-        let Some(time) = time.filter(|_| !self.times.is_empty()) else {
-            return self.still().map(|value| (value, value, 0.0));
-        };
+    /// The value at a time code, the next one, and how far the time is on its way there; that by default where there are no samples. Before the first
+    /// and after the last they hold.
+    pub(super) fn at(&self, time: f64) -> Option<(Value, Value, f64)> {
+        if self.times.is_empty() {
+            return self.default.map(|value| (value, value, 0.0));
+        }
         let after = self.times.partition_point(|&t| t <= time + NEAR);
         let (low, high) = (after.saturating_sub(1), after.min(self.times.len() - 1));
         let (start, end) = (self.times[low], self.times[high]);
@@ -109,6 +131,9 @@ pub(super) trait Layer: Send {
     /// The values of an attribute of a prim; none where it has none of this name.
     fn attribute(&mut self, prim: u32, name: &str) -> Result<Attribute, Failure>;
 
+    /// The names and types of what a mesh has beside its faces, and of the materials of any prim.
+    fn properties(&self, prim: u32) -> Vec<(String, String)>;
+
     /// The numbers of one value: of a number, a vector, a quaternion (its real part last) or a matrix.
     fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure>;
 
@@ -133,7 +158,7 @@ pub(super) fn damaged(what: &str) -> Fault {
 /// The fault of what is composed of other prims or files.
 pub(super) fn composed(what: &str, of: &str) -> Fault {
     Fault::unsupported(format!(
-        "{what} has {of}, which are not read; write all into one file with usdcat --flatten in.usd -o out.usdc"
+        "{what} has {of}, which are not read; write all into one file in Python (pip install usd-core): from pxr import Usd; s = Usd.Stage.Open(\"in.usd\"); [p.SetInstanceable(False) for _ in range(9) for p in list(s.TraverseAll()) if p and p.IsInstance()]; s.Export(\"out.usdc\")"
     ))
 }
 

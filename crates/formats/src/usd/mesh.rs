@@ -7,6 +7,8 @@ use super::choice::choose;
 use super::layer::{Attribute, Layer, Value};
 use super::timing::Grid;
 use super::transform::Chain;
+use super::unread;
+use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::frames::Times;
 use crate::scene::{Animation, Faces, Failure, MOST_REPEATED, determinant, most_corners, placed, topology_changes};
@@ -16,12 +18,14 @@ const USUAL_UNIT: f64 = 0.01;
 
 pub(super) struct MeshFrames<'a> {
     layer: Box<dyn Layer + 'a>,
+    /// Index of the prim.
+    mesh: u32,
     positions: Attribute,
     /// How many corners faces have, and which.
     parts: [Attribute; 2],
     chain: Chain,
     grid: Grid,
-    /// Whether what is wanted is the mesh without a time.
+    /// Whether what is wanted is the first frame alone, whatever moves the mesh.
     is_still: bool,
     /// Whether faces are wound clockwise, or turned so by a transform.
     turned: bool,
@@ -31,11 +35,13 @@ pub(super) struct MeshFrames<'a> {
     points: usize,
     /// The points of the next sample, where a frame lies between two.
     next: Vec<f64>,
+    notes: Vec<String>,
 }
 
 impl<'a> MeshFrames<'a> {
     pub(super) fn open(mut layer: Box<dyn Layer + 'a>, prim: Option<&str>, is_still: bool) -> Result<Self, Failure> {
-        let mesh = choose(&mut layer, prim)?;
+        let (mesh, note) = choose(&mut layer, prim)?;
+        let notes = note.into_iter().chain(unread::visibility(&mut layer, mesh).unwrap_or_default()).collect();
         let mut attribute = |name| layer.attribute(mesh, name);
         let positions = attribute("points")?;
         let parts = [attribute("faceVertexCounts")?, attribute("faceVertexIndices")?];
@@ -49,7 +55,7 @@ impl<'a> MeshFrames<'a> {
                 return Err(Fault::unsupported(what).into());
             }
         }
-        let chain = Chain::of(&mut layer, mesh, is_still)?;
+        let chain = Chain::of(&mut layer, mesh)?;
         let samples = positions.times.iter().copied().chain(chain.times()).collect();
         let grid = Grid::of(layer.stage(), samples)?;
         let is_left = match orientation.still() {
@@ -57,9 +63,22 @@ impl<'a> MeshFrames<'a> {
             None => false,
         };
         let (faces, equal, next) = (Faces::default(), Default::default(), Vec::new());
-        let mut opened =
-            Self { layer, positions, parts, chain, grid, is_still, turned: is_left, faces, equal, points: 0, next };
-        opened.points = match opened.positions.at(opened.time(0)) {
+        let mut opened = Self {
+            layer,
+            mesh,
+            positions,
+            parts,
+            chain,
+            grid,
+            is_still,
+            turned: is_left,
+            faces,
+            equal,
+            points: 0,
+            next,
+            notes,
+        };
+        opened.points = match opened.positions.at(opened.grid.code(0)) {
             Some((first, ..)) => opened.layer.points(first)?.count,
             None => 0,
         };
@@ -79,15 +98,16 @@ impl<'a> MeshFrames<'a> {
         self.faces.left_out
     }
 
-    fn time(&self, frame: usize) -> Option<f64> {
-        (!self.is_still).then(|| self.grid.code(frame))
+    /// What is not read of the mesh.
+    pub(super) fn add_unread(&mut self, dropped: &mut Dropped) -> Result<(), Failure> {
+        unread::add(&mut self.layer, self.mesh, dropped)
     }
 
     /// Whether the transforms turn the inside out.
     fn is_mirrored(&mut self) -> Result<bool, Failure> {
         // What is not there yet is often scaled to nothing.
         for frame in 0..self.frames().min(MOST_REPEATED) {
-            let time = self.time(frame);
+            let time = self.grid.code(frame);
             let scale = self.chain.matrix(self.layer.as_mut(), time)?.as_ref().map_or(1.0, determinant);
             if scale != 0.0 {
                 return Ok(scale < 0.0);
@@ -98,7 +118,7 @@ impl<'a> MeshFrames<'a> {
 
     /// Where the faces of a frame are stored.
     fn places(&self, frame: usize) -> [Option<Value>; 2] {
-        self.parts.each_ref().map(|part| part.at(self.time(frame)).map(|(value, ..)| value))
+        self.parts.each_ref().map(|part| part.at(self.grid.code(frame)).map(|(value, ..)| value))
     }
 
     fn read_faces(&mut self, places: [Option<Value>; 2]) -> Result<Faces, Failure> {
@@ -140,6 +160,10 @@ impl Animation for MeshFrames<'_> {
         &self.faces.polygons
     }
 
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     fn units(&self) -> Units {
         let stage = self.layer.stage();
         let unit = stage.metres_per_unit.filter(|&unit| Units::is_length(unit));
@@ -150,7 +174,7 @@ impl Animation for MeshFrames<'_> {
     }
 
     fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
-        let time = self.time(frame);
+        let time = self.grid.code(frame);
         let Some((value, next, share)) = self.positions.at(time) else { return Ok(false) };
         let points = self.layer.points(value)?;
         if points.count != self.points {

@@ -53,7 +53,8 @@ pub(crate) fn read_model(
 ) -> Result<(Model, usize, Units), Error> {
     let open = || MeshFrames::open(open_layer(source, length)?, prim, true);
     let mut mesh = open().map_err(|failure: Failure| failure.at(path))?;
-    mesh.add_unread(dropped).map_err(|failure| failure.at(path))?;
+    // What cannot be named is no reason to refuse a mesh.
+    mesh.add_unread(dropped).unwrap_or_default();
     let (points, left_out, units, mut values) = (mesh.points(), mesh.left_out(), mesh.units(), Vec::new());
     let mut reader = scene::open(path, mesh, points)?;
     reader.read_next(&mut values)?;

@@ -2,7 +2,7 @@
 
 use super::layer::{NEAR, Stage};
 use crate::error::Fault;
-use crate::frames::Times;
+use crate::frames::{Times, nominal};
 use crate::scene::check_held;
 
 /// Time codes per second where a layer does not say them.
@@ -27,8 +27,8 @@ impl Grid {
         samples.sort_by(f64::total_cmp);
         samples.dedup_by(|b, a| *b - *a <= NEAR);
         let sane = |rate: &f64| (1e-3..1e6).contains(rate);
-        let fps = stage.frames_per_second.filter(sane);
-        let told = stage.time_codes_per_second.filter(sane).or(fps);
+        let fps = stage.frames_per_second.filter(sane).map(nominal);
+        let told = stage.time_codes_per_second.filter(sane).map(nominal).or(fps);
         let rate = told.unwrap_or(USUAL);
         if samples.iter().any(|code| code.abs() > FARTHEST) {
             return Err(Fault::invalid(format!(

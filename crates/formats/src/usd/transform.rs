@@ -2,7 +2,7 @@
 
 use super::layer::{Attribute, Layer, damaged};
 use crate::error::Fault;
-use crate::scene::{Failure, IDENTITY, Matrix, Objects, inverse, multiply, rotation};
+use crate::scene::{Failure, IDENTITY, Matrix, Objects, inverse, multiply, rotation, rows_of, slerp};
 
 /// Operations of a prim, and of all prims above a mesh, which are done for every frame; programs write a handful.
 const MOST_OPERATIONS: usize = 256;
@@ -91,12 +91,7 @@ impl Kind {
             }
             Self::Orient => {
                 // As OpenUSD has it: quaternions are not made to be of length 1.
-                let [x, y, z, w] = std::array::from_fn(|k| values[k]);
-                let rows = [
-                    [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],
-                    [2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)],
-                    [2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)],
-                ];
+                let rows = rows_of(std::array::from_fn(|k| values[k]));
                 matrix.iter_mut().zip(rows).for_each(|(to, row)| to[..3].copy_from_slice(&row));
             }
             Self::Matrix => matrix.as_flattened_mut().copy_from_slice(values),
@@ -106,8 +101,8 @@ impl Kind {
 }
 
 impl Chain {
-    /// The transforms above a mesh and of the mesh itself, up to one that does not inherit what is above it; of a still one those without a time.
-    pub(super) fn of<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32, is_still: bool) -> Result<Self, Failure> {
+    /// The transforms above a mesh and of the mesh itself, up to one that does not inherit what is above it.
+    pub(super) fn of<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32) -> Result<Self, Failure> {
         let (mut links, mut count) = (Vec::new(), 0);
         for prim in layer.ancestry(mesh as usize).collect::<Vec<_>>() {
             let prim = prim as u32;
@@ -125,8 +120,7 @@ impl Chain {
             let mut link = Link { operations, fixed: None };
             if link.operations.iter().all(|operation| operation.values.times.len() < 2) {
                 // A single sample holds at all times, whatever the default.
-                let time = (!is_still).then_some(0.0);
-                link.fixed = Some(link.at(layer.as_mut(), time)?);
+                link.fixed = Some(link.at(layer.as_mut(), 0.0)?);
             }
             links.extend(Some(link).filter(|link| link.fixed != Some(IDENTITY)));
             if reset.is_some() {
@@ -142,8 +136,8 @@ impl Chain {
         moving.flat_map(|link| &link.operations).flat_map(|operation| operation.values.times.iter().copied())
     }
 
-    /// The product of all transforms at a time code, or without one; none for the identity.
-    pub(super) fn matrix(&self, layer: &mut dyn Layer, time: Option<f64>) -> Result<Option<Matrix>, Failure> {
+    /// The product of all transforms at a time code; none for the identity.
+    pub(super) fn matrix(&self, layer: &mut dyn Layer, time: f64) -> Result<Option<Matrix>, Failure> {
         let mut product: Option<Matrix> = None;
         for link in &self.0 {
             let matrix = match link.fixed {
@@ -177,7 +171,7 @@ fn operation(layer: &mut dyn Layer, prim: u32, name: &str) -> Result<Option<Oper
 }
 
 impl Link {
-    fn at(&self, layer: &mut dyn Layer, time: Option<f64>) -> Result<Matrix, Failure> {
+    fn at(&self, layer: &mut dyn Layer, time: f64) -> Result<Matrix, Failure> {
         let mut product = IDENTITY;
         for operation in &self.operations {
             let Some((value, next, share)) = operation.values.at(time) else { continue };
@@ -185,7 +179,10 @@ impl Link {
             if share > 0.0 {
                 let next = operation.numbers(layer, next)?;
                 values = match operation.kind {
-                    Kind::Orient => turned(&values, &next, share),
+                    Kind::Orient => {
+                        let [from, to] = [&values, &next].map(|values| std::array::from_fn(|k| values[k]));
+                        slerp(from, to, share).to_vec()
+                    }
                     _ => values.iter().zip(next).map(|(value, next)| value + share * (next - value)).collect(),
                 };
             }
@@ -204,16 +201,4 @@ impl Operation {
         }
         Ok(values)
     }
-}
-
-/// A rotation on the shorter way from one to another, at an even pace.
-fn turned(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
-    let cosine: f64 = from.iter().zip(to).map(|(a, b)| a * b).sum();
-    let (sign, angle) = (cosine.signum(), cosine.abs().min(1.0).acos());
-    let (near, far) = if angle < 1e-6 {
-        (1.0 - share, share)
-    } else {
-        (((1.0 - share) * angle).sin() / angle.sin(), (share * angle).sin() / angle.sin())
-    };
-    from.iter().zip(to).map(|(a, b)| near * a + sign * far * b).collect()
 }

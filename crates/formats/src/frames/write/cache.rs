@@ -21,6 +21,8 @@ pub(super) struct CacheWriter {
     bytes: Vec<u8>,
     /// What a cache of Maya has around the positions of frames, and the text beside it.
     maya: Option<(Blocks, AtomicFile)>,
+    /// What is lost.
+    note: Option<String>,
 }
 
 /// How positions are stored.
@@ -53,14 +55,21 @@ impl CacheWriter {
             return Err(Fault::unsupported(what).at(&announced.path));
         };
         if format == CacheFormat::Pc2 {
-            return Self::begin(announced, target, (Numbers::Single, options.origin), |file| {
+            let lost = options.even_step().is_none().then(|| {
+                format!(
+                    "{}: holds one distance between all frames, so that these, which are not evenly spaced, play at other times; .mdd, .mcx, .abc and .usdc keep them",
+                    announced.path.display()
+                )
+            });
+            let writer = Self::begin(announced, target, (Numbers::Single, options.origin), |file| {
                 file.write_all(&pc2::header(
                     points,
                     frames,
                     options.number(0) as f32,
                     options.even_step().unwrap_or(1.0) as f32,
                 ))
-            });
+            })?;
+            return Ok(Self { note: lost, ..writer });
         }
         Self::begin(announced, target, (Numbers::SingleBigEndian, options.origin), |file| {
             file.write_all(&mdd::header(points, frames))?;
@@ -102,7 +111,7 @@ impl CacheWriter {
     ) -> Result<Self, Error> {
         let mut file = AtomicFile::create(target)?;
         header(&mut file).map_err(|cause| Error::write(&announced.path, cause))?;
-        Ok(Self { announced, file, numbers, origin, bytes: Vec::new(), maya: None })
+        Ok(Self { announced, file, numbers, origin, bytes: Vec::new(), maya: None, note: None })
     }
 }
 
@@ -130,6 +139,10 @@ impl FrameWriter for CacheWriter {
         self.file.write_all(&self.bytes).map_err(|cause| Error::write(&self.announced.path, cause))?;
         self.announced.written += 1;
         Ok(())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.note.iter().cloned().collect()
     }
 
     fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {

@@ -1,6 +1,6 @@
 //! What a geometry cache of Maya has beside positions, and the text that Maya opens it by.
 
-use super::super::maya::TICKS;
+use super::super::maya::{EXACT_RATE, TICKS};
 use super::output::FrameOptions;
 use crate::error::Fault;
 
@@ -64,6 +64,7 @@ impl Blocks {
 
     pub(super) fn text(&self, options: &FrameOptions) -> String {
         let ticks_of = |frames: f64| (frames * TICKS / options.fps).round().max(1.0);
+        let rate = options.fps;
         let (name, first, last) = (&self.name, self.ticks[0], self.ticks[self.ticks.len() - 1]);
         let (frame, step) = (ticks_of(1.0), ticks_of(options.even_step().unwrap_or(1.0)));
         let sampling = if options.even_step().is_some() { "Regular" } else { "Irregular" };
@@ -76,6 +77,7 @@ impl Blocks {
   <time Range="{first}-{last}"/>
   <cacheTimePerFrame TimePerFrame="{frame}"/>
   <cacheVersion Version="2.0"/>
+  {EXACT_RATE}{rate:?}</extra>
   <Channels>
     <channel0 ChannelName="{name}" ChannelType="{kind}VectorArray" ChannelInterpretation="positions" SamplingType="{sampling}" SamplingRate="{step}" StartTime="{first}" EndTime="{last}"/>
   </Channels>

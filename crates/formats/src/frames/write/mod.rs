@@ -16,6 +16,7 @@ use cager_geometry::mesh::Polygons;
 
 use super::CacheFormat;
 use super::numbered::NumberedNames;
+use super::times::nominal;
 use crate::atomic::Target;
 use crate::error::{Error, Fault};
 use crate::mesh::MeshFormat;
@@ -59,6 +60,7 @@ pub fn create_frames(
     faces: &Polygons,
     options: &FrameOptions,
 ) -> Result<Box<dyn FrameWriter>, Error> {
+    let options = &FrameOptions { fps: nominal(options.fps), ..options.clone() };
     let target = target.into();
     let given = target.path();
     let (path, pattern) = (frames_path(given), mesh_pattern(given));

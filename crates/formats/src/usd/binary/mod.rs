@@ -7,7 +7,7 @@ mod sections;
 
 use std::io::{Read, Seek};
 
-use super::layer::{Attribute, COMPOSED, DEEPEST, Layer, Points, Prim, Stage, Value, composed, damaged, spline};
+use super::layer::{Attribute, COMPOSED, DEEPEST, Kind, Layer, Points, Prim, Stage, Value, composed, damaged, spline};
 use crate::error::Fault;
 use crate::frames::{Scalar, half_precision};
 use crate::scene::Failure;
@@ -42,6 +42,7 @@ pub(super) mod kind {
 pub(super) const ATTRIBUTE: u32 = 1;
 pub(super) const PRIM: u32 = 6;
 pub(super) const ROOT: u32 = 7;
+pub(super) const RELATIONSHIP: u32 = 8;
 
 /// Versions 0.4.0 to 0.13.0 of the format are read: before them tables were not packed.
 const VERSIONS: std::ops::RangeInclusive<u8> = 4..=13;
@@ -51,7 +52,7 @@ pub(super) struct Binary<R> {
     sections: Sections,
     stage: Stage,
     prims: Vec<Prim>,
-    /// Attributes: the paths that they lie below, ascending, and the index of each among the specs.
+    /// Attributes and relationships: the paths that they lie below, ascending, and the index of each among the specs.
     attributes: Vec<(u32, u32)>,
 }
 
@@ -62,7 +63,7 @@ impl<R: Read + Seek> Binary<R> {
         let [major, minor, patch] = file.array(MAGIC.len() as u64)?;
         if major != 0 || !VERSIONS.contains(&minor) {
             let what = format!(
-                "is of version {major}.{minor}.{patch} of USD's binary format, where 0.{}.0 to 0.{}.0 are read; write it again with usdcat in.usd -o out.usdc",
+                "is of version {major}.{minor}.{patch} of USD's binary format, where 0.{}.0 to 0.{}.0 are read; write it again in Python (pip install usd-core): from pxr import Sdf; Sdf.Layer.FindOrOpen(\"in.usd\").Export(\"out.usda\")",
                 VERSIONS.start(),
                 VERSIONS.end()
             );
@@ -73,7 +74,8 @@ impl<R: Read + Seek> Binary<R> {
         let sections = Sections::read(&mut file, contents)?;
         let mut layer = Self { file, sections, stage: Stage::default(), prims: Vec::new(), attributes: Vec::new() };
         let specs = &layer.sections.specs;
-        for (index, spec) in specs.iter().enumerate().filter(|(_, spec)| spec.kind == ATTRIBUTE) {
+        for (index, spec) in specs.iter().enumerate().filter(|(_, spec)| [ATTRIBUTE, RELATIONSHIP].contains(&spec.kind))
+        {
             layer.attributes.push((layer.sections.paths[spec.path as usize].parent, index as u32));
         }
         layer.attributes.sort_unstable();
@@ -89,13 +91,13 @@ impl<R: Read + Seek> Binary<R> {
             let path = sections.paths[spec.path as usize];
             places[spec.path as usize] = self.prims.len() as u32;
             let (spec_index, name, depth) = (index as u32, path.name, path.depth);
-            let mut prim =
-                Prim { parent: None, depth, spec: spec_index, name, is_mesh: false, is_there: false, composed: None };
+            let kind = Kind::Other;
+            let mut prim = Prim { parent: None, depth, spec: spec_index, name, kind, is_there: false, composed: None };
             let mut is_active = true;
             for field in sections.fields(spec) {
                 let (name, value) = field?;
                 match name {
-                    b"typeName" => prim.is_mesh = sections.token(u32::from_le_bytes(value.inlined())) == b"Mesh",
+                    b"typeName" => prim.kind = Kind::of(sections.token(u32::from_le_bytes(value.inlined()))),
                     b"specifier" => prim.is_there = value.inlined() == [0; 4],
                     b"active" => is_active = value.inlined()[0] != 0,
                     _ => {
@@ -169,11 +171,16 @@ impl<R: Read + Seek> Binary<R> {
     }
 
     fn find(&self, prim: u32, name: &str) -> Option<Spec> {
+        self.below(prim).find(|(found, _)| *found == name.as_bytes()).map(|(_, spec)| spec)
+    }
+
+    /// The names of attributes and relationships of a prim, and what they are.
+    fn below(&self, prim: u32) -> impl Iterator<Item = (&[u8], Spec)> {
         let path = self.sections.specs[self.prims[prim as usize].spec as usize].path;
         let first = self.attributes.partition_point(|&(above, _)| above < path);
-        let below = self.attributes[first..].iter().take_while(|&&(above, _)| above == path);
-        let mut specs = below.map(|&(_, spec)| self.sections.specs[spec as usize]);
-        specs.find(|spec| self.sections.token(self.sections.paths[spec.path as usize].name) == name.as_bytes())
+        let below = self.attributes[first..].iter().take_while(move |&&(above, _)| above == path);
+        let specs = below.map(|&(_, spec)| self.sections.specs[spec as usize]);
+        specs.map(|spec| (self.sections.token(self.sections.paths[spec.path as usize].name), spec))
     }
 }
 
@@ -203,6 +210,15 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
             self.samples(samples, &mut attribute)?;
         }
         Ok(attribute)
+    }
+
+    fn properties(&self, prim: u32) -> Vec<(String, String)> {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        let type_name = |spec| {
+            let told = self.sections.field(spec, "typeName").ok().flatten();
+            told.map_or_else(String::new, |told| text(self.sections.token(u32::from_le_bytes(told.inlined()))))
+        };
+        self.below(prim).map(|(name, spec)| (text(name), type_name(spec))).collect()
     }
 
     fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {

@@ -95,6 +95,10 @@ impl<R: Read + Seek + Send> Layer for Text<R> {
         Ok(self.contents.attributes.get(&key).cloned().unwrap_or_default())
     }
 
+    fn properties(&self, prim: u32) -> Vec<(String, String)> {
+        self.contents.properties.get(&prim).cloned().unwrap_or_default()
+    }
+
     fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
         let Stored { is_double, is_quaternion, .. } = self.enter(value)?;
         let (mut numbers, mut depth) = (Vec::new(), 0_usize);

@@ -5,14 +5,15 @@ use std::io::{Read, Seek};
 
 use super::scanner::{Place, Scanner, is_letter};
 use crate::scene::Failure;
-use crate::usd::layer::{Attribute, COMPOSED, DEEPEST, Prim, Stage, Value, composed, too_deep};
+use crate::usd::layer::{Attribute, COMPOSED, DEEPEST, Kind, Prim, Stage, Value, composed, too_deep};
 
 /// Words in front of the type of a property or of the key of a field.
 const MODIFIERS: [&str; 9] =
     ["custom", "uniform", "varying", "config", "add", "append", "prepend", "delete", "reorder"];
 
 /// Attributes that are asked for, beside the operations of transforms.
-const WANTED: [&str; 8] = [
+const WANTED: [&str; 9] = [
+    "subdivisionScheme",
     "points",
     "faceVertexCounts",
     "faceVertexIndices",
@@ -42,6 +43,8 @@ pub(super) struct Contents {
     pub(super) names: Vec<String>,
     pub(super) values: Vec<Stored>,
     pub(super) attributes: HashMap<(u32, String), Attribute>,
+    /// Of meshes their names and types, of others those of materials.
+    pub(super) properties: HashMap<u32, Vec<(String, String)>>,
     /// Attributes that splines animate.
     pub(super) splines: HashSet<(u32, String)>,
 }
@@ -114,7 +117,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         if self.open.len() == DEEPEST as usize {
             return Err(too_deep().into());
         }
-        let is_mesh = self.word()? == "Mesh";
+        let kind = Kind::of(self.word()?.as_bytes());
         let name = self.scanner.string()?;
         let index = self.contents.prims.len();
         self.contents.names.push(name);
@@ -123,7 +126,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
             depth: self.open.len() as u32 + 1,
             spec: index as u32,
             name: index as u32,
-            is_mesh,
+            kind,
             is_there: is_defined,
             composed: None,
         });
@@ -208,6 +211,12 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
             self.scanner.expect(b']')?;
         }
         let name = self.word()?;
+        if let Some(&prim) = self.open.last()
+            && (self.contents.prims[prim as usize].kind == Kind::Mesh || name.starts_with("material:binding"))
+        {
+            let plain = name.split('.').next().unwrap_or_default().to_owned();
+            self.contents.properties.entry(prim).or_default().push((plain, type_name.to_owned()));
+        }
         if self.scanner.has(b'=')? {
             self.value(type_name, &name)?;
         }

@@ -1,0 +1,60 @@
+//! What a mesh of an archive has that is not read.
+
+use std::io::{Read, Seek};
+
+use super::objects::{Archive, Kind as ObjectKind};
+use super::properties::{Kind, find};
+use crate::dropped::{Dropped, counted, listed};
+use crate::scene::{Failure, Objects};
+
+/// Adds what a mesh has beside points and faces.
+pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped: &mut Dropped) -> Result<(), Failure> {
+    let properties = archive.schema(mesh, ".geom")?;
+    let has = |name: &str| {
+        properties.iter().any(|found| found.name == name.as_bytes() && found.samples + found.extent as usize > 0)
+    };
+    let on_faces = [("uv", "texture coordinates (uv)"), ("N", "normals (N)")].into_iter().filter(|(name, _)| has(name));
+    on_faces.for_each(|(_, what)| dropped.add_on_faces(what));
+    let parameters = archive.within(&properties, ".arbGeomParams")?;
+    if !parameters.is_empty() {
+        let names = listed(parameters.iter().map(|parameter| parameter.name.as_slice()));
+        dropped.add_on_faces(format!("parameters (arbGeomParams: {names})"));
+    }
+    for (name, what) in [
+        (".velocities", "velocities"),
+        (".creaseIndices", "creases"),
+        (".cornerIndices", "creases"),
+        (".holes", "holes"),
+        (".scheme", "the subdivision scheme (SubD)"),
+    ] {
+        if has(name) {
+            dropped.add(what);
+        }
+    }
+    let is_set =
+        |k: &usize| archive.objects[*k].kind == ObjectKind::FaceSet && archive.objects[*k].parent == Some(mesh);
+    let sets: Vec<usize> = (0..archive.objects.len()).filter(is_set).collect();
+    let mut has_material = false;
+    for &object in sets.iter().take(1).chain([&mesh]) {
+        has_material |= archive.top_properties(object)?.iter().any(|found| found.name.starts_with(b".material"));
+    }
+    if has_material {
+        dropped.add_on_faces("materials");
+    }
+    if !sets.is_empty() {
+        let names = listed(sets.iter().map(|&set| archive.objects[set].name.as_slice()));
+        dropped.add_on_faces(format!("{} of faces ({names})", counted(sets.len(), "set")));
+    }
+    Ok(())
+}
+
+/// A note of a mesh that is hidden in some frames.
+pub(super) fn visibility<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize) -> Result<Option<String>, Failure> {
+    for object in archive.ancestry(mesh).collect::<Vec<_>>() {
+        let properties = archive.top_properties(object)?;
+        if find(&properties, "visible", Kind::Scalar).is_some_and(|visible| !visible.is_constant()) {
+            return Ok(Some("its visibility is animated, which is not kept".to_owned()));
+        }
+    }
+    Ok(None)
+}
