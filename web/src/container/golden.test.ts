@@ -20,7 +20,7 @@ describe.each(GOLDEN)('the golden file %s', (name) => {
     const capture = await open();
     const { head, static: part } = capture;
     expect(capture.problem).toBeNull();
-    expect(part.system).toBe(name.replace(/^(coded(-parted)?|definition3)-|-(elements|origin)$/g, ''));
+    expect(part.system).toBe(name.replace(/^(coded(-parted)?|definition3|edited)-|-(elements|origin)$/g, ''));
     expect([head.points, part.rest.length / 3, part.cage.positions.length / 3]).toEqual([120, 120, 26]);
     expect(part.cage.triangles.length / 3).toBe(48);
     expect(part.cornerCounts.reduce((sum, count) => sum + count, 0)).toBe(part.corners.length);
@@ -34,6 +34,10 @@ describe.each(GOLDEN)('the golden file %s', (name) => {
     expect([capture.errors.l2.length, capture.errors.linf.length]).toEqual([3, 3]);
     const { max_error: bound } = (part.report?.coding ?? {}) as { max_error?: number };
     capture.errors.linf.forEach((linf, k) => {
+      // Of edited frames nobody knows the errors.
+      const isEdited = capture.layers!.some(({ isOn, first, count }) => isOn && k >= first && k < first + count);
+      expect(Number.isNaN(linf)).toBe(isEdited);
+      if (isEdited) return;
       expect(linf).toBeGreaterThanOrEqual(capture.errors.l2[k]);
       expect(linf).toBeLessThanOrEqual(bound ?? 0.1);
     });
