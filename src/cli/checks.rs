@@ -37,7 +37,7 @@ pub(crate) struct CaptureArgs {
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
     /// The mesh to take of Alembic archives, USD files and glTF (rest pose and capture) with several: its path, such as /walk/body, or its name. An only mesh is taken
-    /// whatever it is called, and of glTF all meshes as one where nothing is said.
+    /// whatever it is called, and of glTF all meshes as one where nothing is said. Of .npz with several arrays that fit, the name of one.
     #[arg(long, value_name = "PATH")]
     pub(super) prim: Option<String>,
 

@@ -11,7 +11,7 @@ pub struct FrameSelection {
     pub range: Option<FrameRange>,
     /// The rest pose, the cage: files that are left out where they lie among the frames, unless they are called as frames are.
     pub no_frames: Vec<PathBuf>,
-    /// The mesh of a scene (Alembic, USD, glTF) that has several, by its path or name.
+    /// The mesh of a scene (Alembic, USD, glTF) that has several, by its path or name; the array of an `.npz` file, by its name.
     pub prim: Option<String>,
     /// The animation of a file of glTF that has several, by its name or its number from 0; the first one that moves the mesh by default.
     pub animation: Option<String>,
