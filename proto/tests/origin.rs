@@ -33,7 +33,7 @@ fn an_origin_comes_back_and_moves_no_position_in_the_file() {
 fn an_origin_is_put_into_a_file_that_otherwise_keeps_its_bytes() {
     let bytes = small_container();
     let mut reader = ContainerReader::open(Cursor::new(&bytes)).unwrap();
-    let moved = ContainerWriter::copy_placed(&mut reader, (Some(ORIGIN), Units::UNKNOWN), Vec::new()).unwrap();
+    let moved = ContainerWriter::copy_placed(&mut reader, (Some(ORIGIN), Units::UNKNOWN), &[], Vec::new()).unwrap();
     let mut parts = take_apart(&bytes);
     parts.insert(1, part(ORIGIN));
     assert_eq!(moved, put_together(&parts));

@@ -54,7 +54,7 @@ fn a_file_without_units_is_what_it_was_and_others_have_one_more_section() {
 fn units_are_put_into_a_file_that_otherwise_keeps_its_bytes() {
     let bytes = small_container();
     let copied = |from: &[u8], place| {
-        ContainerWriter::copy_placed(&mut ContainerReader::open(Cursor::new(from)).unwrap(), place, Vec::new()).unwrap()
+        ContainerWriter::copy_placed(&mut ContainerReader::open(Cursor::new(from)).unwrap(), place, &[], Vec::new()).unwrap()
     };
     let origin = [450_000.0, 0.0, 0.5];
     let placed = copied(&bytes, (Some(origin), CENTIMETRES));
@@ -62,6 +62,26 @@ fn units_are_put_into_a_file_that_otherwise_keeps_its_bytes() {
     parts.splice(1..1, [Part::raw(*b"ORIG", 8, &origin.map(f64::to_le_bytes).concat()), part(0.01, 2)]);
     assert_eq!(placed, put_together(&parts));
     assert_eq!(copied(&placed, (None, Units::UNKNOWN)), bytes, "and taken out of it");
+}
+
+#[test]
+fn numbers_of_frames_are_put_where_the_writer_has_them() {
+    let numbers: Vec<f64> = (0..).map(|k| 1001.0 + 0.5 * f64::from(k)).take(3).collect();
+    let written = |numbers: &[f64]| {
+        let mut writer = ContainerWriter::new(Vec::new(), &header(4), &small_model(), &tetrahedron()).unwrap();
+        (0..3).for_each(|k| writer.write_frame(&support::frame(k, 4), 0.5, 1.5).unwrap());
+        writer.add_frame_numbers(numbers).unwrap();
+        writer.finish(None).unwrap()
+    };
+    let copied = |from: &[u8], numbers: &[f64]| {
+        let mut reader = ContainerReader::open(Cursor::new(from)).unwrap();
+        ContainerWriter::copy_placed(&mut reader, (None, Units::UNKNOWN), numbers, Vec::new())
+    };
+    let (without, with) = (written(&[0.0, 1.0, 2.0]), written(&numbers));
+    assert_eq!(copied(&without, &numbers).unwrap(), with);
+    assert_eq!(copied(&with, &[]).unwrap(), with);
+    assert_eq!(copied(&with, &numbers).unwrap(), with, "in the place of those that are there");
+    assert!(copied(&without, &numbers[..2]).is_err() && copied(&without, &[2.0, 1.0, 3.0]).is_err());
 }
 
 #[test]

@@ -158,7 +158,7 @@ fn placed(encoded: Encoded, (origin, units): (Option<Point>, Units), output: &Ta
     let Encoded { mut report, container: mut from } = encoded;
     let mut reader = ContainerReader::open(BufReader::new(from.reader()?))?;
     let out = BufWriter::new(AtomicFile::create(output)?);
-    let mut container = ContainerWriter::copy_placed(&mut reader, (origin, units), out)?
+    let mut container = ContainerWriter::copy_placed(&mut reader, (origin, units), &[], out)?
         .into_inner()
         .map_err(std::io::IntoInnerError::into_error)?;
     report.origin = origin;
