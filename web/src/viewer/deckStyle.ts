@@ -62,8 +62,11 @@ export const deckStyle = css`
     min-width: 4.2em;
   }
   @container (max-width: 680px) {
-    :is(.title .more, .caption p:has(+ p)) {
+    :is(.title .more, .caption p:has(+ p), .caption .up span) {
       display: none;
+    }
+    .up {
+      margin-left: 4px;
     }
     .transport {
       flex-wrap: wrap;

@@ -59,7 +59,7 @@ const TABLE = [
       { action: 'edit', keys: ['e'], label: 'Edit cage' },
       { action: 'beside', keys: ['b'], label: 'Compare with another capture' },
       { action: 'poses', keys: ['n'], label: 'Blend poses' },
-      { action: 'export', keys: ['q'], label: 'Export' },
+      { action: 'export', keys: ['/'], label: 'Export' },
       { action: 'picture', keys: ['p'], label: 'Save image' },
       { action: 'turntable', keys: ['t'], label: 'Record turntable' },
       { action: 'link', keys: ['9'], label: 'Copy link' },

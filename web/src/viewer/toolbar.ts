@@ -46,9 +46,10 @@ export function upButton(up: UpAxis, choose: (up: UpAxis) => void) {
   return html`<button
     class="up"
     title=${`Up axis: ${up.toUpperCase()}. Click for ${other.toUpperCase()} (${keyLabel('up')})`}
+    aria-label=${`Up: ${up.toUpperCase()}`}
     @click=${() => choose(other)}
   >
-    Up: ${up.toUpperCase()}
+    <span>Up: </span>${up.toUpperCase()}
   </button>`;
 }
 

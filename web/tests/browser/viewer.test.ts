@@ -110,7 +110,7 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
   it('exports the frame as a mesh and the file as it is', async () => {
     const page = await opened('coded-mvc');
     await page.keyboard.press('Home');
-    await page.keyboard.press('q');
+    await page.keyboard.press('/');
     const panel = page.getByRole('complementary', { name: 'Export' });
     const saved = async (name: string) => {
       const [file] = await Promise.all([
