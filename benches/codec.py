@@ -2,8 +2,9 @@
 
 `make bench-codec` builds the program and calls this with the Python of the peers. Everything in a file counts: model, cage, errors, tables.
 Errors are measured on what each decoder gives back. The captures are looked for in CAGER_CAPTURES (default ../shared/data); cages that are
-designed stay in the folder given as argument (default out/codec). `--perceptual` measures and writes what has no times alone: STED and differences
-between whole curves, which any build of the program may be used for.
+designed stay in the folder given as argument (default out/codec). `--perceptual` measures and writes what has no times alone: the measure like STED
+and differences between whole curves, which any build of the program may be used for. `--summary` measures nothing: it writes the summary anew from the
+tables that the page has.
 """
 
 import io
@@ -332,6 +333,40 @@ def rows_of(rows):
     )
 
 
+def at_error(rows, kind, goal):
+    """Bits per vertex and frame of a kind at a KG error, between the two files around it: the logarithm of the rate is taken as linear in that of the
+    error. None where no file is below or none is above."""
+    points = frontier((row["kg"], row["bpvf"]) for row in rows if row["kind"] == kind and row["kg"] > 0)
+    for (low, much), (high, little) in zip(points, points[1:]):
+        if low <= goal <= high:
+            part = math.log(goal / low) / math.log(high / low)
+            return math.exp((1 - part) * math.log(much) + part * math.log(little))
+    return None
+
+
+def summary(captures):
+    """Rates of all kinds at the same errors."""
+    lines = []
+    for name in ("samba", "horse-gallop"):
+        for goal in (0.6, 0.21, 0.11):
+            rates = [at_error(captures[name], kind, goal) for kind in (OURS, *PEERS)]
+            lines.append([name, f"{goal} %", *("–" if rate is None else f"{rate:.2f}" for rate in rates)])
+    head = ["capture", "KG error", "cager, designed cage of 350", "quantised PCA + xz", "Draco, each frame", "meshoptimizer, temporal deltas"]
+    return table(head, lines)
+
+
+def recorded(text):
+    """The rows that the page has, by captures."""
+    captures, rows = {}, None
+    for line in text.split("<!-- rates: begin -->")[1].split("<!-- rates: end -->")[0].splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("## "):
+            rows = captures.setdefault(line[3:], [])
+        elif line.startswith("| ") and cells[0] != "file":
+            rows.append({"kind": cells[0], "setting": cells[1], "bpvf": float(cells[2]), "kg": float(cells[3])})
+    return captures
+
+
 def curve(rows, kind, error):
     """The best points of a kind, as logarithm of the error and rate."""
     points = frontier((row[error], row["bpvf"]) for row in rows if row["kind"] == kind and row[error] > 0)
@@ -342,20 +377,20 @@ def differences(captures):
     """Table of what ours takes more or less than each peer."""
     out = []
     for name, rows in captures.items():
-        for error, label in (("kg", "KG error"), ("sted", "STED")):
+        for error, label in (("kg", "KG error"), ("sted", "STED-like")):
             found = [bd_rate(curve(rows, peer, error), curve(rows, OURS, error)) for peer in PEERS]
             out.append([name, label, *("–" if d is None else f"{d[0]:+.1f} % over {100 * d[1]:.0f} %" for d in found)])
     return table(["capture", "at the same", *(f"against {peer}" for peer in PEERS)], out)
 
 
 def perceptual(captures):
-    """The part of the page about STED: differences between curves, and the values of every file that is not exact."""
+    """The part of the page about the measure like STED: differences between curves, and the values of every file that is not exact."""
     page = io.StringIO()
     page.write(f"\n{differences(captures)}\n")
     for name, rows in captures.items():
         shown = [row for row in rows if row["kind"] in (OURS, *PEERS)]
         page.write(f"\n### {name}\n\n")
-        head = ["file", "setting", "bits per vertex and frame", "KG error, %", "STED", "spatial part", "temporal part"]
+        head = ["file", "setting", "bits per vertex and frame", "KG error, %", "STED-like", "spatial part", "temporal part"]
         lines = [[r["kind"], r["setting"], f"{r['bpvf']:.3f}", f"{r['kg']:.4f}", *(f"{r[key]:.6f}" for key in ("sted", "sted spatial", "sted temporal"))] for r in shown]
         page.write(table(head, lines) + "\n")
     return page.getvalue()
@@ -377,8 +412,14 @@ def write_perceptual(folder, captures):
 
 
 def main():
-    arguments = [argument for argument in sys.argv[1:] if argument != "--perceptual"]
+    arguments = [argument for argument in sys.argv[1:] if argument not in ("--perceptual", "--summary")]
     folder = arguments[0] if arguments else os.path.join(ROOT, "out", "codec")
+    if "--summary" in sys.argv[1:]:
+        with open(PAGE, encoding="utf-8") as file:
+            text = file.read()
+        with open(PAGE, "w", encoding="utf-8") as file:
+            file.write(write(text, "summary", summary(recorded(text))))
+        return
     os.makedirs(folder, exist_ok=True)
     if "--perceptual" in sys.argv[1:]:
         captures = {}
@@ -388,7 +429,6 @@ def main():
         write_perceptual(folder, captures)
         return
     page = io.StringIO()
-    chosen = []
     captures = {}
     for name in CAPTURES:
         capture = Capture(name)
@@ -398,21 +438,12 @@ def main():
         count, points, _ = capture.frames.shape
         page.write(f"\n## {name}\n\n{points:,} points, {count} frames.\n\n![bits over error](rates-{name}.svg)\n\n{rows_of(rows)}\n")
         print(name, flush=True)
-        if name in ("samba", "horse-gallop"):
-            for goal in (0.6, 0.21, 0.11):
-                line = [name, f"{goal} %"]
-                for kind in (OURS, *PEERS):
-                    fitting = [r for r in rows if r["kind"] == kind and r["kg"] <= goal]
-                    best = min(fitting, key=lambda r: r["bpvf"], default=None)
-                    line.append("–" if best is None else f"{best['bpvf']:.2f} at {best['kg']:.2f} %")
-                chosen.append(line)
     with open(os.path.join(folder, "rates.json"), "w", encoding="utf-8") as file:
         json.dump([row for rows in captures.values() for row in rows], file, indent=1)
-    head = ["capture", "KG error at most", "cager, designed cage of 350", "quantised PCA + xz", "Draco, each frame", "meshoptimizer, temporal deltas"]
     with open(PAGE, encoding="utf-8") as file:
         text = write(file.read(), "rates", page.getvalue())
     with open(PAGE, "w", encoding="utf-8") as file:
-        file.write(write(text, "summary", table(head, chosen)))
+        file.write(write(text, "summary", summary(captures)))
     write_perceptual(folder, captures)
 
 

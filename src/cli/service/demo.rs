@@ -169,7 +169,11 @@ fn rows(report: &Report, sted: &Sted, steps: &Steps, decode_seconds: f64) -> Vec
         format!("{:.3} / {:.3} %", 100.0 * report.error.linf_mean, 100.0 * report.error.linf_max),
         "of the rest diagonal",
     );
-    row("STED", format!("{:.5}", sted.total), "uneven change of edges, and trembling (Váša and Skala 2011)");
+    row(
+        "STED-like",
+        format!("{:.5}", sted.total),
+        "uneven change of edges, and trembling; after Váša and Skala 2011, with our constants",
+    );
     row("affine reproduction", format!("{:.1e}", report.affine_reproduction_error), "of the rest diagonal");
     row(
         "condition number",

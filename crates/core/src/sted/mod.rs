@@ -1,4 +1,4 @@
-//! Spatio-temporal edge difference (STED), the perceptual measure of dynamic meshes of Váša and Skala, "A perception correlated comparison method for
+//! A measure like the spatio-temporal edge difference (STED) of Váša and Skala, "A perception correlated comparison method for
 //! dynamic meshes" (IEEE TVCG 17(2), 2011): people see where neighbouring edges change by different ratios, and where vertices tremble, not where
 //! whole regions are displaced.
 //!
