@@ -21,12 +21,30 @@ pub enum RemoteError {
     /// The session to go on with is of something else.
     #[error("{0}; give what session {session} was made with, or leave out --session for a new one", session = .0.session)]
     Different(Difference),
-    /// It broke off, and the service keeps what it has.
+    /// It broke off for a reason that passes, and the service keeps what it has.
     #[error("{cause}; session {session} keeps what was sent: the same command with --session {session} goes on")]
     Kept {
         /// The session.
         session: String,
         /// Why it broke off.
+        cause: Box<Self>,
+    },
+    /// It broke off for a reason that somebody has to remove first, and the service keeps what it has.
+    #[error(
+        "{cause}; session {session} keeps what was sent: once that is put right, the same command with --session {session} goes on"
+    )]
+    Stopped {
+        /// The session.
+        session: String,
+        /// Why it broke off.
+        cause: Box<Self>,
+    },
+    /// A proxy lets no request through that is large enough.
+    #[error("{cause}; session {session} keeps what was sent: with the limit raised, give --session {session} as well")]
+    Limited {
+        /// The session.
+        session: String,
+        /// What the proxy said.
         cause: Box<Self>,
     },
     /// Trying again would end the same way.
@@ -87,14 +105,20 @@ impl RemoteError {
             Self::Client(error) if is_final(error) => {
                 Self::Ended { session, address: address.trim_end_matches('/').to_owned(), cause }
             }
-            _ => Self::Kept { session, cause },
+            Self::Client(error) if error.is_body_limit() => Self::Limited { session, cause },
+            Self::Client(error) if passes(error) => Self::Kept { session, cause },
+            _ => Self::Stopped { session, cause },
         }
     }
 
     /// The error alone, for a service that does not stay.
     pub fn without_session(self) -> Self {
         match self {
-            Self::Kept { cause, .. } | Self::Ended { cause, .. } | Self::Gone { cause } => *cause,
+            Self::Kept { cause, .. }
+            | Self::Stopped { cause, .. }
+            | Self::Limited { cause, .. }
+            | Self::Ended { cause, .. }
+            | Self::Gone { cause } => *cause,
             error => error,
         }
     }
@@ -111,6 +135,15 @@ impl RemoteError {
 
 fn is_gone(error: &ClientError) -> bool {
     matches!(error.status(), Some(404 | 410))
+}
+
+/// Whether the same may succeed later with nothing changed.
+fn passes(error: &ClientError) -> bool {
+    match error {
+        ClientError::Broken { .. } | ClientError::Connect { .. } | ClientError::NotReady { .. } => true,
+        ClientError::GaveUp { last, .. } => last.status().is_none_or(|status| matches!(status, 408 | 425 | 429 | 503)),
+        error => matches!(error.status(), Some(408 | 425 | 429 | 503)),
+    }
 }
 
 /// Whether the session can never be completed. Where in doubt it can.
@@ -139,33 +172,44 @@ mod tests {
         let broken = || ClientError::Broken { address: String::new(), cause: String::new() };
         let refused = |status, word| ClientError::Refused(problem(status, word));
         let full = || io::Error::from(io::ErrorKind::StorageFull);
-        let mendable = [
+        let passing = [
             broken(),
             ClientError::Connect { address: String::new(), cause: String::new() },
             ClientError::GaveUp { attempts: 9, last: Box::new(refused(503, "storage-failed")) },
+            ClientError::GaveUp { attempts: 9, last: Box::new(broken()) },
+            refused(429, "share-taken"),
+            ClientError::NotReady { id: "s-1".to_owned(), waited: Duration::ZERO },
+        ];
+        let mendable = [
             refused(507, "quota-exceeded"),
             refused(507, "storage-full"),
-            refused(429, "share-taken"),
             refused(413, "too-large"),
             refused(401, "unauthorized"),
             refused(422, "invalid-frame"),
             refused(409, "frame-conflict"),
             refused(400, "bad-request"),
-            ClientError::Failed(problem(503, "storage-failed")),
-            ClientError::NotReady { id: "s-1".to_owned(), waited: Duration::ZERO },
             ClientError::Source { frame: 7, cause: io::Error::other("NaN") },
             ClientError::Mismatch("other points".to_owned()),
             ClientError::Protocol("a page".to_owned()),
             ClientError::Output(full()),
         ];
-        for error in mendable {
+        let passing = passing.map(|error| (error, ": the same command with"));
+        for (error, words) in passing.into_iter().chain(mendable.map(|error| (error, ": once that is put right,"))) {
             let text = error.to_string();
             let said = said(error);
-            assert!(said.starts_with(&text) && said.ends_with("the same command with --session s-1 goes on"), "{said}");
+            assert!(said.starts_with(&text) && said.contains(words), "{said}");
+            assert!(said.ends_with("the same command with --session s-1 goes on"), "{said}");
         }
         let path = std::path::PathBuf::from("out.cager");
         let said = said(cager_formats::Error::Io { path, action: cager_formats::Action::Write, cause: full() });
         assert!(said.contains("--session s-1 goes on"), "{said}");
+    }
+
+    #[test]
+    fn a_limit_of_a_proxy_has_to_be_raised_first() {
+        let page = Problem { kind: "about:blank".to_owned(), status: 413, ..Problem::default() };
+        let said = said(ClientError::Refused(Box::new(page)));
+        assert!(said.ends_with("with the limit raised, give --session s-1 as well"), "{said}");
     }
 
     #[test]

@@ -73,9 +73,10 @@ async fn recover(
     }
 }
 
-/// Whether the service refuses what was sent, so that what it has is of no use.
+/// Whether the service refuses what was sent, so that what it has is of no use. A proxy's limit can be raised, and the same call goes on then.
 fn is_refusal(error: &RemoteError) -> bool {
     match error {
+        RemoteError::Client(error) if error.is_body_limit() => false,
         RemoteError::Client(error) => {
             error.status().is_some_and(|status| (400..500).contains(&status) && ![408, 429].contains(&status))
         }

@@ -4,6 +4,7 @@ mod client;
 mod command;
 mod far_away;
 mod gone_on;
+mod limited;
 mod restart;
 mod server;
 // Not all of it is of use here.

@@ -1,5 +1,6 @@
 //! Errors, one variant per reaction of the caller.
 
+use crate::problem::is_body_limit;
 use cager_proto::messages::Problem;
 use std::io;
 use std::time::Duration;
@@ -87,6 +88,11 @@ pub enum ClientError {
 }
 
 impl ClientError {
+    /// Whether a proxy before the service refused the length of a request: its limit has to be raised, trying again gives the same.
+    pub fn is_body_limit(&self) -> bool {
+        self.problem().is_some_and(is_body_limit)
+    }
+
     /// The problem that the service named, where it named one.
     pub fn problem(&self) -> Option<&Problem> {
         match self {

@@ -8,7 +8,7 @@ use crate::sse::SseParser;
 use cager_proto::messages::{Progress, SessionState};
 use futures_util::stream::BoxStream;
 use futures_util::{StreamExt, stream};
-use reqwest::header::ACCEPT;
+use reqwest::header::{ACCEPT, CONTENT_TYPE};
 use reqwest::{Method, Response, StatusCode};
 use serde::de::DeserializeOwned;
 use std::collections::VecDeque;
@@ -16,6 +16,8 @@ use std::time::Duration;
 
 /// Pause before the next connection where the stream does not ask for another one.
 const RECONNECT: Duration = Duration::from_secs(1);
+
+const EVENT_STREAM: &str = "text/event-stream";
 
 /// Longest pause that a stream may ask for.
 const MAX_RECONNECT: Duration = Duration::from_secs(60);
@@ -128,12 +130,20 @@ impl<T: DeserializeOwned + Send + 'static> Events<T> {
     async fn connect(&mut self) -> Result<Option<Response>, Failure> {
         let mut request =
             self.client.request(Method::GET, &["v1", self.place.resource, &self.place.id, "events"], &[]).await?;
-        request = request.header(ACCEPT, "text/event-stream");
+        request = request.header(ACCEPT, EVENT_STREAM);
         if let Some(id) = &self.last_id {
             request = request.header("Last-Event-ID", id);
         }
         let response = self.client.send(request).await?;
         // 204 means that there will be no more events.
-        Ok((response.status() != StatusCode::NO_CONTENT).then_some(response))
+        if response.status() == StatusCode::NO_CONTENT {
+            return Ok(None);
+        }
+        let kind = response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or_default();
+        // A page ends without an event, however often it is asked for.
+        if !kind.to_ascii_lowercase().starts_with(EVENT_STREAM) {
+            return Err(Failure::protocol(format!("{kind:?} came where a stream of events was asked for")));
+        }
+        Ok(Some(response))
     }
 }

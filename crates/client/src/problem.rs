@@ -42,6 +42,11 @@ pub(crate) fn classify(problem: Problem, retry_after: Option<Duration>) -> Failu
     if transient { Failure::Transient { error, retry_after } } else { Failure::Final(error) }
 }
 
+/// Whether a proxy, and not the service, refused the length of a body.
+pub(crate) fn is_body_limit(problem: &Problem) -> bool {
+    problem.status == StatusCode::PAYLOAD_TOO_LARGE.as_u16() && !problem.kind.starts_with(Problem::TYPE_PREFIX)
+}
+
 async fn read_problem(mut response: Response) -> Problem {
     let status = response.status();
     let is_json = header(&response, &CONTENT_TYPE).is_some_and(|kind| kind.to_ascii_lowercase().contains("json"));
@@ -67,7 +72,10 @@ fn header<'a>(response: &'a Response, name: &HeaderName) -> Option<&'a str> {
 
 /// Parses a problem, or makes one from the page of a proxy or another server.
 fn parse(status: StatusCode, is_json: bool, place: Option<&str>, body: &[u8]) -> Problem {
-    if is_json && let Ok(problem) = serde_json::from_slice::<Problem>(body) {
+    let parsed = if is_json { serde_json::from_slice::<Problem>(body).ok() } else { None };
+    if let Some(problem) = parsed
+        .filter(|problem| status != StatusCode::PAYLOAD_TOO_LARGE || problem.kind.starts_with(Problem::TYPE_PREFIX))
+    {
         // The status of the answer is what counts; a problem's own is only for information (RFC 9457, 3.1.2).
         return Problem {
             status: status.as_u16(),
@@ -79,7 +87,13 @@ fn parse(status: StatusCode, is_json: bool, place: Option<&str>, body: &[u8]) ->
     let reason = status.canonical_reason().unwrap_or("an unknown status");
     let text = visible_text(&String::from_utf8_lossy(body));
     let mut detail = format!("the server answered {} ({reason})", status.as_u16());
-    if let Some(place) = place.filter(|_| status.is_redirection()) {
+    if status == StatusCode::PAYLOAD_TOO_LARGE {
+        let said = if text.is_empty() { String::new() } else { format!(": {text}") };
+        detail = format!(
+            "a proxy before the service does not let a request of this size through (413{said}); raise its limit on bodies, which \
+             nginx calls client_max_body_size, or give the service's own address"
+        );
+    } else if let Some(place) = place.filter(|_| status.is_redirection()) {
         detail.push_str(&format!(" and names {}; use that address", printable(place)));
     } else if text.is_empty() {
         detail.push_str(" without saying why; look at its log, or at a proxy's before it");

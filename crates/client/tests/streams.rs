@@ -200,6 +200,18 @@ async fn progress_goes_on_after_the_last_event() {
     );
 }
 
+#[tokio::test]
+async fn a_page_in_the_place_of_events_ends_the_stream() {
+    let (address, log) = scripted(completed(9), |_, exchange| async move {
+        exchange.reply(200, &[("content-type", "text/html")], "<h1>Sign in</h1>").await;
+    })
+    .await;
+    let progress: Result<Vec<Progress>, _> = client(&address).events(ID).try_collect().await;
+    let error = progress.expect_err("no events");
+    assert!(matches!(&error, ClientError::Protocol(what) if what.contains("text/html")), "{error}");
+    assert_eq!(log.lock().expect("no panic").len(), 1);
+}
+
 const CONTAINER: &[u8] = b"0123456789abcdefghijklmnopqrstuvwxyz";
 
 #[tokio::test]

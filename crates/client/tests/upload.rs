@@ -110,6 +110,47 @@ async fn a_refusal_is_told_even_if_the_connection_breaks_over_it() {
 }
 
 #[tokio::test]
+async fn a_proxy_that_limits_bodies_gets_fewer_frames_at_a_time() {
+    // A record of a frame has 88 bytes.
+    for (limit, frames) in [(1 << 20, 60_000), (1000, 300), (88, 9)] {
+        for connections in [1, 3] {
+            let (service, address) = Service::start([Fault::Limit(limit)]).await;
+            let (uploaded, reported) = upload_over(connections, &client(&address), frames).await;
+            assert_eq!(uploaded.expect("an upload").retries, 0, "no failure");
+            assert_whole(&service, frames);
+            assert_each_once(reported, frames);
+            let posts = service.posts().len();
+            // What worked is kept: not each request begins with too much.
+            let at_best = (frames as usize * 88).div_ceil(limit);
+            assert!(posts <= 4 * at_best + 20, "{posts} requests where {at_best} do");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_capture_of_unknown_length_passes_a_limit_too() {
+    let (service, address) = Service::start([Fault::Limit(400)]).await;
+    let source = FnFrames::new(POINTS as usize, None, |number, into: &mut Vec<f32>| {
+        into.clone_from(&frame(number));
+        Ok(number < 64)
+    });
+    let uploaded = client(&address).upload(&session(SessionState::Ready), source, UploadOptions::default()).await;
+    assert_eq!(uploaded.expect("an upload").frames, 64);
+    assert_whole(&service, 64);
+}
+
+#[tokio::test]
+async fn a_limit_below_a_single_frame_is_told_with_what_to_raise() {
+    let (service, address) = Service::start([Fault::Limit(50)]).await;
+    let error = upload(&client(&address), 300).await.0.expect_err("no frame passes");
+    assert!(error.is_body_limit() && error.status() == Some(413), "{error}");
+    let said = error.to_string();
+    assert!(said.starts_with("a single frame of 60 bytes is too much: a proxy before the service"), "{said}");
+    assert!(said.contains("client_max_body_size") && said.contains("413 Request Entity Too Large nginx"), "{said}");
+    assert!(service.posts().len() < 15, "{} requests", service.posts().len());
+}
+
+#[tokio::test]
 async fn a_bad_frame_is_named_and_those_before_it_are_solved() {
     let (service, address) = Service::start([Fault::Problem(6, 422), Fault::Problem(0, 422)]).await;
     let (uploaded, reported) = upload(&client(&address), 20).await;

@@ -32,6 +32,8 @@ pub(crate) enum Layout {
 struct Job {
     ranges: Vec<FrameRange>,
     layout: Layout,
+    /// Most frames to read.
+    most: u32,
     /// The first frame is a piece of its own, so that it can be answered before the next is sent.
     first_alone: bool,
     pieces: async_mpsc::Sender<Bytes>,
@@ -61,10 +63,10 @@ impl FrameFeed {
         let (jobs, queue) = mpsc::channel::<Job>();
         let run = move || {
             let mut reader = Reader { position: None, frame: Vec::new(), rows: Vec::new(), handles };
-            for Job { ranges, layout, first_alone, pieces, outcome } in queue {
+            for Job { ranges, layout, most, first_alone, pieces, outcome } in queue {
                 let mut body =
                     BodyWriter { pieces, piece: Vec::new(), layout, alone: first_alone, flushed: Instant::now() };
-                let end = reader.read(&mut source, &ranges, &mut body);
+                let end = reader.read(&mut source, &ranges, most, &mut body);
                 // Before `body` goes, so that whoever sees the body's end finds the outcome.
                 if let Some(end) = end {
                     let _ = outcome.send(end);
@@ -78,7 +80,7 @@ impl FrameFeed {
         Ok(Self { jobs })
     }
 
-    /// Starts reading the frames of a request; an earlier request is abandoned.
+    /// Starts reading the first `most` frames of a request; an earlier request is abandoned.
     ///
     /// # Errors
     /// The thread is gone, since the source has panicked.
@@ -86,12 +88,13 @@ impl FrameFeed {
         &self,
         ranges: Vec<FrameRange>,
         layout: Layout,
+        most: u32,
         first_alone: bool,
     ) -> Result<BodyChunks, ClientError> {
         let frame = ranges.first().map_or(0, |range| range.first);
         let (pieces, receive) = async_mpsc::channel(WAITING_PIECES);
         let (outcome, ended) = oneshot::channel();
-        let job = Job { ranges, layout, first_alone, pieces, outcome };
+        let job = Job { ranges, layout, most, first_alone, pieces, outcome };
         self.jobs.send(job).map_err(|_| {
             let cause = io::Error::other("the thread that reads the frames has panicked; look at its message");
             ClientError::Source { frame, cause }
@@ -109,11 +112,18 @@ struct Reader {
 }
 
 impl Reader {
-    /// Reads all ranges; `None` if the request was abandoned.
-    fn read(&mut self, source: &mut impl FrameSource, ranges: &[FrameRange], body: &mut BodyWriter) -> Option<Outcome> {
+    /// Reads `most` frames of the ranges; `None` if the request was abandoned.
+    fn read(
+        &mut self,
+        source: &mut impl FrameSource,
+        ranges: &[FrameRange],
+        mut most: u32,
+        body: &mut BodyWriter,
+    ) -> Option<Outcome> {
         for range in ranges {
             let mut next = range.first;
-            while range.end.is_none_or(|end| next < end) {
+            while most > 0 && range.end.is_none_or(|end| next < end) {
+                most -= 1;
                 match self.read_frame(source, next) {
                     Ok(true) => {}
                     Ok(false) if range.end.is_none() => {

@@ -8,9 +8,10 @@ mod set;
 
 use crate::client::Client;
 use crate::error::{ClientError, Failure};
+use crate::problem::is_body_limit;
 use crate::sessions::{known, reason};
 use crate::source::FrameSource;
-use cager_proto::messages::{FrameResult, Session, SessionState};
+use cager_proto::messages::{FrameResult, Problem, Session, SessionState};
 use feed::{FrameFeed, check_handles};
 use set::FrameSet;
 use std::time::Duration;
@@ -59,13 +60,14 @@ impl Client {
     /// Uploads the frames that a session does not have yet, and returns when all of them are solved. Results come back while
     /// frames are sent; memory does not grow with their number. After a broken connection, a restart of the service or its
     /// request for patience, it goes on with what is missing. What is there is not compared, see [`Client::sent`]. Where a proxy in between stops sending a request whose answer has begun, this
-    /// and later uploads of the client have their results at the end of each request.
+    /// and later uploads of the client have their results at the end of each request. Where a proxy limits bodies, fewer frames are sent at a time, one request after the other.
     ///
     /// `source` is read on a thread of its own, for which it is handed over.
     ///
     /// # Errors
     /// [`ClientError::Mismatch`] where the frames do not fit the session, [`ClientError::Source`] where they cannot be read,
-    /// [`ClientError::Refused`] where the service does not want them, and those of [`Client::wait_ready`] and the connection.
+    /// [`ClientError::Refused`] where the service does not want them or a proxy does not let a single one through, and those of
+    /// [`Client::wait_ready`] and the connection.
     /// Frames that have their result stay solved; another upload goes on from there.
     pub async fn upload<S: FrameSource + 'static>(
         &self,
@@ -86,6 +88,7 @@ impl Client {
             Rows::Handles => Some(self.handles(&session.id).await?),
         };
         check_handles(handles.as_deref().unwrap_or_default(), points)?;
+        let rows = handles.as_ref().map_or(u64::from(points), |handles| handles.len() as u64);
         let mut upload = Upload {
             client: self.clone(),
             id: session.id.clone(),
@@ -97,6 +100,9 @@ impl Client {
             on_frame: options.on_frame,
             connections: if session.regularizer == TEMPORAL { 1 } else { options.connections.max(1) },
             sent_bytes: 0,
+            largest_body: 0,
+            frame_bytes: 12 * rows.max(1),
+            most_frames: u32::MAX,
         };
         upload.synchronise(&session).await?;
         upload.run(&FrameFeed::start(source, handles)?).await
@@ -122,6 +128,11 @@ struct Upload<'a> {
     on_frame: Option<&'a mut (dyn FnMut(FrameResult) + Send)>,
     connections: usize,
     sent_bytes: u64,
+    /// Bytes of the longest body of the last pass, as far as it was sent.
+    largest_body: u64,
+    frame_bytes: u64,
+    /// Frames sent at a time, fewer than all where a proxy limits bodies.
+    most_frames: u32,
 }
 
 impl Upload<'_> {
@@ -137,7 +148,15 @@ impl Upload<'_> {
                 // The retry without full duplex succeeded, so full duplex was at fault.
                 self.client.disable_live();
             }
-            let Err(failure) = passed else { continue };
+            let Err(mut failure) = passed else { continue };
+            if let Failure::Final(ClientError::Refused(problem)) = &mut failure
+                && is_body_limit(problem)
+                && self.send_fewer(problem)
+            {
+                let session = self.client.session(&self.id).await?;
+                self.synchronise(&session).await?;
+                continue;
+            }
             if self.done.len() > before {
                 backoff.progress();
             }
@@ -151,6 +170,17 @@ impl Upload<'_> {
         }
         let frames = self.total.unwrap_or_else(|| self.done.end());
         Ok(Uploaded { frames, sent_bytes: self.sent_bytes, retries: backoff.total() })
+    }
+
+    /// Sends at most half as many frames at a time; false where a single one was too much, which `problem` says then.
+    fn send_fewer(&mut self, problem: &mut Problem) -> bool {
+        if self.most_frames == 1 {
+            problem.detail = format!("a single frame of {} bytes is too much: {}", self.frame_bytes, problem.detail);
+            return false;
+        }
+        let sent = u32::try_from(self.largest_body / self.frame_bytes).unwrap_or(u32::MAX);
+        self.most_frames = (self.most_frames.min(sent) / 2).max(1);
+        true
     }
 
     /// Synchronises with the frames that the service has, and reports results that were lost with a connection.

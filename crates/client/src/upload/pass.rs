@@ -52,10 +52,11 @@ impl Upload<'_> {
     ) -> Result<(), Failure> {
         let client = self.client.clone();
         let live = self.live && client.is_live();
-        let connections = if cautious { 1 } else { self.connections };
+        let connections = if cautious || self.most_frames < u32::MAX { 1 } else { self.connections };
+        let before = self.done.len();
         // Records have numbers, and checksums: some proxies lose bytes of a request whose answer has begun.
         let layout = if ranges.len() == 1 && !live && connections == 1 { Layout::Raw } else { Layout::Records };
-        let BodyChunks { pieces, outcome } = feed.read(ranges.clone(), layout, cautious)?;
+        let BodyChunks { pieces, outcome } = feed.read(ranges.clone(), layout, self.most_frames, cautious)?;
         let pieces = Arc::new(tokio::sync::Mutex::new(pieces));
         let first = ranges.first().map_or(0, |range| range.first);
         let sent: Vec<_> =
@@ -71,7 +72,9 @@ impl Upload<'_> {
         // Its frames are abandoned with the requests.
         drop(pieces);
         let Pass { mut outcome, .. } = pass.into_inner().unwrap_or_else(PoisonError::into_inner);
-        self.sent_bytes += sent.iter().map(|sent| sent.bytes.load(Ordering::Relaxed)).sum::<u64>();
+        let sent = || sent.iter().map(|sent| sent.bytes.load(Ordering::Relaxed));
+        self.sent_bytes += sent().sum::<u64>();
+        self.largest_body = sent().max().unwrap_or(0);
         let answer = match answer {
             Err(failure) if live => Err(self.after_live_failure(failure)),
             answer => answer,
@@ -82,7 +85,7 @@ impl Upload<'_> {
         }
         self.read_outcome(&mut outcome)?;
         answer?;
-        if self.is_complete() {
+        if self.is_complete() || self.done.len() - before >= u64::from(self.most_frames) {
             return Ok(());
         }
         let missing = self.done.missing(self.total).first().map_or(0, |range| range.first);

@@ -143,6 +143,12 @@ impl Exchange {
         }
     }
 
+    /// Lets a body that was read whole be read again.
+    pub fn put_back(&mut self, body: Vec<u8>) {
+        self.body = BodyLeft::Bytes(body.len());
+        self.buffer = body;
+    }
+
     pub async fn whole_body(&mut self) -> Vec<u8> {
         let mut body = Vec::new();
         while let Some(piece) = self.body_piece().await {

@@ -32,6 +32,8 @@ pub enum Fault {
     Problem(usize, u16),
     /// A proxy's page.
     Page(u16),
+    /// A proxy's page as soon as the body has more than this many bytes, before the service sees any of it.
+    Limit(usize),
     /// A line that is no JSON.
     Garbage,
     /// A line without end.
@@ -112,6 +114,10 @@ impl Service {
 
     async fn frames(self: Arc<Self>, mut exchange: Exchange) {
         let fault = self.state().faults.pop_front().unwrap_or(Fault::None);
+        if matches!(fault, Fault::Limit(_)) {
+            // So do all later requests.
+            self.state().faults.push_front(fault.clone());
+        }
         match &fault {
             Fault::Refuse(status, word, retry_after) => {
                 let head = format!(
@@ -125,6 +131,17 @@ impl Service {
             }
             Fault::Page(status) => {
                 return exchange.reply(*status, &[("content-type", "text/html")], "<h1>Gateway</h1> sorry").await;
+            }
+            Fault::Limit(most) => {
+                let mut body = Vec::new();
+                while let Some(piece) = exchange.body_piece().await {
+                    body.extend(piece);
+                    if body.len() > *most {
+                        let page = "<h1>413 Request Entity Too Large</h1> nginx";
+                        return exchange.reply(413, &[("content-type", "text/html")], page).await;
+                    }
+                }
+                exchange.put_back(body);
             }
             Fault::Silence => return tokio::time::sleep(std::time::Duration::from_secs(60)).await,
             _ => {}
