@@ -92,6 +92,43 @@ fn the_settings_of_the_manifests_are_settings() {
 }
 
 #[test]
+fn the_manifests_allow_the_memory_that_their_settings_take() {
+    let config = text("deploy/kubernetes/configmap.yaml");
+    let config = config.split("cager.toml: |\n").nth(1).expect("a file of settings").replace("\n    ", "\n");
+    let compose = text("deploy/compose.yaml");
+    let of_compose: String = compose
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("CAGER_")?.split_once(": "))
+        .map(|(key, value)| format!("{} = \"{}\"\n", key.to_lowercase(), value.trim_matches('"')))
+        .collect();
+    for (file, settings) in [(STATEFUL_SET, config.trim_start()), ("deploy/compose.yaml", &of_compose)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("cager.toml");
+        fs::write(&path, settings).expect("a file");
+        let flags = cager_service::config::ServeFlags::default();
+        let config = cager_service::config::ServeConfig::load(Some(&path), std::iter::empty(), &flags).expect(file);
+        let gib = |bytes: u64| bytes as f64 / (1u64 << 30) as f64;
+        // The rows of the table in docs/OPERATIONS.md, for cages of 350 vertices and captures of 20,000 points.
+        let coders = config.worker_threads().div_ceil(2).min(8) as f64;
+        let recoveries = (4 + 2 * config.max_recoveries) as f64 * gib(24 * 20_000 * 350);
+        let taken = config.max_preparing as f64 * gib(config.max_prepare_bytes)
+            + gib(config.cache_bytes + config.shape_bytes)
+            + gib(config.frame_bytes + config.upload_bytes + config.download_bytes)
+            + config.max_designs as f64 * gib(2 * config.max_design_bytes + 240 * 1500 * 1500)
+            + coders * (0.5 + 0.06)
+            + recoveries
+            + 0.5
+            + 0.1;
+        let limit: f64 = text(file)
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("memory: ")?.trim_end_matches(['G', 'i']).parse().ok())
+            .fold(0.0, f64::max);
+        assert!(taken < limit, "{file}: {taken} of {limit}");
+        assert!(taken > 0.8 * limit, "{file}: {limit} GiB are much more than {taken}");
+    }
+}
+
+#[test]
 fn the_network_policy_lets_through_what_the_settings_may_name_and_keeps_metrics_apart() {
     let policy = text("deploy/kubernetes/networkpolicy.yaml");
     let (ingress, egress) = policy.split_once("\n  egress:\n").expect("rules for what goes out");

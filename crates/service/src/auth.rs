@@ -196,7 +196,7 @@ impl Access {
     /// Reads the tokens file; without one, everyone is tenant `local` with the default limits.
     ///
     /// # Errors
-    /// A file that cannot be read, or has an entry that is wrong, with its line.
+    /// A file that cannot be read, has no entry, or has one that is wrong, with its line.
     pub fn open(path: Option<&Path>, defaults: TenantLimits) -> Result<Self, AccessError> {
         // Before reading, so that a concurrent change is noticed later.
         let seen = path.and_then(Stamp::of);
@@ -281,7 +281,7 @@ impl Access {
     }
 
     /// Reads the file again whenever it changes, until `stop`. A removed entry stops working within a second; a file that
-    /// cannot be used is logged, and the entries before stay.
+    /// cannot be used or has no entry is logged, and the entries before stay.
     pub async fn watch(self, stop: CancellationToken) {
         if let Some(provider) = self.provider.clone() {
             let stop = stop.clone();

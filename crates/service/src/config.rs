@@ -99,7 +99,7 @@ settings! {
     /// PEM file of the certificate's private key.
     tls_key: Option<PathBuf> = None, SettingKind::File;
     /// Names by which a service without tokens may be asked, beside `localhost` and addresses.
-    allowed_hosts: Vec<String> = Vec::new(), SettingKind::List;
+    allowed_hosts: Vec<String> = Vec::new(), SettingKind::Hosts;
     /// Origins of pages that may ask, beside the service's own.
     allowed_origins: Vec<String> = Vec::new(), SettingKind::Origins;
     /// Form of log lines: `human` or `json`.
@@ -243,6 +243,9 @@ impl ServeConfig {
         };
         if !fits {
             return Err(ConfigError::UploadRoom { upload_bytes, max_rest_bytes });
+        }
+        if self.listen.port() > 0 && self.admin_listen == Some(self.listen) {
+            return Err(ConfigError::SamePort { listen: self.listen });
         }
         let pairs = [
             ("tls_certificate", self.tls_certificate.is_some(), "tls_key", self.tls_key.is_some()),

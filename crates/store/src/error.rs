@@ -22,8 +22,15 @@ pub enum CatalogError {
     #[error("{0}")]
     Corrupt(String),
     /// A newer version of the program wrote it.
-    #[error("it has version {0}, which is newer than this program: use the one that wrote it")]
-    Newer(i64),
+    #[error(
+        "a newer program wrote it: it has version {found}, and this program knows versions up to {known}; start the newer one, or go back to a backup from before the upgrade"
+    )]
+    Newer {
+        /// Its version.
+        found: i64,
+        /// The newest that this program knows.
+        known: i64,
+    },
     /// Another process has the database for itself.
     #[error("{0}")]
     InUse(String),

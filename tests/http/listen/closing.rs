@@ -55,3 +55,27 @@ async fn a_stream_without_end_is_cut_at_the_end_of_the_drain_time() {
     timeout(HANG, rest).await.expect("the stream goes on");
     assert_took(stopping.await.unwrap(), limits().drain_timeout);
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn work_ends_when_its_client_leaves_though_the_rest_of_the_body_was_not_read() {
+    let long = Limits { body_timeout: HANG * 4, write_timeout: HANG * 4, ..limits() };
+    let server = start(long).await;
+    let mut client = server.connect().await;
+    client.write_all(b"POST /stuck HTTP/1.1\r\nHost: x\r\nContent-Length: 100000000\r\n\r\n").await.unwrap();
+    // More than the service's own buffers hold, so that it does not come to the end of the connection.
+    let _ = timeout(ms(500), client.write_all(&vec![7; 4 << 20])).await;
+    let begun = Instant::now();
+    while STUCK.load(Ordering::SeqCst) == 0 {
+        assert!(begun.elapsed() < HANG, "it was not begun");
+        tokio::time::sleep(ms(10)).await;
+    }
+    // A client that stays is worked for.
+    tokio::time::sleep(ms(300)).await;
+    assert_eq!(STUCK.load(Ordering::SeqCst), 1);
+    drop(client);
+    let left = Instant::now();
+    while STUCK.load(Ordering::SeqCst) > 0 {
+        assert!(left.elapsed() < HANG / 3, "it is worked on for nobody");
+        tokio::time::sleep(ms(10)).await;
+    }
+}

@@ -20,6 +20,7 @@ use http::{StatusCode, header};
 use std::convert::Infallible;
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
@@ -88,6 +89,7 @@ fn app() -> Router {
                 Body::from_stream(endless())
             }),
         )
+        .route("/stuck", post(stuck))
         .route("/refuse", post(async || (StatusCode::PAYLOAD_TOO_LARGE, "too large")))
 }
 
@@ -109,6 +111,25 @@ async fn count(body: Body) -> axum::response::Response {
 async fn lazy(body: Body) -> axum::response::Response {
     tokio::time::sleep(ms(1000)).await;
     count(body).await
+}
+
+/// How many requests of [`stuck`] are worked on.
+static STUCK: AtomicUsize = AtomicUsize::new(0);
+
+/// Reads one piece of the body and works on it for long, as on one that was packed well.
+async fn stuck(body: Body) {
+    struct Work;
+    impl Drop for Work {
+        fn drop(&mut self) {
+            STUCK.fetch_sub(1, Ordering::SeqCst);
+        }
+    }
+    let mut pieces = body.into_data_stream();
+    pieces.next().await;
+    STUCK.fetch_add(1, Ordering::SeqCst);
+    let _work = Work;
+    tokio::time::sleep(ms(60_000)).await;
+    drop(pieces);
 }
 
 async fn start(limits: Limits) -> Server {

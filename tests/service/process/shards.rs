@@ -228,6 +228,27 @@ async fn who_was_there_before_it_was_divided_stays_where_the_sessions_are() {
     let said = String::from_utf8(everywhere.output().expect("the service").stderr).expect("text");
     assert!(said.contains("say by --advertise where they reach this one"), "{said}");
     drop(app);
+    let store = |arguments: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_cager"));
+        command.arg("store").args(arguments).args(database.flags()).arg("--data").arg(place.path());
+        let output = command.envs(database.environment()).output().expect("it runs");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+        (output.status.success(), said)
+    };
+    let copies = folder();
+    let copies = copies.path().display().to_string();
+    for (arguments, good, wanted) in [
+        (&["verify", "--shards", "3"][..], true, "of 3 sessions and jobs and 3 models in 3 shards"),
+        (&["verify", "--shards", "3"], true, "nothing is damaged\n"),
+        (&["verify", "--shards", "3", "--shard", "1"], true, "nothing is damaged in shard 1; the others were not"),
+        (&["verify", "--shards", "2"], false, "the database is divided into 3; give that number"),
+        (&["verify"], false, "is divided into shards"),
+        (&["usage", "--shards", "3"], true, "south "),
+        (&["export", &copies, "--shards", "3"], true, "wrote 3 containers"),
+    ] {
+        let (is_good, said) = store(arguments);
+        assert!(is_good == good && said.contains(wanted), "{arguments:?}: {said}");
+    }
     for (flags, why) in [
         (&["--shards", "3"][..], "shards is set but catalog is not"),
         (&["--shards", "3", "--catalog", "postgres://a@b/c"], "shards is set but tokens is not"),

@@ -62,6 +62,10 @@ impl Entries {
     /// Reads entries; errors have their place in the text.
     fn parse(text: &str, defaults: TenantLimits) -> Result<Self, Wrong> {
         let document: Document = entries::document(text, "tokens")?;
+        if document.token.is_empty() {
+            let why = "there is no token in it, and nobody would be let in; add an entry [[token]] with name, tenant and sha256";
+            return Err((0, why.to_owned()));
+        }
         let mut names = HashMap::new();
         let mut entries: Vec<(Hash, Grant)> = Vec::with_capacity(document.token.len());
         for token in document.token {

@@ -85,6 +85,12 @@ pub enum ConfigError {
         /// The address.
         listen: SocketAddr,
     },
+    /// Two listeners at one address.
+    #[error("listen and admin_listen are both {listen}; give the operators' listener another port")]
+    SamePort {
+        /// The address.
+        listen: SocketAddr,
+    },
     /// A model of the largest size would never find room.
     #[error(
         "upload_bytes is {upload_bytes}, of which one of several tenants gets two thirds, so a model of max_rest_bytes, {max_rest_bytes}, would never find room; raise the one or lower the other"

@@ -5,15 +5,27 @@ use crate::auth::Access;
 use crate::http::listen::tls_config;
 use crate::webhooks;
 use anyhow::{Context as _, Result, bail};
+use cager_store::{Blobs, PostgresCatalog};
+use rustix::fs::{Access as Right, access};
 use std::path::Path;
 
 impl ServeConfig {
-    /// Reads the files that the service reads at its start, and changes nothing.
+    /// Reads the files that the service reads at its start, looks at the addresses of what it uses without asking there, and changes nothing.
     ///
     /// # Errors
     /// One that cannot be used.
     pub fn check_files(&self) -> Result<()> {
-        Access::open(self.tokens.as_deref(), self.tenant_limits())?;
+        let tokens = Access::open(self.tokens.as_deref(), self.tenant_limits())?;
+        if let Some(trust) = self.trust() {
+            tokens.with_provider(trust)?;
+        }
+        if let Some(url) = &self.catalog {
+            PostgresCatalog::check_address(url).context("catalog")?;
+        }
+        if let Some(url) = &self.blobs {
+            Blobs::check_address(url, std::env::vars()).context("blobs")?;
+        }
+        check_data(&self.data)?;
         if let Some(file) = &self.webhooks {
             webhooks::check(file)?;
         }
@@ -27,6 +39,17 @@ impl ServeConfig {
         if !there.is_dir() || audit.is_dir() {
             bail!("audit: {}: is no file in a folder; name one", audit.display());
         }
-        Ok(())
+        let written = if audit.exists() { audit } else { folder };
+        access(written, Right::WRITE_OK).with_context(|| format!("audit: {}: cannot be written", audit.display()))
     }
+}
+
+/// Refuses what cannot be a data folder, or be made one.
+fn check_data(data: &Path) -> Result<()> {
+    let there = data.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
+    if !there.is_dir() {
+        bail!("data: {}: {} is no folder; name another one", data.display(), there.display());
+    }
+    let may = access(there, Right::WRITE_OK | Right::EXEC_OK);
+    may.with_context(|| format!("data: {}: cannot be written by this user", data.display()))
 }

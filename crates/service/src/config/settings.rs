@@ -17,7 +17,8 @@ pub(super) enum SettingKind {
     Url,
     Format,
     Filter,
-    List,
+    /// A list of names of hosts.
+    Hosts,
     /// A list of origins of pages.
     Origins,
     Number {
@@ -102,7 +103,15 @@ impl SettingKind {
                     Err(error) => Err(wrong(error.to_string())),
                 }
             }
-            Self::List => Ok(Value::Array(items(value)?.into_iter().map(Value::String).collect())),
+            Self::Hosts => {
+                let items = items(value)?;
+                if let Some(other) = items.iter().find(|item| !is_host(item)) {
+                    let why =
+                        "is no name of a host: write one such as cager.studio, without a scheme, a port or a path";
+                    return Err(format!("{other} {why}"));
+                }
+                Ok(Value::Array(items.into_iter().map(Value::String).collect()))
+            }
             Self::Origins => {
                 let items = items(value)?;
                 if let Some(other) = items.iter().find(|item| !is_origin(item)) {
@@ -153,6 +162,11 @@ fn items(value: &Value) -> Result<Vec<String>, String> {
 fn is_service(text: &str) -> bool {
     let url = reqwest::Url::parse(text).ok();
     url.is_some_and(|url| matches!(url.scheme(), "http" | "https") && url.has_host() && url.path() == "/")
+}
+
+/// Whether a request can be for this host.
+fn is_host(text: &str) -> bool {
+    !text.contains(|c: char| "/?#@*:".contains(c) || c.is_whitespace())
 }
 
 /// Whether a browser can say that a page has this origin.

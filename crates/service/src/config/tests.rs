@@ -77,6 +77,11 @@ fn mistakes_name_their_place_and_what_to_do() {
         ("advertise = \"10.0.0.5:8080\"", &[], "", "write an address such as http://10.0.0.5:8080"),
         ("allowed_origins = [\"foo\"]", &[], "", "foo is no origin: write one such as https://tools.studio"),
         ("", &[], "--set allowed_origins=https://tools.studio/", "https://tools.studio/ is no origin"),
+        ("allowed_hosts = [\"https://cager.studio\"]", &[], "", "https://cager.studio is no name of a host"),
+        ("", &[], "--set allowed_hosts=cager.studio,a:80", "a:80 is no name of a host"),
+        ("listen = \"127.0.0.1:99999\"", &[], "", "write ADDRESS:PORT"),
+        ("advertise = \"http://10.0.0.5:99999\"", &[], "", "write an address such as http://10.0.0.5:8080"),
+        ("", &[], "--listen 127.0.0.1:80 --admin-listen 127.0.0.1:80", "listen and admin_listen are both 127.0.0.1:80"),
         ("workers = 1\nworkers = 2", &[], "", "DIR/cager.toml: line 2: "),
         ("", &[("CAGER_MAX_STREAM", "1")], "", "environment CAGER_MAX_STREAM: unknown setting max_stream"),
         ("", &[("CAGER_WORKERS", "many")], "", "environment CAGER_WORKERS: workers = \"many\": write"),
@@ -123,18 +128,36 @@ fn who_looks_at_what_is_stored_needs_no_tokens() {
 fn files_that_are_missing_are_told_before_the_start() {
     let folder = tempfile::tempdir().unwrap();
     let good = folder.path().join("tokens.toml");
-    fs::write(&good, "").unwrap();
-    let good = good.display();
+    fs::write(&good, format!("[[token]]\nname = \"a\"\ntenant = \"a\"\nsha256 = \"{}\"", "0".repeat(64))).unwrap();
+    let empty = folder.path().join("empty.toml");
+    fs::write(&empty, "").unwrap();
+    let (good, empty) = (good.display(), empty.display());
     for (line, wanted) in [
         ("--tokens none.toml", "none.toml: cannot be read"),
         ("--set webhooks=none.toml", "none.toml: cannot be read"),
         ("--set audit=none/audit.jsonl", "none/audit.jsonl: cannot be written"),
         ("--tls-certificate c.pem --tls-key k.pem", "c.pem: cannot be read"),
+        (&format!("--tokens {empty}"), "line 1: there is no token in it"),
+        ("--catalog postgres://u@h:99999/d", "catalog: the address of the database cannot be used: invalid"),
+        ("--catalog postgres://u@h/d?sslmode=foo", "sslmode is disable, prefer, require, verify-ca or verify-full"),
+        ("--catalog postgres://u@h/d?sslmode=require&sslrootcert=none.pem", "sslrootcert none.pem: "),
+        ("--catalog postgres://u@h/d?sslmod=require", "catalog: the address of the database cannot be used: "),
+        ("--catalog postgres://u:p@x@h/d", "written %40"),
+        ("--catalog postgres:///d", "it names no host"),
+        ("--catalog postgres://u@h/d --blobs bucket/path", "blobs: \"bucket/path\" is no place for files"),
+        ("--catalog postgres://u@h/d --blobs s3://k@b/path", "keys and endpoints do not belong into it"),
+        (&format!("--data {good}/data"), "tokens.toml is no folder"),
+        (&format!("--data {good}"), "tokens.toml is no folder"),
+        ("--set oidc_issuer=login.studio --set oidc_audience=cager", "oidc_issuer: "),
+        ("--set oidc_issuer=http://login.studio --set oidc_audience=cager", "oidc_issuer: "),
+        ("--set oidc_issuer=https://a --set oidc_audience=c --set oidc_keys=keys.json", "oidc_keys: "),
     ] {
         let error = load("", &[], line).unwrap().check_files().unwrap_err();
         assert!(format!("{error:#}").contains(wanted), "{error:#}");
     }
-    let config = load("", &[], &format!("--tokens {good} --set webhooks={good} --set audit={good}")).unwrap();
+    let config =
+        load("", &[], &format!("--tokens {good} --set webhooks={empty} --set audit={empty} --data {empty}-data"))
+            .unwrap();
     config.check_files().unwrap();
 }
 

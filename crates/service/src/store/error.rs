@@ -21,6 +21,14 @@ pub enum StoreError {
         /// What is wrong.
         what: String,
     },
+    /// The catalogue is damaged, or gone while files of sessions are there. Without it nobody knows whose they are.
+    #[error("{} is damaged: {what}; {}", path.display(), cure_of_catalog(path))]
+    CatalogDamaged {
+        /// The file, or what the database is called.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
     /// Another process uses the folder.
     #[error("the data folder {} is in use by another process; stop it, or give another folder", path.display())]
     Locked {
@@ -92,6 +100,17 @@ impl StoreError {
     /// Whether the file or folder was not there.
     pub fn is_not_found(&self) -> bool {
         matches!(self, Self::Io { cause, .. } if cause.kind() == io::ErrorKind::NotFound)
+    }
+}
+
+fn cure_of_catalog(path: &Path) -> &'static str {
+    match path.file_name().is_some_and(|name| name == super::CATALOG) {
+        true => {
+            "restore the whole data folder from one backup; without one, copy the finished captures, sessions/*/capture.cager, elsewhere and start with an empty folder"
+        }
+        false => {
+            "restore the database from a backup, and the files of the same moment; without one, copy the finished captures, sessions/*/capture.cager, elsewhere and start with an empty schema and folder"
+        }
     }
 }
 

@@ -66,7 +66,7 @@ mod workshop;
 mod tests;
 
 pub use cage_jobs::{CAGE, CageJobMeta};
-pub use cager_store::{CagePlace, FrameEntry, Kind, NewFrame};
+pub use cager_store::{CagePlace, FrameEntry, Kind, NewFrame, PostgresCatalog};
 pub use content::{Content, NamedFile, StoredPart};
 pub use disk::{Disk, LocalDisk};
 pub use error::StoreError;
@@ -202,7 +202,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Locked`] or [`StoreError::InUse`] if another process uses it; [`StoreError::Elsewhere`] where database and folder do not belong
-    /// together; [`StoreError::Damaged`] where its catalogue is damaged, or is missing while sessions or
+    /// together; [`StoreError::CatalogDamaged`] where its catalogue is damaged, or is missing while sessions or
     /// jobs are there. Damaged sessions are not an error.
     pub fn open(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<Opened, StoreError> {
         make_folder(&*disk, root)?;
@@ -253,8 +253,8 @@ impl Store {
         };
         let records = store.catalog().records().map_err(|e| store.failed("open", e))?;
         if records.is_empty() && import::is_without_records(store.files())? {
-            let what = "it is empty, and there are sessions or jobs in the folder";
-            return Err(StoreError::damaged(store.catalog_path(), what));
+            let what = "it is empty, and there are sessions or jobs in the folder".to_owned();
+            return Err(StoreError::CatalogDamaged { path: store.catalog_path().to_owned(), what });
         }
         let mut quarantined = Vec::new();
         let (records, left) = store.take_over(records, &mut quarantined)?;
@@ -380,8 +380,8 @@ fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(
 fn own_catalog(files: &Files) -> Result<Named, StoreError> {
     let path = files.root.join(CATALOG);
     if !files.exists(&path)? && import::is_without_records(files)? {
-        let what = "it is missing, and there are sessions or jobs in the folder";
-        return Err(StoreError::damaged(&path, what));
+        let what = "it is missing, and there are sessions or jobs in the folder".to_owned();
+        return Err(StoreError::CatalogDamaged { path, what });
     }
     let catalog = files.disk.catalog(&path).map_err(|e| of_catalog(&path, "open", e))?;
     files.sync_dir(&files.root)?;
@@ -395,7 +395,12 @@ fn of_catalog(path: &Path, action: &'static str, error: CatalogError) -> StoreEr
         CatalogError::Gone => io::ErrorKind::NotFound.into(),
         CatalogError::Taken => io::ErrorKind::AlreadyExists.into(),
         // While the service runs that is no damage of the session that met it.
-        CatalogError::Corrupt(what) if action == "open" => return StoreError::damaged(path, what),
+        CatalogError::Corrupt(what) if action == "open" => {
+            return StoreError::CatalogDamaged { path: path.to_owned(), what };
+        }
+        newer @ CatalogError::Newer { .. } => {
+            return StoreError::Elsewhere { what: format!("{} cannot be used: {newer}", path.display()) };
+        }
         other => {
             // A database names itself.
             let (what, name) = (other.to_string(), path.display().to_string());

@@ -51,6 +51,14 @@ pub(super) struct Bucket {
 }
 
 impl Bucket {
+    pub(super) fn check_address(url: &str, environment: &[(String, String)]) -> Result<(), BlobsError> {
+        match url.strip_prefix("file://") {
+            // It is made where it is missing.
+            Some(folder) if folder.starts_with('/') => Ok(()),
+            _ => place(url, environment, SILENCE).map(drop),
+        }
+    }
+
     pub(super) fn connect(url: &str, environment: &[(String, String)]) -> Result<Self, BlobsError> {
         Self::connect_within(url, environment, SILENCE)
     }

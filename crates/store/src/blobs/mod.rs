@@ -71,6 +71,14 @@ impl Blobs {
         Ok(blobs)
     }
 
+    /// Checks the address of a bucket, and what the environment says of it, without asking for anything.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn check_address(url: &str, environment: impl IntoIterator<Item = (String, String)>) -> Result<(), BlobsError> {
+        Bucket::check_address(url, &environment.into_iter().collect::<Vec<_>>())
+    }
+
     /// What it is called in messages.
     pub fn name(&self) -> &str {
         &self.bucket.name

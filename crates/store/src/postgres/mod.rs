@@ -93,6 +93,27 @@ impl PostgresCatalog {
         Self::open_place(place.of_schema(&members::schema_of(&schema, shard)), connections)
     }
 
+    /// Into how many shards the database at `url` is divided. Changes nothing.
+    ///
+    /// # Errors
+    /// An address that cannot be used, a database that cannot be reached or has no catalogue.
+    pub fn divided(url: &str) -> Result<u32, CatalogError> {
+        let place = Place::parse(url)?;
+        let link = Link::connect(&place)?;
+        let count = link.read(PREPARING, &async |link: &Link| {
+            only::<i64>(&link.query("SELECT count(*) FROM shards", &[]).await?)
+        });
+        Ok(count.map_err(|trouble| trouble.explain(&place.name))? as u32)
+    }
+
+    /// Checks the address of a database, with the files that it names, without connecting.
+    ///
+    /// # Errors
+    /// What is wrong with it, without the password.
+    pub fn check_address(url: &str) -> Result<(), CatalogError> {
+        Place::parse(url).map(drop)
+    }
+
     fn open_place(place: Place, connections: usize) -> Result<Self, CatalogError> {
         let link = Link::connect(&place)?;
         let prepared = schema::prepare(&link, PREPARING).and_then(|()| {

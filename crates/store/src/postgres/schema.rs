@@ -65,6 +65,6 @@ async fn version(link: &Link, schema: &str) -> Result<i64, Trouble> {
     let version = only(&link.query("SELECT max(version) FROM catalogue", &[]).await?)?;
     match version {
         0..=VERSION => Ok(version),
-        newer => Err(CatalogError::Newer(newer).into()),
+        newer => Err(CatalogError::Newer { found: newer, known: VERSION }.into()),
     }
 }

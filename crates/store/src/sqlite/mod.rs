@@ -77,7 +77,7 @@ impl SqliteCatalog {
                 connection.execute_batch(&format!("BEGIN; {schema} PRAGMA user_version = {VERSION}; COMMIT;"))?;
             }
             VERSION => {}
-            newer => return Err(CatalogError::Newer(newer)),
+            newer => return Err(CatalogError::Newer { found: newer, known: VERSION }),
         }
         let writer = Arc::new(Writer::start(connection)?);
         let looking_after = connect(path)?;

@@ -22,7 +22,7 @@ fn a_newer_version_is_left_as_it_is() {
     let Some(server) = Server::start() else { return };
     open(&server.open(), "a");
     server.sql("UPDATE catalogue SET version = 3");
-    assert_eq!(refused(&server.url()), CatalogError::Newer(3));
+    assert_eq!(refused(&server.url()), CatalogError::Newer { found: 3, known: 2 });
     server.sql("UPDATE catalogue SET version = 2");
     assert_eq!(server.open().records().expect("records").len(), 1);
 }

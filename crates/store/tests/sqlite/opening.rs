@@ -24,8 +24,8 @@ fn a_newer_version_is_left_as_it_is() {
     open(&dir.open(), "a");
     dir.beside().execute_batch("PRAGMA user_version = 2").expect("written");
     let error = refused(&dir.file());
-    assert_eq!(error, CatalogError::Newer(2));
-    assert!(error.to_string().contains("version 2"), "{error}");
+    assert_eq!(error, CatalogError::Newer { found: 2, known: 1 });
+    assert!(error.to_string().contains("has version 2, and this program knows versions up to 1"), "{error}");
     dir.beside().execute_batch("PRAGMA user_version = 1").expect("written");
     assert_eq!(dir.open().records().expect("records").len(), 1);
 }

@@ -3,6 +3,7 @@
 use super::Limits;
 use super::idle::{IdleConnections, IdleEntry};
 use super::service::RequestService;
+use super::shared_stream::SharedStream;
 use super::socket::{ConnectionResources, Socket};
 use super::state::{Reason, State};
 use axum::Router;
@@ -70,7 +71,9 @@ impl Shared {
         keep: ConnectionResources,
         entry: Arc<IdleEntry>,
     ) -> Reason {
-        let Some(tls) = &self.tls else { return self.requests(stream, peer, spare, keep, entry).await };
+        let stream = SharedStream::new(stream);
+        let watched = stream.clone();
+        let Some(tls) = &self.tls else { return self.requests(stream, watched, peer, spare, keep, entry).await };
         let handshake = timeout(self.limits.header_timeout, tls.accept(stream));
         let handshake = entry.displaced.run_until_cancelled(handshake);
         match self.stop.run_until_cancelled(handshake).await {
@@ -81,13 +84,14 @@ impl Shared {
                 tracing::debug!(%peer, %error, "TLS handshake failed");
                 Reason::Handshake
             }
-            Some(Some(Ok(Ok(stream)))) => self.requests(stream, peer, spare, keep, entry).await,
+            Some(Some(Ok(Ok(stream)))) => self.requests(stream, watched, peer, spare, keep, entry).await,
         }
     }
 
     async fn requests<S>(
         &self,
         stream: S,
+        watched: SharedStream,
         peer: SocketAddr,
         spare: bool,
         keep: ConnectionResources,
@@ -134,6 +138,11 @@ impl Shared {
                 }
                 () = begun.notified(), if closing.is_none() => Reason::Spare,
                 _ = clock.tick() => {
+                    // A body that is not read hides the end of the connection from the protocol.
+                    if !state.is_idle() && watched.is_closed_by_peer() {
+                        state.abandon();
+                        return Reason::Normal;
+                    }
                     let Some(reason) = overdue(&state, &self.limits, closing) else { continue };
                     if reason != Reason::Idle || closing.is_some() {
                         state.abandon();

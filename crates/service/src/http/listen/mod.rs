@@ -11,6 +11,7 @@ mod idle;
 mod linger;
 mod peers;
 mod service;
+mod shared_stream;
 mod socket;
 mod state;
 mod tls;

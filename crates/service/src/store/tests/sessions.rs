@@ -69,11 +69,11 @@ fn a_folder_that_has_lost_its_catalogue_is_left_as_it_is() {
     let catalog = folder.join("catalog.db");
     std::fs::rename(&catalog, folder.join("elsewhere")).unwrap();
     let refused = open();
-    assert!(matches!(&refused, Err(StoreError::Damaged { path, .. }) if *path == catalog), "{refused:?}");
+    assert!(matches!(&refused, Err(StoreError::CatalogDamaged { path, .. }) if *path == catalog), "{refused:?}");
     assert!(folder.join("sessions/a/capture.cager").exists() && !catalog.exists());
     std::fs::write(&catalog, "not a database, whatever it is").unwrap();
     let refused = open();
-    assert!(matches!(&refused, Err(StoreError::Damaged { path, .. }) if *path == catalog), "{refused:?}");
+    assert!(matches!(&refused, Err(StoreError::CatalogDamaged { path, .. }) if *path == catalog), "{refused:?}");
     std::fs::rename(folder.join("elsewhere"), &catalog).unwrap();
     let Opened { store, sessions, quarantined, .. } = open().unwrap();
     assert!(quarantined.is_empty() && sessions == [meta("a")]);
