@@ -31,6 +31,13 @@ impl Dropped {
         self.add(phrase);
     }
 
+    /// Textures and materials alone: what of scans cannot be had otherwise.
+    #[must_use]
+    pub fn appearance(mut self) -> Self {
+        self.phrases.retain(|phrase| phrase.contains("texture") || phrase.contains("material"));
+        self
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.phrases.is_empty()
     }
@@ -45,7 +52,8 @@ impl Dropped {
     pub fn sentence(&self, path: &Path, is_reordered: bool) -> Option<String> {
         let (last, others) = self.phrases.split_last()?;
         let all = if others.is_empty() { last.clone() } else { format!("{} and {last}", others.join(", ")) };
-        let are = if others.is_empty() && last.starts_with("1 ") { "is" } else { "are" };
+        let is_one = others.is_empty() && ["1 ", "its "].iter().any(|start| last.starts_with(start));
+        let are = if is_one { "is" } else { "are" };
         let order = if is_reordered && self.is_on_faces {
             ", nor is the order of faces and of their corners; --exact-rest keeps that order, for putting them back"
         } else {

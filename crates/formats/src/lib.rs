@@ -1,7 +1,7 @@
 //! Meshes, point caches, skeletons in motion and sparse matrices to and from files and byte slices.
 //!
 //! Readers take bytes of any origin: they return an error for whatever they do not understand, never panic, and never
-//! allocate more than a small multiple of what the file holds. Writers make files that appear whole or not at all.
+//! allocate more than a small multiple of what the file holds; copies that glTF makes of meshes may take 512 MiB beyond. Writers make files that appear whole or not at all.
 
 mod alembic;
 pub mod atomic;

@@ -293,7 +293,7 @@ fn rates_are_told_apart_long_after_the_beginning() {
 fn of_several_animations_the_first_or_the_chosen_one_is_read() {
     let mut built = Built::default();
     built.points();
-    let times = built.floats("SCALAR", &[0.0, 1.0]);
+    let times = built.floats("SCALAR", &[0.0, 0.04]);
     let ways = [1.0, 2.0, 3.0].map(|x| built.floats("VEC3", &[0.0, 0.0, 0.0, x, 0.0, 0.0]));
     let one = |name: &str, way: usize| {
         let target = r#"{"sampler":0,"target":{"node":0,"path":"translation"}}"#;
@@ -410,7 +410,7 @@ fn distance(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 
 /// The numbers in a note: targets, then the largest and the mean error.
 fn told(notes: &[String]) -> [f64; 3] {
-    let [note] = notes else { panic!("{notes:?}") };
+    let [.., note] = notes else { panic!("{notes:?}") };
     let words = note.split_once("its ").unwrap().1.split([' ', ',']);
     let found: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
     [found[0], found[1], found[3]]
@@ -580,7 +580,7 @@ fn times_before_the_start_are_moved_and_told() {
     let (_folder, path, notes) = written("a.glb", &waves(3), &strip(), &options);
     assert!(notes[0].contains("frame -4 is at 0 s"), "{notes:?}");
     let reader = open_frames(&path, 48).unwrap();
-    assert_eq!((numbers(&*reader), reader.frame_rate()), (vec![0.0, 2.0, 5.0], Some(24.0)));
+    assert_eq!((numbers(&*reader), reader.frame_rate()), (vec![-4.0, -2.0, 1.0], Some(24.0)));
     let far = FrameOptions { origin: Some([1e7, 0.0, 0.0]), rounding: 1e-6, ..FrameOptions::default() };
     assert!(
         message(create_frames(path.with_file_name("far.glb"), 48, 3, &strip(), &far))
@@ -590,6 +590,65 @@ fn times_before_the_start_are_moved_and_told() {
     let (_folder, path, _) = written("a.glb", &waves(3), &strip(), &near);
     let read = all(&mut *open_frames(&path, 48).unwrap());
     assert!((read[0][0] - 1e3 - f64::from(waves(3)[0][0])).abs() < 1e-3);
+}
+
+#[test]
+fn a_shot_from_1001_plays_at_once_and_keeps_its_numbers() {
+    for (numbered, fps) in [
+        (vec![1001.0, 1002.0, 1003.0], 25.0),
+        (vec![1001.0, 1002.0, 1003.0], 12.5),
+        (vec![1001.0, 1003.0, 1004.0], 12.5),
+        (vec![86_400.5, 86_401.5, 86_402.5], 24_000.0 / 1001.0),
+    ] {
+        for name in ["a.glb", "a.gltf"] {
+            let options = FrameOptions { numbers: numbered.clone(), fps, ..FrameOptions::default() };
+            let (_folder, path, notes) = written(name, &waves(3), &strip(), &options);
+            assert!(notes[0].contains("is at 0 s, where programs begin to play"), "{notes:?}");
+            let root = Root::from_slice(&fs::read(&path).unwrap());
+            if let Ok(root) = root {
+                assert!(
+                    root.accessors
+                        .iter()
+                        .any(|accessor| accessor.min.as_ref().is_some_and(|min| min[0] == 0 && min[1].is_null()))
+                );
+            }
+            let reader = open_frames(&path, 48).unwrap();
+            assert_eq!((numbers(&*reader), reader.frame_rate()), (numbered.clone(), Some(fps)));
+            // Slow frames are all there is, as the file says.
+            assert!(!reader.notes().iter().any(|note| note.contains("--sample-rate 24")), "{:?}", reader.notes());
+        }
+    }
+    let (_folder, _, notes) = written("a.glb", &waves(3), &strip(), &FrameOptions::default());
+    assert!(!notes.iter().any(|note| note.contains("is at 0 s")), "{notes:?}");
+}
+
+#[test]
+fn keys_that_are_far_apart_are_told_once_with_the_option() {
+    let mut built = Built::default();
+    built.points();
+    let [far, near] = [[0.0, 0.5], [0.0, 0.04]].map(|times| built.floats("SCALAR", &times));
+    let turn = built.floats("VEC4", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.997_564, 0.069_756]);
+    let still = built.floats("VEC4", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("turn.glb");
+    let notes = |way: &str, times: usize, values: usize, rate: Option<f64>| {
+        let moved = animation(&[(r#"{"node":0,"path":"rotation"}"#, way, times, values)]);
+        let nodes = r#""scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}]"#;
+        fs::write(&path, built.file(&format!("{MESH},{nodes},{moved}"))).unwrap();
+        let selection = FrameSelection { rate, ..FrameSelection::default() };
+        open_selected_frames(&path, 4, &selection).unwrap().notes()
+    };
+    let told = notes("LINEAR", far, turn, None);
+    assert!(told.len() == 1 && told[0].contains("its keys are up to 0.500 s apart, and the 2 frames"), "{told:?}");
+    assert!(told[0].contains("--sample-rate 24"), "{told:?}");
+    for (way, times, values, rate) in [
+        ("LINEAR", far, turn, Some(24.0)),
+        ("LINEAR", near, turn, None),
+        ("STEP", far, turn, None),
+        ("LINEAR", far, still, None),
+    ] {
+        assert_eq!(notes(way, times, values, rate), [""; 0], "{way} {rate:?}");
+    }
 }
 
 #[test]

@@ -323,3 +323,60 @@ fn what_is_not_read_is_named_with_the_way_out() {
         assert_eq!(read("a.glb", changed(&changes, &glb_data())).unwrap(), tetrahedron());
     }
 }
+
+#[test]
+fn valid_documents_that_stricter_readers_refuse_are_read() {
+    let nodes = r#","nodes":[{"mesh":0}],"scene":0,"scenes":[{"nodes":[0]},{"name":"Scene.001"}]"#;
+    for (what, json) in [
+        ("a scene without nodes", glb_json(nodes)),
+        ("extras of all types", {
+            let extras = |value: &str| format!(r#","extras":{value},"nodes":[{{"mesh":0,"extras":{value}}}]"#);
+            glb_json(&(extras("[1,2]") + r#","materials":[{"extras":7},{"extras":null}],"skins":[]"#))
+                .replace(r#""count":4"#, r#""extras":"note","count":4"#)
+        }),
+        ("pictures that are not read", {
+            let pictures = r#","images":[{"uri":7}],"samplers":[{"wrapS":"x"}],"cameras":[{"type":1}],"textures":[{"source":"a"}],"#;
+            glb_json(&format!(r#"{pictures}"materials":[{{"emissiveFactor":[1],"alphaMode":3}}]"#))
+        }),
+        (
+            "whole numbers with a point",
+            glb_json("").replace(r#""count":4"#, r#""count":4.0"#).replace("5126", "5126.0"),
+        ),
+        ("what is nothing", glb_json(r#","scene":null,"nodes":null,"skins":null"#)),
+        ("names that are numbers", glb_json(r#","nodes":[{"mesh":0,"name":12}]"#)),
+        ("animations of nothing", glb_json(r#","animations":[{"name":"a"}]"#)),
+        ("a byte order mark", format!("\u{feff}{}", glb_json(""))),
+        ("zeros behind", glb_json("") + "\0\0\0"),
+        ("extensions that change no shape", {
+            let name = r#"{"extensionsRequired":["KHR_node_visibility","KHR_texture_transform"],"asset""#;
+            glb_json("").replace(r#"{"asset""#, name)
+        }),
+        ("a stride of 0", glb_json("").replace(r#""byteLength":48}"#, r#""byteLength":48,"byteStride":0}"#)),
+    ] {
+        let file = glb_file(&json, &glb_data());
+        assert_eq!(read("a.glb", file).unwrap_or_else(|error| panic!("{what}: {error}")), tetrahedron(), "{what}");
+    }
+    let mut latin = glb_file(&glb_json(r#","nodes":[{"mesh":0,"name":"B@r"}]"#), &glb_data());
+    let at = latin.iter().position(|&byte| byte == b'@').unwrap();
+    latin[at] = 0xe4;
+    assert_eq!(read("a.glb", latin).unwrap(), tetrahedron());
+}
+
+#[test]
+fn scenes_without_a_mesh_and_documents_of_the_first_version_are_called_that() {
+    let text = |json: &str| message(read("a.gltf", json));
+    assert!(text(r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"name":"Scene"}]}"#).contains("has no points"));
+    let first = r#"{"asset":{"version":"1.0"},"meshes":{"a":{}},"scenes":{"b":{"nodes":[]}}}"#;
+    assert!(text(first).contains("is glTF 1.0; export the mesh as glTF 2.0"));
+    assert!(text("{}").contains("has JSON that is not glTF 2.0"));
+}
+
+#[test]
+fn a_thousand_copies_of_a_mesh_are_read() {
+    // 4,000 × 60 points in a file of some kilobytes.
+    let nodes: Vec<String> = (0..4000).map(|k| format!(r#"{{"mesh":0,"translation":[{k},0,0]}}"#)).collect();
+    let json = glb_json(&format!(r#","nodes":[{}]"#, nodes.join(",")));
+    let primitives = vec![PRIMITIVE; 15].join(r#","#).replace(r#""indices":1"#, r#""indices":1,"mode":4"#);
+    let model = read("a.glb", glb_file(&json.replace(PRIMITIVE, &primitives), &glb_data())).unwrap();
+    assert_eq!((model.points.len(), model.faces.len()), (16_000, 15 * 16_000));
+}

@@ -149,7 +149,9 @@ impl Buffers<'_> {
                 found.bytes.chunks(found.stride).take(count).map(&convert).collect()
             }
             // Zeros, but for what a sparse accessor has.
-            None => (0..count.ok_or_else(too_large)?).map(|_| convert(&[0; MAX_ELEMENT_BYTES][..size])).collect(),
+            None => (0..count.filter(|&count| count <= self.most_zeros()).ok_or_else(too_large)?)
+                .map(|_| convert(&[0; MAX_ELEMENT_BYTES][..size]))
+                .collect(),
         };
         if let Some(sparse) = &accessor.sparse {
             // More than there are would be read for nothing.

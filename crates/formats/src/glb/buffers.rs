@@ -13,19 +13,19 @@ use gltf::json::Root;
 
 use super::container::{Chunks, document, split};
 use super::faults::{dangling, too_large};
+use super::lenient;
 use super::meshopt::Packed;
 use crate::error::Fault;
 use crate::text::quoted;
 
-/// Bytes that packed views of any file may have.
-const UNPACKED_FREE: usize = 1 << 20;
-/// Those beyond, for each byte of the file.
-const UNPACKED_PER_BYTE: usize = 24;
+/// Bytes of memory that a file may take however small it is, and those beyond for each of its bytes: nodes repeat meshes, and primitives and channels
+/// accessors, any number of times in a few bytes each. A few million points are read; where more are wanted, the file has to hold them.
+const MEMORY_OF_ANY_FILE: usize = 1 << 29;
+const MEMORY_PER_BYTE: usize = 32;
 
-/// Points, corners and primitives that any file may have.
-const MAX_ITEMS_OF_ANY_FILE: usize = 1 << 16;
-/// Those beyond, for each byte of the file: enough for seven copies of a mesh and more.
-const MAX_ITEMS_PER_BYTE: usize = 2;
+/// Numbers that are read though the file does not hold them, such as zeros of sparse accessors, and those beyond for each byte.
+const ZEROS_OF_ANY_FILE: usize = 1 << 16;
+const ZEROS_PER_BYTE: usize = 2;
 
 /// The files' padding is not always whole.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -40,9 +40,10 @@ pub(super) struct Buffers<'a> {
     decoded: Vec<OnceCell<Vec<u8>>>,
     /// By view: what was packed.
     unpacked: Vec<OnceCell<Vec<u8>>>,
-    /// Bytes that were unpacked, and that may be at the most.
+    /// Bytes that were unpacked.
     taken: Cell<usize>,
-    most: usize,
+    /// The number of the frame at 0 s and frames per second, where the file says them.
+    pub(super) frame_numbers: Option<[f64; 2]>,
     /// Bytes of the file.
     file: usize,
 }
@@ -52,12 +53,9 @@ impl<'a> Buffers<'a> {
     pub(super) fn open(bytes: impl Into<Cow<'a, [u8]>>, source: &Source<'_>) -> Result<Self, Fault> {
         let bytes: Cow<'a, [u8]> = bytes.into();
         let length = bytes.len();
-        let (root, binary) = if source.is_text {
-            (document(&bytes)?, 0..0)
-        } else {
-            let Chunks { json, binary } = split(&bytes)?;
-            (document(json)?, binary)
-        };
+        let Chunks { json, binary } =
+            if source.is_text { Chunks { json: &bytes, binary: 0..0 } } else { split(&bytes)? };
+        let (root, frame_numbers) = (document(json)?, lenient::frame_numbers(json));
         let binary = match bytes {
             Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[binary]),
             Cow::Owned(mut bytes) => {
@@ -71,7 +69,7 @@ impl<'a> Buffers<'a> {
             None => Vec::new(),
         };
         let length = length + others.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
-        let buffers = Self::new(root, binary, length);
+        let buffers = Self { frame_numbers, ..Self::new(root, binary, length) };
         others.into_iter().for_each(|(k, bytes)| drop(buffers.decoded[k].set(bytes)));
         Ok(buffers)
     }
@@ -83,29 +81,26 @@ impl<'a> Buffers<'a> {
             root,
             binary,
             taken: Cell::new(0),
-            most: UNPACKED_FREE + UNPACKED_PER_BYTE * file,
+            frame_numbers: None,
             file,
         }
     }
 
-    /// Points, corners and primitives that a file may have: nodes may repeat a mesh, and primitives an accessor, any number of times in a few bytes each.
-    pub(super) fn most_items(&self) -> usize {
-        MAX_ITEMS_OF_ANY_FILE + MAX_ITEMS_PER_BYTE * self.file
+    /// Bytes that what is read of the file may take.
+    pub(super) fn most_bytes(&self) -> usize {
+        MEMORY_OF_ANY_FILE.saturating_add(MEMORY_PER_BYTE.saturating_mul(self.file))
     }
 
-    /// Unpacks what an accessor reads, and gives the bytes that were unpacked up to now; what is wrong with it is told when it is read.
-    pub(super) fn unpack_for(&self, accessor: usize) -> usize {
-        if let Some(view) = self.root.accessors.get(accessor).and_then(|accessor| accessor.buffer_view) {
-            let _ = self.view(view.value(), "");
-        }
-        self.taken.get()
+    /// Numbers that may be read without being there.
+    pub(super) fn most_zeros(&self) -> usize {
+        ZEROS_OF_ANY_FILE.saturating_add(ZEROS_PER_BYTE.saturating_mul(self.file))
     }
 
     /// The bytes of a view, and its stride where it has one.
     pub(super) fn view(&self, index: usize, place: &str) -> Result<(&[u8], Option<usize>), Fault> {
         let views = &self.root.buffer_views;
         let view = views.get(index).ok_or_else(|| dangling(&format!("bufferView {index}"), views.len()))?;
-        let stride = view.byte_stride.map(|stride| stride.0);
+        let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
         let Some(packed) = Packed::of(view) else {
             let offset = view.byte_offset.map_or(0, |offset| offset.0);
             return Ok((self.part(view.buffer.value(), offset, view.byte_length.0, place)?, stride));
@@ -119,7 +114,8 @@ impl<'a> Buffers<'a> {
             };
             let packed = packed.ok_or_else(damaged)?;
             let size = packed.size().ok_or_else(damaged)?;
-            let taken = self.taken.get().checked_add(size).filter(|&taken| taken <= self.most).ok_or_else(too_large)?;
+            let taken =
+                self.taken.get().checked_add(size).filter(|&taken| taken <= self.most_bytes()).ok_or_else(too_large)?;
             let stream = self.part(packed.buffer, packed.offset, packed.length, place)?;
             let unpacked = packed.unpack(stream).ok_or_else(damaged)?;
             cell.get_or_init(|| unpacked);

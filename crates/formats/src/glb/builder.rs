@@ -17,6 +17,14 @@ use crate::colors::{Colors, Scale, srgb};
 use crate::error::Fault;
 use crate::faces::{Contents, check_face};
 
+/// What a point with its colour takes, and a corner with its share of a face, while others are read.
+const POINT_BYTES: usize = 36;
+const CORNER_BYTES: usize = 8;
+/// What counts for a primitive, a joint and a point that a morph target moves, which take time more than memory.
+const PRIMITIVE_BYTES: usize = 256;
+const JOINT_BYTES: usize = 256;
+const MOVED_BYTES: usize = 4;
+
 /// Puts meshes together, one placement after another.
 pub(super) struct Builder<'a, 'b> {
     buffers: &'a Buffers<'b>,
@@ -25,16 +33,14 @@ pub(super) struct Builder<'a, 'b> {
     skins: Skins,
     model: Model,
     colors: Colors,
-    /// Nodes may repeat a mesh, and primitives an accessor, any number of times in a few bytes each.
+    /// Bytes that may still be taken, beside those of points and corners.
     most: usize,
-    /// Bytes that were packed, which count as those of the file do.
-    unpacked: usize,
 }
 
 impl<'a, 'b> Builder<'a, 'b> {
     pub(super) fn new(buffers: &'a Buffers<'b>, scene: &'a Scene, contents: Contents) -> Self {
         let (model, colors, skins) = (Model::default(), Colors::default(), Skins::new());
-        Self { buffers, scene, contents, skins, model, colors, most: buffers.most_items(), unpacked: 0 }
+        Self { buffers, scene, contents, skins, model, colors, most: buffers.most_bytes() }
     }
 
     /// The meshes of placements in their order, as one.
@@ -55,7 +61,7 @@ impl<'a, 'b> Builder<'a, 'b> {
         let mut placed = HashMap::new();
         for (k, primitive) in mesh.primitives.iter().enumerate() {
             // Counted even if empty: the work, not the memory alone, is bounded.
-            self.most = self.most.checked_sub(1).ok_or_else(too_large)?;
+            self.take(PRIMITIVE_BYTES)?;
             let place = format!("mesh {}, primitive {k}", placement.mesh);
             self.primitive(primitive, placement, mirrored, &place, &mut placed)?;
         }
@@ -64,9 +70,9 @@ impl<'a, 'b> Builder<'a, 'b> {
 
     fn joints(&mut self, skin: usize) -> Result<&Joints, Fault> {
         if let Entry::Vacant(entry) = self.skins.entry(skin) {
-            let (joints, read) = Joints::of(skin, self.scene, self.buffers, self.most)?;
-            self.most -= read;
+            let (joints, read) = Joints::of(skin, self.scene, self.buffers, self.most / JOINT_BYTES)?;
             entry.insert(joints);
+            self.take(JOINT_BYTES * read)?;
         }
         Ok(&self.skins[&skin])
     }
@@ -111,12 +117,9 @@ impl<'a, 'b> Builder<'a, 'b> {
             return Ok(());
         }
         let corners = match primitive.indices {
-            Some(index) => {
-                let room = self.room_for(index.value());
-                self.buffers.indices(index.value(), room, place)?
-            }
+            Some(index) => self.buffers.indices(index.value(), self.room() / CORNER_BYTES, place)?,
             None => {
-                self.check_room(count)?;
+                self.check_room(CORNER_BYTES * count)?;
                 (0..count as u32).collect()
             }
         };
@@ -130,8 +133,7 @@ impl<'a, 'b> Builder<'a, 'b> {
         placement: &Placement,
         place: &str,
     ) -> Result<(usize, usize), Fault> {
-        let room = self.room_for(index);
-        let mut points = self.buffers.positions(index, room, place)?;
+        let mut points = self.buffers.positions(index, self.room() / POINT_BYTES, place)?;
         self.morph(&mut points, primitive, placement, place)?;
         if let Some(skin) = placement.skin {
             self.joints(skin)?;
@@ -166,13 +168,13 @@ impl<'a, 'b> Builder<'a, 'b> {
             let (target, weight) = (positions.value(), f64::from(weight));
             // Of most targets only some points move.
             if let Some(moved) = self.buffers.moved_points(target, points.len(), place)? {
-                self.most = self.most.checked_sub(moved.len() + 1).ok_or_else(too_large)?;
+                self.take(MOVED_BYTES * (moved.len() + 1))?;
                 for (at, moved) in moved {
                     points[at] = along(points[at], weight, moved);
                 }
                 continue;
             }
-            self.most = self.most.checked_sub(points.len() + 1).ok_or_else(too_large)?;
+            self.take(MOVED_BYTES * (points.len() + 1))?;
             let moved = self.buffers.positions(target, points.len(), place)?;
             for (point, moved) in points.iter_mut().zip(moved) {
                 *point = along(*point, weight, moved);
@@ -208,7 +210,7 @@ impl<'a, 'b> Builder<'a, 'b> {
                 corners.len()
             )));
         }
-        self.check_room(triangles.saturating_mul(3))?;
+        self.check_room(triangles.saturating_mul(3 * CORNER_BYTES))?;
         for k in 0..triangles {
             let mut face = match mode {
                 Mode::Triangles => [corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]],
@@ -226,16 +228,17 @@ impl<'a, 'b> Builder<'a, 'b> {
         Ok(())
     }
 
-    /// How many points or corners may still be added.
+    /// Bytes that points and corners may still take.
     fn room(&self) -> usize {
-        let used = self.model.points.len() + self.model.faces.indices().len();
-        (self.most + self.unpacked / 2).min(u32::MAX as usize).saturating_sub(used)
+        let used = POINT_BYTES * self.model.points.len() + CORNER_BYTES * self.model.faces.indices().len();
+        // What counts points and corners has 32 bits.
+        self.most.min(CORNER_BYTES * u32::MAX as usize).saturating_sub(used)
     }
 
-    /// As [`Self::room`], once what an accessor reads is unpacked: two bytes of a packed view are a corner or less.
-    fn room_for(&mut self, accessor: usize) -> usize {
-        self.unpacked = self.buffers.unpack_for(accessor);
-        self.room()
+    /// Counts work, and memory that is given back.
+    fn take(&mut self, bytes: usize) -> Result<(), Fault> {
+        self.most = self.most.checked_sub(bytes).ok_or_else(too_large)?;
+        Ok(())
     }
 
     fn check_room(&self, wanted: usize) -> Result<(), Fault> {

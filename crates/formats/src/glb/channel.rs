@@ -80,6 +80,12 @@ impl Channel {
         Ok(Some(Self { node, property, interpolation, times, width, values }))
     }
 
+    /// Whether it does not stay until its next key.
+    pub(super) fn moves_between_keys(&self) -> bool {
+        let is_still = || self.values.chunks(self.width).all(|value| *value == self.values[..self.width]);
+        self.interpolation != Interpolation::Step && self.times.len() > 1 && !is_still()
+    }
+
     /// Puts the value at a time into a node.
     pub(super) fn apply(&self, time: f64, node: &mut Node) {
         let mut value = vec![0.0; self.width];

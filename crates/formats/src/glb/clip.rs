@@ -16,6 +16,8 @@ use crate::scene::shown;
 
 /// Names of other animations that a message lists.
 const LISTED: usize = 4;
+/// What a number of a channel takes at the most, while it is read.
+const NUMBER_BYTES: usize = 12;
 
 pub(super) struct Clip {
     pub(super) channels: Vec<Channel>,
@@ -46,7 +48,7 @@ impl Clip {
                 None => return Ok(None),
             },
         };
-        let (animation, mut room) = (&root.animations[first], buffers.most_items());
+        let (animation, mut room) = (&root.animations[first], buffers.most_bytes() / NUMBER_BYTES);
         let mut channels = Vec::new();
         for (k, stored) in animation.channels.iter().enumerate() {
             let node = stored.target.node.value();
@@ -88,6 +90,11 @@ impl Clip {
         times.sort_by(f64::total_cmp);
         times.dedup_by(|b, a| *b - *a <= NEAR);
         times
+    }
+
+    /// Whether anything is elsewhere between two keys.
+    pub(super) fn moves_between_keys(&self) -> bool {
+        self.channels.iter().any(Channel::moves_between_keys)
     }
 
     /// Puts the nodes where they are at a time.

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use gltf::json::{Root, Value};
+use gltf::json::Root;
 
+use super::lenient;
 use crate::error::Fault;
 use crate::text::quoted;
 
@@ -42,23 +43,25 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, Fault> {
     Ok(Chunks { json, binary: binary.unwrap_or(end..end) })
 }
 
+/// Objects that any document may have, and bytes of JSON for each one beyond: real ones take twenty and more, where `{}` takes three to make some hundred.
+const MAX_OBJECTS_OF_ANY_FILE: usize = 100_000;
+const BYTES_PER_OBJECT: usize = 12;
+
 /// Parses the JSON; the indices in it are not checked.
 pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
     /// Characters of the reason that are shown.
     const SHOWN: usize = 160;
-    // Three bytes of JSON make an object of some hundred, so that their number is bounded before any is made.
-    const MAX_OBJECTS: usize = 100_000;
-    if json.iter().filter(|&&b| b == b'{').count() > MAX_OBJECTS {
+    let json = without_padding(json);
+    // Before any is made.
+    let most = MAX_OBJECTS_OF_ANY_FILE + json.len() / BYTES_PER_OBJECT;
+    if json.iter().filter(|&&b| b == b'{').count() > most {
         return Err(Fault::unsupported(format!(
-            "describes more than {MAX_OBJECTS} objects; export the mesh alone, without its scene"
+            "describes more than {most} objects; export the mesh alone, without its scene"
         )));
     }
     let parsed = match gltf::json::deserialize::from_slice(json) {
         Ok(root) => Ok(root),
-        Err(cause) => match without_channels_of_no_node(json)? {
-            Some(document) => gltf::json::deserialize::from_value(document),
-            None => Err(cause),
-        },
+        Err(cause) => lenient::parse(json)?.unwrap_or(Err(cause)),
     };
     let root: Root = parsed.map_err(|cause| {
         // It may repeat a text of the file, of any length.
@@ -79,35 +82,32 @@ pub(super) fn document(json: &[u8]) -> Result<Root, Fault> {
     }
 }
 
-/// The JSON without channels of animations that move no node, which readers have to leave out; none where there are no such. What may move the mesh is refused.
-fn without_channels_of_no_node(json: &[u8]) -> Result<Option<Value>, Fault> {
-    let Ok(mut document) = gltf::json::deserialize::from_slice::<Value>(json) else { return Ok(None) };
-    let (mut is_changed, mut moves) = (false, false);
-    let animations = document.get_mut("animations").and_then(|all| all.as_array_mut());
-    for animation in animations.into_iter().flatten() {
-        let Some(channels) = animation.get_mut("channels").and_then(|all| all.as_array_mut()) else { continue };
-        channels.retain(|channel| {
-            let has_node = channel["target"].get("node").is_some();
-            let pointer = channel["target"]["extensions"]["KHR_animation_pointer"]["pointer"].as_str();
-            moves |= !has_node && pointer.is_some_and(|to| to.starts_with("/nodes/") || to.starts_with("/meshes/"));
-            is_changed |= !has_node;
-            has_node
-        });
-    }
-    if moves {
-        return Err(Fault::unsupported(
-            "moves nodes by KHR_animation_pointer, which is not read; export them with channels of their own",
-        ));
-    }
-    Ok(is_changed.then_some(document))
+/// JSON without a byte order mark and zeros behind it, which some programs write.
+fn without_padding(json: &[u8]) -> &[u8] {
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let end = json.iter().rposition(|&byte| byte != 0 && !byte.is_ascii_whitespace()).map_or(0, |last| last + 1);
+    &json[..end]
 }
 
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Whether files that require an extension are read: it is understood, or changes no shape.
 fn is_read(extension: &str) -> bool {
-    /// Parts of the names of extensions for appearance, sound and notes.
-    const OTHER: [&str; 6] = ["_materials_", "_texture_", "_light", "_xmp", "_audio", "_animation_pointer"];
+    /// Parts of the names of extensions for appearance, sound, behaviour and notes.
+    const OTHER: [&str; 12] = [
+        "_materials_",
+        "_texture_",
+        "_light",
+        "_xmp",
+        "_audio",
+        "_animation_pointer",
+        "_interactivity",
+        "_node_visibility",
+        "_node_selectability",
+        "_node_hoverability",
+        "_mesh_features",
+        "_structural_metadata",
+    ];
     matches!(extension, "KHR_mesh_quantization" | "EXT_meshopt_compression" | "KHR_meshopt_compression")
         || OTHER.iter().any(|part| extension.contains(part))
 }

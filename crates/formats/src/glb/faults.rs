@@ -3,7 +3,9 @@
 use crate::error::Fault;
 
 pub(super) fn too_large() -> Fault {
-    Fault::unsupported("repeats its meshes too often; export one copy of each, or bake them into a single mesh")
+    Fault::unsupported(
+        "repeats its meshes too often, to more than 512 MiB; export fewer copies, or bake them into a single mesh",
+    )
 }
 
 /// A reference to something that is not there.

@@ -92,8 +92,10 @@ impl MeshFrames {
         let clip = Clip::of(&buffers, &scene, chosen.clone(), selection.animation.as_deref())?;
         let keys = clip.as_ref().map_or_else(Vec::new, Clip::key_times);
         // A byte of the file stands for a few points of frames at the most: weights of targets, or turns of joints.
-        let held = buffers.most_items().saturating_mul(POINTS_PER_ITEM);
-        let mut grid = Grid::of(keys, selection.rate, |frames| frames.saturating_mul(points) <= held)?;
+        let held = buffers.most_zeros().saturating_mul(POINTS_PER_ITEM);
+        let is_held = |frames: usize| frames.saturating_mul(points) <= held;
+        let is_smooth = clip.as_ref().is_some_and(Clip::moves_between_keys);
+        let mut grid = Grid::of(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
         if let Some(note) = clip.as_ref().and_then(|clip| clip.note.clone()) {
             let others = &mut grid.times.note;
             *others = Some(others.take().map_or(note.clone(), |told| format!("{told}; {note}")));
@@ -147,18 +149,32 @@ struct Grid {
 }
 
 impl Grid {
-    /// At the times of keys, or at whole numbers of frames of a rate as far as these go.
-    fn of(keys: Vec<f64>, rate: Option<f64>, is_held: impl Fn(usize) -> bool) -> Result<Self, Fault> {
+    /// At the times of keys, or at whole numbers of frames of a rate as far as these go. `said` is the number of the frame at 0 s and the rate of all, where the file
+    /// says them: it then has a key for every frame. Otherwise far keys are told where something moves between them.
+    fn of(
+        keys: Vec<f64>,
+        rate: Option<f64>,
+        (said, is_smooth): (Option<[f64; 2]>, bool),
+        is_held: impl Fn(usize) -> bool,
+    ) -> Result<Self, Fault> {
         let (Some(&first), Some(&last)) = (keys.first(), keys.last()) else {
             let times = Times { frame_rate: rate, ..Times::default() };
             return Ok(Self { times, frames: 1, keys: vec![0.0], rate: 1.0 });
         };
         let Some(rate) = rate.filter(|_| keys.len() > 1) else {
             check_held(keys.len(), is_held(keys.len()))?;
-            let mut times = Times::of(&keys, usual_rate(&keys))?;
-            if let Some(note) = times.note.as_mut().filter(|_| times.numbers.is_some()) {
-                note.push_str("; with --sample-rate, where the command has it, they are evenly spaced");
+            let mut times = Times::of(&keys, said.map(|[_, rate]| rate).or_else(|| usual_rate(&keys)))?;
+            if let Some([first, _]) = said {
+                times.begin_at(first);
             }
+            let far = far_keys(&keys).filter(|_| said.is_none() && is_smooth);
+            times.note = match (times.note, far) {
+                (Some(uneven), None) => {
+                    Some(uneven + "; with --sample-rate, where the command has it, they are evenly spaced")
+                }
+                (Some(uneven), Some(far)) => Some(format!("{uneven}; {far}")),
+                (None, far) => far,
+            };
             return Ok(Self { times, frames: keys.len(), keys, rate: 1.0 });
         };
         const SLACK: f64 = 1e-3;
@@ -171,7 +187,10 @@ impl Grid {
         }
         let count = (end - start) as usize + 1;
         check_held(count, keys.len() >= count / 2)?;
-        let times = Times { frame_rate: Some(rate), first: start, ..Times::default() };
+        let mut times = Times { frame_rate: Some(rate), first: start, ..Times::default() };
+        if let Some([first, _]) = said.filter(|[_, told]| (told - rate).abs() < 1e-9 * rate) {
+            times.begin_at(first);
+        }
         Ok(Self { times, frames: count, keys: Vec::new(), rate })
     }
 
@@ -184,6 +203,18 @@ impl Grid {
 const POINTS_PER_ITEM: usize = 1 << 12;
 /// The most by which single precision may move a key from its frame, in frames.
 const LARGEST_ROUNDING: f64 = 0.02;
+
+/// What to say of keys that are farther apart than frames of films are, and a little more: what is between them is not read.
+fn far_keys(keys: &[f64]) -> Option<String> {
+    const FAR: f64 = 1.05 / 24.0;
+    let gap = keys.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    (gap > FAR).then(|| {
+        format!(
+            "its keys are up to {gap:.3} s apart, and the {} frames at them have none of the motion between; --sample-rate 24, where the command has it, reads that too",
+            keys.len()
+        )
+    })
+}
 
 /// The rate at which all keys are at whole frames, as far as single precision tells.
 fn usual_rate(keys: &[f64]) -> Option<f64> {

@@ -12,9 +12,11 @@ mod clip;
 mod container;
 mod faults;
 mod frames;
+mod lenient;
 mod meshopt;
 mod scene;
 mod skin;
+mod unread;
 mod write;
 
 use cager_geometry::mesh::Model;
@@ -35,6 +37,8 @@ pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prim: Option<&str>) -> Res
     let buffers = Buffers::open(bytes, source)?;
     let scene = Scene::of(&buffers.root)?;
     let chosen = choice::choose(&buffers.root, &scene, prim).map_err(Failure::of_bytes)?;
-    let model = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen])?;
-    Ok((model, Dropped::default()))
+    let placements = &scene.placements[chosen];
+    let model = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(placements)?;
+    let dropped = unread::of(&buffers.root, placements, !model.colors.is_empty());
+    Ok((model, dropped))
 }

@@ -44,6 +44,7 @@ impl MorphWriter {
         let wanted = Wanted {
             targets: options.morphs.targets,
             max_error: options.morphs.max_error,
+            is_guarantee: options.morphs.is_guarantee,
             diagonal: options
                 .morphs
                 .diagonal
@@ -56,6 +57,7 @@ impl MorphWriter {
             name: name(path),
             triangles: faces.triangulated(),
             times,
+            numbering: [options.number(0), options.fps],
             origin: change.apply(options.origin.unwrap_or_default()),
             floats: options.morphs.floats,
             normals: options.morphs.normals,
@@ -119,28 +121,21 @@ fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(),
     faces.iter().enumerate().try_for_each(|(k, face)| check_face(face, points, || format!("face {k}")))
 }
 
-/// The seconds of frames, which glTF counts from 0 on in single precision, and what is to be said of them.
+/// The seconds of frames from the first one on, in single precision, and what is to be said of them: programs play from 0 s, and would stand still until a late
+/// first key.
 fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<String>), Fault> {
     if frames < 2 {
         return Ok((Vec::new(), None));
     }
-    let seconds =
-        |first: f64| -> Vec<f32> { (0..frames).map(|k| ((options.number(k) - first) / options.fps) as f32).collect() };
-    let told = seconds(0.0);
-    let ascend = |times: &[f32]| times.windows(2).all(|pair| pair[1] > pair[0]);
-    // Late frames are between those that single precision tells apart.
-    let is_exact = |(k, time): (usize, &f32)| (f64::from(*time) * options.fps - options.number(k)).abs() <= 1e-3;
-    if told[0] >= 0.0 && ascend(&told) && told.iter().enumerate().all(is_exact) {
-        return Ok((told, None));
-    }
-    let moved = seconds(options.number(0));
-    if !ascend(&moved) {
+    let first = options.number(0);
+    let seconds: Vec<f32> = (0..frames).map(|k| ((options.number(k) - first) / options.fps) as f32).collect();
+    if seconds.windows(2).any(|pair| pair[1] <= pair[0]) {
         return Err(Fault::unsupported(
             "has times in single precision, which cannot tell these frames apart; give a smaller --fps, or write .npy",
         ));
     }
-    let note = format!("frame {} is at 0 s, as glTF has no times before that and no very late ones", options.number(0));
-    Ok((moved, Some(note)))
+    let note = || format!("frame {first} is at 0 s, where programs begin to play; its number is kept in extras");
+    Ok((seconds, (first != 0.0).then(note)))
 }
 
 impl FrameWriter for MorphWriter {

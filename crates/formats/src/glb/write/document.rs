@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use super::super::lenient::{FIRST_FRAME, FRAME_RATE};
 use super::Scene;
 use super::stored::{Stored, Values};
 use crate::error::Fault;
@@ -149,9 +150,10 @@ impl Document<'_> {
                 list(self.weights[..targets].iter().map(|&x| f64::from(x)))
             );
             let times = targets + 1 + usize::from(has_faces);
+            let [first, rate] = self.scene.numbering;
             let _ = write!(
                 text,
-                r#""animations":[{{"name":"{name}","channels":[{{"sampler":0,"target":{{"node":0,"path":"weights"}}}}],"samplers":[{{"input":{times},"interpolation":"LINEAR","output":{}}}]}}],"#,
+                r#""animations":[{{"name":"{name}","extras":{{"{FIRST_FRAME}":{first},"{FRAME_RATE}":{rate}}},"channels":[{{"sampler":0,"target":{{"node":0,"path":"weights"}}}}],"samplers":[{{"input":{times},"interpolation":"LINEAR","output":{}}}]}}],"#,
                 times + 1
             );
         } else {

@@ -26,6 +26,8 @@ pub(crate) struct Scene {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Seconds of each frame; none where there is but one.
     pub(crate) times: Vec<f32>,
+    /// The number of the first frame, and frames per second.
+    pub(crate) numbering: [f64; 2],
     /// What is added to all positions.
     pub(crate) origin: Point,
     /// Whether positions are floats instead of whole numbers of 16 bits.
