@@ -1,7 +1,7 @@
 //! `cager cage`: generates, designs and improves cages.
 
 use super::cage_args::{CageArgs, GeneralArg};
-use super::cage_file::read_cage_like;
+use super::cage_file::{dropped_of_cage, read_cage_like};
 use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design;
@@ -79,6 +79,7 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         warnings.push(format!("--vertices: the {most} points of the model tell no more than {most} vertices apart, which the cage gets at the most"));
     }
     let vertices = vertices.min(most);
+    warnings.extend(args.improve.as_deref().and_then(dropped_of_cage));
     let (cage, report) = match (&args.frames, args.general) {
         (Some(frames), None) => designed(args, (rest, units), frames, &mut warnings)?,
         (_, Some(shape)) => {

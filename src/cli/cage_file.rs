@@ -1,6 +1,6 @@
 //! Cages from files: meshes, and the rest cages of .cager files.
 
-use super::{grouped, is_container, read_with_units, warn};
+use super::{dropped, grouped, is_container, read_with_units, warn};
 use anyhow::{Context, Result, bail};
 use cager_cages::diagnosis::weld;
 use cager_capture::decode::{self, DecodeError};
@@ -51,6 +51,12 @@ pub(super) fn read_cage_like(path: &Path, units: Units) -> Result<Model> {
     let (mut model, said) = read_cage_mesh(path)?;
     said.change_to(units).apply_to(&mut model.points);
     Ok(model)
+}
+
+/// What is lost of a cage that is written anew; what is wrong with it is told where it is read.
+pub(super) fn dropped_of_cage(path: &Path) -> Option<String> {
+    let read = cager_formats::read_mesh(path, None).ok().filter(|_| !is_container(path))?;
+    dropped(path, &read)
 }
 
 /// A cage for a service, in the units and axes of its model.

@@ -25,7 +25,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let dry_run = args.outputs.dry_run;
     let inputs = [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()];
     let output = Outputs::new(args.outputs, inputs.into_iter().flatten())?.frames(&args.output)?;
-    let container = if args.salvage { decode::open_cut(&args.input) } else { decode::open(&args.input) }?;
+    let mut container = if args.salvage { decode::open_cut(&args.input) } else { decode::open(&args.input) }?;
     if container.lacks_end() {
         let lost = match container.frames().checked_sub(1) {
             Some(last) => format!("frames after frame {last} are lost, if it had any"),
@@ -38,6 +38,11 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
     if edited.is_some() && container.has_residual() && !transfer.cages {
         warn(&[DETAIL_LOST.to_owned()]);
+    }
+    let is_colored = !transfer.cages && container.colors().is_ok_and(|colors| !colors.is_empty());
+    if is_colored && model.is_none() {
+        let [from, to] = [&args.input, &args.output].map(|path| path.display());
+        warn(&[format!("{from}: the colours of its points are not kept in {to}")]);
     }
     drop(container);
     // Checked against the file that has the frames.

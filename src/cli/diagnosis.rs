@@ -1,10 +1,10 @@
 //! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
 
 use super::cage_args::CageArgs;
-use super::cage_file::read_cage_like;
+use super::cage_file::{dropped_of_cage, read_cage_like};
 use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::dry_run::tell_dry_run;
-use super::print;
+use super::{print, warn};
 use anyhow::{Result, bail};
 use cager_cages::diagnosis::{Findings, check, repair};
 use cager_capture::mismatch::cage_mismatch;
@@ -137,6 +137,7 @@ fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &M
     let mut files = vec![complete_file(output, &cage_bytes(output, &repaired.cage)?)?];
     files.extend(targets.complete(&report, (args, &TriMesh::from(rest), &mesh))?);
     commit_together(files)?;
+    warn(dropped_of_cage(path).as_slice());
     let mut text = String::new();
     for change in &repaired.changes {
         let _ = writeln!(text, "  changed  {change}");

@@ -9,7 +9,7 @@ use super::encode_shared::{
     Targets, checked_options, design_options, finish, name_file, name_files, sized_design, solver_options,
 };
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
-use super::{design, encode_remote, grouped, human_bytes, progress, read_with_units, tell, warn};
+use super::{design, encode_remote, grouped, human_bytes, progress, read_whole, tell, warn};
 use anyhow::{Context, Result};
 use cager_capture::coding::Goal;
 use cager_capture::design::{read_frames, report as design_report};
@@ -20,15 +20,16 @@ use cager_capture::speed::seconds_to_prepare;
 use cager_core::cage::Cage;
 use cager_core::inversion::check_options;
 use cager_core::regularize::Regularizer;
-use cager_formats::FrameReader;
+use cager_formats::{FrameReader, ReadModel};
 use cager_geometry::mesh::Model;
 use cager_proto::report::DesignReport;
 use std::time::Instant;
 
 pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     let clock = Instant::now();
-    let targets = Targets::new(&args)?;
-    let (mut rest, said) = read_with_units(&args.rest, args.capture.checks.prim.as_deref())?;
+    let mut targets = Targets::new(&args)?;
+    let ReadModel { model: mut rest, units: said, dropped, .. } =
+        read_whole(&args.rest, args.capture.checks.prim.as_deref())?;
     args.coding.said = said;
     let args = &args;
     let no_frames = [&args.rest].into_iter().chain(&args.cage);
@@ -37,7 +38,8 @@ pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     (files.rest_units, files.metres_per_unit) = (said, args.coding.unit.map(Unit::metres));
     files.take_origin(&mut rest);
     // What is wrong with it is told before anything is computed.
-    goal(&args.coding, args.coding.units(), args.cage.is_some(), &rest, 1)?;
+    let is_coded = goal(&args.coding, args.coding.units(), args.cage.is_some(), &rest, 1)?.is_some();
+    targets.warnings.extend(dropped.sentence(&args.rest, is_coded && !args.coding.exact_rest));
     let cage = args
         .cage
         .as_ref()
@@ -49,6 +51,7 @@ pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     }
     if args.outputs.dry_run {
         dry_run(args, &targets, &files, &rest, cage.as_ref())?;
+        warn(&targets.warnings);
         warn_of_departures(&files);
         return Ok(());
     }

@@ -25,6 +25,8 @@ use std::time::Instant;
 pub(super) struct Targets {
     pub(super) output: Target,
     pub(super) report: Option<Target>,
+    /// What is to be told of the inputs, in the report too.
+    pub(super) warnings: Vec<String>,
 }
 
 impl Targets {
@@ -32,7 +34,8 @@ impl Targets {
         let inputs = [&args.rest, &args.frames].into_iter().chain(&args.cage).chain(&args.solver.regularizer_matrix);
         let mut outputs = Outputs::new(args.outputs, inputs)?;
         let output = outputs.container(&args.output, "walk.cager")?;
-        Ok(Self { output, report: args.report.as_ref().map(|path| outputs.text(path)).transpose()? })
+        let report = args.report.as_ref().map(|path| outputs.text(path)).transpose()?;
+        Ok(Self { output, report, warnings: Vec::new() })
     }
 
     pub(super) fn begin_report(&self) -> Result<Option<AtomicFile>> {
@@ -48,6 +51,7 @@ pub(super) fn finish(
 ) -> Result<()> {
     let Encoded { mut report, container } = encoded;
     report.seconds.total = clock.elapsed().as_secs_f64();
+    report.warnings.splice(0..0, targets.warnings.iter().cloned());
     // A full disk shows here, before either file has its name.
     let report_file = report_file.map(|file| write_report(file, &report)).transpose()?;
     commit_together(report_file.into_iter().chain([container]).collect())?;

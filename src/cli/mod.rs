@@ -49,7 +49,7 @@ mod transfer_remote;
 mod transfer_source;
 
 use args::{Cli, Command};
-use cager_formats::{CacheFormat, Units};
+use cager_formats::{CacheFormat, ReadModel, Units};
 use cager_geometry::mesh::Model;
 use clap::{CommandFactory, Parser};
 pub(crate) use global_args::{is_quiet, is_verbose, tell};
@@ -146,16 +146,27 @@ fn read_prim(path: &Path, prim: Option<&str>) -> Result<Model, cager_formats::Er
 
 /// As [`read_prim`], with what the file says of its coordinates.
 fn read_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Units), cager_formats::Error> {
-    let (model, note, units) = cager_formats::read_prim_with_units(path, prim)?;
-    warn(note.as_slice());
-    Ok((model, units))
+    read_whole(path, prim).map(|read| (read.model, read.units))
 }
 
-/// A mesh, in the units and axes of another one where both say theirs.
+/// As [`read_prim`], with all that is known of the file; commands whose outputs do without what is dropped tell it.
+fn read_whole(path: &Path, prim: Option<&str>) -> Result<ReadModel, cager_formats::Error> {
+    let read = cager_formats::read_mesh(path, prim)?;
+    warn(read.note.as_slice());
+    Ok(read)
+}
+
+/// What of a mesh an output loses that has points and faces alone.
+fn dropped(path: &Path, read: &ReadModel) -> Option<String> {
+    read.dropped_with_colors().sentence(path, false)
+}
+
+/// A mesh whose points alone are moved, in the units and axes of another one where both say theirs.
 fn read_like(path: &Path, units: Units) -> Result<Model, cager_formats::Error> {
-    let (mut model, said) = read_with_units(path, None)?;
-    said.change_to(units).apply_to(&mut model.points);
-    Ok(model)
+    let mut read = read_whole(path, None)?;
+    warn(dropped(path, &read).as_slice());
+    read.units.change_to(units).apply_to(&mut read.model.points);
+    Ok(read.model)
 }
 
 /// Whether a file is a `.cager` file, by its name.

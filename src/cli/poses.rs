@@ -1,6 +1,6 @@
 //! Poses of one model: meshes, and frames of .cager files.
 
-use super::{grouped, is_container, read_with_units, warn};
+use super::{dropped, grouped, is_container, read_whole, warn};
 use anyhow::{Context, Result, bail};
 use cager_capture::decode::{self, Decoding};
 use cager_capture::mismatch::{Mismatch, mismatches};
@@ -45,9 +45,14 @@ impl PoseFile {
     }
 
     /// The model that has this pose, of a mesh as it stands, of a .cager file at rest, and what its positions mean.
-    fn model(&self) -> Result<(Model, Units)> {
+    fn model(&self, is_first: bool) -> Result<(Model, Units)> {
         let (path, frame) = match self {
-            Self::Mesh(path) => return Ok(read_with_units(path, None)?),
+            Self::Mesh(path) => {
+                let read = read_whole(path, None)?;
+                // All have the faces of the first one, and what belongs to them.
+                warn(dropped(path, &read).filter(|_| is_first).as_slice());
+                return Ok((read.model, read.units));
+            }
             Self::Frame(path, frame) => (path, *frame),
         };
         let mut container = decode::open(path)?;
@@ -96,7 +101,7 @@ impl Poses {
         let (mut model, mut units) = (Model::default(), Units::UNKNOWN);
         let (mut changes, mut read) = (Vec::new(), Vec::new());
         for (k, file) in files.iter().enumerate() {
-            let (mut found, said) = file.model()?;
+            let (mut found, said) = file.model(k == 0)?;
             if k == 0 {
                 units = said;
                 if found.faces.is_empty() {

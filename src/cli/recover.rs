@@ -7,10 +7,12 @@ use super::recover_args::{Align, JointsKind, RecoverArgs};
 use super::recover_stretch::{Beside, Done, Stretching};
 use super::rig::{read_manifold, read_rig};
 use super::stretches::{Stretch, StretchList, cut, numbered};
-use super::{grouped, read_with_units, recover_remote, tell, warn};
+use super::{grouped, read_whole, recover_remote, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::origin::{move_to, own_origin};
-use cager_formats::{AtomicFile, MeshSequence, Target, Units, commit_together, mesh_sequence, missing_frames};
+use cager_formats::{
+    AtomicFile, MeshSequence, ReadModel, Target, Units, commit_together, mesh_sequence, missing_frames, read_mesh,
+};
 use cager_geometry::mesh::{Model, Point};
 use cager_motion::recover::placed_units;
 use cager_proto::report::json_file;
@@ -118,13 +120,14 @@ fn refuse_several(args: &RecoverArgs) -> Result<()> {
 
 /// A template, checked, its origin, and what its positions mean where it is not brought to those of the frames.
 fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Units)> {
-    let (mut template, said) = read_with_units(path, None)?;
+    let ReadModel { model: mut template, units: said, dropped, .. } = read_whole(path, None)?;
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", path.display());
     }
     let placing = [args.align, args.scale].map(|placing| placing == Align::Auto);
     let units = placed_units(said, args.up, placing).or(args.coding.units());
-    goal(&args.coding, units, true, &template, 1)?;
+    let is_coded = goal(&args.coding, units, true, &template, 1)?.is_some();
+    warn(dropped.sentence(path, is_coded && !args.coding.exact_rest).as_slice());
     let origin = own_origin(&template.points);
     if origin.is_some() && args.rig.is_some() {
         bail!(
@@ -173,8 +176,18 @@ fn frames(args: &RecoverArgs) -> Result<MeshSequence> {
         let what = "what follows a gap is recovered as if it came next";
         warn(&[format!("{}: missing frames: {missing}; {what}", args.frames.display())]);
     }
+    warn(dropped_of_first(&files).as_slice());
     if let Some(start) = args.timing.start {
         files.numbers = Some((0..files.files.len()).map(|frame| start + frame as f64).collect());
     }
     Ok(files)
+}
+
+/// The look of the surfaces that the template does not get, by the first of them; what is wrong with it is told when it is followed. Their colours are asked for by
+/// an option, and their normals are followed.
+fn dropped_of_first(files: &MeshSequence) -> Option<String> {
+    let path = files.files.first()?;
+    let dropped = read_mesh(path, None).ok()?.dropped.appearance();
+    let frames = if files.files.len() > 1 { ", nor those of other frames" } else { "" };
+    dropped.sentence(path, false).map(|sentence| sentence + frames)
 }

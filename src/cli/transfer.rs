@@ -9,7 +9,7 @@ use super::encode_summary::write_report;
 use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
 use super::transfer_source::MotionSource;
-use super::{grouped, human_bytes, progress, read_with_units, tell, transfer_remote, warn};
+use super::{grouped, human_bytes, progress, read_whole, tell, transfer_remote, warn};
 use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
 use cager_capture::design::FRAMES;
@@ -19,7 +19,7 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_explore::TransferError;
 use cager_explore::alignment::AlignBy;
-use cager_formats::{AtomicFile, ScratchDir, Target, Units, commit_together};
+use cager_formats::{AtomicFile, ReadModel, ScratchDir, Target, Units, commit_together};
 use cager_geometry::mesh::{Model, Point};
 use cager_motion::recover::Encoding;
 use cager_motion::transfer::{
@@ -35,12 +35,13 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let method = args.method()?;
     let (align, matrix) = args.alignment()?;
     let align = words::align(align, matrix).unwrap_or(AlignBy::Surfaces);
-    let (mut target, said) = read_with_units(&args.target, None)?;
+    let ReadModel { model: mut target, units: said, dropped, .. } = read_whole(&args.target, None)?;
     let units = said.or(args.coding.units());
     let origin = own_origin(&target.points);
     move_to(origin, &mut target.points);
     // What is wrong with them is told before anything is computed.
-    goal(&args.coding, units, true, &target, 1)?;
+    let is_coded = goal(&args.coding, units, true, &target, 1)?.is_some();
+    warn(dropped.sentence(&args.target, is_coded && !args.coding.exact_rest).as_slice());
     let design = DesignOptions {
         goal: design_goal(args.cage_vertices, args.coding.mean_error, target.points.len())?,
         ..DesignOptions::default()

@@ -2,6 +2,7 @@
 
 mod belonging;
 mod designed;
+mod dropped;
 mod frame_names;
 mod gltf;
 mod meshes;
