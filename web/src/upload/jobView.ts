@@ -136,7 +136,7 @@ export function errorChart(measured: Measured, isPreliminary = false) {
   const lines = [series(measured.linf, 'cage'), series(measured.l2, 'accent')];
   const scale = isPreliminary
     ? 'before compression, which makes them smaller'
-    : `up to ${percent(top, 2)} of the diagonal`;
+    : `worst point ${percent(top, 2)} of the diagonal`;
   return html`
     <figure class="errors">
       <figcaption class="row fine">

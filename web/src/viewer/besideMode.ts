@@ -131,8 +131,8 @@ export class BesideMode {
           >${progress ? `${progress.doing} ${Math.round(100 * (progress.fraction ?? 0))} %` : nothing}
           <span data-beside ?hidden=${Boolean(progress)}></span>
         </p>
-        ${pair ? upButton(pair.player.up, (up) => this.setUp(up)) : nothing}
         ${this.isPainted ? html`<p class="fine">Matching colours mark corresponding points</p>` : nothing}
+        ${pair ? upButton(pair.player.up, (up) => this.setUp(up)) : nothing}
       </section>
     </div>`;
   }

@@ -72,10 +72,14 @@ describe.skipIf(chromium === undefined)('the viewer', { timeout: 90_000 }, () =>
     expect(pages.errors).toEqual([]);
   });
 
-  it('saves a picture and a turntable video', async () => {
+  it('saves a picture and a turntable video', { timeout: 150_000 }, async () => {
     const page = await opened('definition3-mvc');
+    await page.setViewportSize({ width: 480, height: 320 });
     const download = async (key: string) => {
-      const [saved] = await Promise.all([page.waitForEvent('download', { timeout: 60_000 }), page.keyboard.press(key)]);
+      const [saved] = await Promise.all([
+        page.waitForEvent('download', { timeout: 120_000 }),
+        page.keyboard.press(key),
+      ]);
       return { name: saved.suggestedFilename(), content: await readFile(await saved.path()) };
     };
     const picture = await download('p');
