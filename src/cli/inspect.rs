@@ -37,7 +37,23 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
 struct Inspected {
     #[serde(flatten)]
     report: Report,
+    layers: Vec<Layer>,
     sections: Vec<Section>,
+}
+
+/// A layer of edits.
+#[derive(Serialize)]
+struct Layer {
+    /// From 1, in the order in which they are applied.
+    number: usize,
+    name: String,
+    on: bool,
+    /// The numbers of the first and the last frame.
+    first: f64,
+    last: f64,
+    frames: usize,
+    vertices: usize,
+    bytes: u64,
 }
 
 impl Inspected {
@@ -45,13 +61,83 @@ impl Inspected {
         let fail = |cause| DecodeError::container(path, cause);
         container.verify().map_err(fail)?;
         let report = container.report().map_err(fail)?;
-        Ok(Self { report, sections: sections(&container) })
+        let layers = layers(&mut container).map_err(fail)?;
+        Ok(Self { report, layers, sections: sections(&container) })
     }
 
     fn tell(&self, path: &Path) -> Result<()> {
         warn(&self.report.warnings);
-        print(&as_text(&path.display().to_string(), &self.report, &self.sections)?)
+        print(&self.as_text(&path.display().to_string())?)
     }
+
+    fn as_text(&self, name: &str) -> Result<String> {
+        let Self { report, layers, sections } = self;
+        let mut out = String::new();
+        writeln!(out, "{name}: {}, every checksum matches", human_bytes(report.bytes.output))?;
+        let (frames, points) = (grouped(report.frames), grouped(report.points));
+        writeln!(out, "  capture   {frames} frames of {points} points")?;
+        numbers(&mut out, report)?;
+        if let Some([x, y, z]) = report.origin {
+            writeln!(out, "  origin    {x} {y} {z}, added to all positions")?;
+        }
+        let unit = report.metres_per_unit.map(|metres| format!("1 is {metres} m"));
+        let up = report.up.as_ref().map(|up| format!("{} up", plain(up).to_uppercase()));
+        if let Some(units) = unit.into_iter().chain(up).reduce(|unit, up| format!("{unit}, {up}")) {
+            writeln!(out, "  units     {units}")?;
+        }
+        let (vertices, faces) = (grouped(report.cage_vertices), grouped(report.cage_faces));
+        writeln!(out, "  cage      {vertices} vertices, {faces} faces")?;
+        // How many are read is known where not every point is.
+        let read = match report.handle_indices.len() {
+            count if count > 0 && report.handles != "all" => format!(" ({count})"),
+            _ => String::new(),
+        };
+        writeln!(
+            out,
+            "  solver    coordinates {}, handles {}{read}, regularizer {}, spectrum {}, lambda {}",
+            plain(&report.coordinates),
+            plain(&report.handles),
+            plain(&report.regularizer),
+            report.spectrum,
+            report.lambda
+        )?;
+        if !report.generator.is_empty() {
+            encoded(&mut out, report)?;
+        }
+        for layer in layers {
+            let Layer { number, on, first, last, vertices, bytes, .. } = layer;
+            let name = if layer.name.is_empty() { String::new() } else { format!(" {}", plain(&layer.name)) };
+            let (state, bytes) = (if *on { "on" } else { "off" }, human_bytes(*bytes));
+            let frames = if layer.frames == 1 { format!("frame {first}") } else { format!("frames {first} to {last}") };
+            let moved = if *vertices == 1 { "vertex" } else { "vertices" };
+            writeln!(out, "  layer {number:<4}{state}{name}: {frames}, {} {moved}, {bytes}", grouped(*vertices))?;
+        }
+        writeln!(out, "  sections  {:<6}{:>8}{:>12}{:>12}{:>8}", "tag", "number", "stored", "decoded", "share")?;
+        for s in sections {
+            let (bytes, raw_bytes) = (human_bytes(s.bytes), human_bytes(s.raw_bytes));
+            let share = 100.0 * s.bytes as f64 / report.bytes.output.max(1) as f64;
+            writeln!(out, "            {:<6}{:>8}{bytes:>12}{raw_bytes:>12}{share:>6.1} %", s.tag, s.count)?;
+        }
+        Ok(out)
+    }
+}
+
+/// All of them; frames by their numbers.
+fn layers(container: &mut Container) -> Result<Vec<Layer>, cager_proto::container::Error> {
+    let numbers = container.frame_numbers()?;
+    let bytes: Vec<u64> = container.sections().iter().filter(|s| s.tag == "EDIT").map(|s| s.bytes).collect();
+    let number = |frame: usize| numbers.get(frame).copied().unwrap_or(frame as f64);
+    let listed = container.layers()?.iter().zip(bytes).enumerate().map(|(k, (layer, bytes))| Layer {
+        number: k + 1,
+        name: layer.name.clone(),
+        on: layer.is_on,
+        first: number(layer.frames().start),
+        last: number(layer.frames().end.saturating_sub(1)),
+        frames: layer.frames().count(),
+        vertices: layer.vertices.len(),
+        bytes,
+    });
+    Ok(listed.collect())
 }
 
 /// Sections of one kind added up.
@@ -76,48 +162,6 @@ fn sections(container: &Container) -> Vec<Section> {
         kinds[at].raw_bytes += section.raw_bytes;
     }
     kinds
-}
-
-fn as_text(name: &str, report: &Report, sections: &[Section]) -> Result<String> {
-    let mut out = String::new();
-    writeln!(out, "{name}: {}, every checksum matches", human_bytes(report.bytes.output))?;
-    let (frames, points) = (grouped(report.frames), grouped(report.points));
-    writeln!(out, "  capture   {frames} frames of {points} points")?;
-    numbers(&mut out, report)?;
-    if let Some([x, y, z]) = report.origin {
-        writeln!(out, "  origin    {x} {y} {z}, added to all positions")?;
-    }
-    let unit = report.metres_per_unit.map(|metres| format!("1 is {metres} m"));
-    let up = report.up.as_ref().map(|up| format!("{} up", plain(up).to_uppercase()));
-    if let Some(units) = unit.into_iter().chain(up).reduce(|unit, up| format!("{unit}, {up}")) {
-        writeln!(out, "  units     {units}")?;
-    }
-    let (vertices, faces) = (grouped(report.cage_vertices), grouped(report.cage_faces));
-    writeln!(out, "  cage      {vertices} vertices, {faces} faces")?;
-    // How many are read is known where not every point is.
-    let read = match report.handle_indices.len() {
-        count if count > 0 && report.handles != "all" => format!(" ({count})"),
-        _ => String::new(),
-    };
-    writeln!(
-        out,
-        "  solver    coordinates {}, handles {}{read}, regularizer {}, spectrum {}, lambda {}",
-        plain(&report.coordinates),
-        plain(&report.handles),
-        plain(&report.regularizer),
-        report.spectrum,
-        report.lambda
-    )?;
-    if !report.generator.is_empty() {
-        encoded(&mut out, report)?;
-    }
-    writeln!(out, "  sections  {:<6}{:>8}{:>12}{:>12}{:>8}", "tag", "number", "stored", "decoded", "share")?;
-    for s in sections {
-        let (bytes, raw_bytes) = (human_bytes(s.bytes), human_bytes(s.raw_bytes));
-        let share = 100.0 * s.bytes as f64 / report.bytes.output.max(1) as f64;
-        writeln!(out, "            {:<6}{:>8}{bytes:>12}{raw_bytes:>12}{share:>6.1} %", s.tag, s.count)?;
-    }
-    Ok(out)
 }
 
 fn numbers(out: &mut String, report: &Report) -> Result<()> {

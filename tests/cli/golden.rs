@@ -38,7 +38,8 @@ fn files_of_every_version_decode_to_what_they_always_did() {
     let kinds = ["mvc", "mvc-origin", "harmonic", "harmonic-elements", "green", "green-free"];
     let definition = cager_core::coordinates::DEFINITION;
     let coded = ["mvc", "harmonic", "green", "green-free", "parted-mvc"].map(|kind| format!("coded-{kind}"));
-    for name in kinds.map(|kind| format!("definition{definition}-{kind}")).iter().chain(&coded) {
+    let edited = ["edited-mvc".to_owned()];
+    for name in kinds.map(|kind| format!("definition{definition}-{kind}")).iter().chain(&coded).chain(&edited) {
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == **name)), "{name} is missing");
     }
     let dir = Dir::new();

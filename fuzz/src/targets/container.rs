@@ -7,7 +7,7 @@ use cager_codec::{AdjacentGroups, CageBasis, CodedMesh, Hierarchy, ResidualGroup
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_geometry::mesh::{Model, Polygons, TriMesh};
-use cager_proto::container::{ContainerReader, ContainerWriter, Header};
+use cager_proto::container::{ContainerReader, ContainerWriter, EditLayer, Header, LayerSource};
 use cager_proto::report::Report;
 use std::io::Cursor;
 
@@ -26,6 +26,7 @@ pub(super) const CONTAINER: Target = Target {
         "TOC_",
         "summ",
         "resi",
+        "EDIT",
         "note",
         "CGRE",
         "mvc",
@@ -81,7 +82,21 @@ fn seeds() -> Vec<Vec<u8>> {
     // Its residual is in two parts.
     let mut parted = include_bytes!("../../../tests/golden/coded-parted-mvc.cager").to_vec();
     parted.insert(0, 1);
-    vec![intact, file(3, true), file(0, false), coded(&header, &rest, &cage), parted]
+    vec![intact, edited(&file(3, true)[1..]), file(3, true), file(0, false), coded(&header, &rest, &cage), parted]
+}
+
+/// A file with two layers of edits, one of them switched off.
+fn edited(file: &[u8]) -> Vec<u8> {
+    let layer = EditLayer {
+        name: "smile".to_owned(),
+        is_on: true,
+        first: 1,
+        vertices: vec![0, 3],
+        changes: (0..12_u8).map(|i| f32::from(i) * 0.5).collect(),
+    };
+    let layers = [layer.clone(), EditLayer { is_on: false, ..layer }].map(LayerSource::New);
+    let mut reader = ContainerReader::open(Cursor::new(file)).expect("a container");
+    ContainerWriter::copy_with_layers(&mut reader, &layers, vec![1]).expect("a container")
 }
 
 /// A file of coded meshes, cages and residual.

@@ -78,8 +78,10 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// Lists the sections from front to back, up to the first whose header is damaged or whose payload is not all there.
     pub(super) fn scan(&mut self) -> Result<(), Error> {
         let mut next = PRELUDE_BYTES as u64;
+        self.layers.is_cut = true;
         while next + HEADER_BYTES as u64 <= self.file_bytes {
             let Ok(header) = self.header_at(next) else { break };
+            self.layers.is_cut = header.tag != tag::CONTENTS;
             let end = (next + HEADER_BYTES as u64).checked_add(header.payload_bytes);
             let Some(end) = end.filter(|&end| end <= self.file_bytes && header.tag != tag::CONTENTS) else { break };
             self.add_entry(Entry { offset: next, header: SectionHeader { payload_crc: 0, ..header } })?;

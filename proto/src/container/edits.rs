@@ -175,6 +175,8 @@ pub(super) struct Layers {
     /// How many could not be read and are passed over, as of a damaged file that is read as far as it goes.
     pub(super) lost: usize,
     pub(super) passes_over_damage: bool,
+    /// Whether the file ends before its table of contents.
+    pub(super) is_cut: bool,
 }
 
 impl<R: Read + Seek> ContainerReader<R> {

@@ -93,9 +93,9 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.entry(tag::ERRORS).is_err()
     }
 
-    /// Whether the file was read from its beginning on, as far as it is there: layers of edits at its end may be missing.
+    /// Whether the file was read from its beginning on, and ends before its table of contents: layers of edits at its end may be missing.
     pub fn was_cut(&self) -> bool {
-        self.layers.passes_over_damage
+        self.layers.is_cut
     }
 
     /// Whether a frame can be read, with its residual where `residual` asks for it.
