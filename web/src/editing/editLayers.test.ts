@@ -9,7 +9,7 @@ import { parseFields } from '../container/section';
 import { diagonalOf } from '../coordinates/topology';
 import type { CageEdit } from './cageEdit';
 import { EditModel } from './editModel';
-import { npyHeader, withNewEdits } from './exporter';
+import { decodedFrames, npyHeader, withNewEdits } from './exporter';
 
 const NAMES = ['definition3-mvc', 'definition3-green', 'definition3-green-free', 'definition3-mvc-origin', 'coded-mvc'];
 const program = process.env.CAGER_BINARY;
@@ -125,6 +125,20 @@ it('layers add up in double precision and are rounded once, in blocks that begin
     [2, 2, 2].map(() => 2 * small).concat([3, 3, 3]),
   );
   expect(cages.every((x) => x === 1)).toBe(true);
+});
+
+it('positions that a service decodes have what is coded beside the cages', async () => {
+  const capture = await openBytes(goldenBytes('coded-mvc'));
+  const { static: part } = capture;
+  // As a service does, which is sent cages alone.
+  capture.decode = async (blob) => {
+    const cages = new Float32Array(await blob.arrayBuffer());
+    const block = { first: 0, count: cages.length / (3 * part.rowsPerFrame), cages, residual: null };
+    return new Response(positionsOf(part, [block]) as Float32Array<ArrayBuffer>);
+  };
+  const saved = new Uint8Array(await (await decodedFrames(capture, [editOf(26)])).arrayBuffer());
+  const edited = await openBytes(await written(goldenBytes('coded-mvc'), [editOf(26)]));
+  expect(numbersOf(Buffer.from(saved), false)).toEqual(positionsOf(part, await allBlocks(edited)));
 });
 
 it('the header of a NumPy file is padded to a multiple of 64 bytes and names the shape', () => {
