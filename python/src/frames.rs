@@ -51,9 +51,10 @@ impl<'a> Frames<'a> {
             return Ok(());
         };
         let advice = match first {
-            Mismatch::Order(_) => "export both from one program with the order of the points kept",
-            Mismatch::Axes(_) => "export both with the same axes",
-            Mismatch::Units(_) => "scale one of them",
+            Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
+            Mismatch::Axes(_) => "export both with the same axes".to_owned(),
+            Mismatch::Units(_) => "scale one of them".to_owned(),
+            Mismatch::Mirrored(mirroring) => Mismatch::mirrored_advice(*mirroring),
         };
         let words: Vec<String> = found.iter().map(ToString::to_string).collect();
         let what = format!(

@@ -58,7 +58,7 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
         );
     }
     if args.check.is_some() || args.repair.is_some() {
-        return super::diagnosis::run(args, &targets, rest);
+        return super::diagnosis::run(args, &targets, (rest, units));
     }
     if let Some(clearance) = args.clearance
         && !(0.0..=MAX_CLEARANCE).contains(&clearance)

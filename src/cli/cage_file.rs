@@ -11,17 +11,14 @@ use cager_formats::{Units, obj_bytes};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use std::path::Path;
 
-/// The cage in a file, checked, about the origin and in the units of its model.
-pub(super) fn read_cage(path: &Path, flip: bool, (origin, units): (Option<Point>, Units)) -> Result<Cage> {
+/// The mesh of a cage as it is encoded with: in the units of its model, with vertices merged that seams split. Both are told.
+pub(super) fn read_welded_cage(path: &Path, units: Units) -> Result<Model> {
     let (mut model, said) = read_cage_mesh(path)?;
     let change = said.change_to(units);
     if !change.is_none() {
         change.apply_to(&mut model.points);
         let what = format!("{}: the cage is {change}, as its unit and axes are not those of its model", path.display());
         warn(&[what]);
-    }
-    if model.faces.is_empty() {
-        bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
     }
     if let Some(welded) = weld(&model) {
         let places = grouped(welded.merged);
@@ -30,6 +27,15 @@ pub(super) fn read_cage(path: &Path, flip: bool, (origin, units): (Option<Point>
             path.display()
         )]);
         model = welded.model;
+    }
+    Ok(model)
+}
+
+/// The cage in a file, checked, about the origin and in the units of its model.
+pub(super) fn read_cage(path: &Path, flip: bool, (origin, units): (Option<Point>, Units)) -> Result<Cage> {
+    let mut model = read_welded_cage(path, units)?;
+    if model.faces.is_empty() {
+        bail!("{}: has no faces, and a cage is a closed mesh; export the cage with its faces", path.display());
     }
     move_to(origin, &mut model.points);
     let mesh = TriMesh::from(&model);

@@ -57,7 +57,7 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     pub(super) all_files: bool,
 
-    /// Go on where rest pose, cage and capture look as if they did not belong together: other units, axes or order of points.
+    /// Go on where rest pose, cage and capture look as if they did not belong together: other units, axes, handedness or order of points.
     #[arg(long)]
     pub(super) force: bool,
 }
@@ -164,6 +164,7 @@ pub(super) fn check_capture(
             "give --unit and --up for files that do not say theirs, or scale one of them".to_owned()
         }
         Mismatch::Units(_) => "scale one of them".to_owned(),
+        Mismatch::Mirrored(mirroring) => Mismatch::mirrored_advice(mirroring),
     };
     let words: Vec<String> = found.iter().map(ToString::to_string).collect();
     let what = format!(

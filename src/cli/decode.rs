@@ -9,7 +9,7 @@ use super::{grouped, plain, progress, read_like, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::cage_export::write_cages;
 use cager_capture::decode::joined::{Joining, decode_joined};
-use cager_capture::decode::{self, Decoding};
+use cager_capture::decode::{self, DecodeError, Decoding};
 use cager_capture::edited::EditedCages;
 use cager_formats::{FrameRange, Target};
 use std::path::Path;
@@ -44,9 +44,11 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         let [from, to] = [&args.input, &args.output].map(|path| path.display());
         warn(&[format!("{from}: the colours of its points are not kept in {to}")]);
     }
+    // Where they are damaged, frames are counted from 0.
+    let numbers = container.frame_numbers().unwrap_or_default();
     drop(container);
     // Checked against the file that has the frames.
-    let range = transfer.range(there, transfer.with_cages.as_ref().unwrap_or(&args.input))?;
+    let range = transfer.range(there, &numbers, transfer.with_cages.as_ref().unwrap_or(&args.input))?;
     let taken = range.as_ref().map_or(there, FrameRange::count);
     if transfer.cages {
         let bar = progress::frames("decoding", taken);
@@ -129,12 +131,16 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
     }
     let files = list.stretches.iter().map(|stretch| args.input.with_file_name(&stretch.file)).collect::<Vec<_>>();
     let output = Outputs::new(args.outputs, files.iter().chain([&args.input]))?.frames(&args.output)?;
-    drop(list.containers(&args.input)?);
+    let mut numbers = Vec::new();
+    for (path, mut container) in list.containers(&args.input)? {
+        let own = container.frame_numbers().map_err(|cause| DecodeError::container(&path, cause))?;
+        numbers.extend((0..container.frames()).map(|k| own.get(k).copied().unwrap_or(k as f64)));
+    }
     let there: usize = list.stretches.iter().map(|stretch| stretch.frames).sum();
     if there == 0 {
         bail!("{}: its files hold no frames; recover them again", args.input.display());
     }
-    let range = transfer.range(there, &args.input)?.unwrap_or(FrameRange::all(there));
+    let range = transfer.range(there, &numbers, &args.input)?.unwrap_or(FrameRange::all(there));
     let mut start = 0;
     let mut parts = Vec::new();
     for (stretch, path) in list.stretches.iter().zip(files) {

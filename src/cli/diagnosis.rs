@@ -1,7 +1,7 @@
 //! `cager cage --check` and `--repair`: what is wrong with a cage, and what of it can be repaired.
 
 use super::cage_args::CageArgs;
-use super::cage_file::{dropped_of_cage, read_cage_like};
+use super::cage_file::{dropped_of_cage, read_cage_like, read_welded_cage};
 use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::dry_run::tell_dry_run;
 use super::{print, warn};
@@ -63,7 +63,7 @@ impl CheckReport {
             inconsistent_edges: found.defects.inconsistent_edges.len(),
             inward_parts: found.defects.inward_parts.len(),
             self_intersections: found.self_intersections.len(),
-            duplicate_vertices: found.duplicate_vertices.len(),
+            duplicate_vertices: found.duplicate_vertices.len() + found.touching_vertices.len(),
             degenerate_faces: found.defects.degenerate_faces.len(),
             loose_vertices: found.defects.loose_vertices.len(),
             idle_vertices: found.idle_vertices.len(),
@@ -78,17 +78,17 @@ impl CheckReport {
     }
 }
 
-pub(super) fn run(args: &CageArgs, targets: &Targets, rest: &Model) -> Result<()> {
+pub(super) fn run(args: &CageArgs, targets: &Targets, (rest, units): (&Model, Units)) -> Result<()> {
     match (&args.check, &args.repair, &targets.output) {
-        (Some(path), _, _) => check_cage(args, targets, rest, path),
-        (None, Some(path), Some(output)) => repair_cage(args, (output, targets), rest, path),
+        (Some(path), _, _) => check_cage(args, targets, (rest, units), path),
+        (None, Some(path), Some(output)) => repair_cage(args, (output, targets), (rest, units), path),
         _ => bail!("-o: say where to write the repaired cage"),
     }
 }
 
 /// Exit status 1 for a cage that cannot be encoded with, so that scripts can ask.
-fn check_cage(args: &CageArgs, targets: &Targets, rest: &Model, path: &Path) -> Result<()> {
-    let cage = read_cage_like(path, Units::UNKNOWN)?;
+fn check_cage(args: &CageArgs, targets: &Targets, (rest, units): (&Model, Units), path: &Path) -> Result<()> {
+    let cage = read_welded_cage(path, units)?;
     let mesh = TriMesh::from(&cage);
     let found = check(&mesh, rest);
     let unfit = unfit(&mesh, rest, &found);
@@ -119,8 +119,13 @@ fn unfit(mesh: &TriMesh, rest: &Model, found: &Findings) -> Option<String> {
     (vertices > points).then(too_many).or_else(|| cage_mismatch(mesh, rest))
 }
 
-fn repair_cage(args: &CageArgs, (output, targets): (&Target, &Targets), rest: &Model, path: &Path) -> Result<()> {
-    let repaired = repair(&read_cage_like(path, Units::UNKNOWN)?, rest);
+fn repair_cage(
+    args: &CageArgs,
+    (output, targets): (&Target, &Targets),
+    (rest, units): (&Model, Units),
+    path: &Path,
+) -> Result<()> {
+    let repaired = repair(&read_cage_like(path, units)?, rest);
     if !repaired.remaining.usable() {
         bail!(
             "{}: could not be repaired: {}; nothing was written",

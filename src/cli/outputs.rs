@@ -3,7 +3,7 @@
 use super::{global_args, interrupt};
 use anyhow::{Result, bail};
 use cager_formats::atomic::destination;
-use cager_formats::{AtomicFile, CacheFormat, MeshFormat, Target, frame_files, frames_path};
+use cager_formats::{AtomicFile, CacheFormat, MeshFormat, Target, frame_files, frames_path, names_beside_others};
 use clap::Args;
 use std::fs;
 use std::io::IsTerminal;
@@ -61,6 +61,9 @@ impl Outputs {
     /// Frames in any of their formats.
     pub(super) fn frames(&mut self, path: &Path) -> Result<Target> {
         refuse_terminal(path, "walk.npy")?;
+        if let Some(is_one) = names_beside_others(path) {
+            return self.beside_others(path, is_one);
+        }
         let place = frames_path(path);
         let target = self.target(path, place)?;
         let here = std::env::current_dir().and_then(|here| here.canonicalize());
@@ -77,6 +80,30 @@ impl Outputs {
             );
         }
         Ok(target)
+    }
+
+    /// Files of a numbered name in a folder that holds others.
+    fn beside_others(&mut self, path: &Path, is_one: impl Fn(&Path) -> bool) -> Result<Target> {
+        let shown = path.display();
+        let inputs = self.inputs.iter().chain(&self.taken);
+        if let Some(other) = inputs.filter(|other| is_one(other)).min() {
+            bail!("{shown}: names {}, which is an input or another output; name other files", other.display());
+        }
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let there = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        if let Some(file) = there.filter(|file| is_one(file)).min().filter(|_| !self.overwrite) {
+            let file = file.strip_prefix(".").unwrap_or(&file);
+            bail!(
+                "{}: is there already; name other files than {shown}, or give --overwrite to replace all that have such a name",
+                file.display()
+            );
+        }
+        self.taken.push(path.to_owned());
+        Ok(self.target_of(path))
+    }
+
+    fn target_of(&self, path: &Path) -> Target {
+        if self.overwrite { Target::Replacing(path.to_owned()) } else { Target::New(path.to_owned()) }
     }
 
     fn target(&mut self, path: &Path, place: &Path) -> Result<Target> {
@@ -110,7 +137,7 @@ impl Outputs {
             }
             _ => {}
         }
-        Ok(if self.overwrite { Target::Replacing(path.to_owned()) } else { Target::New(path.to_owned()) })
+        Ok(self.target_of(path))
     }
 }
 

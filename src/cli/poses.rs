@@ -56,7 +56,10 @@ impl PoseFile {
             Self::Frame(path, frame) => (path, *frame),
         };
         let mut container = decode::open(path)?;
-        FrameRange::only(frame).check(container.frames(), path)?;
+        let numbers = container.frame_numbers().with_context(|| path.display().to_string())?;
+        let (only, number) = (FrameRange::only(frame), |k: usize| numbers.get(k).copied().unwrap_or(k as f64));
+        only.check(container.frames(), number, path)?;
+        warn(only.numbered(number).map(|note| format!("{}: {note}", path.display())).as_slice());
         let mut rest = container.rest().with_context(|| path.display().to_string())?;
         move_from(container.header().origin, &mut rest.points);
         Ok((rest, container.header().units))
@@ -168,9 +171,14 @@ impl Poses {
     }
 }
 
-/// Points in another order give shapes of nothing.
+/// Points in another order, and mirrored ones, give shapes of nothing.
 fn refuse_other_order((file, points): (&PoseFile, &[Point]), (first, model): (&PoseFile, &Model)) -> Result<()> {
     let found = mismatches(model, &[points.as_flattened().to_vec()]);
+    if let Some(Mismatch::Mirrored(mirroring)) = found.last() {
+        let how = mirroring.map_or("left is right in it".to_owned(), |found| found.to_string());
+        let advice = Mismatch::mirrored_advice(*mirroring);
+        bail!("{file}: does not look like a pose of {first}: it is mirrored ({how}); {advice}");
+    }
     let Some(Mismatch::Order(longer)) = found.first() else { return Ok(()) };
     bail!(
         "{file}: does not look like a pose of {first}: its points come in another order: edges of that are {longer:.0} times longer in this; export both from one program with the order of the points kept"

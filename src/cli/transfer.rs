@@ -120,7 +120,14 @@ fn named(error: TransferFailed, args: &TransferMotionArgs) -> Error {
     let source = args.source.as_ref().or(args.source_rest.as_ref());
     let of = |whose: &str| if whose == "target" { Some(&args.target) } else { source };
     let place = match &error {
-        Transfer(Ambiguous) => return anyhow::anyhow!("{}: {error} (--up, --align)", args.target.display()),
+        Transfer(Ambiguous { up }) => {
+            let options = if *up {
+                "--align none, --align MATRIX, --pairs"
+            } else {
+                "--up, --align none, --align MATRIX, --pairs"
+            };
+            return anyhow::anyhow!("{}: {error} ({options})", args.target.display());
+        }
         Transfer(Target(_) | TargetSurface(_) | OutOfReach { .. }) => Some(&args.target),
         Transfer(Source(_) | SourceSurface(_) | Rank { .. } | Inversion(_)) => source,
         Transfer(SourceCage(_)) => args.cage.as_ref().or(source),

@@ -1,6 +1,7 @@
 //! Arguments of `cager decode` other than its files, and of `cager edit`.
 
 use super::outputs::OutputArgs;
+use super::tell;
 use anyhow::{Result, bail};
 use cager_formats::FrameRange;
 use clap::Args;
@@ -36,8 +37,8 @@ pub(crate) struct TransferArgs {
 }
 
 impl TransferArgs {
-    /// The frames that are taken of so many in `source`; all where none is given.
-    pub(crate) fn range(&self, frames: usize, source: &Path) -> Result<Option<FrameRange>> {
+    /// The frames that are taken of so many in `source`, which have these numbers there; all where none is given.
+    pub(crate) fn range(&self, frames: usize, numbers: &[f64], source: &Path) -> Result<Option<FrameRange>> {
         let only = match self.frame.map(|frame| (frame, usize::try_from(frame))) {
             Some((_, Ok(frame))) => Some(FrameRange::only(frame)),
             Some((frame, Err(_))) => bail!(
@@ -48,8 +49,13 @@ impl TransferArgs {
             None => None,
         };
         let range = only.or(self.range);
-        range.map_or(Ok(()), |range| range.check(frames, source))?;
-        Ok(range)
+        let Some(range) = range else { return Ok(None) };
+        let number = |frame: usize| numbers.get(frame).copied().unwrap_or(frame as f64);
+        range.check(frames, number, source)?;
+        if let Some(note) = range.numbered(number) {
+            tell(&format!("{}: {note}\n", source.display()))?;
+        }
+        Ok(Some(range))
     }
 }
 

@@ -144,9 +144,11 @@ fn check_names_everything_that_is_wrong_and_repair_puts_it_right() {
     dir.model("broken.obj", &as_model(&broken));
     let checked = dir.cager("cage --rest rest.obj --check broken.obj --report check.json").run();
     assert_eq!(checked.status, Some(1));
-    for word in ["not usable", "in the same place", "open", "no face"] {
+    for word in ["not usable", "inwards", "no face"] {
         assert!(checked.stdout.contains(word), "{word}: {}", checked.stdout);
     }
+    // The seam is closed, as where the cage is encoded with.
+    assert!(checked.stderr.contains("broken.obj: merged 1 "), "{}", checked.stderr);
     assert_eq!(dir.json("check.json")["usable"], false);
     let repaired = dir.cager("cage --rest rest.obj --repair broken.obj -o repaired.obj").succeeds().stdout;
     assert!(repaired.contains("changed"), "{repaired}");

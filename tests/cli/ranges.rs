@@ -59,6 +59,40 @@ fn printf_and_hash_patterns_name_sequences_in_and_out() {
 }
 
 #[test]
+fn numbered_names_in_a_folder_that_holds_others_are_written_beside_them() {
+    let (dir, small) = Dir::with_encoded();
+    let points = small.rest.points.len();
+    let others = dir.contents();
+    let kept = |dir: &Dir| others.iter().all(|(path, bytes)| dir.contents().get(path) == Some(bytes));
+    dir.cager("decode out.cager -o all.npy").succeeds();
+    let all = read_frames(&dir.path("all.npy"), points);
+    std::fs::create_dir(dir.path("sub")).expect("a folder");
+    dir.write("sub/notes.txt", "kept");
+    for pattern in ["d.####.obj", "./e.%04d.ply", "sub/f_##.obj"] {
+        dir.cager(&format!("decode out.cager -o {pattern}")).succeeds();
+        assert!(same(&read_frames(&dir.path(pattern), points), &all) && kept(&dir), "{pattern}");
+        // Those that are there go with --overwrite alone, all of them and nothing else.
+        let first = pattern.replace("####", "0003").replace("%04d", "0003").replace("##", "03");
+        let line = format!("decode out.cager --range 3-5 -o {pattern}");
+        refused(&dir, &line, &["is there already", pattern, "--overwrite"]);
+        dir.cager(&format!("{line} --overwrite")).succeeds();
+        assert_eq!(read_frames(&dir.path(pattern), points).len(), 3, "{pattern}");
+        assert!(dir.path(&first).exists() && kept(&dir), "{pattern}");
+    }
+    assert!(dir.path("sub/notes.txt").exists());
+    // Read from there again, and not written over what is read.
+    dir.cager("decode out.cager --cages -o c.####.obj").succeeds();
+    refused(
+        &dir,
+        "decode out.cager --with-cages c.####.obj -o c.####.obj --overwrite",
+        &["c.####.obj: names ", "an input"],
+    );
+    dir.cager("encode --rest rest.obj --cage cage.obj --frames d.####.obj -o again.cager").succeeds();
+    let names: Vec<String> = dir.names("").into_iter().filter(|name| name.starts_with(".cager")).collect();
+    assert!(names.is_empty(), "{names:?}");
+}
+
+#[test]
 fn ranges_and_patterns_that_name_nothing_are_refused() {
     let (dir, _) = Dir::with_encoded();
     let encode = ENCODE.replace("out.cager", "part.cager");
@@ -67,7 +101,6 @@ fn ranges_and_patterns_that_name_nothing_are_refused() {
     refused(&dir, "decode out.cager --frame 20 -o part.npy", &["out.cager", "has frames 0 to 19", "frame 20"]);
     refused(&dir, "decode out.cager --cages --frame 20 -o part.npy", &["out.cager", "frame 20"]);
     refused(&dir, &encode.replace("frames.npy", "f.####.obj"), &["f.####.obj", "matches no file"]);
-    refused(&dir, "decode out.cager -o f.####.obj", &["f.####.obj", "names no folder"]);
     refused(&dir, "decode out.cager -o part/f.####.stl", &["f.####.stl", ".obj or .ply"]);
     for wrong in [
         format!("{encode} --frames-range 9-5"),

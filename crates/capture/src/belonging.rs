@@ -108,6 +108,7 @@ impl Finding {
         let advice = match departure {
             Departure::Order(_) | Departure::Faces => "export all from one program with the order of the points kept",
             Departure::Units(_) => "scale the frames alike",
+            Departure::Mirrored(_) => "export all frames with the same axes, right-handed or left-handed",
         };
         Err(Error::Invalid { path, what: format!("{what}; {advice}, or pass --force to go on") })
     }

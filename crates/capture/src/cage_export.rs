@@ -36,7 +36,7 @@ pub fn write_cages(
     let mut container = open(input)?;
     let range = range.unwrap_or(FrameRange::all(container.frames()));
     let there = container.frames();
-    range.check(there, input)?;
+    range.check(there, |frame| frame as f64, input)?;
     container.report().map_err(fail)?;
     let mut cage = Model::from(container.cage().map_err(fail)?);
     move_from(container.header().origin, &mut cage.points);

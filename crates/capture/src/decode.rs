@@ -268,7 +268,7 @@ impl<'a> Chosen<'a> {
         let mut container = if salvage { open_cut(path) } else { open(path) }?;
         container.limit_coordinates(free_bytes());
         let there = cages.as_ref().map_or(container.frames(), EditedCages::frames);
-        range.map_or(Ok(()), |range| range.check(there, path))?;
+        range.map_or(Ok(()), |range| range.check(there, |frame| frame as f64, path))?;
         let taken = range.unwrap_or(FrameRange::all(there));
         let mut wanted: Vec<usize> =
             if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };

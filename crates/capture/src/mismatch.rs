@@ -1,15 +1,18 @@
-//! Detects whether the frames of a capture belong to a rest pose: units, axes and order of points, by edge lengths, extents and the
-//! correlation of positions. Deformation changes these far less than a mix-up does.
+//! Detects whether the frames of a capture belong to a rest pose: units, axes, handedness and order of points, by edge lengths, extents, the
+//! correlation of positions and the maps of regions. Deformation changes these far less than a mix-up does.
 
 mod cage;
 mod faces;
+mod hand;
 pub mod watch;
 
 pub use cage::cage_mismatch;
+pub use hand::{Mirroring, SAME_AXES};
 
 use cager_geometry::mesh::{Model, Point, bounds};
 use cager_geometry::units::Up;
 use cager_geometry::vector::distance;
+use hand::Regions;
 use std::fmt;
 
 /// Number of evenly spaced frames to compare.
@@ -30,6 +33,15 @@ pub enum Mismatch {
     Units(f64),
     /// The axes y and z are exchanged: the one that points up in the capture, unless neither of the two usual conversions leads from one to the other.
     Axes(Option<Up>),
+    /// Left and right are exchanged in all frames: how the axes are, where that can be told.
+    Mirrored(Option<Mirroring>),
+}
+
+impl Mismatch {
+    /// What to do about frames that are mirrored.
+    pub fn mirrored_advice(mirroring: Option<Mirroring>) -> String {
+        mirroring.map_or(SAME_AXES.to_owned(), |found| found.advice())
+    }
 }
 
 /// Detects mismatches from some frames, including the first, points × 3 each; empty if the capture plausibly belongs to the rest pose. All
@@ -49,11 +61,23 @@ pub fn mismatches(rest: &Model, frames: &[Vec<f64>]) -> Vec<Mismatch> {
     if in_other_units(&compared) {
         found.push(Mismatch::Units(first.edges));
     }
+    if let Some(mirrored) = mirrored(rest, frames) {
+        found.push(mirrored);
+        return found;
+    }
     let exchanged: Vec<Mismatch> = compared.iter().filter_map(|frame| frame.turn.exchanged()).collect();
     if 5 * exchanged.len() >= 2 * compared.len() && !compared.iter().any(|frame| frame.turn.clearly_keeps_axes()) {
         found.push(exchanged[0]);
     }
     found
+}
+
+/// All frames that tell are mirrored, and there is one.
+fn mirrored(rest: &Model, frames: &[Vec<f64>]) -> Option<Mismatch> {
+    let regions = Regions::new(&rest.points);
+    let hands: Vec<_> = frames.iter().filter_map(|frame| regions.hand(frame.as_chunks().0)).collect();
+    let first = hands.first().filter(|_| hands.iter().all(|hand| hand.is_mirrored))?;
+    Some(Mismatch::Mirrored(first.mirroring()))
 }
 
 /// A scale that varies between frames is motion; the same scale in all frames and on all edges is a unit.
@@ -265,6 +289,8 @@ impl fmt::Display for Mismatch {
                 f.write_str("its axes y and z look exchanged: z is up where y is in the rest pose")
             }
             Self::Axes(None) => f.write_str("its axes look exchanged"),
+            Self::Mirrored(Some(mirroring)) => write!(f, "its frames are mirrored ({mirroring} in all of them)"),
+            Self::Mirrored(None) => f.write_str("its frames are mirrored (left is right in all of them)"),
         }
     }
 }
@@ -326,6 +352,42 @@ mod tests {
         assert_eq!(found(|t, p| if t == 1 { [0.0; 3] } else { p }), none, "a frame in one place");
         let first = |t: usize, [x, y, z]: Point| if t == 0 { [x, -z, y] } else { [x, y, z] };
         assert_eq!(found(first), none, "lying in one frame");
+        let noise = |_, p: Point| {
+            let mut random = fastrand::Rng::with_seed(p[0].to_bits() ^ p[1].to_bits() ^ p[2].to_bits());
+            p.map(|x| x + 0.8 * (random.f64() - 0.5))
+        };
+        assert!(!found(noise).concat().iter().any(|m| matches!(m, Mismatch::Mirrored(_))), "noise");
+        let halves = |_, [x, y, z]: Point| if y < 2.0 { [x, y, z] } else { [-x, y, z] };
+        assert_eq!(found(halves), none, "one half mirrored");
+        let pressed = |_, [x, y, z]: Point| [x, y, -0.01 * z];
+        assert_eq!(found(pressed), none, "pressed flat");
+    }
+
+    #[test]
+    fn mirrored_frames_are_recognised_however_they_move_and_of_flat_models_nothing_is() {
+        let changes: [fn(Point) -> Point; 4] =
+            [|[x, y, z]| [-x, y, z], |[x, y, z]| [x, -y, z], |[x, y, z]| [z, y, x], |[x, y, z]| [x, z, y]];
+        for change in changes {
+            for found in
+                found(|t, [x, y, z]| change([x + 0.3 * (t as f64 + y).sin(), y, z + 0.1 * (2.0 * t as f64).cos()]))
+            {
+                assert!(matches!(found[..], [Mismatch::Mirrored(Some(_))]), "{found:?}");
+            }
+            let turned = |t: usize, p: Point| {
+                let ([x, y, z], (sin, cos)) = (change(p), (0.7 + t as f64).sin_cos());
+                [100.0 * (cos * x - sin * y), 100.0 * (sin * x + cos * y), 100.0 * z]
+            };
+            for found in found(turned) {
+                assert!(matches!(found[..], [Mismatch::Units(_), Mismatch::Mirrored(_)]), "{found:?}");
+            }
+            let mut flat = tube();
+            flat.points.iter_mut().for_each(|p| p[2] = 1e-3 * p[0].sin());
+            assert!(
+                !mismatches(&flat, &frames(&flat, |_, [x, y, z]| [-x, y, z]))
+                    .iter()
+                    .any(|m| matches!(m, Mismatch::Mirrored(_)))
+            );
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A frame that turns with a shape, so that what is computed in it does not depend on how the shape was turned.
 
 use cager_geometry::linalg::symmetric_eigen;
-use cager_geometry::mesh::{Point, diagonal};
+use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};
 
 use crate::similarity::Similarity;
@@ -26,9 +26,12 @@ pub(crate) fn canonical_frame(points: &[Point]) -> Similarity {
     Similarity { rotation, scale: 1.0, translation: -(rotation * center) }
 }
 
-/// A length that says how large points are, however they are turned: the diagonal of their box along their principal axes.
+/// A length that says how large points are, however they are turned: the diagonal of a solid box with their second moments, `√(12 tr Σ)`.
 pub(crate) fn size(points: &[Point]) -> f64 {
-    diagonal(&canonical_frame(points).apply_all(points))
+    let count = points.len().max(1) as f64;
+    let center = points.iter().map(|&p| DVec3::from(p)).sum::<DVec3>() / count;
+    let spread = points.iter().map(|&p| DVec3::from(p).distance_squared(center)).sum::<f64>() / count;
+    (12.0 * spread).sqrt()
 }
 
 #[cfg(test)]
@@ -36,14 +39,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_size_of_a_stick_does_not_depend_on_its_direction() {
-        let stick = |turn: f64| -> Vec<Point> {
-            let rotation = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), turn);
-            let at = |k: u32| DVec3::new(f64::from(k * k), 0.1 * f64::from(k % 3), 0.05 * f64::from(k % 2));
-            (0..10).map(|k| (rotation * at(k)).to_array()).collect()
-        };
-        for turn in [0.3, 1.0, 2.5] {
-            assert!((size(&stick(turn)) / size(&stick(0.0)) - 1.0).abs() < 1e-9);
+    fn the_size_of_any_shape_does_not_depend_on_how_it_is_turned() {
+        let stick = |k: u32| DVec3::new(f64::from(k * k), 0.1 * f64::from(k % 3), 0.05 * f64::from(k % 2));
+        let cube = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2 & 1));
+        let ring = |k: u32| DVec3::new(f64::from(k).cos(), f64::from(k).sin(), 0.0);
+        let mut random = fastrand::Rng::with_seed(12);
+        for (what, shape) in [
+            ("stick", (0..10).map(stick).collect::<Vec<_>>()),
+            // No principal axes of their own.
+            ("cube", (0..8).map(cube).collect()),
+            ("ring", (0..40).map(ring).collect()),
+        ] {
+            let plain: Vec<Point> = shape.iter().map(DVec3::to_array).collect();
+            for _ in 0..50 {
+                let axis = DVec3::from_array(std::array::from_fn(|_| random.f64() - 0.5)).normalize();
+                let rotation = DMat3::from_axis_angle(axis, 6.0 * random.f64());
+                let turned: Vec<Point> = shape.iter().map(|&p| (rotation * p).to_array()).collect();
+                assert!(
+                    (size(&turned) / size(&plain) - 1.0).abs() < 1e-12,
+                    "{what}: {} {}",
+                    size(&turned),
+                    size(&plain)
+                );
+            }
         }
     }
 }

@@ -90,10 +90,11 @@ pub enum TransferError {
         point: usize,
     },
     /// Two alignments that fit as well as each other.
-    #[error(
-        "source and target can be aligned in two ways that fit equally well; say which axis is up, or give the alignment"
-    )]
-    Ambiguous,
+    #[error("{}", ambiguous(*up))]
+    Ambiguous {
+        /// Whether the axis that points up was given.
+        up: bool,
+    },
     /// The registration ended far from the target.
     #[error(
         "the source cannot be laid onto the target: {}; align them by hand, or take another source",
@@ -201,6 +202,14 @@ pub enum ShapeError {
 
 /// Scores above this share of the greatest one are mostly of distances that were cut off.
 const CUT_OFF: f64 = 0.8;
+
+fn ambiguous(up: bool) -> &'static str {
+    if up {
+        "source and target can be aligned in two ways that fit equally well, two headings about the axis up; take them as they stand, or give the alignment or pairs"
+    } else {
+        "source and target can be aligned in two ways that fit equally well; say which axis is up, take them as they stand, or give the alignment or pairs"
+    }
+}
 
 fn unreached(score: f64, limit: f64) -> String {
     if score.is_nan() {

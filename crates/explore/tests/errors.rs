@@ -82,7 +82,7 @@ fn a_body_that_is_the_same_either_way_round_is_refused_as_ambiguous() {
     let target =
         TriMesh { vertices: egg.vertices.iter().map(|&p| (turn * DVec3::from(p)).to_array()).collect(), ..egg };
     let error = FittedTransfer::new(&source.source(), &target, &FittedOptions::default()).map(|_| ()).unwrap_err();
-    assert!(matches!(error, TransferError::Ambiguous), "{error}");
+    assert!(matches!(error, TransferError::Ambiguous { up: false }), "{error}");
 }
 
 #[test]

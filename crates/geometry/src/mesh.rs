@@ -1,5 +1,7 @@
 //! Meshes as plain data.
 
+mod ears;
+
 pub use crate::vector::Point;
 use crate::vector::{cross, dot, norm, sub};
 
@@ -76,7 +78,7 @@ impl Polygons {
         faces.flat_map(|(face, &arity)| std::iter::repeat_n(face as u32, (arity as usize).saturating_sub(2))).collect()
     }
 
-    /// The faces as a fan of triangles each.
+    /// The faces as a fan of triangles each, where positions do not matter; see [`Model::triangles`].
     pub fn triangulated(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::new();
         for face in self.iter() {
@@ -122,9 +124,19 @@ impl TriMesh {
 }
 
 impl From<&Model> for TriMesh {
-    /// Polygons become fans of triangles.
+    /// Polygons become [`Model::triangles`].
     fn from(model: &Model) -> Self {
-        Self { vertices: model.points.clone(), triangles: model.faces.triangulated() }
+        Self { vertices: model.points.clone(), triangles: model.triangles() }
+    }
+}
+
+impl Model {
+    /// The faces as triangles, those of a face one after another as [`Polygons::polygon_of_triangle`] counts them: fans of convex faces, and concave ones
+    /// as they lie.
+    pub fn triangles(&self) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::new();
+        self.faces.iter().for_each(|face| ears::triangulate(face, &self.points, &mut triangles));
+        triangles
     }
 }
 

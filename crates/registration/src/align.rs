@@ -81,6 +81,15 @@ pub fn align(moved: &Observation, fixed: &Observation, options: &AlignOptions) -
     alignments(moved, fixed, options)[0]
 }
 
+/// Of alignments that fit about as well, the one that turns least: half a turn has to score better than none by the share `half_a_turn`. `None` of none.
+pub fn least_turned(found: &[Alignment], half_a_turn: f64) -> Option<Alignment> {
+    let preferred = |a: &Alignment| a.score * (1.0 + half_a_turn * a.degrees() / 180.0);
+    let at = (0..found.len()).min_by(|&a, &b| preferred(&found[a]).total_cmp(&preferred(&found[b])))?;
+    let others = (0..found.len()).filter(|&k| k != at).map(|k| found[k].score);
+    let runner_up = others.fold(f64::INFINITY, f64::min) / found[at].score;
+    Some(Alignment { runner_up: runner_up.max(1.0), ..found[at] })
+}
+
 /// Ways to lay `moved` onto `fixed`, the best first; there is one at least, and none are turned alike. Tried first are the surface as it stands, the turns
 /// that bring principal axes onto principal axes and, about a given axis up, eighths of a turn; then all points go to their nearest ones (Besl and McKay
 /// 1992), the nearest by normals as well. Runs on the current rayon pool; the result does not depend on it.
@@ -95,10 +104,15 @@ pub fn alignments(moved: &Observation, fixed: &Observation, options: &AlignOptio
         .into_par_iter()
         .map(|rotation| coarse.iterate(coarse.start(rotation, scale), up, options.scale, FIRST_ITERATIONS))
         .collect();
+    // As it stands, the surface of a symmetrical body fits as well as others and may come after them by chance.
+    let (unturned, unturned_score) = (tried[0].rotation, tried[0].score);
     tried.sort_by(|a, b| a.score.total_cmp(&b.score));
+    let is_near = unturned_score <= DOUBTFUL * tried[0].score;
     let mut kept: Vec<Placed> = Vec::new();
     for placed in tried {
-        if kept.len() < MAX_CONTINUED && kept.iter().all(|other| angle(other.rotation, placed.rotation) > SAME_TURN) {
+        let is_unturned = is_near && placed.score == unturned_score && placed.rotation == unturned;
+        let is_other = kept.iter().all(|other| angle(other.rotation, placed.rotation) > SAME_TURN);
+        if is_other && (kept.len() < MAX_CONTINUED || is_unturned) {
             kept.push(placed);
         }
     }
@@ -362,6 +376,28 @@ mod tests {
             let found_rotation = DMat3::from_cols_array_2d(&found.rotation);
             assert!(angle(found_rotation, rotation) < 1.0, "{k}: {}", angle(found_rotation, rotation));
             assert!((found.scale - 1.3).abs() < 0.02 && found.runner_up > 1.2, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn of_turns_that_fit_alike_the_smallest_is_taken() {
+        // An ellipsoid, which four turns leave as it is.
+        let body = |random: &mut fastrand::Rng, count: usize| {
+            let mut seen = Observation::default();
+            for _ in 0..count {
+                let direction = DVec3::from_array(std::array::from_fn(|_| random.f64() - 0.5)).normalize();
+                seen.points.push((direction * DVec3::new(0.4, 0.2, 1.0)).to_array());
+                seen.normals.push((direction / DVec3::new(0.4, 0.2, 1.0)).normalize().to_array());
+            }
+            seen
+        };
+        for (seed, up) in (0..12).flat_map(|seed| [(seed, None), (seed, Some([0.0, 0.0, 1.0]))]) {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let (from, to) = (body(&mut random, 800), body(&mut random, 1200));
+            let target = moved(&to, DMat3::IDENTITY, 1000.0, DVec3::ZERO);
+            let found = alignments(&from, &target, &AlignOptions { scale: true, up });
+            let found = least_turned(&found, 0.15).unwrap();
+            assert!(found.degrees() < 20.0, "{seed}: {}", found.degrees());
         }
     }
 

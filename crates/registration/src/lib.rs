@@ -20,7 +20,7 @@ mod stages;
 mod target;
 mod template;
 
-pub use align::{AlignOptions, Alignment, align, align_pairs, alignments};
+pub use align::{AlignOptions, Alignment, align, align_pairs, alignments, least_turned};
 pub use anchors::Anchors;
 pub use closeness::MeasuredSurface;
 pub use fit::FitOptions;

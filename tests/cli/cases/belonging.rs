@@ -8,7 +8,7 @@ const CASE: &str = "01-order-or-unit-changes-after-frame-0";
 
 /// Refused with these words and nothing written; with --force it is done with the same words as a warning.
 #[track_caller]
-fn refused_unless_forced(dir: &Dir, line: &str, words: &[&str]) {
+pub(super) fn refused_unless_forced(dir: &Dir, line: &str, words: &[&str]) {
     let before = dir.contents();
     let done = dir.cager(line).run();
     assert_eq!(done.status, Some(1), "{line}: {}{}", done.stdout, done.stderr);

@@ -5,7 +5,7 @@ use super::influence::influence;
 use cager_core::cage::{CageError, Defects};
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
 use cager_geometry::spatial::{outside, self_intersections};
-use cager_geometry::topology::fans;
+use cager_geometry::topology::{edges, fans};
 use std::collections::HashMap;
 
 /// What is wrong with a cage around a model. Vertices and faces are counted from 0; faces are triangles.
@@ -19,8 +19,10 @@ pub struct Findings {
     pub refusal: Option<CageError>,
     /// What keeps the mesh from being a cage.
     pub defects: Defects,
-    /// Pairs of vertices in the same place.
+    /// Pairs of vertices in the same place that are one: on open borders, of one face, or without faces.
     pub duplicate_vertices: Vec<[u32; 2]>,
+    /// Pairs of vertices in the same place at which closed parts of the surface touch: merged, they would be non-manifold.
+    pub touching_vertices: Vec<[u32; 2]>,
     /// Vertices at which parts of the surface touch without a common edge.
     pub non_manifold_vertices: Vec<u32>,
     /// Pairs of faces that cut, touch or overlap one another.
@@ -63,6 +65,7 @@ impl Findings {
         self.usable()
             && self.self_intersections.is_empty()
             && self.non_manifold_vertices.is_empty()
+            && self.touching_vertices.is_empty()
             && self.enclosure_examined
             && self.outside.is_none()
     }
@@ -75,12 +78,14 @@ pub fn check(mesh: &TriMesh, model: &Model) -> Findings {
     let exists = |t: &&[u32; 3]| t.iter().all(|&v| (v as usize) < vertices);
     let faces: Vec<[u32; 3]> = mesh.triangles.iter().filter(exists).copied().collect();
     let fans = fans(vertices, &faces);
+    let (duplicate_vertices, touching_vertices) = same_place(mesh, &faces);
     let mut findings = Findings {
         vertices,
         faces: mesh.triangles.len(),
         refusal,
         defects,
-        duplicate_vertices: same_place(mesh),
+        duplicate_vertices,
+        touching_vertices,
         non_manifold_vertices: (0..vertices as u32).filter(|&v| fans[v as usize].len() > 1).collect(),
         self_intersections: self_intersections(mesh),
         ..Findings::default()
@@ -92,8 +97,8 @@ pub fn check(mesh: &TriMesh, model: &Model) -> Findings {
     findings
 }
 
-/// Pairs of vertices with equal coordinates, each with the first of them.
-fn same_place(mesh: &TriMesh) -> Vec<[u32; 2]> {
+/// Pairs of vertices with equal coordinates, each with the first of them: those that are one vertex, and those at which closed parts touch.
+pub(super) fn same_place(mesh: &TriMesh, faces: &[[u32; 3]]) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
     let mut first: HashMap<[u64; 3], u32> = HashMap::new();
     let mut pairs = Vec::new();
     for (v, p) in mesh.vertices.iter().enumerate() {
@@ -103,7 +108,24 @@ fn same_place(mesh: &TriMesh) -> Vec<[u32; 2]> {
             pairs.push([at, v as u32]);
         }
     }
-    pairs
+    if pairs.is_empty() {
+        return (pairs, Vec::new());
+    }
+    let edges = edges(faces);
+    let (mut is_closed, mut is_used) = (vec![true; mesh.vertices.len()], vec![false; mesh.vertices.len()]);
+    for (ends, users) in &edges {
+        for &v in ends {
+            is_used[v as usize] = true;
+            is_closed[v as usize] &= users.len() > 1;
+        }
+    }
+    let touches = |pair: &[u32; 2]| {
+        pair.iter().all(|&v| is_used[v as usize])
+            && pair.iter().any(|&v| is_closed[v as usize])
+            && !edges.contains_key(&[pair[0].min(pair[1]), pair[0].max(pair[1])])
+    };
+    let (touching, one) = pairs.into_iter().partition(touches);
+    (one, touching)
 }
 
 fn examine_fit(findings: &mut Findings, mesh: &TriMesh, model: &Model) {

@@ -29,6 +29,12 @@ impl Findings {
             listed("face", one(&d.degenerate_faces), "without area", "delete them or merge their vertices"),
             listed("pair", two(&d.duplicate_faces), "of faces over the same vertices", "delete one of each"),
             listed("pair", two(&f.duplicate_vertices), "of vertices in the same place", "merge them"),
+            listed(
+                "pair",
+                two(&f.touching_vertices),
+                "of vertices in the same place, at which parts of the surface only touch",
+                "move them apart",
+            ),
             listed("vertex", one(&d.loose_vertices), "that no face uses", "delete loose vertices"),
             listed(
                 "edge",

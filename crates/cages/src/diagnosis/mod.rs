@@ -1,6 +1,7 @@
 //! Diagnosis of a cage: all its defects at once, and repair of those that can be repaired without changing its intent.
 
 mod alignment;
+mod apart;
 mod enlarge;
 mod findings;
 mod holes;

@@ -1,5 +1,6 @@
 //! Repair of a cage: what can be repaired without changing its shape or its faces more than needed.
 
+use super::apart::moved_apart;
 use super::enlarge::enlarged;
 use super::findings::{Findings, check};
 use super::holes::{MAX_HOLE_EDGES, fill};
@@ -22,9 +23,31 @@ pub struct Repair {
 }
 
 /// Repairs a cage: merges doubled vertices along open borders, removes degenerate and doubled faces and loose vertices, splits vertices
-/// at which parts only touch, makes the orientation consistent and outward, fills small holes, and moves vertices out slightly where
-/// points of the model are outside.
+/// at which parts only touch and moves them a little inwards, makes the orientation consistent and outward, fills small holes, and moves vertices out
+/// slightly where points of the model are outside. What is left is not more than before: where it would be, vertices are not split, or nothing is done.
 pub fn repair(cage: &Model, model: &Model) -> Repair {
+    let repaired = attempt(cage, model, true);
+    if repaired.changes.is_empty() {
+        return repaired;
+    }
+    let before = check(&TriMesh::from(cage), model);
+    if severity(&repaired.remaining) <= severity(&before) {
+        return repaired;
+    }
+    let unsplit = attempt(cage, model, false);
+    if severity(&unsplit.remaining) <= severity(&before) {
+        return unsplit;
+    }
+    Repair { cage: cage.clone(), changes: Vec::new(), remaining: before }
+}
+
+/// Whether a cage cannot be encoded with, and in how many places it cannot be edited.
+fn severity(found: &Findings) -> (bool, usize) {
+    let places = [&found.touching_vertices, &found.duplicate_vertices, &found.self_intersections].map(Vec::len);
+    (!found.usable(), places.iter().sum::<usize>() + found.non_manifold_vertices.len())
+}
+
+fn attempt(cage: &Model, model: &Model, splits: bool) -> Repair {
     let mut repairing = Repairing {
         points: cage.points.iter().map(|&p| p.into()).collect(),
         faces: cage.faces.iter().map(<[u32]>::to_vec).collect(),
@@ -33,11 +56,14 @@ pub fn repair(cage: &Model, model: &Model) -> Repair {
     repairing.drop_unusable_faces();
     repairing.merge_border_vertices();
     repairing.drop_repeated_faces();
-    repairing.split_touching_vertices();
+    if splits {
+        repairing.split_touching_vertices();
+    }
     repairing.orient_consistently();
     repairing.fill_holes();
     repairing.orient_outwards();
     repairing.drop_loose_vertices();
+    repairing.move_touching_apart();
     repairing.enlarge(model);
     let cage = repairing.model();
     let remaining = check(&TriMesh::from(&cage), model);
@@ -204,6 +230,18 @@ impl Repairing {
         });
         self.points = kept;
         self.faces.iter_mut().flatten().for_each(|v| *v = new[*v as usize]);
+    }
+
+    /// Vertices of different parts in one place go a little inwards.
+    fn move_touching_apart(&mut self) {
+        let Some((positions, farthest)) = moved_apart(&TriMesh::from(&self.model())) else { return };
+        let moved = positions.iter().zip(&self.points).filter(|(a, b)| a != b).count();
+        self.points = positions;
+        self.changes.push(format!(
+            "moved {} inwards, by {:.2} % of the diagonal at most, as others lay in the same place",
+            counted(moved, "vertex", "vertices"),
+            100.0 * farthest
+        ));
     }
 
     fn enlarge(&mut self, model: &Model) {

@@ -1,7 +1,8 @@
-//! Watches the frames of a capture as they are read: from some frame on, points may come in another order or in another unit. A few
-//! hundred edges of each frame are compared with those of the rest pose and of the frame before.
+//! Watches the frames of a capture as they are read: from some frame on, points may come in another order, in another unit or mirrored. A few
+//! hundred edges of each frame are compared with those of the rest pose and of the frame before, and regions with those at rest.
 
 use super::faces::FaceComparison;
+use super::hand::{Mirroring, Regions};
 use super::{factor, neighbours, quartiles};
 use cager_geometry::mesh::{Model, Point, Polygons};
 use cager_geometry::vector::{distance, sub};
@@ -26,6 +27,8 @@ pub enum Departure {
     Faces,
     /// It is this many times as large as the frame before it.
     Units(f64),
+    /// Left and right are exchanged: how the axes are beside those of the rest pose, where that can be told.
+    Mirrored(Option<Mirroring>),
 }
 
 impl fmt::Display for Departure {
@@ -41,6 +44,12 @@ impl fmt::Display for Departure {
                 let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
                 write!(f, "it is {} times {how} than what comes before it, as with other units", factor(times))
             }
+            Self::Mirrored(Some(mirroring)) => {
+                write!(f, "it is mirrored ({mirroring} in it), and what comes before it is not")
+            }
+            Self::Mirrored(None) => {
+                f.write_str("it is mirrored (left is right in it), and what comes before it is not")
+            }
         }
     }
 }
@@ -51,6 +60,7 @@ pub struct Watch {
     rest: Model,
     edges: Vec<[u32; 2]>,
     sketch: Sketch,
+    regions: Regions,
 }
 
 impl Watch {
@@ -60,7 +70,7 @@ impl Watch {
         let stride = all.len().div_ceil(EDGES).max(1);
         let edges: Vec<[u32; 2]> = all.into_iter().step_by(stride).collect();
         let sketch = Sketch::new(&edges, &rest.points).filter(|_| edges.len() >= 8)?;
-        Some(Self { rest: rest.clone(), edges, sketch })
+        Some(Self { rest: rest.clone(), edges, sketch, regions: Regions::new(&rest.points) })
     }
 }
 
@@ -70,6 +80,8 @@ pub struct Progress {
     previous: Option<Sketch>,
     /// Faces of a frame that differ from those of the rest pose; most captures have the same ones throughout.
     other_faces: Option<(Polygons, FaceComparison)>,
+    /// Whether the last frame that tells was mirrored.
+    is_mirrored: bool,
 }
 
 impl Progress {
@@ -81,7 +93,8 @@ impl Progress {
         let found = sketch
             .in_other_units(previous, &watch.sketch)
             .or_else(|| sketch.in_another_order(previous, &watch.sketch))
-            .or_else(|| self.renumbered(watch, frame, faces?, sketch.radius / watch.sketch.radius));
+            .or_else(|| self.renumbered(watch, frame, faces?, sketch.radius / watch.sketch.radius))
+            .or_else(|| self.mirrored(watch, frame));
         self.previous = Some(sketch);
         found
     }
@@ -89,6 +102,13 @@ impl Progress {
     /// Whether the frame looked at last is about as large as the rest pose.
     pub fn is_as_large_as_at_rest(&self, watch: &Watch) -> bool {
         self.previous.as_ref().is_none_or(|last| last.is_as_large_as(&watch.sketch))
+    }
+
+    /// That a frame is mirrored where those before were not.
+    fn mirrored(&mut self, watch: &Watch, frame: &[Point]) -> Option<Departure> {
+        let hand = watch.regions.hand(frame)?;
+        let was_mirrored = std::mem::replace(&mut self.is_mirrored, hand.is_mirrored);
+        (hand.is_mirrored && !was_mirrored).then(|| Departure::Mirrored(hand.mirroring()))
     }
 
     fn renumbered(&mut self, watch: &Watch, frame: &[Point], faces: &Polygons, scale: f64) -> Option<Departure> {
@@ -259,6 +279,20 @@ mod tests {
                     "{unit}: {found:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn the_first_mirrored_frame_is_found() {
+        for rest in both() {
+            let mirrored = |t: usize, i: usize| {
+                let [x, y, z] = bent(t, rest.points[i]);
+                if t < 5 { [x, y, z] } else { [x, y, -z] }
+            };
+            let found = first(&rest, 9, mirrored);
+            let told = found.map(|(frame, departure)| (frame, departure.to_string()));
+            let what = "it is mirrored (z of the rest pose is -z in it), and what comes before it is not";
+            assert_eq!(told, Some((5, what.to_owned())));
         }
     }
 

@@ -145,6 +145,7 @@ impl<'a> Fitting<'a> {
         if found.len() < 2 {
             return Ok(found[0]);
         }
+        let ambiguous = || TransferError::Ambiguous { up: self.options.up.is_some() };
         let quick = StageOptions { iterations: FIRST_ITERATIONS, good_score: f64::INFINITY, ..self.options.stages };
         let mut scored = Vec::new();
         for aligned in found {
@@ -153,11 +154,11 @@ impl<'a> Fitting<'a> {
         scored.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
         let [first, second] = [&scored[0].0, &scored[1].0];
         if second.score - first.score < SAME.max(AMBIGUOUS * first.score) && self.apart(first, second) > SAME_PLACES {
-            return Err(TransferError::Ambiguous);
+            return Err(ambiguous());
         }
         let best = scored.into_iter().map(|(found, aligned)| (found.score, aligned));
         let best = best.min_by(|a, b| preferred(a).total_cmp(&preferred(b)));
-        best.map(|(_, aligned)| aligned).ok_or(TransferError::Ambiguous)
+        best.map(|(_, aligned)| aligned).ok_or_else(ambiguous)
     }
 
     /// How far two registrations leave the source's vertices from each other, in the mean, as a share of the size.

@@ -2,6 +2,7 @@
 
 mod dir;
 mod file;
+mod group;
 mod target;
 mod temporary;
 
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 pub use dir::AtomicDir;
 pub use file::{AtomicFile, commit_together};
+pub use group::AtomicGroup;
 pub use target::Target;
 pub use temporary::{ScratchDir, remove_temporaries};
 

@@ -48,30 +48,81 @@ impl FrameRange {
         (first <= last).then(|| Self { first: first - start, last: last - start, step: self.step })
     }
 
-    /// Whether there are all of these among `frames` frames of `source`.
+    /// Whether there are all of these among `frames` frames of `source`, which have these numbers there.
     ///
     /// # Errors
-    /// [`Error::Invalid`] with the frames that there are.
-    pub fn check(&self, frames: usize, source: &Path) -> Result<(), Error> {
+    /// [`Error::Invalid`] with the frames that there are; of numbers, the frames that have them.
+    pub fn check(&self, frames: usize, number: impl Fn(usize) -> f64, source: &Path) -> Result<(), Error> {
         if self.last < frames {
             return Ok(());
         }
+        if let Some(places) = self.of_numbers(frames, &number) {
+            let are = if self.first == self.last { "number" } else { "numbers" };
+            let (own, is) = (self.bounds(), if self.first == self.last { "is" } else { "are" });
+            return Err(Fault::invalid(format!(
+                "frames are counted from 0 here, 0 to {}, and {are} {own} {is} {places}; give {}",
+                frames - 1,
+                places.bounds()
+            ))
+            .at(source));
+        }
+        let numbered = || {
+            let (first, last) = (number(0), number(frames - 1));
+            if (first, last) == (0.0, (frames - 1) as f64) {
+                String::new()
+            } else {
+                format!(", with the numbers {first} to {last}")
+            }
+        };
         let there = match frames {
             0 => "has no frames".to_owned(),
             1 => "has one frame, frame 0".to_owned(),
-            _ => format!("has frames 0 to {}", frames - 1),
+            _ => format!("has frames 0 to {}{}", frames - 1, numbered()),
         };
         Err(Fault::invalid(format!("{there}, so {self} cannot be taken from it; give frames that it has")).at(source))
+    }
+
+    /// What is to be said of these frames where they have other numbers than their places.
+    pub fn numbered(&self, number: impl Fn(usize) -> f64) -> Option<String> {
+        let [first, last] = [self.frame(0), self.frame(self.count() - 1)];
+        let [from, to] = [number(first), number(last)];
+        let differ = [from, to] != [first as f64, last as f64];
+        let one = || format!("{self}, counted from 0, has the number {from}");
+        let several = || format!("{self}, counted from 0, have the numbers {from} to {to}");
+        differ.then(|| if first == last { one() } else { several() })
+    }
+
+    /// The frames that have these numbers, where all of them are numbers of frames, evenly spaced.
+    fn of_numbers(&self, frames: usize, number: &impl Fn(usize) -> f64) -> Option<Self> {
+        let mut wanted = (0..self.count()).map(|k| self.frame(k) as f64);
+        let mut places = Vec::new();
+        let mut next = wanted.next();
+        for place in 0..frames {
+            if next == Some(number(place)) {
+                places.push(place);
+                next = wanted.next();
+            }
+        }
+        let (&first, &last) = (places.first()?, places.last()?);
+        let step = places.get(1).map_or(1, |second| second - first);
+        let is_even = places.windows(2).all(|pair| pair[1] - pair[0] == step);
+        (next.is_none() && is_even).then_some(Self { first, last, step })
+    }
+
+    /// As it is written.
+    fn bounds(&self) -> String {
+        match (self.first == self.last, self.step) {
+            (true, _) => self.first.to_string(),
+            (false, 1) => format!("{}-{}", self.first, self.last),
+            (false, step) => format!("{}-{}x{step}", self.first, self.last),
+        }
     }
 }
 
 impl fmt::Display for FrameRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.first == self.last, self.step) {
-            (true, _) => write!(f, "frame {}", self.first),
-            (false, 1) => write!(f, "frames {}-{}", self.first, self.last),
-            (false, step) => write!(f, "frames {}-{}x{step}", self.first, self.last),
-        }
+        let frames = if self.first == self.last { "frame" } else { "frames" };
+        write!(f, "{frames} {}", self.bounds())
     }
 }
 
@@ -102,6 +153,8 @@ pub(super) struct RangeReader {
     taken: usize,
     /// The frame that the reader gives next.
     at: usize,
+    /// What the frames are called in the source, where they have other numbers there.
+    note: Option<String>,
 }
 
 impl RangeReader {
@@ -112,8 +165,10 @@ impl RangeReader {
         source: &Path,
     ) -> Result<Box<dyn FrameReader>, Error> {
         let Some(range) = range else { return Ok(reader) };
-        range.check(reader.frames(), source)?;
-        Ok(Box::new(Self { reader, range, taken: 0, at: 0 }))
+        range.check(reader.frames(), |frame| reader.number(frame), source)?;
+        let note = range.numbered(|frame| reader.number(frame)).filter(|_| !reader.numbers_are_times());
+        let note = note.map(|note| format!("{}: {note}", source.display()));
+        Ok(Box::new(Self { reader, range, taken: 0, at: 0, note }))
     }
 
     /// Moves the reader to the next frame of the range; false at the end.
@@ -160,7 +215,7 @@ impl FrameReader for RangeReader {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.reader.notes()
+        self.reader.notes().into_iter().chain(self.note.clone()).collect()
     }
 
     fn units(&self) -> Units {
@@ -204,6 +259,34 @@ mod tests {
             assert_eq!(all, [3, 7, 11, 15], "{cuts:?}");
         }
         assert_eq!(taken(range.part(4, 3)), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn numbers_that_are_no_frames_are_told_by_the_frames_that_have_them() {
+        let told = |range: &str, frames: usize, number: &dyn Fn(usize) -> f64| {
+            let range: FrameRange = range.parse().unwrap();
+            range.check(frames, number, Path::new("shot")).map_err(|error| error.to_string())
+        };
+        let from_1001 = |place: usize| 1001.0 + place as f64;
+        let counted = "shot: frames are counted from 0 here, 0 to 5, and ";
+        for (range, what) in [
+            ("1003-1003", "number 1003 is frame 2; give 2"),
+            ("1003-1005", "numbers 1003-1005 are frames 2-4; give 2-4"),
+            ("1001-1006x2", "numbers 1001-1006x2 are frames 0-4x2; give 0-4x2"),
+        ] {
+            assert_eq!(told(range, 6, &from_1001), Err(format!("{counted}{what}")));
+        }
+        let error = told("1003-1009", 6, &from_1001).unwrap_err();
+        assert!(error.contains("has frames 0 to 5, with the numbers 1001 to 1006, so frames 1003-1009"), "{error}");
+        // Every second frame of a shot.
+        let twos = |place: usize| 1001.0 + 2.0 * place as f64;
+        assert!(told("1003-1007x2", 6, &twos).unwrap_err().contains("are frames 1-3; give 1-3"));
+        assert!(told("1003-1007", 6, &twos).unwrap_err().contains("give frames that it has"));
+        assert_eq!(told("2-4", 6, &from_1001), Ok(()));
+        let note = |range: &str, number: &dyn Fn(usize) -> f64| range.parse::<FrameRange>().unwrap().numbered(number);
+        assert_eq!(note("2-4", &|place| place as f64), None);
+        assert_eq!(note("9-9", &|place| 1.0 + place as f64).unwrap(), "frame 9, counted from 0, has the number 10");
+        assert_eq!(note("2-5x2", &from_1001).unwrap(), "frames 2-5x2, counted from 0, have the numbers 1003 to 1005");
     }
 
     #[test]

@@ -112,7 +112,7 @@ pub(crate) fn write_off(out: &mut impl Write, model: &Model) -> io::Result<()> {
 
 /// A binary STL file: the triangles of all faces in single precision. Normals are left at 0, which tells readers to take those of the triangles.
 pub(crate) fn write_stl(out: &mut impl Write, model: &Model) -> io::Result<()> {
-    let triangles = model.faces.triangulated();
+    let triangles = model.triangles();
     let count = u32::try_from(triangles.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
     // Beginning with a blank: with `solid` it would look like text.
     out.write_all(&[b' '; 80])?;

@@ -7,6 +7,7 @@ use cager_geometry::units::{Units, Up};
 use cager_geometry::vector::{cross, norm, sub};
 use cager_registration::{
     AlignOptions, Alignment, FitOptions, Observation, ObservationOptions, RegistrationError, Target, Template, align,
+    alignments, least_turned,
 };
 use std::path::Path;
 
@@ -27,8 +28,12 @@ pub struct Placement {
 
 /// A runner-up below this is as good as the best.
 const AMBIGUOUS: f64 = 1.15;
+/// Runners-up below this are told as equal.
+const SAME: f64 = 1.005;
 /// A first fit that a turn makes better than this share of it was turned wrongly.
 const CLEARLY_BETTER: f64 = 0.8;
+/// How much better half a turn has to fit than none.
+const HALF_A_TURN: f64 = 0.15;
 /// Turns below this, in degrees, are left to the fit.
 const MIN_TURN: f64 = 12.0;
 /// Sizes that differ by less are motion.
@@ -57,7 +62,8 @@ impl Placement {
         }
         let up = options.up.map(|up| if up == Up::Z { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] });
         let own = seen(template).ok_or(RegistrationError::NoSurface)?;
-        let found = align(&own, surface, &AlignOptions { up, scale: options.scale });
+        let all = alignments(&own, surface, &AlignOptions { up, scale: options.scale });
+        let found = least_turned(&all, HALF_A_TURN).ok_or(RegistrationError::NoSurface)?;
         template.points.iter_mut().chain(&mut cage.vertices).for_each(|p| *p = found.apply(*p));
         let Alignment { scale, translation, score, runner_up, .. } = found;
         Ok(Some(Self { degrees: found.degrees(), scale, translation, score, runner_up }))
@@ -67,8 +73,8 @@ impl Placement {
     pub(super) fn warning(&self) -> Option<String> {
         (self.runner_up < AMBIGUOUS).then(|| {
             format!(
-                "the template may be turned otherwise: another turn lies only {:.0} % worse on the first surface; look at the result, or turn the template yourself",
-                100.0 * (self.runner_up - 1.0)
+                "the template may be turned otherwise: another turn lies {} on the first surface; look at the result, or turn the template yourself",
+                if self.runner_up < SAME { "as well".to_owned() } else { format!("only {:.0} % worse", 100.0 * (self.runner_up - 1.0)) }
             )
         })
     }

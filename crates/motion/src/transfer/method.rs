@@ -25,6 +25,8 @@ pub(super) struct Mover {
     detail: Option<Detail>,
     cage_vertices: usize,
     aligned: Aligned,
+    /// Whether the axis that points up was given.
+    has_up: bool,
 }
 
 enum Method {
@@ -86,8 +88,9 @@ impl Mover {
         let mut warnings = Vec::new();
         if self.aligned.doubtful() {
             warnings.push(format!(
-                "another way to lay the source onto the target fits almost as well ({:.2} times the distance); look at the result, and give --up or --align where it is wrong",
-                self.aligned.runner_up
+                "another way to lay the source onto the target fits almost as well ({:.2} times the distance); look at the result, and give {} where it is wrong",
+                self.aligned.runner_up,
+                if self.has_up { "--align" } else { "--up or --align" },
             ));
         }
         match &self.method {
@@ -137,7 +140,7 @@ fn fitted(job: &TransferJob<'_>) -> Result<Mover, TransferFailed> {
     };
     let aligned = transfer.report().aligned;
     let method = Method::Fitted(Box::new(transfer));
-    Ok(Mover { method, detail: None, cage_vertices: cage.vertices().len(), aligned })
+    Ok(Mover { method, detail: None, cage_vertices: cage.vertices().len(), aligned, has_up: job.up.is_some() })
 }
 
 fn around(whose: &'static str, model: &Model, stopped: &dyn Fn() -> bool) -> Result<Cage, TransferFailed> {
@@ -190,7 +193,7 @@ fn public(job: &TransferJob<'_>, cage: Public, rigidity: Option<f64>) -> Result<
     } else {
         Method::Public(Box::new(PublicTransfer::new(&rest.vertices, &target.vertices, similarity, cage, job.system)?))
     };
-    Ok(Mover { method, detail, cage_vertices: cage.vertices().len(), aligned })
+    Ok(Mover { method, detail, cage_vertices: cage.vertices().len(), aligned, has_up: job.up.is_some() })
 }
 
 /// Refuses points where coordinates other than mean value ones do not exist.

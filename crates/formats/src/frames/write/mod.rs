@@ -36,6 +36,18 @@ pub fn frames_path(path: &Path) -> &Path {
     path.parent().filter(|_| pattern).unwrap_or(path)
 }
 
+/// Of a name with a place for a number (`FOLDER/NAME.####.obj`) whose files [`create_frames`] puts beside others, whether a file of this path is one of
+/// them; `None` of all other outputs.
+pub fn names_beside_others(path: &Path) -> Option<impl Fn(&Path) -> bool> {
+    let names = NumberedNames::of(path).filter(|_| sequence::shares_folder(path))?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder.canonicalize().ok();
+    Some(move |file: &Path| {
+        let is_named = file.file_name().and_then(|name| name.to_str()).is_some_and(|name| names.number(name).is_some());
+        is_named && file.parent().and_then(|parent| parent.canonicalize().ok()) == folder
+    })
+}
+
 fn mesh_pattern(path: &Path) -> Option<&str> {
     path.file_name()?.to_str().filter(|name| matches!(*name, "*.ply" | "*.obj"))
 }
@@ -46,7 +58,8 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 /// images that move it, as OpenVAT has them. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
-/// A folder with nothing but such files is replaced as a whole where the target may be. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
+/// A folder with nothing but such files is replaced as a whole where the target may be; in the current folder, and in one that holds something else, the
+/// files of such a name are. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
 /// a mesh file. Standard output gets `.npy`.
 ///
 /// # Errors
@@ -75,7 +88,7 @@ pub fn create_frames(
         return Ok(Box::new(CacheWriter::create(announced, &target, CacheFormat::Npy, options)?));
     }
     if let Some(names) = NumberedNames::of(given) {
-        check_numbered(&names, path).map_err(|fault| fault.at(given))?;
+        check_numbered(&names).map_err(|fault| fault.at(given))?;
         return Ok(Box::new(SequenceWriter::create(announced, &target, faces, names, options)?));
     }
     if pattern.is_none() && path.extension().is_some_and(|found| found.eq_ignore_ascii_case("vat")) {
@@ -107,14 +120,11 @@ pub fn create_frames(
     }
 }
 
-fn check_numbered(names: &NumberedNames, folder: &Path) -> Result<(), Fault> {
+fn check_numbered(names: &NumberedNames) -> Result<(), Fault> {
     if !(names.extension_is("obj") || names.extension_is("ply")) {
         return Err(Fault::unsupported(
             "is not of a mesh format that is written for frames; end the name in .obj or .ply",
         ));
-    }
-    if folder.as_os_str().is_empty() {
-        return Err(Fault::invalid("names no folder; give the files a new one, as in FOLDER/NAME.####.obj"));
     }
     Ok(())
 }

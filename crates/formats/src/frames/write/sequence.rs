@@ -1,22 +1,41 @@
 //! Each frame in a mesh file of its own.
 
-use std::io::{BufWriter, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
 
 use super::super::numbered::NumberedNames;
 use super::mesh::FrameMesh;
 use super::output::{Announced, FrameOptions, FrameWriter};
-use crate::atomic::{AtomicDir, Target};
+use crate::atomic::{AtomicDir, AtomicGroup, Target};
 use crate::error::Error;
 use crate::mesh::MeshFormat;
 
 pub(super) struct SequenceWriter {
     announced: Announced,
-    folder: AtomicDir,
+    place: Place,
     mesh: FrameMesh,
     names: NumberedNames,
     options: FrameOptions,
+}
+
+/// Where the files go.
+enum Place {
+    /// Into a folder of their own, which is new or replaced as a whole.
+    Own(AtomicDir),
+    /// Into one with other files.
+    Shared(AtomicGroup),
+}
+
+impl Place {
+    fn create_file(&mut self, name: &str) -> io::Result<File> {
+        match self {
+            Self::Own(folder) => folder.create_file(name),
+            Self::Shared(group) => group.create_file(name),
+        }
+    }
 }
 
 impl SequenceWriter {
@@ -29,8 +48,13 @@ impl SequenceWriter {
     ) -> Result<Self, Error> {
         let format = if names.extension_is("ply") { MeshFormat::Ply } else { MeshFormat::Obj };
         let mesh = FrameMesh::new(format, &announced, faces, options)?;
-        let folder = AtomicDir::create(&announced.path, |name| target.replaces() && names.number(name).is_some())?;
-        Ok(Self { announced, folder, mesh, names, options: options.clone() })
+        let (path, is_frame) = (&announced.path, |name: &str| names.number(name).is_some());
+        let place = if shares_folder(target.path()) {
+            Place::Shared(AtomicGroup::create(path, target.replaces(), is_frame)?)
+        } else {
+            Place::Own(AtomicDir::create(path, |name| target.replaces() && is_frame(name))?)
+        };
+        Ok(Self { announced, place, mesh, names, options: options.clone() })
     }
 }
 
@@ -40,7 +64,7 @@ impl FrameWriter for SequenceWriter {
         let name = self.names.name(self.options.number(self.announced.written));
         let path = self.announced.path.join(&name);
         let failed = |cause| Error::write(&path, cause);
-        let mut file = BufWriter::with_capacity(1 << 16, self.folder.create_file(&name).map_err(failed)?);
+        let mut file = BufWriter::with_capacity(1 << 16, self.place.create_file(&name).map_err(failed)?);
         self.mesh.write(&mut file, positions, &path)?;
         file.flush().map_err(failed)?;
         self.announced.written += 1;
@@ -56,6 +80,20 @@ impl FrameWriter for SequenceWriter {
 
     fn finish(self: Box<Self>) -> Result<(), Error> {
         self.announced.check_complete()?;
-        self.folder.commit()
+        match self.place {
+            Place::Own(folder) => folder.commit(),
+            Place::Shared(group) => group.commit(),
+        }
     }
+}
+
+/// Whether the files that a path names go beside others: those of a numbered name in the current folder, or in one that holds something else.
+pub(super) fn shares_folder(path: &Path) -> bool {
+    let Some(names) = NumberedNames::of(path) else { return false };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Ok(place) = folder.canonicalize() else { return false };
+    let holds_current =
+        std::env::current_dir().and_then(|here| here.canonicalize()).is_ok_and(|here| here.starts_with(&place));
+    let mut entries = place.read_dir().into_iter().flatten().flatten();
+    holds_current || entries.any(|entry| entry.file_name().to_str().is_none_or(|name| names.number(name).is_none()))
 }
