@@ -59,10 +59,12 @@ pub enum CageStyle {
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(default)]
 pub struct CageError {
-    /// On the frames that the design sees; null until a stage is done.
+    /// On the frames that the design is made from; null until a stage is done.
     pub designed: Option<f64>,
-    /// On the frames that are held back to judge by.
+    /// On the frames between them, by which the best cage is chosen.
     pub held_back: Option<f64>,
+    /// Of the final cage on stretches of time that neither saw; null before it is there, and where there are too few frames.
+    pub unseen: Option<f64>,
 }
 
 /// What one stage of a design brought.
@@ -149,6 +151,6 @@ pub struct CageProgress {
     pub fraction: f64,
     /// Vertices of the best cage so far; null before the first.
     pub vertices: Option<u32>,
-    /// Mean L2 error of the best cage so far on held-back frames, as a fraction of the rest pose's diagonal.
+    /// Mean L2 error of the best cage so far on the frames that it is chosen by, as a fraction of the rest pose's diagonal.
     pub error: Option<f64>,
 }

@@ -258,12 +258,18 @@ pub struct DesignReport {
     pub seed: u64,
     /// Vertices of the cage.
     pub vertices: usize,
-    /// Frames that the design saw, and as many or one less that it was judged by.
+    /// Frames that the design was made from; the best of its cages was chosen by as many or one less that lie between them.
     pub frames: usize,
-    /// Error on the frames that the design saw.
+    /// Frames in stretches of time that neither saw; 0 where there were too few to hold some back.
+    #[serde(default)]
+    pub unseen_frames: usize,
+    /// Error on the frames that the design was made from.
     pub designed_error: f64,
-    /// Error on those that it did not see.
+    /// Error on those that the cage was chosen by.
     pub held_back_error: f64,
+    /// Error on those that neither saw.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unseen_error: Option<f64>,
     /// Whether the time limit ended it.
     pub timed_out: bool,
     /// What each stage brought.
@@ -277,9 +283,9 @@ pub struct StageReport {
     pub name: String,
     /// Vertices after it.
     pub vertices: usize,
-    /// Error after it on frames that the design sees.
+    /// Error after it on frames that the design is made from.
     pub designed_error: f64,
-    /// Error after it on frames that it does not see.
+    /// Error after it on the frames between them, by which the best cage is chosen.
     pub held_back_error: f64,
     /// Condition number of the coordinates after it; absent where they are singular, and where it was not computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]

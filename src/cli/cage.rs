@@ -198,6 +198,21 @@ fn name_file(error: &EncloseError, args: &CageArgs) -> anyhow::Error {
     }
 }
 
+/// The error of a designed cage where nothing of it was chosen, or where that is not known, the nearest to it.
+pub(super) fn judged(design: &DesignReport) -> String {
+    match design.unseen_error {
+        Some(error) => format!(
+            "L2 {:.4} % of the diagonal on {} frames, in stretches of time that neither the design nor its choice saw",
+            100.0 * error,
+            grouped(design.unseen_frames)
+        ),
+        None => format!(
+            "L2 {:.4} % of the diagonal on the frames between those it was made from, which chose it: there are too few to hold stretches of time back",
+            100.0 * design.held_back_error
+        ),
+    }
+}
+
 fn summary(report: &CageReport, output: &Path) -> String {
     let mut text =
         format!("{}: {} vertices, {} triangles\n", output.display(), grouped(report.vertices), grouped(report.faces));
@@ -207,8 +222,8 @@ fn summary(report: &CageReport, output: &Path) -> String {
         // A search for the smallest cage may end with fewer vertices than the first one, and more error.
         let better = if times >= 1.05 { format!(", {times:.1} times below the first cage's") } else { String::new() };
         text += &format!(
-            "  error   {:.4} % of the diagonal on frames not seen ({:.4} % on those seen){better}\n",
-            100.0 * design.held_back_error,
+            "  error   {} ({:.4} % on those it was made from){better}\n",
+            judged(design),
             100.0 * design.designed_error,
         );
     }

@@ -1,5 +1,6 @@
 //! Summary and report of `cager encode`.
 
+use super::cage::judged;
 use super::{grouped, human_bytes, is_verbose};
 use anyhow::Result;
 use cager_formats::AtomicFile;
@@ -47,8 +48,8 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     };
     let again = match &report.design {
         Some(design) if output.as_os_str() != "-" => format!(
-            "  cage    designed, L2 {:.4} % on frames it was not made from; for more takes of this model pass --cage {}\n",
-            100.0 * design.held_back_error,
+            "  cage    designed, {}; for more takes of this model pass --cage {}\n",
+            judged(design),
             output.display()
         ),
         _ => String::new(),

@@ -176,10 +176,15 @@ fn summary(report: &RecoveryReport, encoded: &cager_proto::report::Report, outpu
     let placed = report.placement.map_or_else(String::new, |placed| {
         format!("  placed  turned by {:.1} degrees, scaled by {:.4}\n", placed.degrees, placed.scale)
     });
+    let apart = match report.departures.len() {
+        0 => String::new(),
+        1 => "; 1 part leaves its surface".to_owned(),
+        parts => format!("; {} parts leave their surface", grouped(parts)),
+    };
     let s = report.seconds;
     format!(
         "{}: {} frames of {} points as cages of {} vertices\n\
-         {placed}\x20 frames  {} followed from the one before, {} found by a wider search, {} lost\n\
+         {placed}\x20 frames  {} followed from the one before, {} found by a wider search, {} lost{apart}\n\
          \x20 surface template to surface {}, surface to template {} of the diagonal, on average\n\
          \x20 size    {}; errors of encoding: L2 {} on average, L∞ {} at most\n\
          \x20 time    {:.3} s: {:.3} s to prepare, {:.3} s to follow, {:.3} s to refine\n",

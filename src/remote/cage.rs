@@ -91,5 +91,5 @@ pub(super) fn report_of_job(job: &CageJob, options: &DesignOptions) -> DesignRep
         singular: stage.singular,
         seconds: stage.seconds,
     });
-    of_stages(stages.collect(), options, job.sampled_frames as usize, job.timed_out)
+    of_stages(stages.collect(), job.error.unseen, options, job.sampled_frames as usize, job.timed_out)
 }

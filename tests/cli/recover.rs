@@ -3,7 +3,7 @@
 use crate::refused::refused;
 use crate::support::{Dir, mean, measure, polygons, read_frames};
 use cager_demo::{Capture, Options};
-use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use cager_geometry::vector::{add, centroid, mean as average};
 use cager_proto::container::ContainerReader;
 use cager_registration::{Observation, ObservationOptions};
@@ -415,4 +415,96 @@ fn decoded_as_one(dir: &Dir) {
     dir.write("wrong.stretches.json", r#"{"version": 1, "stretches": []}"#);
     refused(dir, "inspect wrong.stretches.json", &["lists no files"]);
     assert!(!dir.path("none").exists() && !dir.path("whole.npy").exists());
+}
+
+/// A closed ball of triangles around a point.
+fn ball(centre: Point, radius: f64) -> Model {
+    let (rings, around) = (10u32, 16u32);
+    let mut points = Vec::new();
+    for i in 0..=rings {
+        let (sin, cos) = (std::f64::consts::PI * f64::from(i) / f64::from(rings)).sin_cos();
+        for k in 0..around {
+            let (y, x) = (std::f64::consts::TAU * f64::from(k) / f64::from(around)).sin_cos();
+            points.push([centre[0] + radius * sin * x, centre[1] + radius * sin * y, centre[2] + radius * cos]);
+        }
+    }
+    let at = |i: u32, k: u32| i * around + k % around;
+    let faces =
+        (0..rings).flat_map(|i| (0..around).map(move |k| vec![at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]));
+    Model { faces: polygons(faces), points, ..Model::default() }
+}
+
+/// Two models in one.
+fn together(a: &Model, b: &Model) -> Model {
+    let count = a.points.len() as u32;
+    let moved = b.faces.iter().map(|face| face.iter().map(|v| v + count).collect::<Vec<u32>>());
+    let faces = polygons(a.faces.iter().map(<[u32]>::to_vec).chain(moved));
+    Model { faces, points: [a.points.clone(), b.points.clone()].concat(), ..Model::default() }
+}
+
+#[test]
+fn parts_that_leave_their_surface_in_frames_that_are_not_lost_are_told_with_frame_and_place() {
+    let (dir, dance) = (Dir::new(), Dance::of(12));
+    let size = diagonal(&dance.rest.points);
+    let side = |v: &usize| dance.rest.points[*v][0];
+    let hand = (0..dance.rest.points.len()).max_by(|a, b| side(a).total_cmp(&side(b))).expect("points");
+    // A ball in the hand.
+    let held = |frame: usize, away: f64| {
+        let [x, y, z] = dance.frames[frame].as_chunks::<3>().0[hand];
+        ball([x + (0.02 + away) * size, y, z], 0.035 * size)
+    };
+    let tell = |name: &str, scans: &dyn Fn(usize) -> Model, template: &Model| {
+        dir.model("rest.obj", template);
+        for frame in 0..12 {
+            dir.model(&format!("scan_{}.obj", 5 + frame), &remeshed(&scans(frame), false));
+        }
+        let line = "recover --template rest.obj --frames scan_*.obj --overwrite";
+        let said = dir.cager(&format!("{line} -o {name}.cager --report {name}.json")).succeeds();
+        println!("{name}: {}{}", said.stderr, said.stdout);
+        (said, dir.json(&format!("{name}.json"))["departures"].clone())
+    };
+    let with = |frame: usize| together(&dance.posed(frame), &held(frame, 0.0));
+
+    // It stays: nothing is told.
+    let (said, departures) = tell("stays", &with, &with(0));
+    assert!(
+        !said.stderr.contains("of the diagonal") && departures.as_array().expect("a list").is_empty(),
+        "{departures}"
+    );
+    assert!(said.stdout.contains("0 lost\n"), "{}", said.stdout);
+
+    // It is let go of, and is gone: the template's ball is where nothing is.
+    let (said, departures) = tell("gone", &|frame| if frame < 7 { with(frame) } else { dance.posed(frame) }, &with(0));
+    let told = &departures[0];
+    let (from, to) = (told["from"].as_f64().expect("a number"), told["to"].as_f64());
+    // What lies near at first is told when it is far.
+    assert!(told["what"] == "off_surface" && (12.0..=13.0).contains(&from) && to == Some(16.0), "{departures}");
+    let vertex = told["vertex"].as_u64().expect("a vertex") as usize;
+    assert!(vertex >= dance.rest.points.len(), "{told}");
+    assert!(
+        told["largest"].as_f64().expect("a share") > 0.012 && told["points"].as_u64().expect("points") > 20,
+        "{told}"
+    );
+    assert!(
+        said.stderr.contains(&format!("from frame {from} to 16, ")) && said.stderr.contains("away from the surface"),
+        "{}",
+        said.stderr
+    );
+    assert!(said.stdout.contains(" leave"), "{}", said.stdout);
+
+    // Something is there that the template has not.
+    let (said, departures) = tell(
+        "new",
+        &|frame| if frame < 7 { dance.posed(frame) } else { together(&dance.posed(frame), &held(frame, 0.2)) },
+        &dance.rest,
+    );
+    let told = departures.as_array().expect("a list").iter().find(|told| told["what"] == "unexplained");
+    let told = told.unwrap_or_else(|| panic!("{departures}"));
+    assert_eq!((told["from"].as_f64(), told["to"].as_f64()), (Some(12.0), Some(16.0)));
+    let place: Vec<f64> =
+        told["position"].as_array().expect("a place").iter().filter_map(serde_json::Value::as_f64).collect();
+    let worst = told["worst"].as_f64().expect("a frame") as usize - 5;
+    let off = (0..3).map(|k| (place[k] - average(&held(worst, 0.2).points)[k]).powi(2)).sum::<f64>().sqrt();
+    assert!(off < 0.06 * size, "{told}");
+    assert!(said.stderr.contains("nowhere near part of the surface"), "{}", said.stderr);
 }

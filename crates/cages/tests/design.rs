@@ -2,7 +2,7 @@
 
 mod common;
 
-use cager_cages::{Design, DesignError, DesignOptions, Goal, Style, design, enclose};
+use cager_cages::{Design, DesignError, DesignOptions, Goal, Parts, Style, design, enclose};
 use cager_core::cage::Cage;
 use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_geometry::mesh::{Model, TriMesh};
@@ -95,6 +95,24 @@ fn a_designed_cage_is_several_times_more_accurate_than_one_of_the_rest_pose_also
     let (first, last) = (&found.stages[0], found.stages.last().unwrap());
     assert!(last.validation_error < first.validation_error / 2.0 && last.training_error < first.training_error / 2.0);
     assert!(last.validation_error < 1.5 * last.training_error);
+}
+
+#[test]
+fn what_is_told_in_the_end_is_measured_where_neither_the_design_nor_its_choice_saw_anything() {
+    let mut capture = capture();
+    let options = with_vertices(40, Style::Free);
+    assert_eq!(designed(&capture, None, &options).unwrap().unseen, None, "too few frames");
+    capture.frames = [capture.frames.clone(), capture.frames].concat();
+    // A motion that is in the stretches that are held back, and nowhere else.
+    let parts = Parts::of(capture.frames.len());
+    for frame in parts.unseen.iter().cloned().flatten() {
+        let positions = capture.frames[frame].as_chunks_mut::<3>().0;
+        positions.iter_mut().zip(&capture.rest.points).for_each(|(p, q)| p[0] += 0.1 * (40.0 * q[2]).sin());
+    }
+    let found = designed(&capture, None, &options).unwrap();
+    let (unseen, last) = (found.unseen.expect("stretches"), found.stages.last().unwrap());
+    assert_eq!(unseen.stretches, parts.unseen);
+    assert!(unseen.error > 3.0 * last.validation_error, "{unseen:?} {last:?}");
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
-use cager_cages::{Design, DesignOptions, Style};
+use cager_cages::{Design, DesignOptions, Parts, Style};
 use cager_proto::report::{DesignReport, StageReport};
 
-/// Frames of a capture that a design looks at, at most: every second one to design by, the others to judge by.
+/// Frames of a capture that a design looks at, at most: some to design by, others to choose by, and stretches of time to judge by.
 pub const FRAMES: usize = 160;
 
 /// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
@@ -32,19 +32,29 @@ pub fn report(design: &Design, options: &DesignOptions, frames: usize) -> Design
         singular: stage.condition_number == Some(f64::INFINITY),
         seconds: stage.seconds,
     });
-    of_stages(stages.collect(), options, frames, design.timed_out)
+    let unseen = design.unseen.as_ref().map(|unseen| unseen.error);
+    of_stages(stages.collect(), unseen, options, frames, design.timed_out)
 }
 
-/// What is worth telling of a design whose stages these are, from so many frames.
-pub fn of_stages(stages: Vec<StageReport>, options: &DesignOptions, frames: usize, timed_out: bool) -> DesignReport {
+/// What is worth telling of a design whose stages these are, with this error on frames that it did not see, from so many frames.
+pub fn of_stages(
+    stages: Vec<StageReport>,
+    unseen_error: Option<f64>,
+    options: &DesignOptions,
+    frames: usize,
+    timed_out: bool,
+) -> DesignReport {
     let last = stages.last();
+    let parts = Parts::of(frames);
     DesignReport {
         style: style_name(options.style).to_owned(),
         seed: options.seed,
         vertices: last.map_or(0, |stage| stage.vertices),
-        frames: frames.div_ceil(2),
+        frames: parts.designed.len(),
+        unseen_frames: unseen_error.map_or(0, |_| parts.unseen_frames()),
         designed_error: last.map_or(0.0, |stage| stage.designed_error),
         held_back_error: last.map_or(0.0, |stage| stage.held_back_error),
+        unseen_error,
         timed_out,
         stages,
     }

@@ -24,6 +24,8 @@ pub struct MovedModel {
     pub positions: Vec<f32>,
     /// Points of the model outside the rest cage; they follow it less and less with distance.
     pub outside: u32,
+    /// Points of the model beside poles of the cage's coordinates: they follow the nearest places of the session's own model.
+    pub bound: u32,
 }
 
 impl Client {
@@ -45,12 +47,14 @@ impl Client {
             let request = request.header(ACCEPT, "application/octet-stream").multipart(form);
             let response = self.send_counted(request, &sent).await?;
             let outside = number(response.headers(), "cager-outside")?;
+            // Services before this version bind none.
+            let bound = number(response.headers(), "cager-bound").unwrap_or(0);
             let most = most_points(model.bytes.len()).saturating_mul(12 * frames as u64);
             let bytes = whole(self, response, most).await?;
             if !bytes.len().is_multiple_of(12 * frames.max(1)) {
                 return Err(self.broken(format!("{} bytes are no {frames} whole frames", bytes.len())));
             }
-            Ok::<_, Failure>(MovedModel { positions: numbers(&bytes, f32::from_le_bytes)?, outside })
+            Ok::<_, Failure>(MovedModel { positions: numbers(&bytes, f32::from_le_bytes)?, outside, bound })
         })
         .await
     }

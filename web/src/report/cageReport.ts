@@ -82,14 +82,19 @@ function design(found: CageFigures['design']) {
   return html`
     <h2>Design</h2>
     <p>
-      ${found.style[0].toUpperCase()}${found.style.slice(1)} cage, designed from ${found.frames} frames and judged by as
-      many others. Errors are mean distances in percent of the diagonal.
+      ${found.style[0].toUpperCase()}${found.style.slice(1)} cage, designed from ${found.frames} frames and chosen by as
+      many between them. Errors are mean distances in percent of the diagonal.
+      ${
+        found.unseen_frames
+          ? `On ${found.unseen_frames} frames in stretches of time that neither saw it is ${percents(found.unseen_error, 4)} %.`
+          : 'There were too few frames to hold stretches of time back.'
+      }
     </p>
     ${table(found.stages, [
       ['stage', (stage) => stage.name],
       ['vertices', (stage) => count(stage.vertices)],
-      ['error seen %', (stage) => percents(stage.designed_error, 4)],
-      ['error not seen %', (stage) => percents(stage.held_back_error, 4)],
+      ['error of design %', (stage) => percents(stage.designed_error, 4)],
+      ['error of choice %', (stage) => percents(stage.held_back_error, 4)],
       ['condition', (stage) => condition(stage.condition_number)],
       ['after', (stage) => seconds(stage.seconds)],
     ])}

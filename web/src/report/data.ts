@@ -186,6 +186,9 @@ export interface CageFigures {
   readonly design?: {
     readonly style: string;
     readonly frames: number;
+    /** In stretches of time that neither the design nor its choice saw, and the error there. */
+    readonly unseen_frames?: number;
+    readonly unseen_error?: Figure;
     readonly stages: readonly {
       readonly name: string;
       readonly vertices: number;

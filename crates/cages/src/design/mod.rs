@@ -6,6 +6,7 @@ mod descent;
 mod exchange;
 mod fit;
 mod options;
+mod parts;
 mod run;
 mod samples;
 mod search;
@@ -13,7 +14,8 @@ mod symmetry;
 mod topology;
 
 use self::contact::{Distances, Obstacles};
-pub use self::options::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style};
+pub use self::options::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style, Unseen};
+pub use self::parts::Parts;
 use self::run::{Best, Defects, Run};
 use self::samples::Samples;
 use self::symmetry::Symmetry;
@@ -30,8 +32,8 @@ use std::time::Instant;
 const CLEARANCE: f64 = 0.002;
 const GAP: f64 = 0.002;
 
-/// Designs a cage from a rest pose and frames of its motion, each with the points of the rest pose back to back: some of the frames
-/// (every second one) are held back to judge by. `start`, where given, is the cage to begin with. `watch` is called with the progress at least once a
+/// Designs a cage from a rest pose and frames of its motion, each with the points of the rest pose back to back: it is made from some of them, chosen by
+/// others and judged by stretches of time that neither saw ([`Parts`]). `start`, where given, is the cage to begin with. `watch` is called with the progress at least once a
 /// second; it may end the design, whose result is then the best cage so far. Runs on the current rayon pool.
 ///
 /// # Errors
@@ -68,7 +70,8 @@ pub fn design(
     if vertices > MAX_VERTICES {
         return Err(DesignError::TooManyVertices { vertices, most: MAX_VERTICES });
     }
-    let sampled = || Samples::new(rest, frames, &mut fastrand::Rng::with_seed(options.seed));
+    let parts = Parts::of(frames.len());
+    let sampled = || Samples::new(rest, frames, &parts, &mut fastrand::Rng::with_seed(options.seed));
     let mut samples = None;
     let mesh = rayon::in_place_scope(|scope| {
         // Meanwhile, as enclosing keeps one thread busy most of the time.
@@ -95,9 +98,20 @@ pub fn design(
     let obstacles = obstacles(rest, &defects.outside, options.style, symmetry);
     let valid = cage.mesh().clone();
     let best = Best { mesh: cage.mesh().clone(), evaluation: samples.evaluate(&cage) };
-    let run =
-        Run { rest, samples: &samples, options, clock, watch, best, valid, defects, stages: Vec::new(), missed: false };
-    Ok(run.optimise(cage, obstacles, frames))
+    let run = Run {
+        rest,
+        frames: (frames, &parts),
+        samples: &samples,
+        options,
+        clock,
+        watch,
+        best,
+        valid,
+        defects,
+        stages: Vec::new(),
+        missed: false,
+    };
+    Ok(run.optimise(cage, obstacles))
 }
 
 /// The obstacles: the points inside the cage, of a large model those that stand for the others, and, for editable cages, the cage itself.

@@ -3,6 +3,7 @@
 use crate::EncloseError;
 use cager_core::cage::CageError;
 use cager_geometry::mesh::TriMesh;
+use std::ops::Range;
 use std::time::Duration;
 
 /// Vertices of a designed cage at most.
@@ -23,7 +24,7 @@ pub enum Style {
 pub enum Goal {
     /// At most so many vertices.
     Vertices(usize),
-    /// As few vertices as keep the mean L2 error on held-back frames at or below this fraction of the diagonal.
+    /// As few vertices as keep the mean L2 error on the frames that a cage is chosen by at or below this fraction of the diagonal.
     MeanError(f64),
 }
 
@@ -64,7 +65,7 @@ pub struct Progress<'a> {
     pub stage: &'static str,
     /// How much of the work is done, from 0 to 1.
     pub fraction: f64,
-    /// Root mean square error on held-back frames of the best cage so far, as a fraction of the diagonal; `None` before the first.
+    /// Root mean square error, on the frames that it is chosen by, of the best cage so far, as a fraction of the diagonal; `None` before the first.
     pub error: Option<f64>,
     /// The best cage so far, where it is another one than at the call before.
     pub better: Option<&'a TriMesh>,
@@ -77,14 +78,23 @@ pub struct Stage {
     pub name: String,
     /// Vertices after it.
     pub vertices: usize,
-    /// Root mean square error after it on the frames that the design sees, as a fraction of the diagonal.
+    /// Root mean square error after it on the frames that the design is made from, as a fraction of the diagonal.
     pub training_error: f64,
-    /// The same on the frames that it does not see.
+    /// The same on the frames between them, by which the best cage is chosen.
     pub validation_error: f64,
     /// Condition number of the coordinates after it, infinite where they are singular; `None` where it was not computed.
     pub condition_number: Option<f64>,
     /// Seconds since the design began.
     pub seconds: f64,
+}
+
+/// What a cage does on stretches of time that neither its design nor its choice saw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unseen {
+    /// Root mean square error, as a fraction of the diagonal.
+    pub error: f64,
+    /// The stretches, among the frames given.
+    pub stretches: Vec<Range<usize>>,
 }
 
 /// A designed cage.
@@ -94,6 +104,8 @@ pub struct Design {
     pub cage: TriMesh,
     /// What each stage brought, in order. The last holds the final errors.
     pub stages: Vec<Stage>,
+    /// How it does where nothing of it was chosen by; `None` of too few frames to hold some back.
+    pub unseen: Option<Unseen>,
     /// Whether the time limit ended it.
     pub timed_out: bool,
     /// Whether the error that was asked for is not met.

@@ -2,7 +2,8 @@
 
 use super::contact::Obstacles;
 use super::descent::Descent;
-use super::options::{Design, DesignOptions, Goal, Progress, Stage, Style};
+use super::options::{Design, DesignOptions, Goal, Progress, Stage, Style, Unseen};
+use super::parts::Parts;
 use super::samples::{Evaluation, Samples};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, Point, TriMesh};
@@ -53,6 +54,8 @@ impl Defects {
 /// A running design.
 pub(super) struct Run<'a> {
     pub(super) rest: &'a Model,
+    /// What the design was given, and what each is for.
+    pub(super) frames: (&'a [Vec<f64>], &'a Parts),
     pub(super) samples: &'a Samples,
     pub(super) options: &'a DesignOptions,
     pub(super) clock: Instant,
@@ -77,7 +80,7 @@ pub(super) struct Phase {
 }
 
 impl Run<'_> {
-    pub(super) fn optimise(mut self, cage: Cage, obstacles: Obstacles, frames: &[Vec<f64>]) -> Design {
+    pub(super) fn optimise(mut self, cage: Cage, obstacles: Obstacles) -> Design {
         let mut descent = Descent::new(cage, self.samples, obstacles, self.options);
         let mut warnings = Vec::new();
         let evaluation = self.best.evaluation.clone();
@@ -92,7 +95,7 @@ impl Run<'_> {
         self.note("start", &descent.cage, &evaluation);
         let ended = match told {
             ControlFlow::Break(()) => ControlFlow::Break(()),
-            ControlFlow::Continue(()) => self.descend(&mut descent, frames, &mut warnings),
+            ControlFlow::Continue(()) => self.descend(&mut descent, &mut warnings),
         };
         if self.options.style == Style::Editable && !self.defects.outside.is_empty() {
             warnings.push(format!(
@@ -108,22 +111,20 @@ impl Run<'_> {
         }
         let timed_out = ended.is_break() && self.is_late();
         let Best { mesh, evaluation } = self.best;
+        let mut unseen = None;
         if let Ok(cage) = Cage::new(mesh.clone()) {
             self.stages.push(stage("the best", &cage, &evaluation, self.clock));
+            let error = self.samples.unseen_error(&cage);
+            unseen = error.map(|error| Unseen { error, stretches: self.frames.1.unseen.clone() });
         }
-        Design { cage: mesh, stages: self.stages, timed_out, missed: self.missed, warnings }
+        Design { cage: mesh, stages: self.stages, unseen, timed_out, missed: self.missed, warnings }
     }
 
-    fn descend(
-        &mut self,
-        descent: &mut Descent<'_>,
-        frames: &[Vec<f64>],
-        warnings: &mut Vec<String>,
-    ) -> ControlFlow<()> {
+    fn descend(&mut self, descent: &mut Descent<'_>, warnings: &mut Vec<String>) -> ControlFlow<()> {
         let goal = match self.options.goal {
             _ if self.keeps_connectivity() => descent.cage.vertices().len(),
             Goal::Vertices(goal) => goal,
-            Goal::MeanError(error) => return self.search(descent, frames, error, warnings),
+            Goal::MeanError(error) => return self.search(descent, error, warnings),
         };
         self.phase(descent, &Phase { stage: "moving the vertices", steps: STEPS, goal, fraction: [0.0, 1.0] })
     }

@@ -1,11 +1,13 @@
-//! Training and validation data of a design: sampled points with the non-affine part of their motion, and points and frames held back for evaluation.
+//! Data of a design: sampled points with the non-affine part of their motion, and points and frames that cages are chosen and judged by.
 
 use super::fit::{BLOCK_ROWS, Fit, ridge_factor};
+use super::parts::Parts;
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_geometry::linalg::{accumulate_product, gram, solve_cholesky, to_double, to_single, transposed_product};
 use cager_geometry::mesh::{Model, Point, diagonal};
 use faer::{Accum, Mat, MatRef, concat};
+use std::ops::Range;
 
 /// Maximum number of points sampled from a model.
 const MAX_POINTS: usize = 20_000;
@@ -14,8 +16,8 @@ const COLUMNS: usize = 96;
 /// Root mean square of the motion that the reduction may leave out, as a fraction of the diagonal.
 const LEFT_OUT: f64 = 1e-5;
 /// Numbers of points and frames on which a cage is evaluated.
-const VALIDATION_POINTS: usize = 8_000;
-const VALIDATION_FRAMES: usize = 40;
+const JUDGED_POINTS: usize = 8_000;
+const JUDGED_FRAMES: usize = 40;
 /// Ridge of the fits that judge a cage, as a fraction of the mean diagonal entry of `ΦᵀΦ`.
 const RIDGE: f64 = 1e-6;
 /// Number of vertices above which the condition number is not computed.
@@ -28,12 +30,14 @@ pub(super) struct Samples {
     /// Training motion, n × c, as fractions of the diagonal: every frame minus its best affine image of the rest pose, which coordinates reproduce exactly, projected to the
     /// principal components of all frames. A fit to these has the same sum of squared residuals as one to the frames, up to the truncation.
     training: Mat<f32>,
-    /// Validation points and the principal components of their motion: in training frames and, from column `held_back_from` on, in held-back frames; and
-    /// the numbers of both.
-    validation_points: Vec<Point>,
-    validation_motion: Mat<f32>,
-    held_back_from: usize,
-    validation_frames: [usize; 2],
+    /// Points that cages are judged at, and the principal components of their motion: in training frames and, from column `chosen_from` on, in those that the
+    /// best is chosen by; and the numbers of both.
+    judged_points: Vec<Point>,
+    judged_motion: Mat<f32>,
+    chosen_from: usize,
+    judged_frames: [usize; 2],
+    /// Their motion in frames that neither sees, and how many these are.
+    unseen: Option<(Mat<f32>, usize)>,
     /// Diagonal of the rest pose.
     pub(super) diagonal: f64,
 }
@@ -69,22 +73,22 @@ impl Evaluation {
 }
 
 impl Samples {
-    /// Alternates frames between training and validation; a single frame serves as both.
-    pub(super) fn new(rest: &Model, frames: &[Vec<f64>], random: &mut fastrand::Rng) -> Self {
-        let every = |first: usize| -> Vec<&[f64]> { frames.iter().skip(first).step_by(2).map(Vec::as_slice).collect() };
-        let (designed, mut held_back) = (every(0), every(1));
-        if held_back.is_empty() {
-            held_back.clone_from(&designed);
-        }
+    /// Of frames with these parts.
+    pub(super) fn new(rest: &Model, frames: &[Vec<f64>], parts: &Parts, random: &mut fastrand::Rng) -> Self {
+        let of = |part: &[usize]| -> Vec<&[f64]> { part.iter().map(|&frame| frames[frame].as_slice()).collect() };
+        let (designed, choosing) = (of(&parts.designed), of(&parts.choosing));
+        let unseen = of(&parts.unseen.iter().cloned().flatten().collect::<Vec<_>>());
         let mut some = |count: usize| -> Vec<usize> {
             let mut indices = random.choose_multiple(0..rest.points.len(), count);
             indices.sort_unstable();
             indices
         };
-        let (used, validation_points) = (some(MAX_POINTS), some(VALIDATION_POINTS));
-        let (seen, unseen) = (evenly(&designed, VALIDATION_FRAMES), evenly(&held_back, VALIDATION_FRAMES));
-        let [seen_motion, unseen_motion] = [&seen, &unseen]
-            .map(|frames| principal(&without_affine(&rest.points, &validation_points, frames), usize::MAX));
+        let (used, judged_points) = (some(MAX_POINTS), some(JUDGED_POINTS));
+        let (seen, choosing) = (evenly(&designed, JUDGED_FRAMES), evenly(&choosing, JUDGED_FRAMES));
+        let unseen = evenly(&unseen, JUDGED_FRAMES);
+        let motion = |frames: &[&[f64]]| principal(&without_affine(&rest.points, &judged_points, frames), usize::MAX);
+        let (seen_motion, chosen_motion) = (motion(&seen), motion(&choosing));
+        let single = |motion: &Mat<f64>| to_single(motion.as_ref(), judged_points.len());
         let at = |indices: &[usize]| -> Vec<Point> { indices.iter().map(|&i| rest.points[i]).collect() };
         Self {
             points: at(&used),
@@ -92,10 +96,11 @@ impl Samples {
                 principal(&without_affine(&rest.points, &used, &designed), COLUMNS).as_ref(),
                 used.len(),
             ),
-            validation_points: at(&validation_points),
-            validation_motion: to_single(concat![[seen_motion, unseen_motion]].as_ref(), validation_points.len()),
-            held_back_from: seen_motion.ncols(),
-            validation_frames: [seen.len(), unseen.len()],
+            judged_points: at(&judged_points),
+            judged_motion: single(&concat![[seen_motion, chosen_motion]]),
+            chosen_from: seen_motion.ncols(),
+            judged_frames: [seen.len(), choosing.len()],
+            unseen: (!unseen.is_empty()).then(|| (single(&motion(&unseen)), unseen.len())),
             diagonal: diagonal(&rest.points),
         }
     }
@@ -110,23 +115,40 @@ impl Samples {
 
     /// Root mean square errors of a cage.
     pub(super) fn evaluate(&self, cage: &Cage) -> Evaluation {
-        let phi = MeanValue.smooth_coordinates(cage, &self.validation_points);
-        // In single precision `ΦᵀΦ` would be off by more than the ridge.
-        let gram = gram(to_double(phi.as_ref()).as_ref(), BLOCK_ROWS);
-        let kept = (gram.nrows() <= LARGE).then(|| gram.clone());
-        let fit = Fit::of_factor(phi.as_ref(), self.validation_motion.as_ref(), || ridge_factor(gram, RIDGE));
-        let error = |first: usize, last: usize, frames: usize| {
-            let Some(fit) = &fit else { return f64::INFINITY };
-            let left = fit.residual.as_ref().subcols(first, last - first);
-            (f64::from(left.squared_norm_l2()) / (left.nrows() * frames) as f64).sqrt()
+        let (gram, residual) = self.residual(cage, &self.judged_motion);
+        let kept = (gram.nrows() <= LARGE).then_some(gram);
+        let error = |columns: Range<usize>, frames: usize| {
+            residual.as_ref().map_or(f64::INFINITY, |left| root_mean_square(left.as_ref(), columns, frames))
         };
-        let [seen, held_back] = self.validation_frames;
+        let [seen, choosing] = self.judged_frames;
         Evaluation {
-            training_error: error(0, self.held_back_from, seen),
-            validation_error: error(self.held_back_from, self.validation_motion.ncols(), held_back),
+            training_error: error(0..self.chosen_from, seen),
+            validation_error: error(self.chosen_from..self.judged_motion.ncols(), choosing),
             gram: kept,
         }
     }
+
+    /// The error of a cage on frames that no choice saw, infinite where it has none; `None` where there are no such frames.
+    pub(super) fn unseen_error(&self, cage: &Cage) -> Option<f64> {
+        let (motion, frames) = self.unseen.as_ref()?;
+        let (_, residual) = self.residual(cage, motion);
+        Some(residual.map_or(f64::INFINITY, |left| root_mean_square(left.as_ref(), 0..left.ncols(), *frames)))
+    }
+
+    /// `ΦᵀΦ` of the points that cages are judged at, and what a fit to their motion leaves.
+    fn residual(&self, cage: &Cage, motion: &Mat<f32>) -> (Mat<f64>, Option<Mat<f32>>) {
+        let phi = MeanValue.smooth_coordinates(cage, &self.judged_points);
+        // In single precision `ΦᵀΦ` would be off by more than the ridge.
+        let gram = gram(to_double(phi.as_ref()).as_ref(), BLOCK_ROWS);
+        let fit = Fit::of_factor(phi.as_ref(), motion.as_ref(), || ridge_factor(gram.clone(), RIDGE));
+        (gram, fit.map(|fit| fit.residual))
+    }
+}
+
+/// Of some columns, which stand for so many frames.
+fn root_mean_square(residual: MatRef<'_, f32>, columns: Range<usize>, frames: usize) -> f64 {
+    let left = residual.subcols(columns.start, columns.len());
+    (f64::from(left.squared_norm_l2()) / (left.nrows() * frames) as f64).sqrt()
 }
 
 /// At most `count` of the frames, evenly spaced.

@@ -30,12 +30,11 @@ pub(super) fn first_vertices(points: usize) -> usize {
 }
 
 impl Run<'_> {
-    /// Grows or shrinks the cage until its error, as the encoder's default options would leave it on held-back frames, is at most `error`
-    /// and not much less.
+    /// Grows or shrinks the cage until its error, as the encoder's default options would leave it on the frames that it is chosen by, is at most
+    /// `error` and not much less.
     pub(super) fn search(
         &mut self,
         descent: &mut Descent<'_>,
-        frames: &[Vec<f64>],
         error: f64,
         warnings: &mut Vec<String>,
     ) -> ControlFlow<()> {
@@ -57,7 +56,7 @@ impl Run<'_> {
                 self.best = Best { mesh, evaluation };
             }
             let best = self.best.clone();
-            let found = self.encoded_error(&best, frames);
+            let found = self.encoded_error(&best);
             if lowest.as_ref().is_none_or(|(least, _)| found < *least) {
                 lowest = Some((found, best.clone()));
             }
@@ -111,17 +110,17 @@ impl Run<'_> {
         ended
     }
 
-    /// Mean L2 error on held-back frames of the encoder with spread handles, as a fraction of the diagonal; infinite where it refuses the
+    /// Mean L2 error, on the frames that cages are chosen by, of the encoder with spread handles, as a fraction of the diagonal; infinite where it refuses the
     /// cage.
-    fn encoded_error(&self, best: &Best, frames: &[Vec<f64>]) -> f64 {
+    fn encoded_error(&self, best: &Best) -> f64 {
         let Ok(cage) = Cage::new(best.mesh.clone()) else { return f64::INFINITY };
         let options = SolverOptions::for_unknowns(cage.vertices().len());
         let Ok(solver) = Solver::prepare(&MeanValue, &cage, &self.rest.points, options) else { return f64::INFINITY };
         assert!(!solver.follows_previous(), "a solver whose cages do not depend on the frame before");
-        let held_back: Vec<&[f64]> =
-            frames.iter().skip(usize::from(frames.len() > 1)).step_by(2).map(Vec::as_slice).collect();
+        let (frames, parts) = self.frames;
+        let choosing: Vec<&[f64]> = parts.choosing.iter().map(|&frame| frames[frame].as_slice()).collect();
         let mut errors = Vec::new();
-        for frames in evenly(&held_back, MAX_MEASURED_FRAMES).chunks(BATCH) {
+        for frames in evenly(&choosing, MAX_MEASURED_FRAMES).chunks(BATCH) {
             let inverted = solver.invert(Rows::All, None, frames);
             let views: Vec<&[f32]> = inverted.iter().map(|inverted| inverted.cage.as_slice()).collect();
             errors.extend(solver.decoder().measure(&views, frames));

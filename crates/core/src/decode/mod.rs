@@ -3,9 +3,11 @@
 
 mod error;
 mod phi;
+mod poles;
 
 pub use error::FrameError;
 pub(crate) use phi::for_each_chunk;
+pub use poles::{Bound, Survey, beside_poles};
 
 use crate::batch::{BATCH, product_columns};
 use crate::cage::Cage;
@@ -95,6 +97,13 @@ impl Decoder {
             assert_eq!(self.columns(), self.positions + normals.faces().len(), "one column per vertex and face");
         }
         self.normals = normals.map(Arc::new);
+        self
+    }
+
+    /// The same, but for some points whose coordinates are others.
+    #[must_use]
+    pub fn with_bound(mut self, bound: Bound) -> Self {
+        self.phi.bind(bound);
         self
     }
 

@@ -1,5 +1,6 @@
 //! A decoder's `Φ`: stored, or recomputed chunk by chunk at every use.
 
+use super::poles::Bound;
 use crate::cage::Cage;
 use crate::coordinates::{Coordinates, PointwiseCoordinates};
 use cager_geometry::linalg;
@@ -27,11 +28,30 @@ pub(super) struct Recomputed {
     cage: Cage,
     points: Vec<Point>,
     columns: usize,
+    /// Points with other coordinates.
+    bound: Bound,
 }
 
 impl Phi {
     pub(super) fn computed(pointwise: PointwiseCoordinates, cage: Cage, points: Vec<Point>, columns: usize) -> Self {
-        Self::Recomputed(Arc::new(Recomputed { pointwise, cage, points, columns }))
+        Self::Recomputed(Arc::new(Recomputed { pointwise, cage, points, columns, bound: Bound::none() }))
+    }
+
+    /// Gives some points other coordinates.
+    ///
+    /// # Panics
+    /// Where it is shared already and recomputed.
+    pub(super) fn bind(&mut self, bound: Bound) {
+        match self {
+            Self::Stored(phi) => {
+                let phi = Arc::make_mut(phi);
+                let all = bound.within(0, phi.nrows());
+                put(phi, &bound, all);
+            }
+            Self::Recomputed(computed) => {
+                Arc::get_mut(computed).expect("coordinates that are not shared yet").bound = bound;
+            }
+        }
     }
 
     pub(super) fn columns(&self) -> usize {
@@ -53,9 +73,11 @@ impl Phi {
         match self {
             Self::Stored(phi) => work(0, (**phi).as_ref()),
             Self::Recomputed(computed) => {
-                let Recomputed { pointwise, cage, points, columns } = &**computed;
+                let Recomputed { pointwise, cage, points, columns, bound } = &**computed;
                 for_each_chunk(*pointwise, cage, points, *columns, |first, part| {
-                    work(first, to_padded_single(part.phi.as_ref()).as_ref());
+                    let mut phi = to_padded_single(part.phi.as_ref());
+                    put(&mut phi, bound, bound.within(first, part.phi.nrows()));
+                    work(first, phi.as_ref());
                 });
             }
         }
@@ -66,9 +88,11 @@ impl Phi {
             Self::Stored(phi) => linalg::rows_of((**phi).as_ref(), rows),
             Self::Recomputed(computed) => {
                 let points: Vec<Point> = rows.iter().map(|&i| computed.points[i as usize]).collect();
-                to_padded_single((computed.pointwise)(&computed.cage, &points).phi.as_ref())
-                    .subrows(0, rows.len())
-                    .to_owned()
+                let mut phi = to_padded_single((computed.pointwise)(&computed.cage, &points).phi.as_ref());
+                let at = rows.iter().enumerate();
+                let bound = &computed.bound;
+                put(&mut phi, bound, at.filter_map(|(row, i)| Some((row, bound.places.binary_search(i).ok()?))));
+                phi.subrows(0, rows.len()).to_owned()
             }
         }
     }
@@ -85,6 +109,13 @@ pub(crate) fn for_each_chunk(
     let size = (CHUNK_BYTES / (12 * columns)).max(1).next_multiple_of(BLOCK_ROWS);
     for (part, points) in points.chunks(size).enumerate() {
         work(part * size, &pointwise(cage, points));
+    }
+}
+
+/// Puts rows of points that are bound in the place of others: pairs of a row and its place among those bound.
+fn put(phi: &mut Mat<f32>, bound: &Bound, rows: impl Iterator<Item = (usize, usize)>) {
+    for (row, at) in rows {
+        (0..phi.ncols()).for_each(|j| phi[(row, j)] = bound.rows[(at, j)] as f32);
     }
 }
 

@@ -105,6 +105,6 @@ impl<'a> Recovering<'a> {
             surfaces.on_pool(|| finish(frame, seen.as_ref(), &tracked))?;
         }
         let cages = tracked.into_iter().map(|frame| frame.cage).collect();
-        Ok(Finished { reports: reports.into(), cages, joints: None, written: finisher.into_frames()? })
+        Ok(Finished { reports: reports.into(), cages, joints: None, written: finisher.into_frames(surfaces.origin)? })
     }
 }

@@ -2,8 +2,10 @@
 
 use super::surfaces::Followed;
 use cager_geometry::mesh::{Point, TriMesh};
-use cager_geometry::spatial::Surface;
-use cager_registration::NearestPoints;
+use cager_geometry::spatial::{Nearest, Surface};
+use cager_registration::{NearestPoints, welded};
+use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Distances between a template and an observed surface, as shares of the diagonal.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
@@ -54,20 +56,78 @@ pub(super) fn is_elsewhere(samples: &[Point], seen: &Followed, from_surface: Opt
 /// Observed points that are measured to the template, at the most.
 const MAX_MEASURED: usize = 5000;
 
-/// Distances from the template to the observed surface, which a cloud has none, and back.
-pub(super) fn distances(
-    template: &TriMesh,
-    samples: &[Point],
-    seen: &Followed,
-    diagonal: f64,
-) -> (Option<Distances>, Option<Distances>) {
-    use rayon::prelude::*;
-    let to = |surface: &Surface, points: &[glam::DVec3]| -> Vec<f64> {
-        points.par_iter().with_min_len(64).map(|&p| surface.nearest(p).map_or(f64::NAN, |n| n.distance)).collect()
-    };
-    let samples: Vec<glam::DVec3> = samples.iter().map(|&p| p.into()).collect();
-    let there = seen.surface.as_ref().and_then(|surface| Distances::new(to(surface, &samples), diagonal));
-    let every = seen.target.points().len().div_ceil(MAX_MEASURED).max(1);
-    let observed: Vec<glam::DVec3> = seen.target.points().iter().copied().step_by(every).collect();
-    (there, Distances::new(to(&Surface::from(template), &observed), diagonal))
+/// Distances of a frame, place by place.
+pub(super) struct Looked {
+    /// From each sample of the template to the observed surface; empty of a cloud.
+    there: Vec<f64>,
+    /// Samples that have nothing beside them since the surface ends there.
+    at_rim: Vec<bool>,
+    /// From observed points to the template, and the point of it that is nearest.
+    pub(super) back: Vec<(Point, f64, u32)>,
+}
+
+impl Looked {
+    /// Of samples of a template.
+    pub(super) fn at(template: &TriMesh, samples: &[Point], seen: &Followed, diagonal: f64) -> Self {
+        let nearest = |surface: &Surface, p: glam::DVec3| surface.nearest(p);
+        let found: Vec<Option<Nearest>> = seen.surface.as_ref().map_or_else(Vec::new, |surface| {
+            samples.par_iter().with_min_len(64).map(|&p| nearest(surface, p.into())).collect()
+        });
+        let there: Vec<f64> = found.iter().map(|found| found.map_or(f64::NAN, |found| found.distance)).collect();
+        let is_far = |&d: &f64| d > SEEN_WITHIN * diagonal;
+        let rim = seen.surface.as_ref().filter(|_| there.iter().any(is_far)).map(rim);
+        let at_rim = |found: &Option<Nearest>| match (found, &seen.surface, &rim) {
+            (Some(found), Some(surface), Some(rim)) => {
+                let corners = surface.triangles[found.face as usize].into_iter().zip(found.weights);
+                corners.filter(|&(_, weight)| weight > 1e-9).all(|(v, _)| rim[v as usize])
+            }
+            _ => false,
+        };
+        let at_rim = found.iter().map(at_rim).collect();
+        let every = seen.target.points().len().div_ceil(MAX_MEASURED).max(1);
+        let observed: Vec<glam::DVec3> = seen.target.points().iter().copied().step_by(every).collect();
+        let template = Surface::from(template);
+        let back = observed.par_iter().with_min_len(64).map(|&p| {
+            let found = nearest(&template, p);
+            let heaviest = |found: &Nearest| (0..3).max_by(|&a, &b| found.weights[a].total_cmp(&found.weights[b]));
+            let vertex =
+                found.map_or(0, |found| template.triangles[found.face as usize][heaviest(&found).unwrap_or(0)]);
+            (p.to_array(), found.map_or(f64::NAN, |found| found.distance), vertex)
+        });
+        Self { there, at_rim, back: back.collect() }
+    }
+
+    /// From the template to the surface, which a cloud has none, and back.
+    pub(super) fn distances(&self, diagonal: f64) -> (Option<Distances>, Option<Distances>) {
+        let there = (!self.there.is_empty()).then(|| Distances::new(self.there.clone(), diagonal)).flatten();
+        (there, Distances::new(self.back.iter().map(|&(_, d, _)| d).collect(), diagonal))
+    }
+
+    /// Samples with a surface beside them, and how far it is.
+    pub(super) fn beside(&self) -> impl Iterator<Item = (usize, f64)> {
+        let all = self.there.iter().copied().zip(&self.at_rim).enumerate();
+        all.filter(|(_, (d, at_rim))| d.is_finite() && !**at_rim).map(|(sample, (d, _))| (sample, d))
+    }
+}
+
+/// Whether a surface ends at a sample is looked at where some are farther from it than this share of the diagonal.
+const SEEN_WITHIN: f64 = 0.005;
+
+/// The vertices at which a surface ends: those of edges that a single triangle has.
+fn rim(surface: &Surface) -> Vec<bool> {
+    let places: Vec<Point> = surface.vertices.iter().map(glam::DVec3::to_array).collect();
+    let first = welded(&places);
+    let mut edges: HashMap<[u32; 2], u32> = HashMap::with_capacity(2 * surface.triangles.len());
+    for triangle in &surface.triangles {
+        let [a, b, c] = triangle.map(|v| first[v as usize]);
+        for [a, b] in [[a, b], [b, c], [c, a]] {
+            *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    let mut rim = vec![false; places.len()];
+    edges
+        .iter()
+        .filter(|(_, count)| **count == 1)
+        .for_each(|(edge, _)| edge.iter().for_each(|&v| rim[v as usize] = true));
+    first.iter().map(|&v| rim[v as usize]).collect()
 }

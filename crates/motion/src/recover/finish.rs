@@ -2,7 +2,8 @@
 
 use super::RecoverError;
 use super::colors::Painter;
-use super::distances::{distances, is_elsewhere};
+use super::departures::{Departure, Departures};
+use super::distances::{Looked, is_elsewhere};
 use super::positions::RecoveredFrames;
 use super::report::{FrameReport, How};
 use super::source::SurfaceSource;
@@ -21,11 +22,13 @@ pub(super) struct Finisher<'a> {
     samples: Vec<SurfacePoint>,
     written: RecoveredFrames,
     painter: Painter,
+    departures: Departures,
 }
 
-/// Frames that can be read, and colours of the template where surfaces had some.
+/// Frames that can be read, what left its surface in them, and colours of the template where surfaces had some.
 pub(super) struct Written {
     pub(super) frames: RecoveredFrames,
+    pub(super) departures: Vec<Departure>,
     pub(super) colors: Option<Vec<[u8; 3]>>,
 }
 
@@ -44,7 +47,8 @@ impl<'a> Finisher<'a> {
         let samples = sample_surface(&rest.vertices, &rest.triangles, MEASURED, 1);
         let offsets = offsets.then(|| OffsetSolver::new(rest, diagonal));
         let painter = Painter::new(rest.vertices.len(), diagonal);
-        Self { rest, source, diagonal, offsets, samples, written, painter }
+        let departures = Departures::new(rest, &samples);
+        Self { rest, source, diagonal, offsets, samples, written, painter, departures }
     }
 
     /// Writes a frame from where its cage has the template's points.
@@ -64,18 +68,22 @@ impl<'a> Finisher<'a> {
         }
         let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
         let points: Vec<Point> = self.samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
-        let distances = seen.map_or((None, None), |seen| distances(&mesh, &points, seen, self.diagonal));
-        let how = match seen {
-            Some(seen) if is_elsewhere(&points, seen, distances.1, self.diagonal) => how.lost(),
-            _ => how,
-        };
+        let looked = seen.map(|seen| Looked::at(&mesh, &points, seen, self.diagonal));
+        let distances = looked.as_ref().map_or((None, None), |looked| looked.distances(self.diagonal));
+        let elsewhere = seen.is_some_and(|seen| is_elsewhere(&points, seen, distances.1, self.diagonal));
+        let how = if elsewhere { how.lost() } else { how };
+        if let Some(looked) = looked.filter(|_| !elsewhere) {
+            self.departures.look(frame, &mesh, &points, &looked, self.diagonal);
+        }
         let named = (self.written.number(frame), self.source.file(frame));
         Ok(FrameReport::new(named, how, distances, seen.map(|seen| (seen.notes, seen.strays))))
     }
 
-    /// All frames, ready to be read.
-    pub(super) fn into_frames(mut self) -> Result<Written, RecoverError> {
+    /// All frames, ready to be read. `origin` was subtracted from them.
+    pub(super) fn into_frames(mut self, origin: Option<Point>) -> Result<Written, RecoverError> {
         self.written.rewind()?;
-        Ok(Written { frames: self.written, colors: self.painter.colors(&self.rest.vertices) })
+        let numbers: Vec<f64> = (0..self.written.frames()).map(|frame| self.written.number(frame)).collect();
+        let departures = self.departures.found(&numbers, origin);
+        Ok(Written { frames: self.written, departures, colors: self.painter.colors(&self.rest.vertices) })
     }
 }

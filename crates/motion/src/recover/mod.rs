@@ -2,6 +2,7 @@
 
 mod any_subject;
 mod colors;
+mod departures;
 mod distances;
 mod encoding;
 mod finish;
@@ -15,6 +16,7 @@ mod spread;
 mod start;
 mod surfaces;
 
+pub use departures::Departure;
 pub use distances::Distances;
 pub use encoding::Encoding;
 pub use gait::GaitCurve;
@@ -289,14 +291,15 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
         seconds.refine = clock.elapsed().as_secs_f64();
         found
     };
-    let mut report = RecoveryReport::new((&rest, &cage), surfaces.diagonal, placement, reports, seconds);
+    let Written { frames, departures, colors: found } = written;
+    let found_all = (reports, departures);
+    let mut report = RecoveryReport::new((&rest, &cage), surfaces.diagonal, placement, found_all, seconds);
     match &joints {
         Some(joints) => report.gait = joints.gait(),
         None => report.find_change(),
     }
     warnings.extend(report.warnings());
     warnings.extend(placement.and_then(|placement| placement.warning()));
-    let Written { frames, colors: found } = written;
     match found {
         Some(found) => template.colors = found,
         None if colors => warnings.push("no frame has colours, so the template keeps its own".to_owned()),

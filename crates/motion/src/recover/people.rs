@@ -126,6 +126,6 @@ impl Person<'_> {
             Ok(())
         })?;
         let joints = Some(Joints { caged, frames: joints, up: self.rig.up });
-        Ok(Finished { reports, cages, joints, written: finisher.into_frames()? })
+        Ok(Finished { reports, cages, joints, written: finisher.into_frames(surfaces.origin)? })
     }
 }

@@ -1,5 +1,6 @@
 //! What is told of a recovery.
 
+use super::departures::{Departure, told};
 use super::distances::Distances;
 use super::gait::GaitCurve;
 use super::placement::Placement;
@@ -25,6 +26,9 @@ pub struct RecoveryReport {
     pub placement: Option<Placement>,
     /// Frames in which part of the template may be somewhere else, by their numbers.
     pub lost: Vec<f64>,
+    /// Parts of the template that left the surface, parts of the surface that it does not explain, and parts that are stretched, lost frames or not: the
+    /// farthest first, twenty at the most.
+    pub departures: Vec<Departure>,
     /// The number of the frame from which on the template lies worse all at once and to the end: the topology seems to have changed for good.
     pub changed_from: Option<f64>,
     /// From the template to the surfaces, on average over the frames that are not lost, or over all where all are.
@@ -149,7 +153,7 @@ impl RecoveryReport {
         (rest, cage): (&TriMesh, &Cage),
         diagonal: f64,
         placement: Option<Placement>,
-        frames: Vec<FrameReport>,
+        (frames, departures): (Vec<FrameReport>, Vec<Departure>),
         seconds: Seconds,
     ) -> Self {
         let all_lost = frames.iter().all(|frame| frame.outcome == "lost");
@@ -168,6 +172,7 @@ impl RecoveryReport {
             diagonal,
             placement,
             lost: frames.iter().filter(|frame| frame.outcome == "lost").map(|frame| frame.number).collect(),
+            departures,
             changed_from: None,
             to_surface: mean(|frame| frame.to_surface),
             from_surface: mean(|frame| frame.from_surface),
@@ -206,6 +211,7 @@ impl RecoveryReport {
         let strays: usize = self.frames.iter().map(|frame| frame.strays).sum();
         let what = format!("points alone and far from all others were left out, {strays} together, in frames");
         tell(&of(|frame| frame.strays > 0), &what);
+        warnings.extend(told(&self.departures));
         warnings.extend(self.changed_from.map(|number| format!(
             "the template lies worse from frame {number} to the end: where the topology changed for good there, go on with another template (--template {number}:OTHER)"
         )));

@@ -68,7 +68,7 @@ impl Work for CageDesign {
 pub(crate) struct Progress {
     stage: Option<&'static str>,
     fraction: f64,
-    /// Error on the held-back frames.
+    /// Error on the frames that the best cage is chosen by.
     error: Option<f64>,
     /// Number of frames sampled.
     sampled: u32,
@@ -178,7 +178,7 @@ impl CageJob {
             faces: progress.best.as_ref().map(|best| best.faces),
             stage: progress.stage.map(str::to_owned),
             fraction: progress.fraction,
-            error: CageError { designed: None, held_back: progress.error },
+            error: CageError { held_back: progress.error, ..CageError::default() },
             stages: Vec::new(),
             seconds: progress.seconds(),
             timed_out: progress.timed_out,

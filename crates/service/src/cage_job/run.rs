@@ -190,7 +190,11 @@ fn finished(designed: &Design, best: &Best, sampled: usize, told: Option<f64>, c
         .map(|stage| CageStage {
             name: stage.name.clone(),
             vertices: stage.vertices as u32,
-            error: CageError { designed: finite(stage.training_error), held_back: finite(stage.validation_error) },
+            error: CageError {
+                designed: finite(stage.training_error),
+                held_back: finite(stage.validation_error),
+                unseen: None,
+            },
             condition_number: stage.condition_number.and_then(finite),
             singular: stage.condition_number == Some(f64::INFINITY),
             seconds: stage.seconds,
@@ -200,7 +204,10 @@ fn finished(designed: &Design, best: &Best, sampled: usize, told: Option<f64>, c
         vertices: best.vertices,
         faces: best.faces,
         sampled: sampled as u32,
-        error: stages.last().map_or(CageError { designed: None, held_back: told }, |stage| stage.error),
+        error: CageError {
+            unseen: designed.unseen.as_ref().and_then(|unseen| finite(unseen.error)),
+            ..stages.last().map_or(CageError { held_back: told, ..CageError::default() }, |stage| stage.error)
+        },
         stages,
         seconds: clock.elapsed().as_secs_f64(),
         timed_out: designed.timed_out,

@@ -29,7 +29,8 @@ use tokio::sync::{oneshot, watch};
 /// Positions of a cage: m × 3 little-endian f32 in, n × 3 out, for as many cages as the body has. Cages may be edited.
 ///
 /// As a form, another model that lies in the same rest cage is moved instead: its points are those of the file in the part `model`, and
-/// `Cager-Outside` says how many of them lie outside the rest cage.
+/// `Cager-Outside` says how many of them lie outside the rest cage, and `Cager-Bound` how many lie beside poles of its coordinates and follow the nearest
+/// places of the session's own model.
 ///
 /// With `layer` and no body, the session's own frames are decoded, where their frames are coded up to the last group that is.
 #[utoipa::path(
@@ -38,7 +39,10 @@ use tokio::sync::{oneshot, watch};
         (Vec<u8> = "application/octet-stream"), (openapi::OtherModelForm = "multipart/form-data"),
     )),
     responses((status = 200, description = "n × 3 numbers per cage", content_type = "application/octet-stream", body = Vec<u8>,
-        headers(("Cager-Outside" = u32, description = "With another model: its points outside the rest cage")))),
+        headers(
+            ("Cager-Outside" = u32, description = "With another model: its points outside the rest cage"),
+            ("Cager-Bound" = u32, description = "With another model: its points that follow the session's own model"),
+        ))),
 )]
 pub(crate) async fn post(
     State(service): State<Arc<Service>>,
@@ -80,10 +84,10 @@ pub(crate) async fn post(
     let arrived = spool.arrived.subscribe();
     let limit = service.config.max_rest_bytes;
     tokio::spawn(spool_cages(Arc::clone(&spool), cages, limit, Arc::clone(&service), Arc::clone(&session)));
-    let (decoder, outside) = match model {
+    let (decoder, counts) = match model {
         Some(model) => {
             let bound = other_model::bind(&service, &session, &tenant.name, model).await?;
-            (bound.decoder, Some(bound.outside))
+            (bound.decoder, Some((bound.outside, bound.bound)))
         }
         None => (service.solver(&session).await?.solver.decoder().clone(), None),
     };
@@ -115,8 +119,9 @@ pub(crate) async fn post(
     let first = futures_util::stream::iter(first.map(Ok));
     let body = Body::from_stream(first.chain(rest));
     let mut response = ([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response();
-    if let Some(outside) = outside {
+    if let Some((outside, bound)) = counts {
         response.headers_mut().insert("cager-outside", HeaderValue::from(outside));
+        response.headers_mut().insert("cager-bound", HeaderValue::from(bound));
     }
     Ok(response)
 }

@@ -90,6 +90,7 @@ pub(super) fn cors(config: &ServeConfig) -> Option<CorsLayer> {
         header::LOCATION,
         header::RETRY_AFTER,
         header::WWW_AUTHENTICATE,
+        name("cager-bound"),
         name("cager-columns"),
         name("cager-faces"),
         name("cager-frames"),

@@ -12,8 +12,10 @@ use crate::session::Session;
 use crate::tasks::blocking;
 use axum::extract::Request;
 use bytes::Bytes;
-use cager_core::decode::Decoder;
+use cager_core::coordinates::{CoordinateSystem as _, MeanValue};
+use cager_core::decode::{self, Decoder, beside_poles};
 use cager_core::inversion::reject_far_points;
+use cager_geometry::mesh::TriMesh;
 use futures_util::StreamExt as _;
 use futures_util::stream::{BoxStream, poll_fn};
 use std::sync::Arc;
@@ -31,6 +33,8 @@ pub(super) struct Bound {
     pub(super) decoder: Decoder,
     /// Points that lie outside the rest cage.
     pub(super) outside: usize,
+    /// Points that lie beside poles of the coordinates, and are bound to the session's own model.
+    pub(super) bound: usize,
 }
 
 /// Reads the part `model`, which comes first, and gives the part `cages` as it arrives.
@@ -108,10 +112,21 @@ pub(super) async fn bind(
         let plan = prepared.solver.preparation().plan.as_ref();
         let coordinates = service.solvers.pool().install(|| system.coordinates(&cage, &model.points, plan));
         let found = coordinates.map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
-        let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len());
+        let mut bound = decode::Bound::none();
+        if let Some(pointwise) = system.pointwise().filter(|_| system.name() == MeanValue.name()) {
+            let beside = beside_poles(found.phi.as_ref());
+            if !beside.is_empty() {
+                let fitted = TriMesh::from(&session.geometry()?.rest);
+                let bind = || decode::Bound::new(pointwise, &cage, &fitted, &model.points, &beside);
+                bound = service.solvers.pool().install(bind);
+            }
+        }
+        let count = bound.places.len();
+        let decoder = Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_bound(bound);
         Ok(Bound {
             decoder: decoder.with_dependent_normals(system.values(&cage).dependent_normals),
             outside: found.outside.len(),
+            bound: count,
         })
     })
     .await?
