@@ -181,6 +181,47 @@ fn section_as_large_as_allowed_stays_within_the_declared_memory() {
 }
 
 #[test]
+fn layers_as_large_as_allowed_stay_within_the_declared_memory() {
+    let (rows, zeros) = (1 << 20, zstd::bulk::compress(&vec![0; 12 << 20], 3).unwrap());
+    let raw = 12u64 << 20;
+    let points = planes(*b"RPTS", &zeros, raw);
+    let faces = Part { codec: 2, ..planes(*b"RFAC", &zeros, raw) };
+    let counts = Header { points: raw / 12, rest_faces: raw / 4, cage_vertices: raw / 12, ..support::header(rows) };
+    let counts = Header { cage_faces: raw / 12, ..counts };
+    // One change of as many vertices as there is room for, and as many layers of one.
+    let vertices = ((8 << 20) - 8 - 24 * 255) / 28;
+    let mut layer: Vec<u8> = [0, vertices].into_iter().chain(0..vertices).flat_map(u32::to_le_bytes).collect();
+    layer.resize(layer.len() + 24 * vertices as usize, 0);
+    let split: Vec<u8> = (0..4).flat_map(|k| layer.iter().skip(k).step_by(4).copied()).collect();
+    let split = zstd::bulk::compress(&split, 19).unwrap();
+    let small = [0u32, 1, 7, 0, 0, 0].map(u32::to_le_bytes).concat();
+    let mut parts = vec![
+        Part::raw(*b"HEAD", 1, &wire::encode::<_, 600>(&counts).unwrap()),
+        points.clone(),
+        faces.clone(),
+        Part { tag: *b"CVTX", ..points },
+        Part { tag: *b"CTRI", ..faces.clone() },
+        Part { tag: *b"FRAM", frames: (0, 1), ..faces.clone() },
+        Part { tag: *b"FRAM", frames: (1, 1), ..faces },
+        Part::raw(*b"ERRS", 4, &[0; 16]),
+        Part { frames: (0, 2), ..planes(*b"EDIT", &split, layer.len() as u64) },
+    ];
+    parts.extend(vec![Part { frames: (1, 1), ..Part::raw(*b"EDIT", 4, &small) }; 255]);
+    let bytes = put_together(&parts);
+    let (result, peak) = peak_of(|| read_all(&bytes));
+    result.unwrap();
+    assert!(peak < budget(bytes.len()), "{peak} bytes for {}", bytes.len());
+    // Twice as much is refused before any of it is read.
+    parts.truncate(parts.len() - 254);
+    let last = parts[8].clone();
+    parts.extend(vec![last; 16]);
+    let bytes = put_together(&parts);
+    let (result, peak) = peak_of(|| ContainerReader::open(Cursor::new(&bytes)).map(|_| ()));
+    assert!(result.unwrap_err().to_string().contains("more layers of edits than it can hold"));
+    assert!(peak < 1 << 20, "{peak} bytes");
+}
+
+#[test]
 fn report_of_many_empty_texts_stays_within_the_declared_memory() {
     let warnings = vec![""; (4 << 20) / 3 - 200];
     let text = serde_json::to_vec(&serde_json::json!({ "warnings": warnings })).unwrap();

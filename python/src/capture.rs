@@ -12,7 +12,7 @@ use crate::frames::Cages;
 use crate::geometry::{array, triangles};
 use crate::own_file::{OwnFile, temporary};
 use cager_capture::decode::{self, DecodeError, Positions};
-use cager_capture::edit::edit;
+use cager_capture::edit::{Editing, edit};
 use cager_capture::edited::EditedCages;
 use cager_capture::origin::move_from;
 use cager_formats::{Action, AtomicFile, Error, FrameReader, Target, commit_together};
@@ -236,7 +236,8 @@ impl Capture {
             };
             let edited = EditedCages::of_frames(Path::new("cages"), &container, Box::new(reopen))?;
             let file = OwnFile::new(temporary()?.into_temp_path());
-            let made = edit(container, &self.path, edited, &Target::Replacing(file.path().to_owned()), &mut |_| ())?;
+            let target = Target::Replacing(file.path().to_owned());
+            let made = edit(container, &self.path, edited, &Editing::default(), &target, &mut |_| ())?;
             commit_together(vec![made.container])?;
             Self::of_encoding(file)
         })

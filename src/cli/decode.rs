@@ -9,7 +9,7 @@ use super::{grouped, plain, progress, read_like, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::cage_export::write_cages;
 use cager_capture::decode::joined::{Joining, decode_joined};
-use cager_capture::decode::{self, DecodeError, Decoding};
+use cager_capture::decode::{self, Container, DecodeError, Decoding};
 use cager_capture::edited::EditedCages;
 use cager_formats::{FrameRange, Target};
 use std::path::Path;
@@ -33,19 +33,21 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         };
         warn(&[format!("{}: was cut, or is damaged: {lost}; get the file again", args.input.display())]);
     }
+    if let Some(lost) = lost_layers(&mut container) {
+        warn(&[format!("{}: {lost}; get the file again", args.input.display())]);
+    }
     let edited = transfer.with_cages.as_ref().map(|path| EditedCages::open(path, &container)).transpose()?;
     let model = transfer.model.as_ref().map(|path| read_like(path, container.header().units)).transpose()?;
     let there = edited.as_ref().map_or(container.frames(), EditedCages::frames);
-    if edited.is_some() && container.has_residual() && !transfer.cages {
-        warn(&[DETAIL_LOST.to_owned()]);
-    }
+    let replaced = edited.as_ref().is_some_and(|edited| edited.replaces_frames(None));
+    let loses_detail = replaced && container.has_residual();
+    // Where they are damaged, frames are counted from 0.
+    let numbers = container.frame_numbers().unwrap_or_default();
     let is_colored = !transfer.cages && container.colors().is_ok_and(|colors| !colors.is_empty());
     if is_colored && model.is_none() {
         let [from, to] = [&args.input, &args.output].map(|path| path.display());
         warn(&[format!("{from}: the colours of its points are not kept in {to}")]);
     }
-    // Where they are damaged, frames are counted from 0.
-    let numbers = container.frame_numbers().unwrap_or_default();
     drop(container);
     // Checked against the file that has the frames.
     let range = transfer.range(there, &numbers, transfer.with_cages.as_ref().unwrap_or(&args.input))?;
@@ -88,17 +90,12 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
     bar.finish();
     let found = result?;
+    if loses_detail {
+        warn(&[DETAIL_LOST.to_owned()]);
+    }
     // For the file's own model, encoding has warned already.
     if let (Some(path), true) = (&transfer.model, found.outside > 0) {
         warn(&[outside(path, found.outside, found.points)]);
-    }
-    if let (Some(path), true) = (&transfer.model, found.bound > 0) {
-        warn(&[format!(
-            "{}: {} of {} points lie beside poles of the cage's coordinates, where these follow nothing; they follow the nearest places of the file's own model",
-            path.display(),
-            grouped(found.bound),
-            grouped(found.points)
-        )]);
     }
     if let [first, .., last] | [first @ last] = found.damaged[..] {
         let count = grouped(found.damaged.len());
@@ -121,6 +118,18 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         grouped(found.points),
         clock.elapsed().as_secs_f64()
     ))
+}
+
+/// What is to be said of layers of edits that a damaged file has not, if anything.
+fn lost_layers(container: &mut Container) -> Option<String> {
+    let (_, lost) = (container.layers().is_ok(), container.lost_layers());
+    match lost {
+        0 if container.was_cut() && !container.lacks_end() => {
+            Some("its end is missing or damaged: layers of edits that were there are lost".to_owned())
+        }
+        0 => None,
+        _ => Some(format!("{} of its layers of edits are damaged and left out", grouped(lost))),
+    }
 }
 
 /// Decodes the files of a list as one sequence.

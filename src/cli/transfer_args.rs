@@ -4,8 +4,10 @@ use super::outputs::OutputArgs;
 use super::tell;
 use anyhow::{Result, bail};
 use cager_formats::FrameRange;
-use clap::Args;
+use cager_proto::container::MAX_LAYER_NAME;
+use clap::{ArgGroup, Args};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// What is decoded, where it is not every frame of the file's own model and cages.
 #[derive(Args, Debug)]
@@ -59,24 +61,79 @@ impl TransferArgs {
     }
 }
 
-/// Write a .cager file again with edited cages.
+/// Add edited cages to a .cager file as a layer, or take layers back, switch them and write them into the cages.
 ///
-/// `cager decode --cages` writes the cages to edit. Errors of the frames that changed are not measured: the capture is not there.
-/// Example: cager edit walk.cager --with-cages edited.npy -o edited.cager
+/// `cager decode --cages` writes the cages to edit. A layer says by how much vertices of the cage are moved in which frames; all else in the file stays as it is,
+/// details beside the cages too, so that a layer can be taken back.
+/// Example: cager edit walk.cager --with-cages edited.npy --name smile -o edited.cager
 #[derive(Args, Debug)]
+#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["with_cages", "flatten", "remove", "on", "off"]))]
 pub(crate) struct EditArgs {
     /// File to read.
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Edited cages: folder, quoted glob or numbered name of mesh files, .npy, .pc2, .mdd, .mcx, .abc or .usdc, of any number of frames.
+    /// Edited cages: folder, quoted glob or numbered name of mesh files, .npy, .pc2, .mdd, .mcx, .abc or .usdc. Of another number of frames than the file has, they
+    /// take the place of all its frames.
     #[arg(long, value_name = "EDITED")]
-    pub(crate) with_cages: PathBuf,
+    pub(crate) with_cages: Option<PathBuf>,
 
-    /// File to write, or - for standard output; it appears whole or not at all.
+    /// What the layer is called, in at most 256 bytes.
+    #[arg(long, requires = "with_cages", conflicts_with = "flatten", value_parser = layer_name)]
+    pub(crate) name: Option<String>,
+
+    /// Take only frames A to B of the file, both included, counted from 0; EDITED has all frames, or these.
+    #[arg(long, value_name = "A-B", requires = "with_cages", allow_hyphen_values = true)]
+    pub(crate) frames_range: Option<FrameRange>,
+
+    /// Write the layers that are on into the cages, and none beside them.
+    #[arg(long)]
+    pub(crate) flatten: bool,
+
+    /// Take back the last layer, the one with this number (from 1), or all.
+    #[arg(long, value_name = "LAYER|all", num_args = 0..=1, default_missing_value = "last", conflicts_with_all = ["with_cages", "flatten", "on", "off"])]
+    pub(crate) remove: Option<LayerChoice>,
+
+    /// Switch the layer with this number on.
+    #[arg(long, value_name = "LAYER", conflicts_with_all = ["with_cages", "flatten"])]
+    pub(crate) on: Option<usize>,
+
+    /// Switch the layer with this number off: it is kept and not applied.
+    #[arg(long, value_name = "LAYER", conflicts_with_all = ["with_cages", "flatten"])]
+    pub(crate) off: Option<usize>,
+
+    /// File to write, or - for standard output; it appears whole or not at all. With --overwrite it may be IN.cager.
     #[arg(short, long, value_name = "OUT.cager")]
     pub(crate) output: PathBuf,
 
     #[command(flatten)]
     pub(crate) outputs: OutputArgs,
+}
+
+/// Layers that are taken back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LayerChoice {
+    Last,
+    Number(usize),
+    All,
+}
+
+impl FromStr for LayerChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "last" => Ok(Self::Last),
+            "all" => Ok(Self::All),
+            number => number
+                .parse()
+                .map(Self::Number)
+                .map_err(|_| "is no layer; give the number that `cager inspect` shows, or all".to_owned()),
+        }
+    }
+}
+
+fn layer_name(text: &str) -> Result<String, String> {
+    let fits = text.len() <= MAX_LAYER_NAME;
+    fits.then(|| text.to_owned()).ok_or_else(|| format!("has {} bytes, more than {MAX_LAYER_NAME}", text.len()))
 }

@@ -1,7 +1,7 @@
 //! Files that the program wrote, with the positions that they decoded to: they decode to the same for ever.
 //!
 //! `tests/golden/definitionN-SYSTEM.cager` was written by a program whose coordinates are of definition N, and the array beside it by its
-//! `cager decode`; `-elements` is with the boundary elements in the file, `-origin` of a capture far from the origin of its coordinates. Frames of `coded-SYSTEM` are coded, by
+//! `cager decode`; `-elements` is with the boundary elements in the file, `-origin` of a capture far from the origin of its coordinates, `edited` with layers of edits. Frames of `coded-SYSTEM` are coded, by
 //! `--max-error 1e-3`, with `harmonic` by `--quality preview`; `coded-parted-SYSTEM` has a residual in two parts, by a program whose `PARTED_NUMBERS` is 1. The model has 120 points in a
 //! cage of 26 vertices, and three frames.
 
@@ -35,7 +35,7 @@ fn numbers(file: &Path) -> Vec<f64> {
 #[test]
 fn files_of_every_version_decode_to_what_they_always_did() {
     let files = golden();
-    let kinds = ["mvc", "mvc-origin", "harmonic", "harmonic-elements", "green", "green-free"];
+    let kinds = ["mvc", "mvc-origin", "mvc-edited", "harmonic", "harmonic-elements", "green", "green-free"];
     let definition = cager_core::coordinates::DEFINITION;
     let coded = ["mvc", "harmonic", "green", "green-free", "parted-mvc"].map(|kind| format!("coded-{kind}"));
     let edited = ["edited-mvc".to_owned()];

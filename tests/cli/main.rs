@@ -9,6 +9,7 @@ mod compare;
 mod decode;
 mod defaults;
 mod demo;
+mod edits;
 mod encode;
 mod explore;
 mod farm;

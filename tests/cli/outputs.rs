@@ -95,7 +95,7 @@ fn inputs_are_never_outputs() {
         (format!("{} -o walk/1.obj", ENCODE_NEW.replace("frames.npy", "walk/%d.obj")), "1.obj"),
         ("decode out.cager --with-cages cages -o cages/".into(), "cages"),
         ("decode out.cager --with-cages cages/*.obj -o cages/*.obj".into(), "cages"),
-        ("edit out.cager --with-cages cages -o ./out.cager".into(), "out.cager"),
+        ("edit out.cager --with-cages cages/*.obj -o cages/frame_0001.obj".into(), "obj"),
         ("cage --rest rest.obj --repair cage.obj -o cage.obj".into(), "cage.obj"),
         (format!("{COMPARE} -o cage.obj"), "cage.obj"),
     ] {

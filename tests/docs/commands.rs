@@ -123,12 +123,15 @@ fn the_commands_of_readme_and_guide_encode_decode_and_edit() {
 
     fs::copy(folder.join("rest.obj"), folder.join("coat.obj")).expect("a copy");
     let edited = section(GUIDE, "Edited cages, other models, some frames");
-    assert_eq!(edited.len(), 5, "{edited:?}");
+    assert_eq!(edited.len(), 6, "{edited:?}");
     let (cages, rest) = edited.split_at(1);
     run(folder, cages.to_vec());
-    fs::copy(folder.join("cages.npy"), folder.join("edited.npy")).expect("a copy");
+    let mut moved = fs::read(folder.join("cages.npy")).expect("cages");
+    let last = moved.len() - 4;
+    moved[last..].copy_from_slice(&0.5_f32.to_le_bytes());
+    fs::write(folder.join("edited.npy"), moved).expect("cages");
     run(folder, rest.to_vec());
-    for file in ["cages.cage.obj", "edited.pc2", "edited.cager", "coat.pc2", "out/walk.0020.obj"] {
+    for file in ["cages.cage.obj", "edited.pc2", "edited.cager", "walk-again.cager", "coat.pc2", "out/walk.0020.obj"] {
         assert!(folder.join(file).exists(), "{file}");
     }
 }

@@ -11,11 +11,11 @@ use crate::origin::{LOST, move_to};
 use crate::timing::Timing;
 use cager_core::cage::Cage;
 use cager_core::coordinates;
-use cager_core::coordinates::{CoordinateSystem as _, Coordinates, DEFINITION, ElementPlan, MeanValue};
-use cager_core::decode::{Bound, Decoder, Survey};
+use cager_core::coordinates::{Coordinates, DEFINITION, ElementPlan};
+use cager_core::decode::Decoder;
 use cager_core::inversion::{BATCH, coordinates_bytes, reject_far_points};
 use cager_formats::{CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
-use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Point, Polygons, diagonal};
 use cager_proto::container;
 use std::path::{Path, PathBuf};
 
@@ -58,7 +58,12 @@ pub enum Layer {
 impl Decoding<'_> {
     /// Whether it is the file's own model and cages, which alone the residual is of.
     fn own(&self) -> bool {
-        self.model.is_none() && self.cages.is_none()
+        self.model.is_none() && self.has_own_frames()
+    }
+
+    /// Whether no edited cages take the place of all frames.
+    fn has_own_frames(&self) -> bool {
+        self.cages.as_ref().is_none_or(|cages| !cages.replaces_frames(None))
     }
 }
 
@@ -71,8 +76,6 @@ pub struct Decoded {
     pub frames: usize,
     /// Points of another model that lie outside the rest cage.
     pub outside: usize,
-    /// Points of another model that lie beside poles of the coordinates, and are bound to the file's own model.
-    pub bound: usize,
     /// Frames of the file that were left out because they are damaged, from 0.
     pub damaged: Vec<usize>,
     /// Whether the numbers of the file's frames are damaged, so that they are counted from 0.
@@ -81,13 +84,15 @@ pub struct Decoded {
     pub notes: Vec<String>,
 }
 
-/// A model in its rest pose with its decoder, and the numbers of its points outside the rest cage and beside poles.
+/// A model in its rest pose with its decoder, and the number of its points outside the rest cage.
 struct BoundModel {
     rest: Model,
     decoder: Decoder,
     outside: usize,
-    bound: usize,
 }
+
+/// Entries of `Φ` computed at a time to find the points outside.
+const OUTSIDE_ENTRIES: usize = 1 << 23;
 
 /// Computes the coordinates of the container's model, if they are not `known`, or of another, in the container's cage; `keeps(points, columns)` decides whether
 /// to keep them in memory.
@@ -111,14 +116,14 @@ fn bind(
         return Err(unsupported(format!("its coordinates are of definition {}", header.coordinates_definition)));
     }
     let own = container.rest().map_err(fail)?;
-    let (model_path, rest, fitted) = match other {
-        None => (path, own, None),
-        Some((path, model)) => {
+    let (model_path, rest) = other.map_or_else(
+        || (path, own),
+        |(path, model)| {
             let mut model = model.clone();
             move_to(header.origin, &mut model.points);
-            (path, model, Some(TriMesh::from(&own)))
-        }
-    };
+            (path, model)
+        },
+    );
     if let Some(face) = rest.faces.arities().iter().position(|&corners| corners < 3) {
         return Err(fail(container::Error::Corrupt {
             offset: 0,
@@ -147,13 +152,10 @@ fn bind(
             columns,
         );
         let decoder = decoder.with_dependent_normals(values.dependent_normals);
-        let Some(fitted) = fitted else { return Ok(BoundModel { rest, decoder, outside: 0, bound: 0 }) };
-        let Survey { outside, mut beside } = Survey::of(pointwise, &cage, &rest.points);
-        // Other coordinates have no poles.
-        beside.retain(|_| header.coordinates == MeanValue.name());
-        let bound = Bound::new(pointwise, &cage, &fitted, &rest.points, &beside);
-        let count = bound.places.len();
-        return Ok(BoundModel { rest, decoder: decoder.with_bound(bound), outside, bound: count });
+        let some = (OUTSIDE_ENTRIES / columns).max(1);
+        let outside = |points: &[Point]| pointwise(&cage, points).outside.len();
+        let outside = other.map_or(0, |_| rest.points.chunks(some).map(outside).sum());
+        return Ok(BoundModel { rest, decoder, outside });
     }
     let elements = if known.is_some() { 0 } else { system.working_bytes(&cage, plan.as_ref()) };
     let needed = coordinates_bytes(rest.points.len(), columns, 2).saturating_add(elements);
@@ -164,7 +166,7 @@ fn bind(
     let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
     let decoder =
         Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals);
-    Ok(BoundModel { rest, decoder, outside: found.outside.len(), bound: 0 })
+    Ok(BoundModel { rest, decoder, outside: found.outside.len() })
 }
 
 /// Frames of a container, decoded as they are asked for.
@@ -283,7 +285,7 @@ impl<'a> Chosen<'a> {
         }
         let numbers_lost = salvage && container.frame_numbers().is_err();
         let mut damaged = Vec::new();
-        if salvage && cages.is_none() {
+        if salvage && what.has_own_frames() {
             damaged = wanted.clone();
             damaged.retain(|&frame| !container.is_intact(frame, what.own() && what.layer == Layer::All));
             let mut at = wanted.iter();
@@ -340,8 +342,11 @@ impl<'a> Chosen<'a> {
             let wanted = &self.wanted[first..first + count];
             for (&frame, cage) in wanted.iter().zip(&mut cages) {
                 match &mut self.what.cages {
-                    Some(edited) => edited.read_frame(frame, cage)?,
-                    None => self.container.read_frame(frame, cage).map_err(fail)?,
+                    Some(edited) if edited.replaces_frames(None) => edited.read_frame(frame, cage)?,
+                    edited => {
+                        self.container.read_frame(frame, cage).map_err(fail)?;
+                        edited.as_mut().map_or(Ok(()), |edited| edited.move_frame(frame, cage))?;
+                    }
                 }
             }
             if !self.what.dry_run {
@@ -389,5 +394,5 @@ pub fn decode(
         writer.finish()?;
     }
     let Chosen { damaged, numbers_lost, .. } = chosen;
-    Ok(Decoded { points, frames, outside: bound.outside, bound: bound.bound, damaged, numbers_lost, notes })
+    Ok(Decoded { points, frames, outside: bound.outside, damaged, numbers_lost, notes })
 }

@@ -1,10 +1,10 @@
-//! Writes containers with edited cages.
+//! Writes containers with edited cages: as a layer beside what is there, or anew.
 
 use crate::capture::GENERATOR;
 use crate::decode::{Container, DecodeError};
 use crate::edited::EditedCages;
-use cager_formats::{Action, AtomicFile, Target};
-use cager_proto::container::{self, ContainerWriter};
+use cager_formats::{Action, AtomicFile, FrameRange, Target};
+use cager_proto::container::{self, ContainerWriter, EditLayer, LayerBuilder, LayerSource};
 use cager_proto::report::{Errors, Report};
 use std::io::BufWriter;
 use std::path::Path;
@@ -12,20 +12,34 @@ use std::path::Path;
 /// What a report says of errors that are not known.
 const NOT_MEASURED: &str = "the cages were edited: their errors are not measured";
 
+/// A file that takes a container.
+type Output = BufWriter<AtomicFile>;
+
+/// How edited cages are taken.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Editing<'a> {
+    /// What the layer is called; may be empty.
+    pub name: &'a str,
+    /// The frames of the container that are edited; the edited cages are those of all its frames, or of these.
+    pub range: Option<FrameRange>,
+}
+
 /// What [`edit`] gives.
 pub struct Edited {
     /// Number of frames.
     pub frames: usize,
     /// Frames whose cage is another than in the container it came from, or has no counterpart there.
     pub changed: usize,
-    /// Whether the container had corrections of points beside the cages, which are left out.
+    /// Vertices of the cage that the layer moves; none where there is no layer.
+    pub vertices: usize,
+    /// Whether the container had corrections of points beside the cages, which are left out, as of another number of frames.
     pub loses_detail: bool,
     /// The container, complete but for its name.
     pub container: AtomicFile,
 }
 
-/// Writes the container at `input` again with edited cages. Unchanged frames keep their errors; those of changed frames are not measured,
-/// since the capture is not available. Where no frame is changed, the container is copied.
+/// Writes the container at `input` again with one more layer: edited cages less those that it has. All else keeps its bytes, and positions are what they were plus
+/// what the layer moves them by. Where no frame is changed, the container is copied. Cages of another number of frames take the place of all that are there.
 ///
 /// # Errors
 /// Damage; edited cages that cannot be read; an output that refuses.
@@ -33,14 +47,95 @@ pub fn edit(
     mut container: Container,
     input: &Path,
     mut edited: EditedCages,
+    what: &Editing<'_>,
+    output: &Target,
+    progress: &mut dyn FnMut(usize),
+) -> Result<Edited, DecodeError> {
+    if edited.replaces_frames(what.range) {
+        return rewritten(container, input, edited, output, progress);
+    }
+    let frames = container.frames();
+    let (layer, changed) = layer(&mut container, input, &mut edited, what, progress)?;
+    let vertices = layer.as_ref().map_or(0, |layer| layer.vertices.len());
+    let file = match layer {
+        Some(layer) => {
+            let there = container.layers().map_err(|cause| DecodeError::container(input, cause))?.len();
+            let layers: Vec<_> = (0..there).map(LayerSource::Kept).chain([LayerSource::New(layer)]).collect();
+            with_layers(&mut container, input, &layers, output)?
+        }
+        None => copied(input, output)?,
+    };
+    Ok(Edited { frames, changed, vertices, loses_detail: false, container: file })
+}
+
+/// The layer that makes edited cages of a container's own, nothing where they are the same; and how many frames it changes.
+///
+/// # Errors
+/// Damage; edited cages that cannot be read.
+pub fn layer(
+    container: &mut Container,
+    input: &Path,
+    edited: &mut EditedCages,
+    what: &Editing<'_>,
+    progress: &mut dyn FnMut(usize),
+) -> Result<(Option<EditLayer>, usize), DecodeError> {
+    let mut builder = LayerBuilder::default();
+    let (mut old, mut new, mut changed) = (Vec::new(), Vec::new(), 0);
+    for (done, (place, frame)) in edited.places(what.range)?.into_iter().enumerate() {
+        container.read_frame(frame, &mut old).map_err(|cause| DecodeError::container(input, cause))?;
+        edited.read_beside(place, &old, &mut new)?;
+        changed += usize::from(builder.add(frame, &old, &new));
+        progress(done + 1);
+    }
+    Ok((builder.finish(what.name), changed))
+}
+
+/// Writes the container at `input` again with these layers; all else keeps its bytes.
+///
+/// # Errors
+/// Damage; layers that do not fit it; an output that refuses.
+pub fn with_layers(
+    container: &mut Container,
+    input: &Path,
+    layers: &[LayerSource],
+    output: &Target,
+) -> Result<AtomicFile, DecodeError> {
+    written(input, output, |file| ContainerWriter::copy_with_layers(container, layers, file))
+}
+
+/// Writes the container at `input` again with cages that have its layers in them, and `more`. What is added to positions beside the cages is kept; those that are
+/// switched off are not.
+///
+/// # Errors
+/// Damage; an output that refuses.
+pub fn flattened(
+    mut container: Container,
+    input: &Path,
+    more: Option<EditLayer>,
+    output: &Target,
+) -> Result<AtomicFile, DecodeError> {
+    let fail = |cause| DecodeError::container(input, cause);
+    if let Some(layer) = more {
+        container.push_layer(layer).map_err(fail)?;
+    }
+    if container.layers().map_err(fail)?.iter().all(|layer| !layer.is_on) {
+        return with_layers(&mut container, input, &[], output);
+    }
+    let report = after_editing(container.report().map_err(fail)?);
+    written(input, output, |file| ContainerWriter::copy_flattened(&mut container, Some(&report), file))
+}
+
+/// The container with edited cages alone, in place of all that it has. Unchanged frames keep their errors; those of changed frames are not measured, since the
+/// capture is not available.
+fn rewritten(
+    mut container: Container,
+    input: &Path,
+    mut edited: EditedCages,
     output: &Target,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Edited, DecodeError> {
     let fail = |cause| DecodeError::container(input, cause);
-    if container.has_residual() && is_same(&mut container, &mut edited, input)? {
-        return copied(input, output, edited.frames());
-    }
-    let refused = |cause: container::Error| written(output.path(), cause);
+    let refused = |cause: container::Error| refused(output.path(), cause);
     let (mut rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
     rest.colors = container.colors().map_err(fail)?;
     let report = container.report().map_err(fail)?;
@@ -67,65 +162,56 @@ pub fn edit(
         writer.write_frame(&new, error.0, error.1).map_err(refused)?;
         progress(frame + 1);
     }
-    let same = changed == 0 && frames == container.frames() && !loses;
-    if frames == container.frames() {
-        writer.add_frame_numbers(&container.frame_numbers().map_err(fail)?).map_err(refused)?;
-    }
     // Cages are stored as they are.
-    let report = Report { coding: None, ..if same { report } else { after_editing(report) } };
-    let buffered = writer.finish(Some(&report)).map_err(refused)?;
-    let mut container = buffered.into_inner().map_err(|error| refused(error.into_error().into()))?;
-    container.complete()?;
-    Ok(Edited { frames, changed, loses_detail: loses, container })
+    let report = Report { coding: None, ..after_editing(report) };
+    let container = completed(writer.finish(Some(&report)).map_err(refused)?, output)?;
+    Ok(Edited { frames, changed, vertices: 0, loses_detail: loses, container })
 }
 
-/// Whether all cages are those of the container.
-fn is_same(container: &mut Container, edited: &mut EditedCages, input: &Path) -> Result<bool, DecodeError> {
-    if edited.frames() != container.frames() {
-        return Ok(false);
-    }
-    let (mut old, mut new) = (Vec::new(), Vec::new());
-    for frame in 0..edited.frames() {
-        edited.read_frame(frame, &mut new)?;
-        container.read_frame(frame, &mut old).map_err(|cause| DecodeError::container(input, cause))?;
-        if old != new {
-            return Ok(false);
-        }
-    }
-    Ok(true)
+/// A container that `write` makes of the one at `input`.
+fn written(
+    input: &Path,
+    output: &Target,
+    write: impl FnOnce(Output) -> Result<Output, container::Error>,
+) -> Result<AtomicFile, DecodeError> {
+    let file = BufWriter::with_capacity(1 << 20, AtomicFile::create(output)?);
+    // What cannot be written names the output already.
+    let buffered = write(file).map_err(|cause| refused(input, cause))?;
+    completed(buffered, output)
 }
 
-fn copied(input: &Path, output: &Target, frames: usize) -> Result<Edited, DecodeError> {
+fn completed(buffered: Output, output: &Target) -> Result<AtomicFile, DecodeError> {
+    let file = buffered.into_inner();
+    let mut file = file.map_err(|error| refused(output.path(), error.into_error().into()))?;
+    file.complete()?;
+    Ok(file)
+}
+
+fn copied(input: &Path, output: &Target) -> Result<AtomicFile, DecodeError> {
     let read = |cause| cager_formats::Error::Io { path: input.to_owned(), action: Action::Read, cause };
     let mut file = AtomicFile::create(output)?;
     std::io::copy(&mut std::fs::File::open(input).map_err(read)?, &mut file).map_err(read)?;
     file.complete()?;
-    Ok(Edited { frames, changed: 0, loses_detail: false, container: file })
+    Ok(file)
 }
 
 /// The parts of the summary that are still valid.
 fn after_editing(report: Report) -> Report {
-    let (unknown, mut warnings) = (f64::NAN, report.warnings);
+    let mut warnings = report.warnings;
     warnings.retain(|warning| warning != NOT_MEASURED);
     warnings.push(NOT_MEASURED.to_owned());
-    let error = Errors {
-        l2_mean: unknown,
-        l2_max: unknown,
-        linf_mean: unknown,
-        linf_max: unknown,
-        kg_percent: unknown,
-        ..Errors::default()
-    };
+    let mut error = Errors::default();
+    error.forget(&[]);
     Report { generator: GENERATOR.to_owned(), error, warnings, ..report }
 }
 
-fn written(output: &Path, cause: container::Error) -> DecodeError {
+fn refused(path: &Path, cause: container::Error) -> DecodeError {
     match cause {
         // Errors of `AtomicFile` that pass through `io::Write` contain the path already.
         container::Error::Io(io) => match io.downcast() {
             Ok(named) => DecodeError::Formats(named),
-            Err(cause) => cager_formats::Error::Io { path: output.to_owned(), action: Action::Write, cause }.into(),
+            Err(cause) => cager_formats::Error::Io { path: path.to_owned(), action: Action::Write, cause }.into(),
         },
-        cause => DecodeError::container(output, cause),
+        cause => DecodeError::container(path, cause),
     }
 }

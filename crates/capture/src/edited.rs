@@ -2,9 +2,10 @@
 
 use crate::decode::opened::{Container, DecodeError};
 use crate::origin::move_to;
-use cager_formats::{Error, FrameReader, open_frames};
+use cager_formats::{Error, FrameRange, FrameReader, open_frames};
 use cager_geometry::mesh::Point;
 use cager_geometry::units::Change;
+use cager_proto::container::LayerBuilder;
 use std::path::{Path, PathBuf};
 
 /// Opens the frames of edited cages from the first.
@@ -14,6 +15,10 @@ type Reopen = dyn Fn() -> Result<Box<dyn FrameReader>, Error> + Send;
 pub struct EditedCages {
     path: PathBuf,
     vertices: usize,
+    /// Frames of the container.
+    own_frames: usize,
+    /// Why they cannot take the place of all its frames, if they cannot.
+    incomplete: Option<String>,
     /// Points of the model.
     points: u64,
     origin: Option<Point>,
@@ -24,6 +29,8 @@ pub struct EditedCages {
     /// The frame that the reader gives next.
     next: usize,
     wide: Vec<f64>,
+    /// By how much coordinates of the frame read last may be others than they were before they were stored in this file.
+    slack: Vec<f64>,
 }
 
 impl EditedCages {
@@ -34,7 +41,7 @@ impl EditedCages {
     /// Frames that cannot be read or have another number of vertices; cages with normals of their own, which no file of
     /// positions holds.
     pub fn open(path: &Path, container: &Container) -> Result<Self, DecodeError> {
-        let (file, vertices) = (path.to_owned(), container.header().rows_per_frame as usize);
+        let (file, vertices) = (path.to_owned(), container.header().cage_vertices as usize);
         Self::of_frames(path, container, Box::new(move || open_frames(&file, vertices)))
     }
 
@@ -44,18 +51,31 @@ impl EditedCages {
     /// As [`Self::open`].
     pub fn of_frames(path: &Path, container: &Container, reopen: Box<Reopen>) -> Result<Self, DecodeError> {
         let header = container.header();
-        let fail = |what: String| DecodeError::Edited { path: path.to_owned(), what };
-        if u64::from(header.rows_per_frame) != header.cage_vertices {
-            return Err(fail(format!(
-                "edited cages have no normals, which {} coordinates keep for every face beside the vertices; encode the capture with --coordinates green or mvc to edit its cages",
-                header.coordinates
-            )));
-        }
-        let vertices = header.rows_per_frame as usize;
+        let incomplete = (u64::from(header.rows_per_frame) != header.cage_vertices).then(|| {
+            format!(
+                "edited cages have no normals, which {} coordinates keep for every face beside the vertices, so there must be one for each of the {} frames; add or leave out none, or encode the capture with --coordinates green or mvc",
+                header.coordinates,
+                container.frames()
+            )
+        });
+        let vertices = header.cage_vertices as usize;
         let reader = reopen().map_err(|error| named(error, vertices, header.points))?;
         let (points, origin) = (header.points, header.origin);
         let change = reader.units().change_to(header.units);
-        Ok(Self { path: path.to_owned(), vertices, points, origin, change, reader, reopen, next: 0, wide: Vec::new() })
+        Ok(Self {
+            path: path.to_owned(),
+            vertices,
+            own_frames: container.frames(),
+            incomplete,
+            points,
+            origin,
+            change,
+            reader,
+            reopen,
+            next: 0,
+            wide: Vec::new(),
+            slack: Vec::new(),
+        })
     }
 
     /// Number of frames.
@@ -63,11 +83,72 @@ impl EditedCages {
         self.reader.frames()
     }
 
-    /// Reads the cage of a frame, vertices × 3. Reading in ascending order is fastest.
+    /// Whether they take the place of all frames of the container, since there is not one for each of these, or of a range of them.
+    pub fn replaces_frames(&self, range: Option<FrameRange>) -> bool {
+        range.is_none() && self.frames() != self.own_frames
+    }
+
+    /// Which edited cage is of which frame of the container.
+    ///
+    /// # Errors
+    /// Cages that are neither of all frames nor of `range`, and frames that are not there.
+    pub(crate) fn places(&self, range: Option<FrameRange>) -> Result<Vec<(usize, usize)>, DecodeError> {
+        let Some(range) = range else { return Ok((0..self.own_frames).map(|frame| (frame, frame)).collect()) };
+        range.check(self.own_frames, |frame| frame as f64, &self.path)?;
+        let frames = (0..range.count()).map(|place| range.frame(place));
+        match self.frames() {
+            all if all == self.own_frames => Ok(frames.map(|frame| (frame, frame)).collect()),
+            some if some == range.count() => Ok(frames.enumerate().collect()),
+            other => Err(self.fail(format!(
+                "has {other} frames, where {} are edited of {}; give as many, or all",
+                range.count(),
+                self.own_frames
+            ))),
+        }
+    }
+
+    /// Reads the cage of a frame beside the one that it was made from: coordinates are those of `old`, which may have more rows, where they differ by no more
+    /// than this file rounds them by.
+    ///
+    /// # Errors
+    /// As [`Self::read_frame`].
+    pub(crate) fn read_beside(&mut self, frame: usize, old: &[f32], out: &mut Vec<f32>) -> Result<(), DecodeError> {
+        self.read(frame, out)?;
+        for ((new, &old), slack) in out.iter_mut().zip(old).zip(&self.slack) {
+            if (f64::from(*new) - f64::from(old)).abs() <= *slack {
+                *new = old;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes the edited cage of a frame of the container's own, as a layer does.
+    ///
+    /// # Errors
+    /// As [`Self::read_frame`].
+    pub(crate) fn move_frame(&mut self, frame: usize, cage: &mut [f32]) -> Result<(), DecodeError> {
+        let mut new = Vec::with_capacity(3 * self.vertices);
+        self.read_beside(frame, cage, &mut new)?;
+        let mut builder = LayerBuilder::default();
+        builder.add(frame, cage, &new);
+        if let Some(layer) = builder.finish("") {
+            layer.apply(frame, cage);
+        }
+        Ok(())
+    }
+
+    /// Reads the cage of a frame as it takes the place of one of the container, vertices × 3. Reading in ascending order is fastest.
     ///
     /// # Errors
     /// Damage, another number of vertices, and coordinates beyond single precision.
     pub fn read_frame(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), DecodeError> {
+        match &self.incomplete {
+            Some(what) => Err(self.fail(what.clone())),
+            None => self.read(frame, out),
+        }
+    }
+
+    fn read(&mut self, frame: usize, out: &mut Vec<f32>) -> Result<(), DecodeError> {
         if frame < self.next {
             self.reader = (self.reopen)()?;
             self.next = 0;
@@ -82,8 +163,18 @@ impl EditedCages {
         }
         self.next += 1;
         out.clear();
+        // What the file can hold: single precision, or so many decimals.
+        let is_single = self.wide.iter().all(|&x| f64::from(x as f32).to_bits() == x.to_bits());
+        let decimals = (3..8).find(|&k| self.wide.iter().all(|&x| (x * 10f64.powi(k)).round() / 10f64.powi(k) == x));
         let points = self.wide.as_chunks_mut().0;
         self.change.apply_to(points);
+        self.slack.clear();
+        let rounded = decimals.filter(|_| !is_single).map_or(0.0, |decimals| 0.5 * 10f64.powi(-decimals));
+        let slack = |&x: &f64| match (is_single, decimals) {
+            (false, None) => 0.0,
+            _ => self.change.scale.abs() * rounded + 2.0 * f64::from(f32::EPSILON) * x.abs(),
+        };
+        self.slack.extend(points.as_flattened().iter().map(slack));
         move_to(self.origin, points);
         out.extend(self.wide.iter().map(|&x| x as f32));
         match out.iter().position(|x| x.is_nan() || x.abs() > FARTHEST) {
