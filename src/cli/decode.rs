@@ -97,6 +97,14 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     if let (Some(path), true) = (&transfer.model, found.outside > 0) {
         warn(&[outside(path, found.outside, found.points)]);
     }
+    if let (Some(path), true) = (&transfer.model, found.bound > 0) {
+        warn(&[format!(
+            "{}: {} of {} points lie beside poles of the cage's coordinates, where these follow nothing; they follow the nearest places of the file's own model",
+            path.display(),
+            grouped(found.bound),
+            grouped(found.points)
+        )]);
+    }
     if let [first, .., last] | [first @ last] = found.damaged[..] {
         let count = grouped(found.damaged.len());
         warn(&[format!(

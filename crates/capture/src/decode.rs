@@ -11,11 +11,11 @@ use crate::origin::{LOST, move_to};
 use crate::timing::Timing;
 use cager_core::cage::Cage;
 use cager_core::coordinates;
-use cager_core::coordinates::{Coordinates, DEFINITION, ElementPlan};
-use cager_core::decode::Decoder;
+use cager_core::coordinates::{CoordinateSystem as _, Coordinates, DEFINITION, ElementPlan, MeanValue};
+use cager_core::decode::{Bound, Decoder, Survey};
 use cager_core::inversion::{BATCH, coordinates_bytes, reject_far_points};
 use cager_formats::{CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
-use cager_geometry::mesh::{Model, Point, Polygons, diagonal};
+use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
 use cager_proto::container;
 use std::path::{Path, PathBuf};
 
@@ -76,6 +76,8 @@ pub struct Decoded {
     pub frames: usize,
     /// Points of another model that lie outside the rest cage.
     pub outside: usize,
+    /// Points of another model that lie beside poles of the coordinates, and are bound to the file's own model.
+    pub bound: usize,
     /// Frames of the file that were left out because they are damaged, from 0.
     pub damaged: Vec<usize>,
     /// Whether the numbers of the file's frames are damaged, so that they are counted from 0.
@@ -84,15 +86,13 @@ pub struct Decoded {
     pub notes: Vec<String>,
 }
 
-/// A model in its rest pose with its decoder, and the number of its points outside the rest cage.
+/// A model in its rest pose with its decoder, and the numbers of its points outside the rest cage and beside poles.
 struct BoundModel {
     rest: Model,
     decoder: Decoder,
     outside: usize,
+    bound: usize,
 }
-
-/// Entries of `Φ` computed at a time to find the points outside.
-const OUTSIDE_ENTRIES: usize = 1 << 23;
 
 /// Computes the coordinates of the container's model, if they are not `known`, or of another, in the container's cage; `keeps(points, columns)` decides whether
 /// to keep them in memory.
@@ -116,14 +116,14 @@ fn bind(
         return Err(unsupported(format!("its coordinates are of definition {}", header.coordinates_definition)));
     }
     let own = container.rest().map_err(fail)?;
-    let (model_path, rest) = other.map_or_else(
-        || (path, own),
-        |(path, model)| {
+    let (model_path, rest, fitted) = match other {
+        None => (path, own, None),
+        Some((path, model)) => {
             let mut model = model.clone();
             move_to(header.origin, &mut model.points);
-            (path, model)
-        },
-    );
+            (path, model, Some(TriMesh::from(&own)))
+        }
+    };
     if let Some(face) = rest.faces.arities().iter().position(|&corners| corners < 3) {
         return Err(fail(container::Error::Corrupt {
             offset: 0,
@@ -152,10 +152,13 @@ fn bind(
             columns,
         );
         let decoder = decoder.with_dependent_normals(values.dependent_normals);
-        let some = (OUTSIDE_ENTRIES / columns).max(1);
-        let outside = |points: &[Point]| pointwise(&cage, points).outside.len();
-        let outside = other.map_or(0, |_| rest.points.chunks(some).map(outside).sum());
-        return Ok(BoundModel { rest, decoder, outside });
+        let Some(fitted) = fitted else { return Ok(BoundModel { rest, decoder, outside: 0, bound: 0 }) };
+        let Survey { outside, mut beside } = Survey::of(pointwise, &cage, &rest.points);
+        // Other coordinates have no poles.
+        beside.retain(|_| header.coordinates == MeanValue.name());
+        let bound = Bound::new(pointwise, &cage, &fitted, &rest.points, &beside);
+        let count = bound.places.len();
+        return Ok(BoundModel { rest, decoder: decoder.with_bound(bound), outside, bound: count });
     }
     let elements = if known.is_some() { 0 } else { system.working_bytes(&cage, plan.as_ref()) };
     let needed = coordinates_bytes(rest.points.len(), columns, 2).saturating_add(elements);
@@ -166,7 +169,7 @@ fn bind(
     let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
     let decoder =
         Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals);
-    Ok(BoundModel { rest, decoder, outside: found.outside.len() })
+    Ok(BoundModel { rest, decoder, outside: found.outside.len(), bound: 0 })
 }
 
 /// Frames of a container, decoded as they are asked for.
@@ -394,5 +397,5 @@ pub fn decode(
         writer.finish()?;
     }
     let Chosen { damaged, numbers_lost, .. } = chosen;
-    Ok(Decoded { points, frames, outside: bound.outside, damaged, numbers_lost, notes })
+    Ok(Decoded { points, frames, outside: bound.outside, bound: bound.bound, damaged, numbers_lost, notes })
 }
