@@ -39,7 +39,7 @@ fn pass(mut client: TcpStream, server: &str, limit: usize) -> Option<()> {
         true => chunks_end(&request[head..]),
         false => request.len() >= head + length.unwrap_or(0),
     };
-    while !is_whole(&request) {
+    loop {
         if length.unwrap_or(0).max(request.len() - head) > limit {
             let page = "<html><h1>413 Request Entity Too Large</h1>nginx/1.22.1</html>";
             let answer = format!(
@@ -51,6 +51,9 @@ fn pass(mut client: TcpStream, server: &str, limit: usize) -> Option<()> {
             client.set_read_timeout(Some(Duration::from_secs(2))).ok()?;
             while more(&mut client, &mut Vec::new()).is_some() {}
             return None;
+        }
+        if is_whole(&request) {
+            break;
         }
         more(&mut client, &mut request)?;
     }

@@ -182,7 +182,7 @@ pub(super) fn bad(detail: String) -> ApiError {
 
 pub(super) fn broken(error: &MultipartError) -> ApiError {
     let general = body_error(error);
-    if general.problem.word() == problem::REQUEST_TIMEOUT.word {
+    if general.problem.word() != problem::BAD_REQUEST.word {
         return general;
     }
     bad(format!("the multipart body cannot be read: {}", error.body_text()))

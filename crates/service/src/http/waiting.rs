@@ -1,5 +1,6 @@
 //! What handlers wait for, and what they answer where it does not come.
 
+use super::content_encoding::is_packed_too_well;
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::session::facts::Facts;
@@ -57,6 +58,10 @@ pub(crate) fn too_slow() -> ApiError {
 pub(crate) fn body_error(error: &(dyn std::error::Error + 'static)) -> ApiError {
     if super::listen::is_body_timeout(error) {
         return ApiError::new(problem::REQUEST_TIMEOUT, "the body stopped arriving; send the rest again");
+    }
+    if is_packed_too_well(error) {
+        let detail = "the body unpacks to more than 100 times its length, and to more than 32 MiB; send fewer frames at a time, or send them as they are";
+        return ApiError::new(problem::TOO_LARGE, detail);
     }
     ApiError::new(problem::BAD_REQUEST, format!("the body broke off ({error}); send the rest again"))
 }

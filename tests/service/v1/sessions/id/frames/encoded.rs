@@ -4,7 +4,7 @@ use crate::support::{Capture, OCTETS, TestApp, lines};
 use http::Method;
 use std::io::Write as _;
 
-fn gzip(bytes: &[u8]) -> Vec<u8> {
+pub(super) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     out.write_all(bytes).expect("compressed");
     out.finish().expect("compressed")
@@ -54,6 +54,19 @@ async fn a_small_body_that_unpacks_to_a_large_one_is_bounded() {
     let post = app.request(Method::POST, "/v1/sessions").header("content-encoding", "gzip");
     let reply = app.send(post.header("content-type", "multipart/form-data; boundary=b").body(bomb)).await;
     reply.problem(413, "too-large");
+}
+
+#[tokio::test]
+async fn frames_that_unpack_to_very_much_are_refused_at_some_point() {
+    let app = TestApp::start();
+    let capture = Capture::tiny();
+    let session = app.ready(capture).await;
+    let still = capture.raw(0..1).repeat((40 << 20) / capture.raw(0..1).len());
+    let bomb = zstd::stream::encode_all(&still[..], 1).expect("compressed");
+    assert!(100 * bomb.len() < still.len());
+    let post = app.request(Method::POST, &format!("/v1/sessions/{}/frames", session.id));
+    let reply = app.send(post.header("content-type", OCTETS).header("content-encoding", "zstd").body(bomb)).await;
+    assert!(reply.text().contains("unpacks to more than 100 times its length"), "{}", reply.text().len());
 }
 
 #[tokio::test]
