@@ -23,7 +23,7 @@ LINT := target/lint-deploy
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/viewer/index.html
 
-.PHONY: help demo test web viewer page-test page-lint captures proxies blender blender-extension blender-pictures alembic usd gltf farm buckets python soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo emulated test web viewer page-test page-lint captures proxies blender blender-extension blender-pictures alembic usd gltf farm buckets python soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -125,6 +125,12 @@ $(GLTF): Makefile
 	mkdir -p target/gltf
 	cd target/gltf && npm init --yes >/dev/null && npm install --silent --no-audit --no-fund gltf-validator@2.0.0-dev.3.10 three@0.187.0
 	@touch $@
+
+# Debian's package; another system's emulator is named by QEMU.
+QEMU := qemu-x86_64
+emulated: ## guaranteed errors on a processor without AVX and FMA, by QEMU's emulation in user mode; installs it where apt-get can
+	@command -v $(QEMU) >/dev/null || { apt-get update -qq && apt-get install -y -qq qemu-user >/dev/null; }
+	CAGER_QEMU=$(QEMU) $(CARGO) test --workspace --locked --test cli emulated -- --nocapture
 
 farm: $(FARM) ## jobs of render farms, their shots encoded; installs openjd-cli and opencue-pyoutline
 	CAGER_FARM_PYTHON=$(abspath $(FARM)) $(CARGO) test --workspace --locked --test cli farm -- --nocapture

@@ -14,7 +14,7 @@ thread, within seconds.
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, NoReturn, SupportsIndex, TypeVar, final, overload, type_check_only
+from typing import Any, Literal, NoReturn, SupportsIndex, TypedDict, TypeVar, final, overload, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,8 @@ _Faces = ArrayLike | Sequence[Sequence[int]]
 _Frames = ArrayLike | Iterable[ArrayLike]
 _Progress = Callable[[str, float], object]
 _Kind = Literal["mvc", "harmonic", "green", "green-free"]
+_Up = Literal["y", "z"]
+_Unit = Literal["mm", "cm", "m", "in", "ft"] | float
 _Positions = NDArray[np.float32] | NDArray[np.float64]
 _Out = TypeVar("_Out", NDArray[np.float32], NDArray[np.float64])
 
@@ -31,6 +33,15 @@ __version__: str
 
 class CagerError(ValueError):
     """What was given cannot be used, or a file cannot be read or written; the message says which and what to do."""
+
+@type_check_only
+class _Layer(TypedDict):
+    """What was added to vertices of the cage in some frames."""
+
+    name: str
+    on: bool
+    frames: range
+    vertices: NDArray[np.int64]
 
 @final
 class Capture:
@@ -61,22 +72,42 @@ class Capture:
         """
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
         """Write the .cager file; it appears whole or not at all. What has that name is replaced with ``overwrite``."""
-    def export(self, path: str | PathLike[str], overwrite: bool = False, with_cage: bool = False) -> list[str]:
+    def export(
+        self,
+        path: str | PathLike[str],
+        overwrite: bool = False,
+        with_cage: bool = False,
+        *,
+        up: _Up | None = None,
+        unit: _Unit | None = None,
+    ) -> list[str]:
         """Write all frames in a format of other programs: .usdc, .usdz, .abc, .glb, .gltf, .npy, .pc2, .mdd, a .vat folder,
         or a folder or pattern of mesh files, as the path says.
 
         Returns what the file loses, in sentences. ``with_cage`` keeps the cage beside the model, in USD alone.
+        Positions are turned to ``up`` and scaled to ``unit``, of a capture that knows its own; glTF is in metres with Y up.
         """
     def pose(self, cage: ArrayLike) -> _Positions:
         """What a cage, (m, 3), alone makes of the model, (n, 3): ``with_cages([cage])[0]`` without a file between.
 
         float64 far from the origin.
         """
-    def with_cages(self, edited: _Frames) -> Capture:
-        """The same capture with other cages, (f, m, 3): as many vertices, any number of frames.
+    def with_cages(self, edited: _Frames, *, name: str = "") -> Capture:
+        """The same capture with other cages, (f, m, 3): one more layer, of this name, says what is moved, and all else stays.
 
-        What a cage left over is dropped, and errors of changed frames are not measured.
+        What a cage left over is kept: positions are what they were plus what the cage is moved by. As many bytes as
+        ``cager edit --with-cages`` writes. Cages of another number of frames take the place of all there are: what they
+        left over is dropped, and errors of changed frames are not measured.
         """
+    @property
+    def layers(self) -> list[_Layer]:
+        """The layers of edits, in the order in which they are applied: name, whether it is on, frames and vertices."""
+    def remove_layer(self, layer: SupportsIndex = -1) -> Capture:
+        """The capture without a layer, counted from 0, or from the end where it is negative. Raises IndexError."""
+    def switch_layer(self, layer: SupportsIndex, on: bool) -> Capture:
+        """The capture with a layer switched on or off: what is off is kept and not applied. Raises IndexError."""
+    def flatten(self) -> Capture:
+        """The capture whose cages have the layers in them that are on, and which has no layers."""
     @property
     def cages(self) -> _Positions:
         """The cage of every frame, (f, m, 3); float64 far from the origin."""
@@ -95,6 +126,15 @@ class Capture:
     @property
     def frame_rate(self) -> float | None:
         """Frames per second, where known."""
+    @property
+    def unit(self) -> float | None:
+        """Metres of 1 in its positions, where known."""
+    @property
+    def up(self) -> _Up | None:
+        """The axis that points up, where known."""
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The number of each frame where it comes from, (f,): 0, 1, 2, … where nobody says otherwise."""
     @property
     def report(self) -> dict[str, Any]:
         """Sizes, errors and warnings of the encoding: the keys of ``cager inspect --json``."""
@@ -115,6 +155,10 @@ def encode(
     seed: int = 0,
     coordinates: _Kind = "mvc",
     frame_rate: float | None = None,
+    unit: _Unit | None = None,
+    up: _Up | None = None,
+    start: float | None = None,
+    times: ArrayLike | None = None,
     force: bool = False,
 ) -> Capture:
     """Encode a capture: the same bytes as ``cager encode`` writes of the same numbers.
@@ -128,6 +172,10 @@ def encode(
         as the cage follows them.
     mean_error: the mean L2 error of the file, or of the cage that is designed for it; what no cage meets is coded.
     frame_rate: frames per second, kept with the capture.
+    unit: what 1 in the positions is, "cm" say or its metres, and up: the axis that points up. Both are kept with the
+        capture, for programs that read what is exported; positions stay as they are.
+    start: number of the first frame, 1001 say, or times: the number of each, ascending, (f,), with fractions such as
+        1001.5 for what lies between two frames. Without them they are 0, 1, 2, …
     force: go on where rest pose, cage and frames look as if they did not belong together.
     """
 
@@ -202,6 +250,10 @@ class Client:
         seed: int = 0,
         coordinates: _Kind = "mvc",
         frame_rate: float | None = None,
+        unit: _Unit | None = None,
+        up: _Up | None = None,
+        start: float | None = None,
+        times: ArrayLike | None = None,
         force: bool = False,
         name: str | None = None,
         keep: bool = False,

@@ -1,8 +1,8 @@
 """Import, play, edit and encode .cager captures of animated meshes."""
 
-from . import captures, edit_operators, encode_operators, import_operators, live, panel, paths, settings
+from . import bake, captures, edit_operators, encode_operators, import_operators, live, panel, paths, settings
 
-PARTS = (settings, import_operators, edit_operators, encode_operators, panel, paths, live)
+PARTS = (settings, import_operators, edit_operators, encode_operators, panel, paths, live, bake)
 
 
 def register():

@@ -6,6 +6,7 @@ import cager
 import numpy as np
 
 from . import paths
+from .times import SAME
 
 _opened = {}
 
@@ -15,6 +16,9 @@ class Opened:
 
     def __init__(self, path):
         self.capture = cager.open(path)
+        numbers = self.capture.times
+        # Its frames, counted from that of the scene that shows the first or the part of a frame before it.
+        self.times = numbers - np.floor(numbers[:1])
         self.rest_cage = self.capture.rest_cage
         report = self.capture.report
         self.has_details, self.is_free = bool(report.get("coding")), report.get("coordinates") == "green-free"
@@ -31,7 +35,7 @@ class Opened:
 
     def positions(self, frame, part=0):
         """The model in a frame, (n, 3), or a part of the way to the next."""
-        return self._relative(between(self.capture, frame, part))
+        return self.relative(between(self.capture, frame, part))
 
     def edited(self, points, frame, part=0):
         """The cage of a frame with vertices that were moved, (m, 3); None where none was. Raises CagerError."""
@@ -52,13 +56,16 @@ class Opened:
 
     def posed(self, cage):
         """The model in an edited cage, (n, 3)."""
-        return self._relative(self.capture.pose(cage))
+        return self.relative(self.capture.pose(cage))
 
-    def details(self, frame):
-        """What the cage of a frame leaves over, (n, 3)."""
-        return self.positions(frame) - self.posed(self.stored[frame])
+    def details(self, frame, part=0):
+        """What the cage of a frame leaves over, (n, 3), which stays where the cage is edited; 0 where it leaves nothing."""
+        if not self.has_details:
+            return 0
+        return self.positions(frame, part) - self.posed(np.array(between(self.stored, frame, part), float))
 
-    def _relative(self, positions):
+    def relative(self, positions):
+        """Positions of the capture as Blender has them."""
         return positions if positions.dtype == np.float32 else (positions - self.offset).astype(np.float32)
 
 
@@ -113,7 +120,22 @@ def model_of(thing):
     return next((each for each in children if each.cager.file and thing in (each.parent, each.cager.cage)), None)
 
 
+def time_of(model, frame):
+    """The scene's time of a frame of the capture."""
+    return model.cager.first + float(of_model(model).times[frame])
+
+
+def step_after(model, time):
+    """How long a frame of the capture is shown, of the scene's frames."""
+    times = of_model(model).times
+    frame = int(np.searchsorted(times, time - model.cager.first + SAME, side="right"))
+    return float(times[frame] - times[frame - 1]) if 0 < frame < len(times) else 1
+
+
 def place_of(model, time):
     """The frame of the capture at a time, and the part of the way to the next; the first before it begins, the last after its end."""
-    place = min(max(time - model.cager.first, 0), len(of_model(model)) - 1)
-    return int(place), place - int(place)
+    times, at = of_model(model).times, time - model.cager.first
+    frame = max(int(np.searchsorted(times, at + SAME, side="right")) - 1, 0)
+    if frame + 1 == len(times) or at - times[frame] <= SAME:
+        return frame, 0
+    return frame, float((at - times[frame]) / (times[frame + 1] - times[frame]))

@@ -1,6 +1,5 @@
 """Edits a cage in a frame, saves edited cages, and exports what is seen for other programs."""
 
-import math
 import os
 
 import bpy
@@ -8,7 +7,7 @@ import cager
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from . import captures, paths, times
+from . import bake, captures, paths, times
 from .edits import edited_capture, leave_edit_mode, spans
 from .keys import key_name
 from .reading import Refused
@@ -32,11 +31,11 @@ class OfModel:
         cls.poll_message_set("Click on a model that was imported from a .cager file, or on its cage")
         return captures.model_of(context.object) is not None
 
-    def edited(self, context):
-        """The capture as it is seen; None after a report of why there is none."""
+    def edited(self, context, name=""):
+        """The capture as it is seen, edits in a layer of this name; None after a report of why there is none."""
         model = captures.model_of(context.object)
         try:
-            return (model, *edited_capture(context, model))
+            return (model, *edited_capture(context, model, name))
         except (cager.CagerError, OSError, Refused) as error:
             self.report({"ERROR"}, str(error))
             return None
@@ -47,16 +46,9 @@ class OfModel:
         if library:
             self.report(
                 {"ERROR"},
-                f"The capture is linked from {os.path.basename(library.filepath)}: to edit its cage, append it instead, or choose Object > Relations > Make Local > All.",
+                f"The capture is linked from {os.path.basename(library.filepath)}: to edit its cage or to bake it, append it instead, or choose Object > Relations > Make Local > All.",
             )
         return library is not None
-
-    def warn_of_details(self, model, frames):
-        if frames and captures.of_model(model).has_details:
-            self.report(
-                {"WARNING"},
-                "Details that the cage does not follow are left out, as they belong to the cages before they were edited. To keep them, encode with Keep: Motion of the cage",
-            )
 
 
 class EditFrame(OfModel, bpy.types.Operator):
@@ -72,14 +64,20 @@ class EditFrame(OfModel, bpy.types.Operator):
         model = captures.model_of(context.object)
         cage = model.cager.cage
         keys = cage and cage.data.shape_keys
-        frame = math.floor(times.now(context.scene))
-        place = keys.key_blocks.find(key_name(frame)) if keys else -1
+        try:
+            now = times.now(context.scene)
+            time = captures.time_of(model, captures.place_of(model, now)[0])
+        except (cager.CagerError, OSError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        is_there = keys and -times.SAME <= now - time < max(1, captures.step_after(model, time))
+        place = keys.key_blocks.find(key_name(time)) if is_there else -1
         if place < 0:
-            self.report({"ERROR"}, f"There is no cage for frame {frame}: go to a frame of the capture, and import it with its cage.")
+            self.report({"ERROR"}, f"There is no cage for frame {times.words(now)}: go to a frame of the capture, and import it with its cage.")
             return {"CANCELLED"}
         leave_edit_mode(context)
-        if frame != times.now(context.scene):
-            times.go_to(context.scene, frame)
+        if abs(now - time) > times.SAME:
+            times.go_to(context.scene, time)
         for each in context.selected_objects:
             each.select_set(False)
         cage.select_set(True)
@@ -90,7 +88,7 @@ class EditFrame(OfModel, bpy.types.Operator):
 
 
 class SaveEdits(OfModel, bpy.types.Operator, ExportHelper):
-    """Write a .cager file with the cages as they are edited; the model shows it from then on"""
+    """Write a .cager file with the edits as one more layer, all else as it was; the model shows it from then on"""
 
     bl_idname = "cager.save_edits"
     bl_label = "Save edited cages"
@@ -98,16 +96,16 @@ class SaveEdits(OfModel, bpy.types.Operator, ExportHelper):
     filename_ext = ".cager"
     filepath: paths.file_property("File", "The .cager file to write")
     filter_glob: StringProperty(default="*.cager", options={"HIDDEN"})
+    layer: StringProperty(name="Layer", description="The name of the layer that keeps these edits, which cager edit switches off and takes back")
 
     def execute(self, context):
-        found = None if self.refused_as_linked(context) else self.edited(context)
+        found = None if self.refused_as_linked(context) else self.edited(context, self.layer)
         if found is None:
             return {"CANCELLED"}
         model, capture, frames = found
         if not frames:
             self.report({"WARNING"}, "No cage was edited, so nothing is written: move vertices of the cage first.")
             return {"CANCELLED"}
-        self.warn_of_details(model, frames)
         try:
             path = paths.chosen(self.filepath)
             capture.save(path, overwrite=True)
@@ -131,6 +129,14 @@ class Export(OfModel, bpy.types.Operator, ExportHelper):
     filepath: paths.file_property("File", "The file to write, with the ending of the format")
     check_extension = None
     format: EnumProperty(name="Format", items=FORMATS)
+    up: EnumProperty(
+        name="Up",
+        items=(
+            ("AUTO", "As usual", "Y in Alembic and glTF, as programs take it, and as the capture has it in others"),
+            ("Y", "Y", "Y points up"),
+            ("Z", "Z", "Z points up"),
+        ),
+    )
     with_cage: BoolProperty(name="With cage", description="Keep the cage in USD as a second mesh, a guide that is not rendered")
 
     def check(self, _):
@@ -143,16 +149,40 @@ class Export(OfModel, bpy.types.Operator, ExportHelper):
         if found is None:
             return {"CANCELLED"}
         model, capture, frames = found
-        self.warn_of_details(model, frames)
         try:
             path = paths.chosen(with_ending(self.filepath, self.format))
-            losses = capture.export(path, overwrite=True, with_cage=self.with_cage and self.format in ("usdc", "usdz"))
+            up = self.up.lower()
+            if self.up == "AUTO":
+                up = "y" if self.format == "abc" and capture.up else None
+            losses = capture.export(path, overwrite=True, with_cage=self.with_cage and self.format in ("usdc", "usdz"), up=up)
         except (cager.CagerError, OSError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         for loss in losses:
             self.report({"INFO"}, loss)
         self.report({"INFO"}, f"{os.path.basename(path)}: {len(capture)} frames" + (f", edited in {spans(frames)}" if frames else ""))
+        return {"FINISHED"}
+
+
+class Bake(OfModel, bpy.types.Operator):
+    """Write what is seen of the model into a cache beside the .blend file, for machines that render without this extension"""
+
+    bl_idname = "cager.bake"
+    bl_label = "Bake for rendering"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        found = None if self.refused_as_linked(context) else self.edited(context)
+        if found is None:
+            return {"CANCELLED"}
+        model, capture, _ = found
+        try:
+            path = bake.bake(model, capture)
+        except (cager.CagerError, OSError, Refused) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        megabytes = os.path.getsize(path) / 1e6
+        self.report({"INFO"}, f"{os.path.basename(path)}: {megabytes:.1f} MB. Save the .blend file, and keep the cache beside it")
         return {"FINISHED"}
 
 
@@ -166,7 +196,7 @@ def menu(self, _):
     self.layout.operator(Export.bl_idname, text="CageR capture (.usdc, .abc, .glb)")
 
 
-CLASSES = (EditFrame, SaveEdits, Export)
+CLASSES = (EditFrame, SaveEdits, Export, Bake)
 
 
 def register():

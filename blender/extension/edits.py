@@ -13,8 +13,8 @@ def leave_edit_mode(context):
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def edited_capture(context, model):
-    """The capture as it is seen in the scene, and the scene's frames that were edited. Raises CagerError and Refused."""
+def edited_capture(context, model, name=""):
+    """The capture as it is seen in the scene, edits in a layer of this name, and the scene's frames that were edited. Raises CagerError and Refused."""
     leave_edit_mode(context)
     opened, scene = captures.of_model(model), context.scene
     if model.cager.cage is None:
@@ -23,23 +23,24 @@ def edited_capture(context, model):
     with times.kept(scene):
         with live.paused(model), switched_on(context, [model, model.cager.cage]):
             for k in range(len(opened)):
-                times.go_to(scene, model.cager.first + k)
+                time = captures.time_of(model, k)
+                times.go_to(scene, time)
                 if not any(each.visible_get() for each in (model, model.cager.cage)):
-                    raise Refused(f"{model.name} is hidden in frame {scene.frame_current}: take off the animation that hides it.")
+                    raise Refused(f"{model.name} is hidden in frame {times.words(time)}: take off the animation that hides it.")
                 points = live.cage_of(model, context.evaluated_depsgraph_get())
                 cage = None if points is None else opened.edited(points, k)
                 if cage is not None:
                     cages[k] = cage
-                    frames.append(model.cager.first + k)
-    return opened.capture.with_cages(cages) if frames else opened.capture, frames
+                    frames.append(time)
+    return opened.capture.with_cages(cages, name=name) if frames else opened.capture, frames
 
 
 def spans(frames):
     """Frames in words: 3, 5 to 9."""
     parts, start = [], 0
     for k in range(1, len(frames) + 1):
-        if k == len(frames) or frames[k] != frames[k - 1] + 1:
-            first, last = frames[start], frames[k - 1]
-            parts.append(str(first) if first == last else f"{first} to {last}")
+        if k == len(frames) or frames[k] > frames[k - 1] + 1:
+            first, last = times.words(frames[start]), times.words(frames[k - 1])
+            parts.append(first if first == last else f"{first} to {last}")
             start = k
     return ", ".join(parts)

@@ -1,12 +1,13 @@
 """Encodes an animated object: frames are read bit by bit in Blender's own thread, which no other may do, and encoded in another."""
 
+import math
 import threading
 import time
 
 import cager
 import numpy as np
 
-from . import live, times
+from . import live, objects, times
 from .reading import KINDS, Refused, closed_cage, seen, switched_on
 
 
@@ -24,11 +25,16 @@ class Encoding:
         self.options = {
             "max_error": 0.01 * chosen.max_error if chosen.keep == "ERROR" else None,
             "vertices": chosen.vertices or None if chosen.cage is None else None,
-            "frame_rate": self.scene.render.fps / self.scene.render.fps_base,
+            "frame_rate": times.rate(self.scene),
+            "unit": objects.unit(self.scene),
+            # As everywhere in Blender.
+            "up": "z",
         }
         self.shows, self.name = chosen.show, thing.name
         self.first = self.scene.frame_start
-        self.total = self.scene.frame_end - self.first + 1
+        whole = self.scene.frame_end - self.first
+        self.times = [self.first + k / chosen.samples for k in range(whole * chosen.samples + 1)]
+        self.total = len(self.times)
         self.stage, self.fraction = "reading frames", 0.0
         self.capture = self.error = self.faces = self.cage_mesh = None
         self.frames, self.thread = [], None
@@ -68,7 +74,8 @@ class Encoding:
             raise Refused(f"{self.name} is edited while it is read: encode it again, and stay in Object Mode meanwhile.")
         with times.kept(self.scene), switched_on(context, self._needed()):
             while len(self.frames) < self.total and not self._stopped.is_set():
-                self.scene.frame_set(self.first + len(self.frames))
+                now = self.times[len(self.frames)]
+                self.scene.frame_set(math.floor(now), subframe=now - math.floor(now))
                 self._read_frame(context.evaluated_depsgraph_get())
                 self.fraction = len(self.frames) / self.total
                 if time.monotonic() > end:
@@ -79,7 +86,7 @@ class Encoding:
         return [self.thing] if self.frames or not self.cage else [self.thing, self.cage]
 
     def _read_frame(self, depsgraph):
-        frame = self.first + len(self.frames)
+        frame = times.words(self.times[len(self.frames)])
         for each in self._needed():
             if not each.visible_get():
                 raise Refused(f"{each.name} is hidden in frame {frame}: show it in the viewport, or take off the animation that hides it.")
@@ -103,7 +110,7 @@ class Encoding:
         try:
             rest = self.frames[0].astype(float)
             faces = self.faces if len(self.faces) else None
-            capture = cager.encode(rest, faces, self.frames, self.cage_mesh, progress=self._tell, **self.options)
+            capture = cager.encode(rest, faces, self.frames, self.cage_mesh, progress=self._tell, times=self.times, **self.options)
             self._tell("saving", 1.0)
             capture.save(self.path, overwrite=True)
             self.capture = capture

@@ -4,18 +4,20 @@ import re
 
 import numpy as np
 
-OF_FRAME = re.compile(r"frame -?\d+")
+from .times import words
+
+OF_FRAME = re.compile(r"frame -?\d+(\.\d+)?")
 
 
 def key_name(time):
-    return f"frame {time}"
+    return f"frame {words(time)}"
 
 
-def add(cage, cages, first):
+def add(cage, cages, times):
     """Adds a shape key for each frame. Keyframes for so many would take longer than all else."""
     cage.shape_key_add(name="rest", from_mix=False)
-    for k, points in enumerate(cages):
-        key = cage.shape_key_add(name=key_name(first + k), from_mix=False)
+    for time, points in zip(times, cages):
+        key = cage.shape_key_add(name=key_name(time), from_mix=False)
         key.data.foreach_set("co", points.ravel())
         key.value = 0
 
@@ -30,11 +32,9 @@ def points_of(blocks, time):
     return points.reshape(-1, 3)
 
 
-def weigh(blocks, first, frame, part):
-    """Lets a cage be in a frame, or a part of the way to the next. Keys of the user's own stay as they are."""
-    wanted = {key_name(first + frame): np.float32(1 - part)}
-    if part:
-        wanted[key_name(first + frame + 1)] = np.float32(part)
+def weigh(blocks, times, part):
+    """Lets a cage be as at a time, or a part of the way to the next of two. Keys of the user's own stay as they are."""
+    wanted = dict(zip(map(key_name, times), (np.float32(1 - part), np.float32(part))))
     values = np.empty(len(blocks), np.float32)
     blocks.foreach_get("value", values)
     for k in np.flatnonzero(values).tolist():

@@ -7,7 +7,7 @@ import cager
 import numpy as np
 from bpy.app.handlers import persistent
 
-from . import captures, handlers, keys, paths, times
+from . import bake, captures, handlers, keys, paths, times
 from .reading import cage_seen
 
 # By the whole name of the model: what cannot be shown and why, and the place and cage that were shown last.
@@ -49,27 +49,18 @@ def show(model, scene, depsgraph, only_if_new=False):
         if only_if_new and last and last[0] == place and np.array_equal(last[1], points):
             return
         edited = None if points is None else opened.edited(points, *place)
-        write(model.data, opened.positions(*place) if edited is None else opened.posed(edited) + details(model, opened, points, *place))
+        write(model.data, opened.positions(*place) if edited is None else opened.posed(edited) + opened.details(*place))
         _last[name] = place, points
-        problems.pop(name, None)
+        if problems.pop(name, None):
+            bake.switch(model, False)
     except (cager.CagerError, OSError) as error:
         # It is opened again as soon as it can be.
         captures.forget(paths.found(model))
         if problems.get(name) != str(error):
             print(f"CageR: {name}: {error}")
+            # What was baked is better than a model that stands still.
+            bake.switch(model, True)
         problems[name] = str(error)
-
-
-def details(model, opened, points, frame, part):
-    """What an edited cage does not follow: fades between a frame that has its details and one whose key was edited, else none."""
-    if not (part and opened.has_details and model.cager.cage.data.shape_keys):
-        return 0
-    first, blocks = model.cager.first, model.cager.cage.data.shape_keys.key_blocks
-    cages = {k: keys.points_of(blocks, first + k) for k in (frame, frame + 1)}
-    if any(cage is None for cage in cages.values()) or opened.differs(points, captures.between(cages, frame, part)).any():
-        return 0
-    weights = {frame: np.float32(1 - part), frame + 1: np.float32(part)}
-    return sum(weights[k] * opened.details(k) for k in weights if opened.edited(cages[k], k) is None)
 
 
 def write(mesh, positions):
@@ -93,7 +84,9 @@ def pose_cages(scene):
         cage = model.cager.cage
         if cage and cage.data.shape_keys:
             try:
-                keys.weigh(cage.data.shape_keys.key_blocks, model.cager.first, *captures.place_of(model, times.now(scene)))
+                frame, part = captures.place_of(model, times.now(scene))
+                around = [captures.time_of(model, k) for k in ((frame, frame + 1) if part else (frame,))]
+                keys.weigh(cage.data.shape_keys.key_blocks, around, part)
             except (cager.CagerError, OSError):
                 # Why, is told as the model is shown.
                 pass

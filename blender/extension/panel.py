@@ -5,7 +5,7 @@ import textwrap
 
 import bpy
 
-from . import captures, encode_operators, live, paths
+from . import bake, captures, encode_operators, live, paths
 
 
 class CagerPanel:
@@ -42,6 +42,7 @@ class CapturePanel(CagerPanel, bpy.types.Panel):
         column.operator("cager.edit_frame", icon="EDITMODE_HLT")
         column.operator("cager.save_edits", icon="FILE_TICK")
         column.operator("cager.export", text="Export", icon="EXPORT")
+        draw_bake(layout, model)
 
 
 class EncodePanel(CagerPanel, bpy.types.Panel):
@@ -58,6 +59,7 @@ class EncodePanel(CagerPanel, bpy.types.Panel):
         layout.prop(chosen, "cage")
         if chosen.cage is None:
             layout.prop(chosen, "vertices")
+        layout.prop(chosen, "samples")
         layout.prop(chosen, "keep")
         if chosen.keep == "ERROR":
             layout.prop(chosen, "max_error")
@@ -66,6 +68,17 @@ class EncodePanel(CagerPanel, bpy.types.Panel):
         words, is_error = encode_operators.told
         if words:
             lines(layout.box(), words, icon="ERROR" if is_error else "CHECKMARK")
+
+
+def draw_bake(layout, model):
+    column = layout.column(align=True)
+    column.operator("cager.bake", icon="RENDER_ANIMATION")
+    if bake.modifier_of(model) is None:
+        lines(column, "Without this extension the model stands still, as on render farms, unless it is baked.", icon="INFO")
+    elif model.name_full in bake.stale:
+        lines(column, "It has changed since it was baked: bake it again.", icon="ERROR")
+    else:
+        lines(column, "Baked: it plays without this extension, too.", icon="CHECKMARK")
 
 
 def lines(layout, words, icon="NONE"):

@@ -16,6 +16,7 @@ class CagerLink(bpy.types.PropertyGroup):
     file: paths.file_property("File", "The .cager file that this object shows")
     found: StringProperty(options={"HIDDEN"}, description="The whole path of the file where it was last")
     first: times.first_frame_property()
+    baked: StringProperty(options={"HIDDEN"}, description="What tells whether the cache for rendering shows what is seen")
     cage: PointerProperty(name="Cage", type=bpy.types.Object, poll=is_mesh, description="The object that is edited")
 
 
@@ -31,8 +32,8 @@ class CagerEncoding(bpy.types.PropertyGroup):
     keep: EnumProperty(
         name="Keep",
         items=(
-            ("CAGE", "Motion of the cage", "The model follows its cage exactly, so that edits change nothing else. Best for editing"),
-            ("ERROR", "Details up to an error", "Details that the cage does not follow are kept as well, in a smaller file. Edited captures lose them"),
+            ("CAGE", "Motion of the cage", "The model follows its cage exactly, and is what the cage says alone"),
+            ("ERROR", "Details up to an error", "Details that the cage does not follow are kept as well, in a smaller file, also where the cage is edited"),
         ),
         default="CAGE",
     )
@@ -47,6 +48,13 @@ class CagerEncoding(bpy.types.PropertyGroup):
     )
     vertices: IntProperty(
         name="Vertices", min=0, max=5000, default=0, description="Vertices of the cage that is made; 0 chooses a number that suits"
+    )
+    samples: IntProperty(
+        name="Samples",
+        min=1,
+        max=64,
+        default=1,
+        description="How often each frame is read: more than once for motion that is fast within a frame, which the capture then has between frames",
     )
     show: BoolProperty(name="Import when done", default=True, description="Add the encoded capture to the scene")
 

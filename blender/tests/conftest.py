@@ -69,12 +69,12 @@ def bend(points, t):
     return np.stack([x * np.cos(angle) - z * np.sin(angle), y, x * np.sin(angle) + z * np.cos(angle)], axis=1)
 
 
-def encoded(path, rings=16, around=24, cage_rings=5, cage_around=8, frames=10, **options):
+def encoded(path, rings=16, around=24, cage_rings=5, cage_around=8, frames=10, start=1, **options):
     import cager
 
     points, faces = tube(rings, around, 0.5, 1.0)
     cage = tube(cage_rings, cage_around, 0.65, 1.2)
-    capture = cager.encode(points, faces, [bend(points, t) for t in np.linspace(0, 2.5, frames)], cage, frame_rate=25, **options)
+    capture = cager.encode(points, faces, [bend(points, t) for t in np.linspace(0, 2.5, frames)], cage, frame_rate=25, start=start, **options)
     capture.save(path)
     return capture
 

@@ -29,10 +29,10 @@ def test_blenders_own_tool_finds_nothing_wrong_with_the_zip():
 
 def test_the_extension_comes_and_goes_without_a_trace(scene):
     there = traces()
-    # One of each kind: saving (before, after and where it fails), frame (before and after), edit, load (before and after), undo and redo;
+    # One of each kind: saving (before, after and where it fails, of paths and of what was baked), frame (before and after), edit, load (before and after), undo and redo;
     # import and export.
     frames = ["before_frame", "on_edit", "on_frame", "on_load", "on_load", "on_undo", "on_undo"]
-    assert sorted(there[0]) == sorted(["after_saving", "after_saving", "before_saving", *frames, "menu", "menu"])
+    assert sorted(there[0]) == sorted([*["after_saving"] * 5, *["before_saving"] * 2, *frames, "menu", "menu"])
     for _ in range(2):
         bpy.ops.preferences.addon_disable(module=MODULE)
         assert traces() == ([], [])

@@ -53,7 +53,8 @@ def test_the_panel_shows_what_can_be_done(scene, small):
     model = bpy.context.object
     for active in (model, model.cager.cage, model.parent):
         bpy.context.view_layer.objects.active = active
-        assert {"small.cager", "cager.edit_frame", "cager.save_edits", "cager.export"} <= set(drawn("CapturePanel"))
+        assert {"small.cager", "cager.edit_frame", "cager.save_edits", "cager.export", "cager.bake"} <= set(drawn("CapturePanel"))
+    assert "Without this extension the model stands still" in " ".join(drawn("CapturePanel"))
     model.cager.file = "/nowhere/gone.cager"
     scene.frame_set(5)
     assert "gone.cager" in "".join(drawn("CapturePanel")) and "cager.export" not in drawn("CapturePanel")
@@ -61,7 +62,7 @@ def test_the_panel_shows_what_can_be_done(scene, small):
 
 def test_the_panel_shows_how_far_an_encoding_is(scene, small, monkeypatch):
     operators = part("encode_operators")
-    assert {"cage", "vertices", "keep", "show", "cager.encode"} <= set(drawn("EncodePanel"))
+    assert {"cage", "vertices", "samples", "keep", "show", "cager.encode"} <= set(drawn("EncodePanel"))
     scene.cager.keep = "ERROR"
     assert "max_error" in drawn("EncodePanel")
     bpy.ops.cager.import_capture(filepath=small.path)

@@ -45,7 +45,7 @@ def test_details_of_a_coded_file_are_shown(scene, tmp_path):
 
 
 def test_a_capture_is_turned_upright_and_moved_as_a_whole(scene, small):
-    model = imported(small.path, y_is_up=True)
+    model = imported(small.path, up="Y")
     model.parent.location.x = 5
     scene.frame_set(5)
     bpy.context.view_layer.update()
@@ -60,7 +60,7 @@ def test_a_capture_far_away_keeps_its_digits(scene, tmp_path):
     far, path = np.array([691_234.0, 5_334_987.0, 512.0]), str(tmp_path / "far.cager")
     near = encoded(str(tmp_path / "near.cager"))
     frames = near.decode().astype(float)
-    cager.encode(near.rest + far, near.faces, frames + far, (near.rest_cage + far, near.cage_faces)).save(path)
+    cager.encode(near.rest + far, near.faces, frames + far, (near.rest_cage + far, near.cage_faces), start=1).save(path)
     model, capture = imported(path), cager.open(path)
     for frame in (1, 6):
         scene.frame_set(frame)

@@ -40,22 +40,24 @@ def test_between_frames_edits_come_and_go(scene, small):
         assert np.abs(seen(model) - small.capture.pose(between)).max() <= 1e-5 * small.diagonal
 
 
-def test_details_fade_beside_an_edited_frame(scene, coded):
+def test_details_stay_where_a_cage_is_edited(scene, coded):
     model, capture, diagonal = coded
     key = model.cager.cage.data.shape_keys.key_blocks["frame 5"]
     key.data[2].co.x += 0.4
     cage = capture.cages[4].copy()
     cage[2, 0] += np.float32(0.4)
-    frames = {4: capture[3], 5: capture.pose(cage), 6: capture[5]}
+    details = [capture[k] - capture.pose(capture.cages[k]) for k in range(10)]
+    frames = {4: capture[3], 5: capture.pose(cage) + details[4], 6: capture[5]}
     for frame, part_of_way in ((4, 0), (4, 0.01), (4, 0.7), (5, 0), (5, 0.3), (6, 0)):
         scene.frame_set(frame, subframe=part_of_way)
         between = (1 - part_of_way) * frames[frame] + part_of_way * frames.get(frame + 1, 0)
         assert np.abs(seen(model) - between).max() <= 1e-5 * diagonal
-    # What is edited over many frames has no details between them either.
+    # Also where it is edited over many frames.
     model.cager.cage.location.z = 2
     scene.frame_set(4, subframe=0.5)
     cages = 0.5 * capture.cages[3] + 0.5 * cage
-    assert np.abs(seen(model) - capture.pose(cages + [0, 0, 2])).max() <= 1e-5 * diagonal
+    expected = capture.pose(cages + [0, 0, 2]) + 0.5 * (details[3] + details[4])
+    assert np.abs(seen(model) - expected).max() <= 1e-5 * diagonal
 
 
 def test_a_cage_is_edited_in_a_whole_frame(scene, small):

@@ -187,6 +187,19 @@ impl Report {
     }
 }
 
+impl Report {
+    /// Files keep few digits of an error, rounded up: what passes a guaranteed error by that alone is the guaranteed one.
+    pub fn hold_errors_to_bound(&mut self) {
+        const ROUNDED: f64 = 1.0 + 1.0 / 1024.0;
+        let Some(bound) = self.coding.and_then(|coding| coding.max_error) else { return };
+        for error in self.error.per_frame.iter_mut().flat_map(|error| [&mut error.l2, &mut error.linf]) {
+            if (bound..bound * ROUNDED).contains(error) {
+                *error = bound;
+            }
+        }
+    }
+}
+
 /// How frames were coded. Steps are fractions of the diagonal.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(default)]
@@ -370,13 +383,8 @@ impl Errors {
         for (error, _) in self.per_frame.iter_mut().zip(frames).filter(|(_, forgotten)| **forgotten) {
             *error = FrameError { l2: unknown, linf: unknown };
         }
-        for all in [
-            &mut self.l2_mean,
-            &mut self.l2_max,
-            &mut self.linf_mean,
-            &mut self.linf_max,
-            &mut self.kg_percent,
-        ] {
+        for all in [&mut self.l2_mean, &mut self.l2_max, &mut self.linf_mean, &mut self.linf_max, &mut self.kg_percent]
+        {
             *all = unknown;
         }
     }

@@ -54,7 +54,8 @@ fn a_file_without_units_is_what_it_was_and_others_have_one_more_section() {
 fn units_are_put_into_a_file_that_otherwise_keeps_its_bytes() {
     let bytes = small_container();
     let copied = |from: &[u8], place| {
-        ContainerWriter::copy_placed(&mut ContainerReader::open(Cursor::new(from)).unwrap(), place, &[], Vec::new()).unwrap()
+        ContainerWriter::copy_placed(&mut ContainerReader::open(Cursor::new(from)).unwrap(), place, &[], Vec::new())
+            .unwrap()
     };
     let origin = [450_000.0, 0.0, 0.5];
     let placed = copied(&bytes, (Some(origin), CENTIMETRES));

@@ -115,6 +115,15 @@ impl<'py> Floats<'py> {
         views.ok_or_else(refused)
     }
 
+    /// Of an array of one dimension.
+    pub(crate) fn numbers(&self) -> Result<Vec<f64>, Fault> {
+        match (&self.values, self.shape().len()) {
+            (Values::Single(array), 1) => Ok(array.as_array().iter().map(|&x| f64::from(x)).collect()),
+            (Values::Double(array), 1) => Ok(array.as_array().iter().copied().collect()),
+            _ => Err(self.refuse("a list of numbers")),
+        }
+    }
+
     /// Of an array n × 3 whose coordinates are finite.
     pub(crate) fn points(&self) -> Result<Vec<Point>, Fault> {
         let mut values = Vec::new();

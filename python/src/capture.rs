@@ -1,8 +1,10 @@
 //! A capture in a container: its frames as arrays, its cages, and other cages in their place.
 
 mod decoding;
+mod layers;
 mod stamp;
 
+use self::layers::{check_name, told};
 use self::stamp::{Stamp, stamp};
 use crate::arguments;
 use crate::arrays::{Floats, frame_arrays, frame_views};
@@ -10,17 +12,20 @@ use crate::export::export;
 use crate::fault::{Fault, computing, detached, of, warn};
 use crate::frames::Cages;
 use crate::geometry::{array, triangles};
-use crate::own_file::{OwnFile, temporary};
+use crate::meaning;
+use crate::own_file::OwnFile;
 use cager_capture::decode::{self, DecodeError, Positions};
-use cager_capture::edit::{Editing, edit};
+use cager_capture::edit::{self, Editing, edit};
 use cager_capture::edited::EditedCages;
 use cager_capture::origin::move_from;
 use cager_formats::{Action, AtomicFile, Error, FrameReader, Target, commit_together};
 use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::units::{Units, Up};
+use cager_proto::container::EditLayer;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyRange, PySlice};
+use pyo3::types::{PyDict, PyList, PyRange, PySlice};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -40,6 +45,9 @@ pub(crate) struct Capture {
     rows: usize,
     frames: usize,
     frame_rate: Option<f64>,
+    units: Units,
+    numbers: Vec<f64>,
+    edits: Vec<EditLayer>,
     report: String,
     pub(crate) warnings: Vec<String>,
 }
@@ -70,6 +78,9 @@ impl Capture {
         let report = serde_json::to_string(&report).map_err(|error| of(path.display(), error))?;
         let header = container.header();
         let (origin, rows, frame_rate) = (header.origin, header.rows_per_frame as usize, header.frame_rate);
+        let units = header.units;
+        let numbers = container.frame_numbers().map_err(fail)?;
+        let edits = container.layers().map_err(fail)?.to_vec();
         let (frames, positions, stamp) = (container.frames(), Mutex::new(None), stamp(&path)?);
         // It is opened again, perhaps from another working directory.
         let path = std::path::absolute(&path).unwrap_or(path);
@@ -84,6 +95,9 @@ impl Capture {
             rows,
             frames,
             frame_rate,
+            units,
+            numbers,
+            edits,
             report,
             warnings,
         })
@@ -197,15 +211,18 @@ impl Capture {
     }
 
     /// Writes the frames in a format of other programs, the one of the path's ending; what the file loses is returned in words.
-    #[pyo3(signature = (path, overwrite=false, with_cage=false))]
+    #[pyo3(signature = (path, overwrite=false, with_cage=false, *, up=None, unit=None))]
     fn export(
         &self,
         py: Python<'_>,
         #[pyo3(from_py_with = arguments::path)] path: PathBuf,
         overwrite: bool,
         with_cage: bool,
+        up: Option<&str>,
+        unit: Option<&Bound<'_, PyAny>>,
     ) -> Result<Vec<String>, Fault> {
-        computing(py, || self.again(|from| export(from, path, overwrite, with_cage)))
+        let units = meaning::units(unit, up)?;
+        computing(py, || self.again(|from| export(from, path, overwrite, with_cage, units)))
     }
 
     /// The model in a cage, m × 3: what the cage alone says of its n × 3 positions.
@@ -214,8 +231,10 @@ impl Capture {
         computing(py, || Ok(self.shown(self.read_pose(cage)?)))?.of_points(py)
     }
 
-    /// The capture with other cages, f × m × 3, as after editing in another program.
-    fn with_cages(&self, py: Python<'_>, edited: &Bound<'_, PyAny>) -> Result<Self, Fault> {
+    /// The capture with other cages, f × m × 3, as after editing in another program: one more layer says what is moved.
+    #[pyo3(signature = (edited, *, name=""))]
+    fn with_cages(&self, py: Python<'_>, edited: &Bound<'_, PyAny>, name: &str) -> Result<Self, Fault> {
+        check_name(name)?;
         let given = frame_arrays(edited, "cages")?;
         let views = frame_views(&given)?;
         let cages = views.iter().map(|view| {
@@ -227,20 +246,38 @@ impl Capture {
         if cages.is_empty() {
             return Err(of("cages", "has no frames; give at least one"));
         }
-        let rows = self.rows;
-        computing(py, || {
-            let container = self.again(decode::open)?;
+        let rows = self.cage.vertices.len();
+        self.rewritten(py, |container, target| {
             let reopen = move || {
                 let reader: Box<dyn FrameReader> = Box::new(Cages { cages: cages.clone(), rows, next: 0 });
                 Ok(reader)
             };
             let edited = EditedCages::of_frames(Path::new("cages"), &container, Box::new(reopen))?;
-            let file = OwnFile::new(temporary()?.into_temp_path());
-            let target = Target::Replacing(file.path().to_owned());
-            let made = edit(container, &self.path, edited, &Editing::default(), &target, &mut |_| ())?;
-            commit_together(vec![made.container])?;
-            Self::of_encoding(file)
+            let what = Editing { name, range: None };
+            Ok(edit(container, &self.path, edited, &what, target, &mut |_| ())?.container)
         })
+    }
+
+    /// The layers of edits, in the order in which they are applied.
+    #[getter]
+    fn layers<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyDict>>, Fault> {
+        self.edits.iter().map(|layer| told(py, layer)).collect()
+    }
+
+    /// The capture without a layer, the last one where none is named.
+    #[pyo3(signature = (layer=-1))]
+    fn remove_layer(&self, py: Python<'_>, layer: isize) -> Result<Self, Fault> {
+        self.without_layer(py, layer)
+    }
+
+    /// The capture with a layer switched on or off.
+    fn switch_layer(&self, py: Python<'_>, layer: isize, on: bool) -> Result<Self, Fault> {
+        self.switched(py, layer, on)
+    }
+
+    /// The capture whose cages have the layers in them that are on, and which has no layers.
+    fn flatten(&self, py: Python<'_>) -> Result<Self, Fault> {
+        self.rewritten(py, |container, target| Ok(edit::flattened(container, &self.path, None, target)?))
     }
 
     /// The cage of every frame: f × m × 3.
@@ -285,6 +322,24 @@ impl Capture {
     #[getter]
     fn frame_rate(&self) -> Option<f64> {
         self.frame_rate
+    }
+
+    /// Metres of one unit of its positions, where known.
+    #[getter]
+    fn unit(&self) -> Option<f64> {
+        self.units.metres_per_unit
+    }
+
+    /// The axis that points up, where known.
+    #[getter]
+    fn up(&self) -> Option<&'static str> {
+        self.units.up.map(Up::name)
+    }
+
+    /// The number of each frame where it comes from: f.
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.numbers)
     }
 
     /// Sizes, errors and warnings of the encoding.

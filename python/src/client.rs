@@ -8,6 +8,7 @@ use crate::fault::Fault;
 use crate::follow::Cages;
 use crate::geometry::{cage_mesh, system};
 use crate::kept_frames::KeptFrames;
+use crate::meaning;
 use crate::remote_encode::{Encoding, checked, encode};
 use cager_client::ClientError;
 use cager_formats::{AtomicFile, Target, commit_together};
@@ -36,7 +37,7 @@ impl Client {
     }
 
     /// Encodes a capture on the service.
-    #[pyo3(signature = (rest, faces, frames, cage=None, max_error=None, mean_error=None, on_progress=None, *, vertices=None, seed=0, coordinates="mvc", frame_rate=None, force=false, name=None, keep=false))]
+    #[pyo3(signature = (rest, faces, frames, cage=None, max_error=None, mean_error=None, on_progress=None, *, vertices=None, seed=0, coordinates="mvc", frame_rate=None, unit=None, up=None, start=None, times=None, force=false, name=None, keep=false))]
     #[expect(clippy::too_many_arguments, reason = "arguments with names")]
     fn encode<'py>(
         &self,
@@ -52,6 +53,10 @@ impl Client {
         #[pyo3(from_py_with = arguments::seed)] seed: u64,
         coordinates: &str,
         frame_rate: Option<f64>,
+        unit: Option<&Bound<'py, PyAny>>,
+        up: Option<&str>,
+        start: Option<f64>,
+        times: Option<&Bound<'py, PyAny>>,
         force: bool,
         name: Option<String>,
         keep: bool,
@@ -59,11 +64,13 @@ impl Client {
         let rest = model(rest, faces, ["rest", "faces"])?;
         let mesh = cage.map(|(vertices, faces)| cage_mesh(&vertices, &faces)).transpose()?;
         let system = system(coordinates, "coordinates")?;
-        let asked = Asked { max_error, mean_error, vertices, seed, system, frame_rate, force };
+        let units = meaning::units(unit, up)?;
+        let asked = Asked { max_error, mean_error, vertices, seed, system, frame_rate, units, force };
         asked.check(mesh.is_some())?;
         let frames = KeptFrames::new(frames, "frames", rest.points.len())?;
+        let numbers = meaning::numbers(start, times, frames.count())?;
         let (client, url) = (self.client.clone(), self.url.clone());
-        let job = Encoding { client, url, rest, mesh, frames, asked, name, keep };
+        let job = Encoding { client, url, rest, mesh, frames, numbers, asked, name, keep };
         awaitable(py, move |call| encode(job, on_progress, call))
     }
 

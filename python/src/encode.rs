@@ -8,6 +8,7 @@ use crate::fault::{Fault, computing, of};
 use crate::frames::Frames;
 use crate::geometry::{cage, cage_mesh, design_goal, designed, of_rest, system};
 use crate::handed_frames::{HandingFrames, Next};
+use crate::meaning;
 use crate::own_file::{OwnFile, WorkFolder, temporary};
 use crate::watch::Watch;
 use cager_cages::{DesignOptions, Style};
@@ -36,6 +37,7 @@ pub(crate) struct Asked {
     pub(crate) seed: u64,
     pub(crate) system: &'static dyn CoordinateSystem,
     pub(crate) frame_rate: Option<f64>,
+    pub(crate) units: Units,
     pub(crate) force: bool,
 }
 
@@ -75,7 +77,7 @@ impl Asked {
 
 /// Encode a capture.
 #[pyfunction]
-#[pyo3(signature = (rest, faces, frames, cage=None, max_error=None, mean_error=None, progress=None, *, vertices=None, seed=0, coordinates="mvc", frame_rate=None, force=false))]
+#[pyo3(signature = (rest, faces, frames, cage=None, max_error=None, mean_error=None, progress=None, *, vertices=None, seed=0, coordinates="mvc", frame_rate=None, unit=None, up=None, start=None, times=None, force=false))]
 #[expect(clippy::too_many_arguments, reason = "arguments with names")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -90,20 +92,26 @@ pub(crate) fn encode<'py>(
     #[pyo3(from_py_with = arguments::seed)] seed: u64,
     coordinates: &str,
     frame_rate: Option<f64>,
+    unit: Option<&Bound<'py, PyAny>>,
+    up: Option<&str>,
+    start: Option<f64>,
+    times: Option<&Bound<'py, PyAny>>,
     force: bool,
 ) -> Result<Capture, Fault> {
     let mut rest = model(rest, faces, ["rest", "faces"])?;
     let mesh = cage.map(|(vertices, faces)| cage_mesh(&vertices, &faces)).transpose()?;
     let system = system(coordinates, "coordinates")?;
-    let asked = Asked { max_error, mean_error, vertices, seed, system, frame_rate, force };
+    let units = meaning::units(unit, up)?;
+    let asked = Asked { max_error, mean_error, vertices, seed, system, frame_rate, units, force };
     // What is wrong with it is told before anything is computed.
     asked.check(mesh.is_some())?;
     let given = frame_arrays(frames, "frames")?;
     let views = frame_views(&given)?;
+    let numbers = meaning::numbers(start, times, views.len())?;
     let watch = Watch::new(progress);
     let capture = computing(py, || {
         let mut frames = of_rest(&mut rest, &views, &watch);
-        frames.frame_rate = frame_rate;
+        (frames.frame_rate, frames.numbers) = (frame_rate, numbers);
         frames.check(&rest, force)?;
         Capture::of_encoding(encoded(rest, mesh, &frames, asked, &watch)?)
     })?;
@@ -151,7 +159,7 @@ fn encoded(
             memory: Memory::half_of_free(),
             goal,
             origin,
-            units: Units::UNKNOWN,
+            units: asked.units,
             exact_rest: false,
         };
         let done = encode_job(job, &|now| {

@@ -85,6 +85,8 @@ impl From<Fault> for PyErr {
                         "is there already; name another file, or pass overwrite=True",
                     )
                     .replace("take one of them (--frame K), or name a folder", "name a folder")
+                    .replace("so that --up cannot", "so that up cannot")
+                    .replace("so that --unit cannot", "so that unit cannot")
                     .replace("the cages that `cager decode --cages` writes", "capture.cages"),
             ),
             Fault::Raised(error) => error,

@@ -21,6 +21,8 @@ pub(crate) struct Frames<'a> {
     /// Points that each frame has to have.
     pub(crate) points: usize,
     pub(crate) frame_rate: Option<f64>,
+    /// The number of each frame; 0, 1, 2, … where the list is empty.
+    pub(crate) numbers: Arc<[f64]>,
     /// What is subtracted from all positions.
     pub(crate) origin: Option<Point>,
     /// What every frame is compared with as it is read.
@@ -93,6 +95,10 @@ impl FrameReader for ArrayFrames<'_> {
 
     fn frame_rate(&self) -> Option<f64> {
         self.frames.frame_rate
+    }
+
+    fn number(&self, frame: usize) -> f64 {
+        self.frames.numbers.get(frame).copied().unwrap_or(frame as f64)
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

@@ -139,7 +139,8 @@ pub(crate) fn design_cage<'py>(
 pub(crate) fn of_rest<'a>(rest: &mut Model, views: &'a [FrameView<'a>], watch: &'a Watch) -> Frames<'a> {
     let origin = own_origin(&rest.points);
     move_to(origin, &mut rest.points);
-    Frames { views, name: "frames", points: rest.points.len(), frame_rate: None, origin, belonging: None, watch }
+    let (points, numbers) = (rest.points.len(), [].into());
+    Frames { views, name: "frames", points, frame_rate: None, numbers, origin, belonging: None, watch }
 }
 
 fn style(name: &str) -> Result<Style, Fault> {

@@ -19,7 +19,7 @@ pub(crate) struct HandedFrames {
     caller: Caller<Next>,
     handed: Receiver<Handed>,
     points: usize,
-    frames: usize,
+    numbers: Vec<f64>,
     frame_rate: Option<f64>,
 }
 
@@ -33,8 +33,9 @@ impl<R: FrameReader> HandingFrames<R> {
     /// Frames of a reader, and what makes frames of a caller of them.
     pub(crate) fn new(frames: R) -> (Self, impl FnOnce(Caller<Next>) -> HandedFrames + Send + 'static) {
         let (hand, handed) = mpsc::channel();
-        let (points, count, frame_rate) = (frames.points(), frames.frames(), frames.frame_rate());
-        let taken = move |caller| HandedFrames { caller, handed, points, frames: count, frame_rate };
+        let (points, frame_rate) = (frames.points(), frames.frame_rate());
+        let numbers = (0..frames.frames()).map(|frame| frames.number(frame)).collect();
+        let taken = move |caller| HandedFrames { caller, handed, points, numbers, frame_rate };
         (Self { frames, hand }, taken)
     }
 
@@ -64,7 +65,11 @@ impl FrameReader for HandedFrames {
     }
 
     fn frames(&self) -> usize {
-        self.frames
+        self.numbers.len()
+    }
+
+    fn number(&self, frame: usize) -> f64 {
+        self.numbers.get(frame).copied().unwrap_or(frame as f64)
     }
 
     fn frame_rate(&self) -> Option<f64> {

@@ -38,6 +38,11 @@ impl KeptFrames {
         self.arrays.bind(py)
     }
 
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.frames
+    }
+
     fn read_wide(&mut self) -> Result<(), Fault> {
         Python::try_attach(|py| {
             let array = self.arrays.bind(py).get_item(self.next)?;

@@ -15,6 +15,7 @@ mod geometry;
 mod handed_frames;
 mod kept_frames;
 mod loop_progress;
+mod meaning;
 mod own_file;
 mod remote_encode;
 mod watch;

@@ -39,6 +39,8 @@ pub(crate) struct Encoding {
     pub(crate) rest: Model,
     pub(crate) mesh: Option<TriMesh>,
     pub(crate) frames: KeptFrames,
+    /// The number of each frame.
+    pub(crate) numbers: Arc<[f64]>,
     pub(crate) asked: Asked,
     pub(crate) name: Option<String>,
     /// Whether the session stays on the service.
@@ -78,6 +80,7 @@ pub(crate) async fn encode(
 
 async fn run(job: Encoding, stop: &mut Stop, progress: &Arc<LoopProgress>, left: &mut Left) -> Result<Capture, Fault> {
     let (client, asked, name) = (job.client.clone(), job.asked, job.name.clone());
+    let numbers = Arc::clone(&job.numbers);
     let preparing = Arc::clone(progress);
     let prepared = stop.or(progress.or(blocking(move || prepare(job, &preparing)))).await?;
     let frames = prepared.frames;
@@ -108,7 +111,7 @@ async fn run(job: Encoding, stop: &mut Stop, progress: &Arc<LoopProgress>, left:
     let id = client.create(&session).await?.id;
     left.session = Some(id.clone());
     drop(session);
-    let mut capture = stop.or(progress.or(filled(&client, &id, frames, progress))).await?;
+    let mut capture = stop.or(progress.or(filled(&client, &id, frames, (asked.units, numbers), progress))).await?;
     capture.warnings.extend(warnings);
     Ok(capture)
 }
@@ -179,7 +182,13 @@ async fn designed(client: &Client, id: &str, progress: &Arc<LoopProgress>) -> Re
 }
 
 /// Sends the frames to a session, and fetches the container.
-async fn filled(client: &Client, id: &str, frames: KeptFrames, progress: &Arc<LoopProgress>) -> Result<Capture, Fault> {
+async fn filled(
+    client: &Client,
+    id: &str,
+    frames: KeptFrames,
+    (units, numbers): (Units, Arc<[f64]>),
+    progress: &Arc<LoopProgress>,
+) -> Result<Capture, Fault> {
     let ready = client.wait_ready(id, READY_TIMEOUT).await?;
     let (origin, total) = (frames.origin, frames.frames().unwrap_or(0).max(1));
     let mut done = 0_u32;
@@ -194,11 +203,13 @@ async fn filled(client: &Client, id: &str, frames: KeptFrames, progress: &Arc<Lo
     client.download(id, file.as_file_mut()).await?;
     blocking(move || {
         let mut container = checked(file.reopen().map_err(ClientError::Output)?)?;
-        let Some(origin) = origin else { return Capture::of_encoding(OwnFile::new(file.into_temp_path())) };
-        // The service was sent positions about an origin that it does not know.
+        if origin.is_none() && units == Units::UNKNOWN && container::counted_from_zero(&numbers) {
+            return Capture::of_encoding(OwnFile::new(file.into_temp_path()));
+        }
+        // The service was sent positions about an origin, and knows neither that nor what they mean.
         let placed = temporary()?;
         let out = BufWriter::new(placed.reopen().map_err(ClientError::Output)?);
-        let out = ContainerWriter::copy_placed(&mut container, (Some(origin), Units::UNKNOWN), out)
+        let out = ContainerWriter::copy_placed(&mut container, (origin, units), &numbers, out)
             .map_err(|error| damaged(&error))?;
         out.into_inner().map_err(|error| ClientError::Output(error.into_error()))?;
         Capture::of_encoding(OwnFile::new(placed.into_temp_path()))

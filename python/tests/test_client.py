@@ -70,6 +70,9 @@ def contents(capture, path):
         ({"max_error": 1e-3}, ["--max-error", "1e-3"]),
         ({"mean_error": 2e-3, "frame_rate": 25}, ["--mean-error", "2e-3", "--fps", "25"]),
         ({"coordinates": "green"}, ["--coordinates", "green"]),
+        # The service knows neither, and both are added to what it sends.
+        ({"unit": "cm", "start": 1001}, ["--unit", "cm", "--start", "1001"]),
+        ({"max_error": 1e-3, "start": -2.5}, ["--max-error", "1e-3", "--start", "-2.5"]),
         ({"cage": None, "max_error": 1e-3, "vertices": 30, "seed": 4}, ["--max-error", "1e-3", "--cage-vertices", "30", "--seed", "4"]),
         ({"cage": None, "max_error": 1e-3}, ["--max-error", "1e-3"]),
     ],

@@ -27,6 +27,12 @@ def arrays(capture: cager.Capture) -> tuple[np.ndarray[tuple[int, ...], np.dtype
     capture.pose(copy.copy(capture).cages[0] * 2)
     return capture.decode(np.zeros((1, 2, 3), np.float32)), capture.decode().dtype == np.float64
 
+def placed(capture: cager.Capture) -> tuple[float | None, float]:
+    capture.export("walk.usdc", up="y", unit="cm")
+    capture.with_cages(capture.cages, name="smile").switch_layer(0, False).remove_layer().flatten()
+    last = cager.encode(capture.rest, None, capture, unit=0.01, up="z", times=capture.times)
+    return last.unit, sum(frame for layer in last.layers if layer["on"] for frame in layer["frames"]) + float(last.times[0])
+
 async def last(client: cager.Client) -> int:
     async with contextlib.aclosing(client.follow("x")) as cages:
         number, cage = await anext(cages)

@@ -55,7 +55,13 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     if transfer.cages {
         let bar = progress::frames("decoding", taken);
         let mut watch = |done: usize| bar.set_position(done as u64);
-        let result = write_cages(&args.input, &output, (range, (&args.timing).into()), dry_run, &mut watch);
+        let result = write_cages(
+            &args.input,
+            &output,
+            (range, (&args.timing).into(), transfer.meaning.units()),
+            dry_run,
+            &mut watch,
+        );
         bar.finish_and_clear();
         let found = result?;
         if found.normals > 0 {
@@ -85,6 +91,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         salvage: args.salvage,
         morphs: args.morphs.options(),
         with_cage: transfer.with_cage,
+        units: transfer.meaning.units(),
     };
     let bar = progress::PreparationBar::new("decoding", taken);
     let result = decode::decode(&args.input, &output, what, &mut |done| bar.done(done));
@@ -179,6 +186,7 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
         memory: args.memory,
         layer: args.layer,
         morphs: args.morphs.options(),
+        units: transfer.meaning.units(),
     };
     let bar = progress::PreparationBar::new("decoding", range.count());
     let result = decode_joined(&parts, &output, what, &mut |done| bar.done(done));

@@ -8,7 +8,7 @@ use anyhow::{Result, bail};
 use cager_capture::decode::{self, Container, DecodeError};
 use cager_capture::edit::{self, Editing};
 use cager_capture::edited::EditedCages;
-use cager_formats::{AtomicFile, Target, commit_together};
+use cager_formats::{AtomicFile, Target, Units, commit_together};
 use cager_proto::container::{EditLayer, LayerSource};
 use std::path::Path;
 
@@ -27,6 +27,10 @@ pub(super) fn run(args: &EditArgs) -> Result<()> {
     }
     if args.with_cages.is_some() {
         return add(args, container, layers.len(), &output);
+    }
+    if args.units() != Units::UNKNOWN {
+        let file = edit::with_units(&mut container, &args.input, args.units(), &output)?;
+        return finish(args, file, &output, "says what its positions mean");
     }
     let (kept, told) = changed(args, layers)?;
     let file = edit::with_layers(&mut container, &args.input, &kept, &output)?;
@@ -79,7 +83,7 @@ fn changed(args: &EditArgs, mut layers: Vec<EditLayer>) -> Result<(Vec<LayerSour
 /// Writes one more layer.
 fn add(args: &EditArgs, mut container: Container, there: usize, output: &Target) -> Result<()> {
     let Some(cages) = &args.with_cages else { return Ok(()) };
-    let edited = EditedCages::open(cages, &container)?;
+    let edited = EditedCages::open(cages, &container)?.meaning(args.units(), &container, &args.input)?;
     check_range(args, &mut container)?;
     let rows = container.header().cage_vertices as usize;
     let bar = progress::frames("editing", edited.frames());

@@ -46,6 +46,7 @@ impl MorphArgs {
         MorphOptions {
             targets: self.targets.map(usize::from),
             max_error: self.max_error,
+            is_guarantee: false,
             diagonal: None,
             floats: self.float,
             normals: self.normals,

@@ -1,9 +1,12 @@
 //! Arguments of `cager decode` other than its files, and of `cager edit`.
 
+use super::checks::up;
+use super::coding_args::Unit;
 use super::outputs::OutputArgs;
 use super::tell;
 use anyhow::{Result, bail};
-use cager_formats::FrameRange;
+use cager_formats::{FrameRange, Units};
+use cager_geometry::units::Up;
 use cager_proto::container::MAX_LAYER_NAME;
 use clap::{ArgGroup, Args};
 use std::path::{Path, PathBuf};
@@ -36,6 +39,27 @@ pub(crate) struct TransferArgs {
     /// Only frames A to B, both included, every STEP-th; counted from 0.
     #[arg(long, value_name = "A-B[xSTEP]", allow_hyphen_values = true)]
     pub(crate) range: Option<FrameRange>,
+
+    #[command(flatten)]
+    pub(crate) meaning: MeaningArgs,
+}
+
+/// Unit and axis of what is written.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct MeaningArgs {
+    /// Turn positions so that this axis points up, y or z [default: as the file has it; y in glTF].
+    #[arg(long, value_name = "AXIS", value_parser = up)]
+    pub(crate) up: Option<Up>,
+
+    /// Scale positions to this unit [default: as the file has it; metres in glTF].
+    #[arg(long, value_name = "UNIT", value_enum, hide_default_value = true)]
+    pub(crate) unit: Option<Unit>,
+}
+
+impl MeaningArgs {
+    pub(crate) fn units(self) -> Units {
+        Units { up: self.up, metres_per_unit: self.unit.map(Unit::metres) }
+    }
 }
 
 impl TransferArgs {
@@ -67,7 +91,7 @@ impl TransferArgs {
 /// details beside the cages too, so that a layer can be taken back.
 /// Example: cager edit walk.cager --with-cages edited.npy --name smile -o edited.cager
 #[derive(Args, Debug)]
-#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["with_cages", "flatten", "remove", "on", "off"]))]
+#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["with_cages", "flatten", "remove", "on", "off", "up", "unit"]))]
 pub(crate) struct EditArgs {
     /// File to read.
     #[arg(value_name = "IN.cager")]
@@ -102,12 +126,26 @@ pub(crate) struct EditArgs {
     #[arg(long, value_name = "LAYER", conflicts_with_all = ["with_cages", "flatten"])]
     pub(crate) off: Option<usize>,
 
+    /// The axis that points up in EDITED, y or z, where its file does not say it: it is turned to that of IN. Without --with-cages, the one in IN, which keeps it.
+    #[arg(long, value_name = "AXIS", value_parser = up, conflicts_with_all = ["flatten", "remove", "on", "off"])]
+    pub(crate) up: Option<Up>,
+
+    /// The unit of EDITED, where its file does not say it: it is scaled to that of IN. Without --with-cages, the one of IN, which keeps it.
+    #[arg(long, value_name = "UNIT", value_enum, conflicts_with_all = ["flatten", "remove", "on", "off"])]
+    pub(crate) unit: Option<Unit>,
+
     /// File to write, or - for standard output; it appears whole or not at all. With --overwrite it may be IN.cager.
     #[arg(short, long, value_name = "OUT.cager")]
     pub(crate) output: PathBuf,
 
     #[command(flatten)]
     pub(crate) outputs: OutputArgs,
+}
+
+impl EditArgs {
+    pub(crate) fn units(&self) -> Units {
+        MeaningArgs { up: self.up, unit: self.unit }.units()
+    }
 }
 
 /// Layers that are taken back.

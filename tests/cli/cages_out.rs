@@ -200,7 +200,11 @@ fn edited_cages_that_do_not_fit_are_refused_in_one_sentence() {
             refused(&dir, &format!("{command} --with-cages {file}"), &words);
         }
     }
-    refused(&dir, "edit out.cager --with-cages fewer.npy -o out.cager", &["out.cager", "is there already", "--overwrite"]);
+    refused(
+        &dir,
+        "edit out.cager --with-cages fewer.npy -o out.cager",
+        &["out.cager", "is there already", "--overwrite"],
+    );
     dir.frames("cages.npy", &stored(&dir, "out.cager"));
     refused(&dir, "decode out.cager --with-cages cages.npy -o cages.npy", &["cages.npy", "is an input"]);
     assert_eq!(dir.cager("decode out.cager --cages --with-cages cages.npy -o b.npy").run().status, Some(2));

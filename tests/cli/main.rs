@@ -1,5 +1,6 @@
 //! The program as its users meet it: command lines in, files, words and exit statuses out.
 
+mod bound;
 mod cage;
 mod cage_of_a_take;
 mod cages_out;

@@ -1,6 +1,7 @@
 //! Units and axes that files say, on their way through containers.
 
-use crate::support::{Dir, ENCODE, Small, as_model};
+use crate::refused::refused;
+use crate::support::{Dir, ENCODE, Small, as_model, read_frames};
 use cager_formats::{FrameOptions, Units, Up, create_frames, open_frames};
 use cager_geometry::mesh::Polygons;
 
@@ -124,4 +125,48 @@ fn a_rest_pose_a_cage_and_a_capture_are_brought_together() {
     let pairs = improved[0].as_flattened().iter().zip(improved[1].as_flattened());
     let off = pairs.fold(0.0_f64, |far, (a, b)| far.max((a - b).abs()));
     assert!(off < 0.01, "{off}");
+}
+
+#[test]
+fn positions_are_turned_and_scaled_where_the_container_knows_its_own() {
+    let (dir, small) = Dir::with_encoded();
+    let points = small.rest.points.len();
+    let read = |name: &str, rows| read_frames(&dir.path(name), rows);
+    refused(
+        &dir,
+        "decode out.cager --up z -o z.npy",
+        &["out.cager", "which axis points up", "say it first: cager edit"],
+    );
+    refused(&dir, "decode out.cager --unit m --cages -o z.npy", &["out.cager", "what its unit is"]);
+    dir.cager("edit out.cager --up y --unit cm -o said.cager").succeeds();
+    refused(&dir, "edit said.cager --up z -o other.cager", &["said.cager", "says already", "cager decode"]);
+    dir.cager("edit said.cager --up y -o same.cager").succeeds();
+    assert_eq!(dir.read("same.cager"), dir.read("said.cager"));
+
+    let near = |found: &[Vec<f64>], own: &[Vec<f64>]| {
+        let turned =
+            own.iter().flat_map(|frame| frame.as_chunks::<3>().0).map(|[x, y, z]| [x / 100.0, -z / 100.0, y / 100.0]);
+        let wanted: Vec<f64> = turned.flatten().collect();
+        found.iter().flatten().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-8) && !wanted.is_empty()
+    };
+    dir.cager("decode said.cager -o own.npy").succeeds();
+    for output in ["z.npy", "z.pc2", "folder/"] {
+        dir.cager(&format!("decode said.cager --up z --unit m -o {output}")).succeeds();
+        assert!(near(&read(output, points), &read("own.npy", points)), "{output}");
+    }
+    // Alembic has no place for an axis.
+    let said = dir.cager("decode said.cager --up z -o z.abc").succeeds().stdout;
+    assert!(said.contains("lay the model on its back"), "{said}");
+    assert!(!dir.cager("decode said.cager -o y.abc").succeeds().stdout.contains("back"));
+
+    // Cages go out turned and scaled, with the rest cage, and come back.
+    let rows = small.cage.vertices.len();
+    dir.cager("decode said.cager --cages -o own-cages.npy").succeeds();
+    dir.cager("decode said.cager --cages --up z --unit m -o cages.npy").succeeds();
+    assert!(near(&read("cages.npy", rows), &read("own-cages.npy", rows)));
+    dir.cager("edit said.cager --with-cages cages.npy --up z --unit m -o back.cager").succeeds();
+    dir.cager("decode back.cager --cages -o back.npy").succeeds();
+    let far = read("back.npy", rows).into_iter().flatten().zip(read("own-cages.npy", rows).into_iter().flatten());
+    assert!(far.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-6);
+    refused(&dir, "edit out.cager --with-cages cages.npy --up z -o no.cager", &["out.cager", "which axis points up"]);
 }

@@ -8,6 +8,8 @@ mod enclose_apart;
 mod thinned;
 
 pub use bounding_shape::{BoundingShape, bounding_shape};
-pub use design::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Parts, Progress, Stage, Style, Unseen, design};
+pub use design::{
+    Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Parts, Progress, Stage, Style, Unseen, design,
+};
 pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_watched};
 pub use enclose_apart::enclose_apart;

@@ -1,10 +1,11 @@
 //! Exports the cages of a container in formats that other programs read.
 
-use crate::decode::{DecodeError, frame_options, open};
+use crate::decode::{DecodeError, frame_options, open, units};
 use crate::origin::move_from;
 use crate::timing::Timing;
 use cager_formats::{AtomicFile, FrameRange, Target, commit_together, create_frames, obj_bytes};
 use cager_geometry::mesh::Model;
+use cager_geometry::units::Units;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +21,7 @@ pub struct CagesWritten {
     pub normals: u64,
 }
 
-/// Writes the cages of a container, or a range of them, to `output`, and the rest cage with its faces to [`rest_cage_path`]. Each file is
+/// Writes the cages of a container, or a range of them, in the container's units or others, to `output`, and the rest cage with its faces to [`rest_cage_path`]. Each file is
 /// created atomically, the frames first. A dry run reads and validates without writing.
 ///
 /// # Errors
@@ -28,7 +29,7 @@ pub struct CagesWritten {
 pub fn write_cages(
     input: &Path,
     output: &Target,
-    (range, timing): (Option<FrameRange>, Timing),
+    (range, timing, asked): (Option<FrameRange>, Timing, Units),
     dry_run: bool,
     progress: &mut dyn FnMut(usize),
 ) -> Result<CagesWritten, DecodeError> {
@@ -40,6 +41,9 @@ pub fn write_cages(
     container.report().map_err(fail)?;
     let mut cage = Model::from(container.cage().map_err(fail)?);
     move_from(container.header().origin, &mut cage.points);
+    let mut options = frame_options(&mut container, there, range, timing, false).map_err(fail)?;
+    let change = units::convert(&mut options, asked, input)?;
+    change.apply_to(&mut cage.points);
     let rest = (*output != Target::StandardOutput).then(|| rest_cage_path(output.path()));
     let mut rest_file = match &rest {
         Some(path) => rest_file(path, output.replaces(), &obj_bytes(&cage))?,
@@ -47,12 +51,12 @@ pub fn write_cages(
     };
 
     let rows = cage.points.len();
-    let options = frame_options(&mut container, there, range, timing, false).map_err(fail)?;
     let mut writer = create_frames(output, rows, range.count(), &cage.faces, &options)?;
     let mut frame = Vec::new();
     for place in 0..range.count() {
         container.read_frame(range.frame(place), &mut frame).map_err(fail)?;
         if !dry_run {
+            units::apply(&change, &mut frame[..3 * rows]);
             writer.write_frame(&frame[..3 * rows])?;
         }
         progress(place + 1);

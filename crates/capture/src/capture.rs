@@ -61,7 +61,11 @@ impl StoredError {
 
     /// Of a measured frame.
     pub fn new(error: &cager_core::decode::FrameError, diagonal: f64) -> Self {
-        let stored = |x: f64| (x / diagonal) as f32;
+        // Not smaller than it is.
+        let stored = |x: f64| {
+            let nearest = (x / diagonal) as f32;
+            if f64::from(nearest) < x / diagonal { nearest.next_up() } else { nearest }
+        };
         Self { l2: stored(error.l2), linf: stored(error.linf), squared: error.squared, spread: error.spread }
     }
 }
@@ -175,6 +179,7 @@ impl<W: Write> CaptureWriter<W> {
     /// # Errors
     /// An output that refuses.
     pub fn finish(mut self) -> Result<(W, Report), container::Error> {
+        self.report.hold_errors_to_bound();
         self.report.warnings.extend(far_away(self.farthest.0, self.farthest.1 / self.diagonal, self.stays_near));
         let frames = &self.report.error.per_frame;
         let mean = |f: fn(&FrameError) -> f64| frames.iter().map(f).sum::<f64>() / frames.len().max(1) as f64;

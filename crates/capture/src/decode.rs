@@ -2,6 +2,7 @@
 
 pub mod joined;
 pub(crate) mod opened;
+pub(crate) mod units;
 
 pub use opened::{Container, DecodeError, open, open_cut};
 
@@ -16,6 +17,7 @@ use cager_core::decode::{Bound, Decoder, Survey};
 use cager_core::inversion::{BATCH, coordinates_bytes, reject_far_points};
 use cager_formats::{CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
 use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
+use cager_geometry::units::{Change, Units};
 use cager_proto::container;
 use std::path::{Path, PathBuf};
 
@@ -42,6 +44,8 @@ pub struct Decoding<'a> {
     pub morphs: MorphOptions,
     /// Whether the cage is kept beside the model, which USD alone does.
     pub with_cage: bool,
+    /// Unit and upward axis that positions are brought to; as the container has them where nothing is said.
+    pub units: Units,
 }
 
 /// How much of a coded file is decoded.
@@ -56,7 +60,7 @@ pub enum Layer {
 }
 
 impl Decoding<'_> {
-    /// Whether it is the file's own model and cages, which alone the residual is of.
+    /// Whether it is the file's own model in its own frames, edited or not, which alone the residual is of.
     fn own(&self) -> bool {
         self.model.is_none() && self.has_own_frames()
     }
@@ -247,9 +251,26 @@ pub(crate) fn frame_options(
     let numbers = timing.numbers(found);
     let numbers = (0..range.count()).filter_map(|place| numbers.get(range.frame(place)).copied()).collect();
     let origin = container.header().origin;
-    let rounding = if origin.is_some() { LOST * diagonal(&container.rest()?.points) } else { 0.0 };
+    let rounding = if origin.is_some() { may_lose(container)? } else { 0.0 };
     let units = container.header().units;
     Ok(FrameOptions { fps, numbers, origin, rounding, units, ..FrameOptions::default() })
+}
+
+/// What a format may lose where it adds the origin in single precision: what a guaranteed error leaves, and what is not seen where there is none.
+fn may_lose(container: &mut Container) -> Result<f64, container::Error> {
+    Ok(diagonal(&container.rest()?.points) * left_by_bound(container)?.unwrap_or(LOST))
+}
+
+/// What a guaranteed error leaves, as a share of the diagonal; `None` where nothing is guaranteed, or known of a file that was cut.
+fn left_by_bound(container: &mut Container) -> Result<Option<f64>, container::Error> {
+    let report = match container.report() {
+        Err(container::Error::Corrupt { .. }) => return Ok(None),
+        found => found?,
+    };
+    let Some(bound) = report.coding.and_then(|coding| coding.max_error) else { return Ok(None) };
+    // Those of edited frames are as large, from what was captured and edited.
+    let largest = container.errors()?.iter().fold(0.0, |largest: f64, error| largest.max(error.linf));
+    Ok(Some((bound - largest).max(0.0)))
 }
 
 /// How many frames of so many points are decoded at a time.
@@ -265,6 +286,8 @@ struct Chosen<'a> {
     /// Their places in the container, or among the edited cages.
     wanted: Vec<usize>,
     options: FrameOptions,
+    /// What makes positions those of the output.
+    change: Change,
     damaged: Vec<usize>,
     numbers_lost: bool,
 }
@@ -281,6 +304,7 @@ impl<'a> Chosen<'a> {
         let mut wanted: Vec<usize> =
             if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };
         let mut options = frame_options(&mut container, there, taken, timing, salvage).map_err(fail)?;
+        let change = units::convert(&mut options, what.units, path)?;
         if what.with_cage {
             let cage = container.cage().map_err(fail)?;
             let faces = Polygons::of_triangles(&cage.triangles);
@@ -306,7 +330,22 @@ impl<'a> Chosen<'a> {
             // Decoding does not need it, but a damaged file is refused wherever the damage is.
             container.report().map_err(fail)?;
         }
-        Ok(Self { container, path, what, wanted, options, damaged, numbers_lost })
+        Ok(Self { container, path, what, wanted, options, change, damaged, numbers_lost })
+    }
+
+    /// How a `.glb` holds the frames, where the user has not said what it may lose: to what a guaranteed error leaves.
+    fn morphs(&mut self, asked: MorphOptions, rest: &Model) -> Result<MorphOptions, DecodeError> {
+        /// The rounding of a sum of targets, which encoders leave room for.
+        const LEAST: f64 = 5e-7;
+        let asked = MorphOptions { diagonal: Some(diagonal(&rest.points)), ..asked };
+        if asked.targets.is_some() || asked.max_error.is_some() || !self.what.own() || self.what.layer != Layer::All {
+            return Ok(asked);
+        }
+        let left = left_by_bound(&mut self.container).map_err(|cause| DecodeError::container(self.path, cause))?;
+        Ok(match left {
+            Some(left) => MorphOptions { max_error: Some(left.max(LEAST)), is_guarantee: true, floats: true, ..asked },
+            None => asked,
+        })
     }
 
     fn memory(&self) -> Memory {
@@ -358,13 +397,16 @@ impl<'a> Chosen<'a> {
                 if residual {
                     self.container.add_residual(wanted, &mut positions[..count]).map_err(fail)?;
                 }
-                for frame in &positions[..count] {
+                for frame in &mut positions[..count] {
+                    units::apply(&self.change, frame);
                     writer.write_frame(frame)?;
                 }
                 if let Some(mesh) = &self.options.cage {
-                    for cage in &cages[..count] {
+                    for cage in &mut cages[..count] {
                         // Normals of the cage follow, where there are any.
-                        writer.write_cage(&cage[..3 * mesh.points])?;
+                        let vertices = &mut cage[..3 * mesh.points];
+                        units::apply(&self.change, vertices);
+                        writer.write_cage(vertices)?;
                     }
                 }
             }
@@ -386,13 +428,16 @@ pub fn decode(
     progress: &mut dyn FnMut(usize),
 ) -> Result<Decoded, DecodeError> {
     let dry_run = what.dry_run;
+    let output = output.into();
+    let path = output.path().to_owned();
     let mut chosen = Chosen::open(input, what)?;
     let bound = chosen.bind()?;
     let (points, frames) = (bound.rest.points.len(), chosen.wanted.len());
-    chosen.options.morphs = MorphOptions { diagonal: Some(diagonal(&bound.rest.points)), ..chosen.what.morphs };
+    chosen.options.morphs = chosen.morphs(chosen.what.morphs, &bound.rest)?;
     let mut writer = create_frames(output, points, frames, &bound.rest.faces, &chosen.options)?;
     chosen.write(&bound, &mut *writer, progress)?;
-    let notes = writer.notes();
+    let mut notes = writer.notes();
+    notes.extend(units::notes(&path, chosen.options.units, chosen.what.units));
     if !dry_run {
         writer.finish()?;
     }

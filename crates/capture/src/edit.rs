@@ -4,6 +4,7 @@ use crate::capture::GENERATOR;
 use crate::decode::{Container, DecodeError};
 use crate::edited::EditedCages;
 use cager_formats::{Action, AtomicFile, FrameRange, Target};
+use cager_geometry::units::Units;
 use cager_proto::container::{self, ContainerWriter, EditLayer, LayerBuilder, LayerSource};
 use cager_proto::report::{Errors, Report};
 use std::io::BufWriter;
@@ -101,6 +102,25 @@ pub fn with_layers(
     output: &Target,
 ) -> Result<AtomicFile, DecodeError> {
     written(input, output, |file| ContainerWriter::copy_with_layers(container, layers, file))
+}
+
+/// Writes the container at `input` again, which then says that its positions mean this; all else keeps its bytes.
+///
+/// # Errors
+/// Damage; a container that says something else; an output that refuses.
+pub fn with_units(
+    container: &mut Container,
+    input: &Path,
+    units: Units,
+    output: &Target,
+) -> Result<AtomicFile, DecodeError> {
+    let header = container.header();
+    let (origin, own) = (header.origin, header.units);
+    if !own.change_to(units).is_none() {
+        let what = "says already that its unit or its axis is another, and what is in it is not scaled or turned; cager decode --unit UNIT --up AXIS writes positions that are".to_owned();
+        return Err(DecodeError::Meaning { path: input.to_owned(), what });
+    }
+    written(input, output, |file| ContainerWriter::copy_placed(container, (origin, own.or(units)), &[], file))
 }
 
 /// Writes the container at `input` again with cages that have its layers in them, and `more`. What is added to positions beside the cages is kept; those that are

@@ -1,10 +1,11 @@
 //! Reading cages that were edited in another program.
 
 use crate::decode::opened::{Container, DecodeError};
+use crate::decode::units;
 use crate::origin::move_to;
 use cager_formats::{Error, FrameRange, FrameReader, open_frames};
 use cager_geometry::mesh::Point;
-use cager_geometry::units::Change;
+use cager_geometry::units::{Change, Units};
 use cager_proto::container::LayerBuilder;
 use std::path::{Path, PathBuf};
 
@@ -76,6 +77,17 @@ impl EditedCages {
             wide: Vec::new(),
             slack: Vec::new(),
         })
+    }
+
+    /// Lets positions mean this where the file does not say it; they are changed to what those of the container at `input` mean.
+    ///
+    /// # Errors
+    /// A unit or an axis is given, and the container does not know its own.
+    pub fn meaning(mut self, given: Units, container: &Container, input: &Path) -> Result<Self, DecodeError> {
+        let own = container.header().units;
+        units::check(own, given, input)?;
+        self.change = self.reader.units().or(given).change_to(own);
+        Ok(self)
     }
 
     /// Number of frames.

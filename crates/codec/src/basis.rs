@@ -3,9 +3,12 @@
 //! With Gram matrix `G = ΦᵀΦ/n + εI = L Lᵀ`, the rows of `Y = Lᵀ(C − C₀)` have the length of what they move the model, in the root mean square over
 //! its points; so a uniform step in Y is optimal at a given mean square error of the positions (reverse water-filling). A rotation of Y to the
 //! eigenvectors of `LᵀL` gathers what moves much: `Y = S Vᵀ(C − C₀)`, with the singular values S and vectors V of Φ.
+//!
+//! G is rounded first, by steps that the bytes say, so that every machine computes the basis from the same numbers, however it rounds Φ.
 
+use crate::gram_rounding::GramRounding;
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, ElementPlan};
+use cager_core::coordinates::{CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, MeanValue};
 use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef, Par};
@@ -14,14 +17,28 @@ use faer::{Mat, MatRef, Par};
 const FLOOR: f64 = 1e-2;
 /// Equal eigenvalues would leave their vectors open; scaling the rows by up to this much, each otherwise, parts them.
 const SPLIT: f64 = 1e-3;
-/// Largest change of a coefficient, relative to the largest, by rounding on another machine.
+/// Largest change of a coefficient, relative to the largest, by rounding of the factorisations on another machine.
 const STABLE: f64 = 1e-7;
+/// What those are disturbed by to see that, over the largest diagonal entry of G: rounding many times over.
+const DISTURBANCE: f64 = 1e-14;
+
+/// What two machines' entries of `ΦᵀΦ/n` may differ by, over the mean of its diagonal.
+const TOLERANCE: f64 = 1e-9;
+
+/// How a basis is computed from `Φ`, as the bytes of a group of cages say it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BasisRecord {
+    /// Whether it is rotated to eigenvectors.
+    pub rotated: bool,
+    /// How the Gram matrix is rounded; `None` in files of programs before 0.3, which did not.
+    pub rounding: Option<GramRounding>,
+}
 
 /// The coordinates of a cage's rows that bytes hold.
 #[derive(Clone, Debug)]
 pub struct CageBasis {
     rest: Vec<Point>,
-    rotated: bool,
+    record: BasisRecord,
     /// Y from rows, m × m.
     to: Mat<f64>,
     /// Rows from Y.
@@ -32,8 +49,10 @@ impl CageBasis {
     /// Most points whose coordinates are read.
     pub const SAMPLE: usize = 1 << 14;
 
-    /// For a model in its cage: from every k-th point, with the smallest k that leaves 16,384 of them; and the coordinates of these. `rotated` is what the
-    /// encoder found; an encoder leaves it out. `None` where numbers are not finite.
+    /// For a model in its cage: from every k-th point, with the smallest k that leaves 16,384 of them; and the coordinates of these, where they are those of
+    /// the system. `record` is what the encoder found; an encoder leaves it out. `None` where numbers are not finite.
+    ///
+    /// Coordinates that are solved for depend on the machine by far more than rounding: the basis is that of mean value coordinates then.
     ///
     /// # Errors
     /// As [`CoordinateSystem::coordinates`].
@@ -42,54 +61,62 @@ impl CageBasis {
         cage: &Cage,
         points: &[Point],
         plan: Option<&ElementPlan>,
-        rotated: Option<bool>,
-    ) -> Result<Option<(Self, Coordinates)>, CoordinatesError> {
+        record: Option<&BasisRecord>,
+    ) -> Result<Option<(Self, Option<Coordinates>)>, CoordinatesError> {
         let every = points.len().div_ceil(Self::SAMPLE).max(1);
         let sample: Vec<Point> = points.iter().step_by(every).copied().collect();
-        let found = system.coordinates(cage, &sample, plan)?;
+        let is_own = system.pointwise().is_some() || record.is_some_and(|record| record.rounding.is_none());
+        let system: &dyn CoordinateSystem = if is_own { system } else { &MeanValue };
+        let found = system.coordinates(cage, &sample, plan.filter(|_| is_own))?;
         // Of normals that follow from the vertices no rows are stored.
         let values = system.values(cage);
         let rows = values.unknowns();
         let (phi, rest) = (found.phi.subcols(0, rows), &values.rest[..rows]);
-        let basis = match rotated {
-            Some(rotated) => Self::new(phi, rest, rotated),
+        let basis = match record {
+            Some(record) => Self::new(phi, rest, record),
             None => Self::for_encoding(phi, rest),
         };
-        Ok(basis.map(|basis| (basis, found)))
+        Ok(basis.map(|basis| (basis, is_own.then_some(found))))
     }
 
-    /// From rows of `Φ`, any number of them × m, and the rest pose's rows, m × 3. `None` where numbers are not finite.
-    ///
-    /// `rotated` is false for files whose encoder found that the rotation could not be relied on.
-    pub fn new(phi: MatRef<'_, f64>, rest: &[Point], rotated: bool) -> Option<Self> {
-        Self::of_gram(gram(phi).as_ref(), rest, rotated)
+    /// From rows of `Φ`, any number of them × m, and the rest pose's rows, m × 3, as the bytes say. `None` where numbers are not finite.
+    pub fn new(phi: MatRef<'_, f64>, rest: &[Point], record: &BasisRecord) -> Option<Self> {
+        let products = products(phi);
+        let rounded = match &record.rounding {
+            Some(rounding) => rounding.apply(products)?,
+            None => products,
+        };
+        Self::of_gram(with_floor(rounded).as_ref(), rest, record.clone())
     }
 
-    /// Rotated where another machine would find the same rotation, but for rounding.
+    /// The basis for encoding, of coordinates in closed form. It is rotated where the factorisations are stable.
     pub fn for_encoding(phi: MatRef<'_, f64>, rest: &[Point]) -> Option<Self> {
-        let gram = gram(phi);
-        let rotated = Self::of_gram(gram.as_ref(), rest, true)?;
-        // What rounding can do to the sums, several times over.
+        let products = products(phi);
+        let rounding = GramRounding::of(products.as_ref(), TOLERANCE)?;
+        let gram = with_floor(rounding.apply(products)?);
+        let record = |rotated| BasisRecord { rotated, rounding: Some(rounding.clone()) };
+        let rotated = Self::of_gram(gram.as_ref(), rest, record(true))?;
         let m = gram.nrows();
+        let size = DISTURBANCE * (0..m).map(|k| gram[(k, k)]).fold(0.0, f64::max);
         let disturbed = Mat::from_fn(m, m, |i, j| {
             let (i, j) = (i.min(j), i.max(j));
-            gram[(i, j)] * (1.0 + 1e-13 * (2.0 * spread(i * 31 + j) - 1.0))
+            gram[(i, j)] + size * (2.0 * spread(i * 31 + j) - 1.0)
         });
-        let same = Self::of_gram(disturbed.as_ref(), rest, true).is_some_and(|other| {
+        let same = Self::of_gram(disturbed.as_ref(), rest, record(true)).is_some_and(|other| {
             let there_and_back = linalg::product(other.to.as_ref(), rotated.from.as_ref());
             (0..m).all(|j| (0..m).all(|i| (there_and_back[(i, j)] - f64::from(u8::from(i == j))).abs() <= STABLE))
         });
-        if same { Some(rotated) } else { Self::of_gram(gram.as_ref(), rest, false) }
+        if same { Some(rotated) } else { Self::of_gram(gram.as_ref(), rest, record(false)) }
     }
 
-    fn of_gram(gram: MatRef<'_, f64>, rest: &[Point], rotated: bool) -> Option<Self> {
+    fn of_gram(gram: MatRef<'_, f64>, rest: &[Point], record: BasisRecord) -> Option<Self> {
         let m = gram.nrows();
         let l = linalg::cholesky(gram.to_owned())?;
         let mut to = l.transpose().to_owned();
         // L⁻ᵀ
         let mut from = Mat::identity(m, m);
         faer::linalg::triangular_solve::solve_upper_triangular_in_place(l.transpose(), from.as_mut(), Par::Seq);
-        if rotated {
+        if record.rotated {
             let inner = linalg::product(l.transpose(), l.as_ref());
             let part = |k: usize| 1.0 + SPLIT * spread(k);
             let split = Mat::from_fn(m, m, |i, j| inner[(i, j)] * part(i) * part(j));
@@ -103,12 +130,12 @@ impl CageBasis {
             to = linalg::product(vectors.transpose(), to.as_ref());
             from = linalg::product(from.as_ref(), vectors.as_ref());
         }
-        Some(Self { rest: rest.to_vec(), rotated, to, from })
+        Some(Self { rest: rest.to_vec(), record, to, from })
     }
 
-    /// Whether the coordinates are rotated to eigenvectors.
-    pub fn rotated(&self) -> bool {
-        self.rotated
+    /// How it was computed, for the bytes of its groups.
+    pub fn record(&self) -> &BasisRecord {
+        &self.record
     }
 
     /// Rows of a cage.
@@ -136,18 +163,21 @@ impl CageBasis {
     }
 }
 
-/// `ΦᵀΦ/n + εI`.
-fn gram(phi: MatRef<'_, f64>) -> Mat<f64> {
-    let (n, m) = phi.shape();
-    let mut gram = linalg::mirrored(linalg::lower_product(phi.transpose(), phi));
-    let scale = 1.0 / n.max(1) as f64;
-    let trace: f64 = (0..m).map(|k| gram[(k, k)]).sum::<f64>() * scale;
+/// `ΦᵀΦ/n`.
+fn products(phi: MatRef<'_, f64>) -> Mat<f64> {
+    let n = phi.nrows();
+    let mut products = linalg::mirrored(linalg::lower_product(phi.transpose(), phi));
+    products *= faer::Scale(1.0 / n.max(1) as f64);
+    products
+}
+
+/// G of `ΦᵀΦ/n`.
+fn with_floor(mut gram: Mat<f64>) -> Mat<f64> {
+    let m = gram.nrows();
+    let trace: f64 = (0..m).map(|k| gram[(k, k)]).sum();
     let floor = FLOOR * (trace / m as f64).max(f64::MIN_POSITIVE);
-    for j in 0..m {
-        for i in 0..m {
-            gram[(i, j)] *= scale;
-        }
-        gram[(j, j)] += floor;
+    for k in 0..m {
+        gram[(k, k)] += floor;
     }
     gram
 }
@@ -161,15 +191,19 @@ fn spread(k: usize) -> f64 {
 mod tests {
     use super::*;
 
+    fn cage_of(m: usize) -> (Vec<Point>, Vec<f32>) {
+        let mut random = fastrand::Rng::with_seed(3);
+        ((0..m).map(|k| [k as f64, 0.0, 1.0]).collect(), (0..3 * m).map(|_| random.f32()).collect())
+    }
+
     #[test]
     fn lengths_are_what_the_model_moves_and_equal_values_do_not_rotate() {
         let mut random = fastrand::Rng::with_seed(3);
         let (n, m) = (200, 12);
         let phi = Mat::from_fn(n, m, |_, _| random.f64());
-        let rest: Vec<Point> = (0..m).map(|k| [k as f64, 0.0, 1.0]).collect();
-        let cage: Vec<f32> = (0..3 * m).map(|_| random.f32()).collect();
+        let (rest, cage) = cage_of(m);
         let basis = CageBasis::for_encoding(phi.as_ref(), &rest).unwrap();
-        assert!(basis.rotated());
+        assert!(basis.record().rotated);
         let y = basis.forward(&[&cage]);
         let moved = Mat::from_fn(m, 3, |j, c| f64::from(cage[3 * j + c]) - rest[j][c]);
         let model = linalg::product(phi.as_ref(), moved.as_ref());
@@ -179,13 +213,39 @@ mod tests {
         assert!(back[0].iter().zip(&cage).all(|(a, b)| (a - b).abs() < 1e-5));
     }
 
+    /// Coordinates with the symmetries of a regular polygon, whose eigenvalues come in equal pairs.
+    fn symmetrical(m: usize) -> Mat<f64> {
+        Mat::from_fn(9 * m, m, |i, j| {
+            let turn = (i % m + m - j) % m;
+            let distance = turn.min(m - turn) as f64;
+            (-0.1 * distance * distance * (1.0 + (i / m) as f64)).exp()
+        })
+    }
+
+    #[test]
+    fn other_rounding_of_coordinates_finds_the_same_basis() {
+        let (phi, (rest, cage)) = (symmetrical(40), cage_of(40));
+        let basis = CageBasis::for_encoding(phi.as_ref(), &rest).unwrap();
+        assert!(basis.record().rotated);
+        let mut random = fastrand::Rng::with_seed(8);
+        let mean = phi.squared_norm_l2() / phi.nrows() as f64 / 40.0;
+        for _ in 0..8 {
+            // As another machine would compute them, by as much as the tolerance allows.
+            let by = 0.2 * TOLERANCE * mean.sqrt();
+            let other = Mat::from_fn(phi.nrows(), 40, |i, j| phi[(i, j)] + by * (random.f64() - 0.5));
+            let other = CageBasis::new(other.as_ref(), &rest, basis.record()).unwrap();
+            let back = other.inverse(basis.forward(&[&cage]).as_ref());
+            assert!(back[0].iter().zip(&cage).all(|(a, b)| (a - b).abs() < 1e-5));
+        }
+    }
+
     #[test]
     fn directions_that_rounding_could_turn_are_left_as_they_are() {
         // Rows of Φ that say the same of all vertices: all eigenvalues but one are equal.
         let phi = Mat::from_fn(40, 8, |i, j| f64::from(u8::from(i % 8 == j)));
         let rest = vec![[0.0; 3]; 8];
         let basis = CageBasis::for_encoding(phi.as_ref(), &rest).unwrap();
-        let other = CageBasis::new(phi.as_ref(), &rest, basis.rotated()).unwrap();
+        let other = CageBasis::new(phi.as_ref(), &rest, basis.record()).unwrap();
         let cage: Vec<f32> = (0..24).map(|k| k as f32).collect();
         let back = other.inverse(basis.forward(&[&cage]).as_ref());
         assert!(back[0].iter().zip(&cage).all(|(a, b)| (a - b).abs() < 1e-4));

@@ -1,15 +1,15 @@
 //! Cages of a group of frames: `Y = E A` in the coordinates of [`CageBasis`], A in whole steps.
 
-use crate::basis::CageBasis;
+use crate::basis::{BasisRecord, CageBasis};
 use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, MAX_SIZE, SIZES, size_class};
 use crate::error::{Error, Result};
+use crate::gram_rounding::GramRounding;
 use crate::trajectories::{PULSE_FRAMES, Trajectories, fit};
 use crate::{MAX_FRAMES, trajectories};
 use cager_geometry::linalg;
 use faer::Mat;
 
-/// Bytes before the coded numbers: whether the basis is rotated, then the step as f64 and the number of components as u16.
-const HEAD: usize = 1 + STEP_AND_COUNT;
+/// Bytes after the basis and before the coded numbers: the step as f64 and the number of components as u16.
 pub(crate) const STEP_AND_COUNT: usize = 10;
 
 /// Part of a step from which a number is rounded away from 0: small ones cost less than they are worth.
@@ -64,7 +64,7 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, adjacent: Ad
         whole.extend(missing.iter().map(|x| in_steps(x / height, 0.5)).collect::<Option<Vec<_>>>()?);
     }
     let count = chosen.count();
-    let mut bytes = vec![u8::from(basis.rotated())];
+    let mut bytes = write_record(basis.record());
     bytes.extend(step.to_le_bytes());
     bytes.extend((count as u16).to_le_bytes());
     let mut coder = Encoder::default();
@@ -80,12 +80,13 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, adjacent: Ad
 /// Bytes that the encoder did not write.
 pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Vec<Vec<f32>>> {
     let rows = basis.rows();
-    let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("a group of cages is cut"))?;
-    let (step, count) = step_and_count(&std::array::from_fn(|k| head[1 + k]));
+    let (record, bytes) = read_record(bytes)?;
+    let (head, coded) = bytes.split_first_chunk().ok_or(Error::Damaged("a group of cages is cut"))?;
+    let (step, count) = step_and_count(head);
     if frames > MAX_FRAMES || count > frames.min(3 * rows) || !(step.is_finite() && step > 0.0) {
         return Err(Error::Damaged("a group of cages has impossible counts"));
     }
-    if is_rotated(bytes)? != basis.rotated() {
+    if &record != basis.record() {
         return Err(Error::Damaged("a group of cages is in another basis"));
     }
     let mut coder = Decoder::new(coded)?;
@@ -102,16 +103,31 @@ pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Ve
     Ok(cages)
 }
 
-/// Whether bytes of [`encode_cages`] are in a rotated basis.
+/// The basis that bytes of [`encode_cages`] are in.
 ///
 /// # Errors
 /// Bytes that the encoder did not write.
-pub fn is_rotated(bytes: &[u8]) -> Result<bool> {
-    match bytes.first() {
-        Some(0) => Ok(false),
-        Some(1) => Ok(true),
-        _ => Err(Error::Damaged("a group of cages has an unknown basis")),
+pub fn basis_record(bytes: &[u8]) -> Result<BasisRecord> {
+    read_record(bytes).map(|(record, _)| record)
+}
+
+/// A first byte of 2 or 3 says that the Gram matrix is rounded, odd ones that the basis is rotated.
+fn read_record(bytes: &[u8]) -> Result<(BasisRecord, &[u8])> {
+    let (&kind, mut rest) = bytes.split_first().ok_or(Error::Damaged("a group of cages is cut"))?;
+    let rounding = match kind {
+        0 | 1 => None,
+        2 | 3 => Some(GramRounding::read(&mut rest)?),
+        _ => return Err(Error::Damaged("a group of cages has an unknown basis")),
+    };
+    Ok((BasisRecord { rotated: kind % 2 == 1, rounding }, rest))
+}
+
+fn write_record(record: &BasisRecord) -> Vec<u8> {
+    let mut bytes = vec![u8::from(record.rotated) + if record.rounding.is_some() { 2 } else { 0 }];
+    if let Some(rounding) = &record.rounding {
+        rounding.write(&mut bytes);
     }
+    bytes
 }
 
 pub(crate) fn step_and_count(head: &[u8; STEP_AND_COUNT]) -> (f64, usize) {

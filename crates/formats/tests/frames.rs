@@ -760,5 +760,8 @@ fn a_folder_of_arrays_has_one_frame_in_each() {
     let mut reader = open_frames(folder.path(), 2).unwrap();
     assert!(reader.read_next(&mut out).unwrap());
     let error = message(reader.read_next(&mut out));
-    assert!(error.contains("f_010.npy: frame 1: has 2 frames, where a folder of several files has one in each"), "{error}");
+    assert!(
+        error.contains("f_010.npy: frame 1: has 2 frames, where a folder of several files has one in each"),
+        "{error}"
+    );
 }

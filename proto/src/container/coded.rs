@@ -5,7 +5,8 @@ use super::reader::{ContainerReader, check_finite};
 use super::section::{Entry, SectionHeader};
 use super::{Error, tag};
 use cager_codec::{
-    CageBasis, Hierarchy, MAX_ROWS, Residual, decode_cages, decode_errors, decode_faces, decode_positions, is_rotated,
+    BasisRecord, CageBasis, Hierarchy, MAX_ROWS, Residual, basis_record, decode_cages, decode_errors, decode_faces,
+    decode_positions,
 };
 use cager_core::cage::Cage;
 use cager_core::coordinates::{self, CoordinateSystem, Coordinates, DEFINITION, ElementPlan};
@@ -22,9 +23,9 @@ struct Binding {
 }
 
 impl Binding {
-    fn basis(&self, rotated: bool) -> Result<(CageBasis, Coordinates), Error> {
+    fn basis(&self, record: &BasisRecord) -> Result<(CageBasis, Option<Coordinates>), Error> {
         let corrupt = |what: String| Error::corrupt(self.offset, what);
-        CageBasis::of(self.system, &self.cage, &self.points, self.plan.as_ref(), Some(rotated))
+        CageBasis::of(self.system, &self.cage, &self.points, self.plan.as_ref(), Some(record))
             .map_err(|e| corrupt(e.to_string()))?
             .ok_or_else(|| corrupt("the coordinates have no basis".to_owned()))
     }
@@ -50,8 +51,8 @@ impl CodedSection {
         decode_errors(&self.payload, frames).map_err(|e| self.damaged(&e))
     }
 
-    fn is_rotated(&self) -> Result<bool, Error> {
-        is_rotated(&self.payload).map_err(|e| self.damaged(&e))
+    fn basis_record(&self) -> Result<BasisRecord, Error> {
+        basis_record(&self.payload).map_err(|e| self.damaged(&e))
     }
 
     fn residual(&self, hierarchy: &Hierarchy, frames: u32, most: usize) -> Result<Residual, Error> {
@@ -83,11 +84,15 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// The cages of a coded group, as the bytes of an uncoded one.
     pub(super) fn group(&mut self, entry: Entry) -> Result<Vec<u8>, Error> {
         let section = self.coded_entry(entry)?;
-        let rotated = section.is_rotated()?;
-        if self.groups.bases[usize::from(rotated)].is_none() {
-            self.groups.bases[usize::from(rotated)] = Some(self.binding(entry.offset)?.basis(rotated)?.0);
+        let record = section.basis_record()?;
+        if self.groups.basis(&record).is_none() {
+            if !self.groups.may_compute() {
+                return Err(Error::corrupt(entry.offset, "the groups have too many bases"));
+            }
+            let basis = self.binding(entry.offset)?.basis(&record)?.0;
+            self.groups.keep_basis(basis);
         }
-        let Some(basis) = &self.groups.bases[usize::from(rotated)] else {
+        let Some(basis) = self.groups.basis(&record) else {
             return Err(Error::corrupt(entry.offset, "a group without a basis"));
         };
         let frames = entry.header.count as usize;
@@ -132,7 +137,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         if entry.header.codec != CODED {
             return Ok(None);
         }
-        let rotated = self.coded_entry(entry)?.is_rotated()?;
+        let record = self.coded_entry(entry)?.basis_record()?;
         let Ok(binding) = self.binding(entry.offset) else { return Ok(None) };
         let rest = self.rest()?;
         let residual = match self.residual_entry(frame) {
@@ -143,7 +148,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         // Two of them would be more than a reader may take.
         self.groups.residuals.clear();
         let (basis, residual) = rayon::join(
-            || binding.basis(rotated),
+            || binding.basis(&record),
             || {
                 residual.map(|(entry, section)| {
                     let hierarchy = Hierarchy::new(&rest.faces, rest.points.len());
@@ -153,13 +158,13 @@ impl<R: Read + Seek> ContainerReader<R> {
             },
         );
         let Ok((basis, coordinates)) = basis else { return Ok(None) };
-        self.groups.bases[usize::from(rotated)] = Some(basis);
+        self.groups.keep_basis(basis);
         if let Some(found) = residual {
             let (hierarchy, residual) = found?;
             self.groups.hierarchy = Some(hierarchy);
             self.groups.residuals = vec![residual];
         }
-        Ok(Some(coordinates).filter(|found| found.phi.nrows() == rest.points.len()))
+        Ok(coordinates.filter(|found| found.phi.nrows() == rest.points.len()))
     }
 
     /// Whether the file holds more of the positions than its cages say.

@@ -1,14 +1,37 @@
 //! What decoding coded groups needs.
 
 use super::section::Entry;
-use cager_codec::{CageBasis, Hierarchy, Residual};
+use cager_codec::{BasisRecord, CageBasis, Hierarchy, Residual};
+
+/// Bases that are computed for one file: all groups of a writer have the same, and each takes as long as a cube of the rows.
+const MAX_BASES: usize = 8;
 
 /// What decoding groups needs, computed where the first is read.
 #[derive(Default)]
 pub(super) struct Groups {
-    /// Unrotated and rotated, as each group says which it has.
-    pub(super) bases: [Option<CageBasis>; 2],
+    /// Those that groups say they have, two at the most.
+    bases: Vec<CageBasis>,
+    /// How many were computed.
+    computed: usize,
     pub(super) hierarchy: Option<Hierarchy>,
     /// The residuals decoded last, each with the entry that it was read from.
     pub(super) residuals: Vec<(Entry, Residual)>,
+}
+
+impl Groups {
+    pub(super) fn basis(&self, record: &BasisRecord) -> Option<&CageBasis> {
+        self.bases.iter().find(|basis| basis.record() == record)
+    }
+
+    /// Whether a file may have one more basis.
+    pub(super) fn may_compute(&self) -> bool {
+        self.computed < MAX_BASES
+    }
+
+    pub(super) fn keep_basis(&mut self, basis: CageBasis) {
+        self.computed += 1;
+        self.bases.retain(|other| other.record() != basis.record());
+        self.bases.truncate(1);
+        self.bases.insert(0, basis);
+    }
 }

@@ -54,7 +54,14 @@ impl SlowDesigns {
             }
             slow.running.fetch_sub(1, SeqCst);
             outcome?;
-            Ok(Design { cage, stages: Vec::new(), unseen: None, timed_out: false, missed: false, warnings: vec!["slow".to_owned()] })
+            Ok(Design {
+                cage,
+                stages: Vec::new(),
+                unseen: None,
+                timed_out: false,
+                missed: false,
+                warnings: vec!["slow".to_owned()],
+            })
         })
     }
 }

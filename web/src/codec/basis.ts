@@ -3,6 +3,7 @@
 import { cholesky, multiply, solveTransposed, transposedTimesSelf } from './dense';
 import { eigenvectors } from './eigen';
 import { CodedDataError } from './error';
+import { type BasisRecord, roundGram } from './gramRounding';
 
 /** ε over the mean of the diagonal of the Gram matrix. */
 const FLOOR = 1e-2;
@@ -19,8 +20,8 @@ export function sampleStride(points: number): number {
 /** Sums up `ΦᵀΦ` of the sampled points, some of them at a time, and makes bases of it. */
 export class CageBasis {
   private readonly gram: GramMatrix;
-  private factor: Float64Array | null = null;
-  private readonly inverses = new Map<boolean, Float64Array>();
+  /** The inverse made last, and the record that it is of: all groups of a writer have the same. */
+  private latest: { readonly key: string; readonly inverse: Float64Array } | null = null;
 
   constructor(private readonly rows: number) {
     this.gram = new GramMatrix(rows);
@@ -32,30 +33,30 @@ export class CageBasis {
   }
 
   /**
-   * The matrix, rows × rows, that takes coefficients to differences of a cage's rows from those at rest; `rotated` as the group of cages says.
+   * The matrix, rows × rows, that takes coefficients to differences of a cage's rows from those at rest; `record` as the group of cages says.
    *
    * @throws {CodedDataError} where coordinates are not finite.
    */
-  inverse(rotated: boolean): Float64Array {
-    let inverse = this.inverses.get(rotated);
-    if (inverse === undefined) {
-      this.factor ??= this.factorise();
-      inverse = rotated ? rotation(this.factor, this.rows) : identity(this.rows);
-      solveTransposed(this.factor, inverse, this.rows, this.rows);
-      this.inverses.set(rotated, inverse);
+  inverse(record: BasisRecord): Float64Array {
+    if (this.latest?.key !== record.key) {
+      const factor = this.factorise(record);
+      const inverse = record.rotated ? rotation(factor, this.rows) : identity(this.rows);
+      solveTransposed(factor, inverse, this.rows, this.rows);
+      this.latest = { key: record.key, inverse };
     }
-    return inverse;
+    return this.latest.inverse;
   }
 
-  /** L of `ΦᵀΦ/n + εI = L Lᵀ`. */
-  private factorise(): Float64Array {
+  /** L of `G = L Lᵀ`. */
+  private factorise(record: BasisRecord): Float64Array {
     const { rows } = this;
-    const scaled = this.gram.lower.map((x) => x / Math.max(this.gram.points, 1));
+    const gram = this.gram.lower.map((x) => x / Math.max(this.gram.points, 1));
+    if (record.rounding !== null) roundGram(gram, rows, record.rounding);
     let trace = 0;
-    for (let k = 0; k < rows; k++) trace += scaled[k * rows + k];
+    for (let k = 0; k < rows; k++) trace += gram[k * rows + k];
     const floor = FLOOR * Math.max(trace / rows, 2.2250738585072014e-308);
-    for (let k = 0; k < rows; k++) scaled[k * rows + k] += floor;
-    const factor = cholesky(scaled, rows);
+    for (let k = 0; k < rows; k++) gram[k * rows + k] += floor;
+    const factor = cholesky(gram, rows);
     if (factor === null) throw new CodedDataError('the coordinates have no basis');
     return factor;
   }

@@ -3,19 +3,20 @@
 import type { CageBasis } from './basis';
 import { multiply } from './dense';
 import { CodedDataError } from './error';
+import { type BasisRecord, readBasisRecord } from './gramRounding';
 import { IntegerModels, MAX_CONTEXT_SIZE, SIZE_CLASSES, sizeClass } from './integers';
 import { RangeDecoder } from './rangeDecoder';
 import { decodeTrajectories } from './trajectories';
 
 export const MAX_FRAMES = 1024;
 export const MAX_ROWS = 4096;
-/** Whether the basis is rotated (u8), the step (f64) and the number of components (u16). */
-const HEAD_BYTES = 11;
+/** After the basis, the step (f64) and the number of components (u16). */
+const HEAD_BYTES = 10;
 
 /** What a group of cages holds: `E·A` in whole steps of a basis. */
 export interface CageNumbers {
   readonly frames: number;
-  readonly rotated: boolean;
+  readonly basis: BasisRecord;
   readonly step: number;
   readonly components: number;
   /** E, frames × components. */
@@ -26,19 +27,18 @@ export interface CageNumbers {
 
 /** Reads the numbers of a group of so many frames. */
 export function decodeCageNumbers(bytes: Uint8Array, frames: number, rows: number): CageNumbers {
-  if (bytes.length < HEAD_BYTES) throw new CodedDataError('a group of cages is cut');
-  const head = new DataView(bytes.buffer, bytes.byteOffset, HEAD_BYTES);
-  const kind = head.getUint8(0);
-  const step = head.getFloat64(1, true);
-  const components = head.getUint16(9, true);
-  if (kind > 1) throw new CodedDataError('a group of cages has an unknown basis');
+  const { record: basis, length } = readBasisRecord(bytes);
+  if (bytes.length < length + HEAD_BYTES) throw new CodedDataError('a group of cages is cut');
+  const head = new DataView(bytes.buffer, bytes.byteOffset + length, HEAD_BYTES);
+  const step = head.getFloat64(0, true);
+  const components = head.getUint16(8, true);
   const possible = Number.isFinite(step) && step > 0 && components <= Math.min(frames, 3 * rows);
   if (frames > MAX_FRAMES || rows > MAX_ROWS || !possible)
     throw new CodedDataError('a group of cages has impossible counts');
-  const decoder = new RangeDecoder(bytes.subarray(HEAD_BYTES));
+  const decoder = new RangeDecoder(bytes.subarray(length + HEAD_BYTES));
   const trajectories = decodeTrajectories(decoder, frames, components);
   const numbers = decodeNumbers(decoder, components, 3 * rows);
-  return { frames, rotated: kind === 1, step, components, trajectories, numbers };
+  return { frames, basis, step, components, trajectories, numbers };
 }
 
 /** The rows of all frames of a group, frames × rows × 3. */
@@ -54,7 +54,7 @@ export function cagesOf(group: CageNumbers, basis: CageBasis, rest: Float64Array
       }
     }
   }
-  const moved = multiply(basis.inverse(group.rotated), coefficients, rows, rows, 3 * components);
+  const moved = multiply(basis.inverse(group.basis), coefficients, rows, rows, 3 * components);
   const shapes = new Float64Array(components * 3 * rows);
   for (let row = 0; row < rows; row++) {
     for (let k = 0; k < components; k++) {

@@ -89,7 +89,8 @@ describe('CageBasis', () => {
   };
 
   it('does not depend on how many points are added at a time', () => {
-    expect(farthest(basisOf(50).inverse(true), basisOf(11).inverse(true))).toBeLessThan(1e-12);
+    const record = { rotated: true, rounding: null, key: '1' };
+    expect(farthest(basisOf(50).inverse(record), basisOf(11).inverse(record))).toBeLessThan(1e-12);
   });
 
   it('has coefficients whose lengths are what they move the model', () => {
@@ -101,7 +102,7 @@ describe('CageBasis', () => {
     const trace = gram.reduce((sum, x, at) => sum + (at % (rows + 1) === 0 ? x : 0), 0);
     const floored = gram.map((x, at) => x + (at % (rows + 1) === 0 ? (0.01 * trace) / rows : 0));
     for (const rotated of [false, true]) {
-      const inverse = basisOf(50).inverse(rotated);
+      const inverse = basisOf(50).inverse({ rotated, rounding: null, key: String(rotated) });
       const product = multiply(
         transposed(inverse, rows, rows),
         multiply(floored, inverse, rows, rows, rows),

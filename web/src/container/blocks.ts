@@ -30,6 +30,8 @@ export interface DecodedBlock {
 
 export class BlockDecoder {
   private basis: Promise<void> | null = null;
+  /** Whether that basis is of the given coordinates. */
+  private basisIsGiven = false;
   /** Φ of all points, where the basis is of all of them, until it is handed on. */
   private computed: Promise<Float32Array> | null = null;
   private onProgress: ((fraction: number) => void) | undefined;
@@ -93,7 +95,10 @@ export class BlockDecoder {
       return new Float32Array(decodePayload(entry, payload, 3 * this.part.rowsPerFrame).buffer);
     if (this.part.rowsPerFrame > MAX_ROWS)
       throw damaged(entry.offset, `a coded frame has ${this.part.rowsPerFrame} rows`);
-    await (this.basis ?? this.prepareBasis());
+    // Groups whose basis is rounded have it of coordinates in closed form.
+    const isGiven = this.given !== null && payload.length > 0 && payload[0] < 2;
+    if (this.basis === null || this.basisIsGiven !== isGiven) this.basis = this.prepareBasis(isGiven);
+    await this.basis;
     return located(entry, this.codec.call('cages', [payload, count, restRows(this.part)], signal));
   }
 
@@ -111,9 +116,10 @@ export class BlockDecoder {
     return located(entry, this.codec.call('residual', [payload, entry.fields.count, most], signal));
   }
 
-  private prepareBasis(): Promise<void> {
+  private prepareBasis(isGiven = false): Promise<void> {
     const { given } = this;
-    this.basis = given === null ? this.computeBasis() : this.addGiven(given);
+    this.basisIsGiven = isGiven;
+    this.basis = given === null || !isGiven ? this.computeBasis() : this.addGiven(given);
     return this.basis.catch((error: unknown) => {
       this.basis = null;
       this.computed = null;
@@ -124,7 +130,8 @@ export class BlockDecoder {
   /** Computes the coordinates of the sampled points, and hands them to the codec as they come. */
   private async computeBasis(): Promise<void> {
     const { part, codec } = this;
-    const { system, cage, rowsPerFrame } = part;
+    const { cage, rowsPerFrame } = part;
+    const system = part.system === 'harmonic' ? 'mvc' : part.system;
     const rest = pointsAt(part.rest, sampledPoints(part));
     let isFirst = true;
     const onRows = async (rows: Float64Array): Promise<void> => {
@@ -133,7 +140,7 @@ export class BlockDecoder {
       await codec.call('addCoordinates', [rows, columnsOf(system, cage), rowsPerFrame, start]);
     };
     const phi = computePhi({ system, cage, rest }, { onRows, onProgress: (fraction) => this.onProgress?.(fraction) });
-    this.computed = rest.length === part.rest.length ? phi : null;
+    this.computed = system === part.system && rest.length === part.rest.length ? phi : null;
     await phi;
   }
 

@@ -116,11 +116,16 @@ pub struct Carried {
     pub room: Option<Room>,
 }
 
-/// What positions may differ by from machine to machine, where the sizes of what is [added up](cager_core::decode::Decoder::largest_sum) for a
-/// coordinate are at most `sum` together, and coordinates at most `farthest`: the sums by their rounding, and the coordinates by a unit in the last place
-/// of each of three.
-pub fn slack(diagonal: f64, sum: f64, farthest: f64) -> f64 {
-    1e-6 * diagonal.max(sum) + 2.0 * f64::from(f32::EPSILON) * farthest
+/// What positions may differ by from machine to machine, where for a coordinate so many `terms` are
+/// [added up](cager_core::decode::Decoder::largest_sum) whose sizes are at most `sum` together, and coordinates are at most `farthest`.
+///
+/// In single precision both factors of a term are rounded, and each partial sum is, by at most u of it: together at most n·u·`sum`, and as the
+/// signs of roundings are as good as random, 2·√n·u·`sum` is six standard deviations or more (Higham and Mary 2019). The
+/// coordinates are rounded by a unit in the last place of each of three.
+pub fn slack(diagonal: f64, terms: usize, sum: f64, farthest: f64) -> f64 {
+    let unit = f64::from(f32::EPSILON) / 2.0;
+    let rounding = (2.0 + 2.0 * (terms as f64).sqrt()) * unit * sum;
+    rounding.max(1e-6 * diagonal.max(sum)) + 4.0 * unit * farthest
 }
 
 /// Bytes that coding a group holds, and of these for each position of a frame: as captured, of its cage, as a residual, decoded.
@@ -156,7 +161,7 @@ mod tests {
     fn the_least_error_that_is_told_is_not_refused() {
         for farthest in [0.0, 0.5, 3.7, 130.0, 9_876.5] {
             for goal in [Goal::MaxError, Goal::MeanError] {
-                let slack = slack(1.7, 0.9, farthest);
+                let slack = slack(1.7, 350, 0.9, farthest);
                 let told = match goal(1e-9).check_precision(1.7, slack) {
                     Err(CodingError::BelowPrecision { least, .. }) => format!("{least:.1e}"),
                     other => panic!("{other:?}"),

@@ -148,7 +148,7 @@ impl GroupCoder {
             // A mean error is promised of no other machine.
             let is_bound = matches!(self.goal, Goal::MaxError(_));
             let sum = if is_bound { self.model.largest_sum(&self.cages) } else { 0.0 };
-            slack(self.diagonal, sum, farthest)
+            slack(self.diagonal, self.model.terms(), sum, farthest)
         })
     }
 

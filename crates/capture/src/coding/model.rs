@@ -90,6 +90,11 @@ impl GroupDecoder {
         positions
     }
 
+    /// Products that are added up for a coordinate.
+    pub(super) fn terms(&self) -> usize {
+        self.decoder.columns()
+    }
+
     /// See [`Decoder::largest_sum`].
     pub(super) fn largest_sum(&self, cages: &[Vec<f32>]) -> f64 {
         self.decoder.largest_sum(&cages.iter().map(Vec::as_slice).collect::<Vec<_>>())

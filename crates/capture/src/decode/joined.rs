@@ -1,10 +1,11 @@
 //! Decodes containers that play one after the other to one sequence.
 
-use super::{Chosen, DecodeError, Decoding, Layer};
+use super::{Chosen, DecodeError, Decoding, Layer, units as meaning};
 use crate::memory::Memory;
 use crate::timing::Timing;
 use cager_formats::{FrameOptions, FrameRange, MorphOptions, Target, create_frames};
-use cager_geometry::mesh::{Model, diagonal};
+use cager_geometry::mesh::Model;
+use cager_geometry::units::Units;
 use std::path::PathBuf;
 
 /// What to decode of several containers that play one after the other.
@@ -22,6 +23,8 @@ pub struct Joining {
     pub layer: Layer,
     /// How a `.glb` holds the frames.
     pub morphs: MorphOptions,
+    /// Unit and upward axis that positions are brought to.
+    pub units: Units,
 }
 
 /// Decodes ranges of frames of containers, at least one, into one `output`, whose files have the mesh of their container each. Formats of one mesh are refused
@@ -36,20 +39,22 @@ pub fn decode_joined(
     what: Joining,
     progress: &mut dyn FnMut(usize),
 ) -> Result<(usize, Vec<String>), DecodeError> {
-    let Joining { fps, shift, dry_run, memory, layer, morphs } = what;
+    let Joining { fps, shift, dry_run, memory, layer, morphs, units } = what;
     let timing = Timing { fps, start: None };
     let mut all = Vec::with_capacity(inputs.len());
     for (path, range) in inputs {
-        let what = Decoding { range: Some(*range), timing, dry_run, memory, layer, ..Decoding::default() };
+        let what = Decoding { range: Some(*range), timing, dry_run, memory, layer, units, ..Decoding::default() };
         let mut chosen = Chosen::open(path, what)?;
         let rest = chosen.container.rest().map_err(|cause| DecodeError::container(path, cause))?;
         all.push((chosen, rest));
     }
     let numbers = all.iter().flat_map(|(chosen, _)| &chosen.options.numbers).map(|number| number + shift).collect();
     let frames = all.iter().map(|(chosen, _)| chosen.wanted.len()).sum();
-    let (first, rest) = &all[0];
-    let morphs = MorphOptions { diagonal: Some(diagonal(&rest.points)), ..morphs };
+    let (first, rest) = &mut all[0];
+    let morphs = first.morphs(morphs, rest)?;
     let options = FrameOptions { numbers, morphs, ..first.options.clone() };
+    let output = output.into();
+    let path = output.path().to_owned();
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;
     let same = |a: &(Chosen<'_>, Model), b: &(Chosen<'_>, Model)| {
         (a.1.points.len(), &a.1.faces, a.0.options.origin) == (b.1.points.len(), &b.1.faces, b.0.options.origin)
@@ -69,7 +74,8 @@ pub fn decode_joined(
         chosen.write(&bound, &mut *writer, &mut |count| progress(done + count))?;
         done += chosen.wanted.len();
     }
-    let notes = writer.notes();
+    let mut notes = writer.notes();
+    notes.extend(meaning::notes(&path, options.units, units));
     if !dry_run {
         writer.finish()?;
     }

@@ -88,6 +88,14 @@ pub enum DecodeError {
         /// What is wrong with it, and what to do.
         what: String,
     },
+    /// A unit or an axis that the container does not know its own of.
+    #[error("{}: {what}", .path.display())]
+    Meaning {
+        /// The container.
+        path: PathBuf,
+        /// What it does not know, and what to do.
+        what: String,
+    },
     /// The positions cannot be written, or the edited cages not be read.
     #[error(transparent)]
     Formats(#[from] cager_formats::Error),

@@ -6,10 +6,10 @@ use super::nearness::Nearness;
 use super::{Convergence, RegularizationTarget};
 use crate::batch::product_columns;
 use crate::decode::Decoder;
-use cager_geometry::linalg::BLOCK_ROWS;
+use cager_geometry::linalg::{self, BLOCK_ROWS};
 use cager_geometry::mesh::Point;
 use cager_geometry::spatial::Aabb;
-use faer::{Accum, Mat, Par};
+use faer::{Accum, Mat};
 use std::sync::Arc;
 
 /// A prepared inversion: `C_t = R · H_t`, plus a constant or a linear function of the previous cage for some terms.
@@ -170,13 +170,12 @@ impl Solver {
                 }
                 *around = around.union(&Aabb::around_all(&read[..rows]));
             }
-            faer::linalg::matmul::matmul(
+            linalg::multiply_add(
                 cages.as_mut(),
                 if first == 0 { Accum::Replace } else { Accum::Add },
                 self.operator.as_ref().subrows(first, rows).transpose(),
                 block.as_ref().subrows(0, rows),
                 1.0,
-                Par::Seq,
             );
             first += rows;
         }

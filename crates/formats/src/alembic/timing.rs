@@ -33,8 +33,7 @@ pub(super) fn timing(sampling: &Sampling, samples: usize, told: Option<f64>, is_
         let what = format!("has samples {step} s apart from {start} s on; export it again with times in seconds");
         return Err(Fault::invalid(what));
     }
-    let own =
-        told.filter(|told| (told * step - 1.0).abs() < EQUAL).unwrap_or_else(|| nominal(rounded(own, 1e3, 1e-6)));
+    let own = told.filter(|told| (told * step - 1.0).abs() < EQUAL).unwrap_or_else(|| nominal(rounded(own, 1e3, 1e-6)));
     // A program that writes several samples a frame, or one for several frames, counts in frames all the same.
     let frames = told.map(|told| rounded(told * step, 1.0, NEAR)).filter(|&frames| {
         let is_whole = |x: f64| x >= 1.0 && (x - x.round()).abs() < NEAR * x;

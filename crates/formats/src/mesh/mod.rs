@@ -43,7 +43,7 @@ pub enum MeshFormat {
     Glb,
     /// Alembic in the Ogawa container: the first frame of its mesh.
     Abc,
-    /// Universal Scene Description in binary: its mesh without a time, or in its first frame.
+    /// Universal Scene Description in binary: the first frame of its mesh.
     Usdc,
     /// The same as a package.
     Usdz,

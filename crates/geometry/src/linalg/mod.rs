@@ -16,8 +16,8 @@ pub use factors::{
     solve_definite_within, solve_lower, solve_upper, upper_factor, upper_inverse,
 };
 pub use products::{
-    BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, product, rows_of,
-    tall_product, to_double, to_single, transposed_product,
+    BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, multiply_add,
+    product, rows_of, tall_product, to_double, to_single, transposed_product,
 };
 pub use rotation::nearest_rotation;
 pub use small::symmetric_eigen;

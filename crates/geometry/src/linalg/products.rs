@@ -50,9 +50,26 @@ pub fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     out
 }
 
-/// `out = A · B`, sequentially.
-pub fn multiply<T: faer::traits::ComplexField>(out: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
-    matmul(out, Accum::Replace, a, b, one(), Par::Seq);
+/// `out = A · B`, sequentially; see [`multiply_add`].
+pub fn multiply<T: RealField + Copy>(out: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
+    multiply_add(out, Accum::Replace, a, b, one());
+}
+
+/// `out = α A B`, or what is added to it, sequentially. A column has the same bits whatever other columns there are, where these are whole tiles.
+pub fn multiply_add<T: RealField + Copy>(
+    out: MatMut<'_, T>,
+    accumulate: Accum,
+    a: MatRef<'_, T>,
+    b: MatRef<'_, T>,
+    alpha: T,
+) {
+    // So few entries of a transposed matrix are summed by another kernel, in another order.
+    const FEW_ENTRIES: usize = 256;
+    if out.nrows() * out.ncols() <= FEW_ENTRIES && a.col_stride() == 1 {
+        let by_columns = a.to_owned();
+        return matmul(out, accumulate, by_columns.as_ref(), b, alpha, Par::Seq);
+    }
+    matmul(out, accumulate, a, b, alpha, Par::Seq);
 }
 
 /// The given rows of a matrix, in the given order.

@@ -12,10 +12,9 @@ use crate::store::{Completion, StoreError};
 use crate::tasks::blocking;
 use axum::extract::State;
 use axum::response::{IntoResponse as _, Response};
-use cager_capture::decode::{Decoding, Layer, decode};
+use cager_capture::decode::{DecodeError, Decoding, decode};
 use cager_capture::memory::Memory;
-use cager_capture::timing::Timing;
-use cager_formats::{MorphOptions, Target};
+use cager_formats::Target;
 use http::header::{CONTENT_DISPOSITION, ETAG};
 use http::{HeaderMap, HeaderValue, StatusCode};
 use serde::Deserialize;
@@ -210,18 +209,7 @@ async fn made(
 }
 
 fn write(container: &Path, folder: &Path, name: &str) -> anyhow::Result<(File, u64)> {
-    let what = Decoding {
-        model: None,
-        cages: None,
-        range: None,
-        timing: Timing::default(),
-        dry_run: false,
-        memory: Some(Memory::at_most(4 * BUFFERS)),
-        layer: Layer::All,
-        salvage: false,
-        morphs: MorphOptions::default(),
-        with_cage: false,
-    };
+    let what = Decoding { memory: Some(Memory::at_most(4 * BUFFERS)), ..Decoding::default() };
     std::fs::create_dir(folder)?;
     let output = folder.join(name);
     let written = decode(container, Target::New(output.clone()), what, &mut |_| ());
@@ -235,6 +223,10 @@ fn write(container: &Path, folder: &Path, name: &str) -> anyhow::Result<(File, u
 
 fn refused(folder: &Path, error: &anyhow::Error) -> ApiError {
     use io::ErrorKind::{InvalidData, InvalidInput, Other, UnexpectedEof};
+    if let Some(DecodeError::Formats(cager_formats::Error::Unsupported { what, .. })) = error.downcast_ref() {
+        let detail = format!("a file of this format {what}; or download capture.cager and decode it: cager decode");
+        return ApiError::new(problem::INVALID_OPTIONS, detail);
+    }
     let mut kinds = error.chain().filter_map(|cause| Some(cause.downcast_ref::<io::Error>()?.kind()));
     // These are of what was read, others of the disk.
     let by_disk = kinds.find(|kind| !matches!(kind, InvalidData | InvalidInput | Other | UnexpectedEof));

@@ -57,7 +57,7 @@ fn check_goal(goal: Goal, geometry: &Geometry, rows: usize, frames: u32) -> Resu
         _ if rows > MAX_ROWS => Err(CodingError::TooManyRows { rows, most: MAX_ROWS }),
         goal => goal
             .check_size(meshes, frames as usize)
-            .and_then(|()| goal.check_precision(geometry.unit, slack(geometry.unit, 0.0, farthest))),
+            .and_then(|()| goal.check_precision(geometry.unit, slack(geometry.unit, 0, 0.0, farthest))),
     };
     checked.map_err(|error| cannot_be_coded(goal, &error))
 }

@@ -100,9 +100,8 @@ impl PostgresCatalog {
     pub fn divided(url: &str) -> Result<u32, CatalogError> {
         let place = Place::parse(url)?;
         let link = Link::connect(&place)?;
-        let count = link.read(PREPARING, &async |link: &Link| {
-            only::<i64>(&link.query("SELECT count(*) FROM shards", &[]).await?)
-        });
+        let count = link
+            .read(PREPARING, &async |link: &Link| only::<i64>(&link.query("SELECT count(*) FROM shards", &[]).await?));
         Ok(count.map_err(|trouble| trouble.explain(&place.name))? as u32)
     }
 

@@ -19,9 +19,20 @@ pub(super) fn damp(mut a: MatMut<'_, f64>, fraction: f64) {
     }
 }
 
+/// Smallest pivot of a factorisation over the diagonal entry it began as, where a damping is chosen: far above what rounding changes, so
+/// that the factorisation succeeds on every machine.
+const MIN_PIVOT: f64 = 1e-6;
+
+/// Factors the lower triangle of a symmetric matrix; whether it is definite, and by `safely` how the matrix is rounded has no say in that.
+pub(super) fn factor(mut matrix: MatMut<'_, f64>, par: Par, safely: bool) -> bool {
+    let diagonal: Vec<f64> = (0..matrix.nrows()).map(|k| matrix[(k, k)]).collect();
+    cholesky_in_place(matrix.as_mut(), par).is_some()
+        && (!safely || diagonal.iter().enumerate().all(|(k, entry)| matrix[(k, k)].powi(2) >= MIN_PIVOT * entry))
+}
+
 /// The first of [`DAMPING`], from the given one on, with which a factorisation succeeds.
 ///
-/// A plan gives the one that succeeded where it was made. Where a matrix is hardly definite, the rounding of other instructions can make it fail there:
+/// A plan gives the one that succeeded where it was made. In plans of programs up to 0.2 it may fail by the rounding of other instructions:
 /// coordinates that are off by about what the larger diagonal changes are better than none.
 pub(super) fn least_damping(given: Option<u8>, mut succeeds: impl FnMut(f64) -> bool) -> Option<u8> {
     (given.unwrap_or(0)..DAMPING.len() as u8).find(|&step| succeeds(DAMPING[usize::from(step)]))
@@ -123,21 +134,21 @@ pub(super) fn solve(
         fill_low(matrix.as_mut(), equations, patch);
         fill_near(matrix.as_mut(), equations, patch, &layout);
         damp(matrix.as_mut(), fraction);
-        cholesky_in_place(matrix, Par::Seq).is_some()
+        factor(matrix, Par::Seq, patch.damping.is_none())
     };
     let damping = least_damping(patch.damping, definite)?;
-    let factor = MatRef::from_column_major_slice(memory, layout.count, layout.count);
+    let lower = MatRef::from_column_major_slice(memory, layout.count, layout.count);
     // The solution, and what the highest degrees contribute to it.
     let mut x = Mat::<f64>::zeros(layout.count, 2);
     for (&(e, column), rows) in patch.places.iter().zip(&layout.rows) {
         let residual = residuals[e as usize].col(column as usize);
         residual.iter().zip(&rows[low..]).for_each(|(&value, &row)| x[(row, 0)] = value);
     }
-    triangular_solve::solve_lower_triangular_in_place(factor, x.as_mut().subcols_mut(0, 1), Par::Seq);
+    triangular_solve::solve_lower_triangular_in_place(lower, x.as_mut().subcols_mut(0, 1), Par::Seq);
     for row in layout.coarse..layout.count {
         x[(row, 1)] = x[(row, 0)];
     }
-    triangular_solve::solve_upper_triangular_in_place(factor.transpose(), x.as_mut(), Par::Seq);
+    triangular_solve::solve_upper_triangular_in_place(lower.transpose(), x.as_mut(), Par::Seq);
     Some(Step {
         high: layout.rows.iter().flat_map(|rows| rows[low..].iter().map(|&row| x[(row, 0)])).collect(),
         change: layout.rows.iter().flatten().map(|&row| x[(row, 1)]).collect(),

@@ -155,7 +155,7 @@ impl LowSystem {
                 restore(matrix.as_mut(), far);
                 damp(matrix.as_mut(), fraction);
             }
-            linalg::cholesky_in_place(matrix.as_mut(), Par::rayon(0)).is_some()
+            patch::factor(matrix.as_mut(), Par::rayon(0), given.is_none())
         };
         let damping = patch::least_damping(given, definite)?;
         Some(Self { factor: matrix, damping })
@@ -338,6 +338,11 @@ mod tests {
             LowSystem::new(matrix.clone(), &linalg::to_single(matrix.as_ref(), 2), given).map(|low| low.damping)
         };
         assert_eq!(factored(None), Some(1));
+        // Definite, but by no more than rounding may take away.
+        let hardly = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 1.0 - 2e-7 });
+        let single = linalg::to_single(hardly.as_ref(), 2);
+        let damping = |given| LowSystem::new(hardly.clone(), &single, given).map(|low| low.damping);
+        assert_eq!([None, Some(0)].map(damping), [Some(1), Some(0)]);
         assert_eq!([0, 1, 3].map(|given| factored(Some(given))), [Some(1), Some(1), Some(3)]);
         let hopeless = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 2.0 });
         assert!(LowSystem::new(hopeless.clone(), &linalg::to_single(hopeless.as_ref(), 2), Some(2)).is_none());

@@ -19,7 +19,7 @@ use crate::decode::Decoder;
 use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{along, dot, sub};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, MatRef};
 use state::FrameState;
 
 use crate::batch::product_columns;
@@ -213,7 +213,7 @@ impl Consistent {
             };
             let accumulate = if first == 0 { Accum::Replace } else { Accum::Add };
             let block = block.as_ref().subrows(0, count);
-            faer::linalg::matmul::matmul(sides.as_mut(), accumulate, rows.transpose(), block, 1.0, Par::Seq);
+            linalg::multiply_add(sides.as_mut(), accumulate, rows.transpose(), block, 1.0);
         }
         for (f, frame) in frames.iter_mut().enumerate() {
             frame.right_hand_side = (0..total).map(|j| [0, 1, 2].map(|k| sides[(j, 3 * f + k)])).collect();

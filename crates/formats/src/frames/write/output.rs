@@ -79,6 +79,8 @@ pub struct MorphOptions {
     pub targets: Option<usize>,
     /// What may be lost, as a share of the diagonal: as few targets are taken as hold it.
     pub max_error: Option<f64>,
+    /// Whether that is what a guaranteed error of the capture leaves, and nobody asked for it.
+    pub is_guarantee: bool,
     /// The diagonal of the rest pose; that of the mean shape by default.
     pub diagonal: Option<f64>,
     /// Whether positions are floats instead of whole numbers of 16 bits.
@@ -131,12 +133,14 @@ pub(super) fn extend_changed(out: &mut Vec<f32>, positions: &[f32], change: &Cha
 /// Refuses formats of single precision where it loses too much about an origin.
 pub(super) fn check_precision(options: &FrameOptions, path: &Path) -> Result<(), Error> {
     let farthest = options.origin.iter().flatten().fold(0.0, |far: f64, x| far.max(x.abs()));
-    let lost = farthest * f64::from(f32::EPSILON) / 2.0;
+    // By half a unit in the last place of each coordinate.
+    let lost = 3f64.sqrt() * farthest * f64::from(f32::EPSILON) / 2.0;
     if lost <= options.rounding {
         return Ok(());
     }
     let what = format!(
-        "holds single precision, which loses all that is smaller than {lost:.1e} units so far from the origin; write .npy, or .obj or .ply files"
+        "holds single precision, which moves points by up to {lost:.1e} units so far from the origin, where {:.1e} are allowed; write .npy, or .obj or .ply files, or .abc or .usdc, which place the model by a transform",
+        options.rounding
     );
     Err(Fault::unsupported(what).at(path))
 }

@@ -25,6 +25,8 @@ pub(crate) struct Wanted {
     pub(crate) targets: Option<usize>,
     /// What may be lost, as a share of the diagonal: as few targets are taken as hold it.
     pub(crate) max_error: Option<f64>,
+    /// Whether that is what a guaranteed error leaves, and nobody asked for it.
+    pub(crate) is_guarantee: bool,
     /// That of the rest pose; of the mean shape where it is not told.
     pub(crate) diagonal: Option<f64>,
 }
@@ -71,6 +73,14 @@ impl Components {
             let found = &stored.deviation;
             if holds(found) {
                 return Ok(stored);
+            }
+            if targets == most && wanted.is_guarantee {
+                return Err(Fault::unsupported(format!(
+                    "cannot hold the guaranteed error of the capture: {} morph targets are {:.2e} of the diagonal from the frames; allow that with --targets {}, keep fewer frames (--range), or write .usdc or .abc",
+                    found.targets,
+                    found.share(found.largest),
+                    found.targets
+                )));
             }
             if targets == most {
                 return Err(Fault::unsupported(format!(
