@@ -106,8 +106,7 @@ impl SettingKind {
             Self::Hosts => {
                 let items = items(value)?;
                 if let Some(other) = items.iter().find(|item| !is_host(item)) {
-                    let why =
-                        "is no name of a host: write one such as cager.studio, without a scheme, a port or a path";
+                    let why = "is no name of a host: write one such as cager.studio, without a scheme or a path";
                     return Err(format!("{other} {why}"));
                 }
                 Ok(Value::Array(items.into_iter().map(Value::String).collect()))
@@ -164,9 +163,10 @@ fn is_service(text: &str) -> bool {
     url.is_some_and(|url| matches!(url.scheme(), "http" | "https") && url.has_host() && url.path() == "/")
 }
 
-/// Whether a request can be for this host.
+/// Whether a request can be for this host, at one port or any.
 fn is_host(text: &str) -> bool {
-    !text.contains(|c: char| "/?#@*:".contains(c) || c.is_whitespace())
+    let name = text.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok()).map_or(text, |(name, _)| name);
+    !name.is_empty() && !name.contains(|c: char| "/?#@*:".contains(c) || c.is_whitespace())
 }
 
 /// Whether a browser can say that a page has this origin.

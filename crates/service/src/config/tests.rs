@@ -78,7 +78,7 @@ fn mistakes_name_their_place_and_what_to_do() {
         ("allowed_origins = [\"foo\"]", &[], "", "foo is no origin: write one such as https://tools.studio"),
         ("", &[], "--set allowed_origins=https://tools.studio/", "https://tools.studio/ is no origin"),
         ("allowed_hosts = [\"https://cager.studio\"]", &[], "", "https://cager.studio is no name of a host"),
-        ("", &[], "--set allowed_hosts=cager.studio,a:80", "a:80 is no name of a host"),
+        ("", &[], "--set allowed_hosts=cager.studio,b:80,a:b", "a:b is no name of a host"),
         ("listen = \"127.0.0.1:99999\"", &[], "", "write ADDRESS:PORT"),
         ("advertise = \"http://10.0.0.5:99999\"", &[], "", "write an address such as http://10.0.0.5:8080"),
         ("", &[], "--listen 127.0.0.1:80 --admin-listen 127.0.0.1:80", "listen and admin_listen are both 127.0.0.1:80"),

@@ -88,27 +88,30 @@ fn reader(body: Body) -> (impl AsyncBufRead + Send + Unpin + 'static, Arc<Atomic
     (StreamReader::new(Box::pin(pieces)), read)
 }
 
-/// Reads [`AHEAD_BYTES`] of a body before they are asked for.
+/// Reads [`AHEAD_BYTES`] of a body before they are asked for, once the first are: who is refused before is not told to go on.
 fn read_ahead(body: Body) -> impl Stream<Item = io::Result<Bytes>> + Send {
-    let (send, receive) = mpsc::unbounded_channel();
-    let room = Arc::new(Semaphore::new(AHEAD_BYTES));
-    let reading = async move {
-        let mut pieces = body.into_data_stream();
-        while let Some(piece) = pieces.next().await {
-            let bytes = piece.as_ref().map_or(0, Bytes::len).clamp(1, AHEAD_BYTES);
-            // Never closed; a piece that is larger than all room takes all of it.
-            let Ok(taken) = Arc::clone(&room).acquire_many_owned(bytes as u32).await else { return };
-            if send.send((piece.map_err(io::Error::other), taken)).is_err() {
-                return;
+    stream::once(async move {
+        let (send, receive) = mpsc::unbounded_channel();
+        let room = Arc::new(Semaphore::new(AHEAD_BYTES));
+        let reading = async move {
+            let mut pieces = body.into_data_stream();
+            while let Some(piece) = pieces.next().await {
+                let bytes = piece.as_ref().map_or(0, Bytes::len).clamp(1, AHEAD_BYTES);
+                // Never closed; a piece that is larger than all room takes all of it.
+                let Ok(taken) = Arc::clone(&room).acquire_many_owned(bytes as u32).await else { return };
+                if send.send((piece.map_err(io::Error::other), taken)).is_err() {
+                    return;
+                }
             }
-        }
-    };
-    // Ends with the stream, whose end may leave it waiting for room or for the client.
-    let reading = tokio_util::task::AbortOnDropHandle::new(tokio::spawn(reading));
-    stream::unfold((receive, reading), async |(mut receive, reading)| {
-        let (piece, _taken) = receive.recv().await?;
-        Some((piece, (receive, reading)))
+        };
+        // Ends with the stream, whose end may leave it waiting for room or for the client.
+        let reading = tokio_util::task::AbortOnDropHandle::new(tokio::spawn(reading));
+        stream::unfold((receive, reading), async |(mut receive, reading)| {
+            let (piece, _taken) = receive.recv().await?;
+            Some((piece, (receive, reading)))
+        })
     })
+    .flatten()
 }
 
 /// What a decoder gives, up to a multiple of what it was given.
