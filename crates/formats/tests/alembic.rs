@@ -260,6 +260,9 @@ fn what_is_not_read_of_a_mesh_is_named() {
     for (name, extent) in [("uv", 2), ("N", 3), (".velocities", 3)] {
         node.properties.push(array(name, (F32, extent), 0, &[vec![0.5_f32; 6]], f32::to_le_bytes));
     }
+    // With indices, as Blender writes texture coordinates.
+    let uv = node.properties.iter_mut().find(|property| property.name == "uv").unwrap();
+    *uv = Property { kind: 0, number: 0, extent: 0, samples: vec![], ..uv.clone() };
     let set = Node {
         name: "skin",
         metadata: "schema=AbcGeom_FaceSet_v1",

@@ -3,16 +3,16 @@
 use std::io::{Read, Seek};
 
 use super::objects::{Archive, Kind as ObjectKind};
-use super::properties::{Kind, find};
+use super::properties::{Kind, Property, find};
 use crate::dropped::{Dropped, counted, listed};
 use crate::scene::{Failure, Objects};
 
 /// Adds what a mesh has beside points and faces.
 pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped: &mut Dropped) -> Result<(), Failure> {
     let properties = archive.schema(mesh, ".geom")?;
-    let has = |name: &str| {
-        properties.iter().any(|found| found.name == name.as_bytes() && found.samples + found.extent as usize > 0)
-    };
+    // With indices, as most programs write them, values are in a compound.
+    let is_there = |found: &Property| found.kind == Kind::Compound || found.samples > 0;
+    let has = |name: &str| properties.iter().any(|found| found.name == name.as_bytes() && is_there(found));
     let on_faces = [("uv", "texture coordinates (uv)"), ("N", "normals (N)")].into_iter().filter(|(name, _)| has(name));
     on_faces.for_each(|(_, what)| dropped.add_on_faces(what));
     let parameters = archive.within(&properties, ".arbGeomParams")?;

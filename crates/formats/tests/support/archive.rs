@@ -21,7 +21,7 @@ pub const TEXT: u32 = 12;
 #[derive(Clone)]
 pub struct Property {
     pub name: &'static str,
-    /// 1 a scalar, 2 an array.
+    /// 0 a compound, 1 a scalar, 2 an array.
     pub kind: u32,
     pub number: u32,
     pub extent: u32,
@@ -182,7 +182,9 @@ impl Out {
             headers.extend((bits | states).to_le_bytes());
             let changes = property.changes.iter().flatten().copied();
             let counts = changes.chain(property.changes.is_none().then_some(count));
-            headers.extend(counts.chain([property.sampling]).flat_map(u32::to_le_bytes));
+            if property.kind > 0 {
+                headers.extend(counts.chain([property.sampling]).flat_map(u32::to_le_bytes));
+            }
             headers.extend((property.name.len() as u32).to_le_bytes());
             headers.extend(property.name.bytes());
             headers.extend(3_u32.to_le_bytes());
