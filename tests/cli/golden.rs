@@ -2,7 +2,8 @@
 //!
 //! `tests/golden/definitionN-SYSTEM.cager` was written by a program whose coordinates are of definition N, and the array beside it by its
 //! `cager decode`; `-elements` is with the boundary elements in the file, `-origin` of a capture far from the origin of its coordinates, `edited` with layers of edits. Frames of `coded-SYSTEM` are coded, by
-//! `--max-error 1e-3`, with `harmonic` by `--quality preview`; `coded-parted-SYSTEM` has a residual in two parts, by a program whose `PARTED_NUMBERS` is 1. The model has 120 points in a
+//! `--max-error 1e-3`, with `harmonic` by `--quality preview`; `coded-parted-SYSTEM` has a residual in two parts, by a program whose `PARTED_NUMBERS` is 1;
+//! cages of `rounded-SYSTEM` are coded in a basis of rounded numbers. The model has 120 points in a
 //! cage of 26 vertices, and three frames.
 
 use crate::support::Dir;
@@ -39,7 +40,8 @@ fn files_of_every_version_decode_to_what_they_always_did() {
     let definition = cager_core::coordinates::DEFINITION;
     let coded = ["mvc", "harmonic", "green", "green-free", "parted-mvc"].map(|kind| format!("coded-{kind}"));
     let edited = ["edited-mvc".to_owned()];
-    for name in kinds.map(|kind| format!("definition{definition}-{kind}")).iter().chain(&coded).chain(&edited) {
+    let rounded = ["mvc", "harmonic", "green", "green-free"].map(|kind| format!("rounded-{kind}"));
+    for name in kinds.map(|kind| format!("definition{definition}-{kind}")).iter().chain(&coded).chain(&rounded).chain(&edited) {
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == **name)), "{name} is missing");
     }
     let dir = Dir::new();

@@ -216,6 +216,14 @@ impl Positions {
         Ok(positions)
     }
 
+    /// How far positions may move where the origin is added to them in single precision.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn may_lose(&mut self) -> Result<f64, DecodeError> {
+        may_lose(&mut self.container).map_err(|cause| DecodeError::container(&self.path, cause))
+    }
+
     /// What a cage of vertices × 3 makes of the model, without the residual; the container's origin is subtracted from both.
     ///
     /// # Panics
@@ -268,8 +276,9 @@ fn left_by_bound(container: &mut Container) -> Result<Option<f64>, container::Er
         found => found?,
     };
     let Some(bound) = report.coding.and_then(|coding| coding.max_error) else { return Ok(None) };
-    // Those of edited frames are as large, from what was captured and edited.
-    let largest = container.errors()?.iter().fold(0.0, |largest: f64, error| largest.max(error.linf));
+    // Those of edited frames are as large, from what was captured and edited; of flattened ones they are not known.
+    let known = |error: f64| if error.is_nan() { bound } else { error };
+    let largest = container.errors()?.iter().fold(0.0, |largest: f64, error| largest.max(known(error.linf)));
     Ok(Some((bound - largest).max(0.0)))
 }
 

@@ -5,8 +5,8 @@ use crate::apart::interruptible;
 use crate::fault::{Fault, computing, of};
 use crate::geometry::array;
 use cager_capture::decode::{self, DecodeError, Positions};
-use cager_capture::origin::{LOST, move_from, move_to};
-use cager_geometry::mesh::{Point, diagonal};
+use cager_capture::origin::{move_from, move_to};
+use cager_geometry::mesh::Point;
 use numpy::ndarray::{ArrayViewMut3, Axis};
 use numpy::{BorrowError, IntoPyArray, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyOverflowError, PyTypeError};
@@ -154,12 +154,16 @@ impl Capture {
     /// Refuses single precision where files of it are refused.
     fn check_precision(&self) -> Result<(), Fault> {
         let farthest = self.origin.iter().flatten().fold(0.0, |far: f64, x| far.max(x.abs()));
-        let lost = farthest * f64::from(f32::EPSILON) / 2.0;
-        if lost <= LOST * diagonal(&self.rest.points) {
+        let lost = 3f64.sqrt() * farthest * f64::from(f32::EPSILON) / 2.0;
+        if lost == 0.0 {
+            return Ok(());
+        }
+        let allowed = self.decoding(|positions| Ok(positions.may_lose()?))?;
+        if lost <= allowed {
             return Ok(());
         }
         let what = format!(
-            "holds single precision, which loses all that is smaller than {lost:.1e} units so far from the origin; give an array of float64"
+            "holds single precision, which moves points by up to {lost:.1e} units so far from the origin, where {allowed:.1e} are allowed; give an array of float64"
         );
         Err(of("out", what))
     }

@@ -20,7 +20,7 @@ describe.each(GOLDEN)('the golden file %s', (name) => {
     const capture = await open();
     const { head, static: part } = capture;
     expect(capture.problem).toBeNull();
-    expect(part.system).toBe(name.replace(/^(coded(-parted)?|definition3|edited)-|-(elements|origin)$/g, ''));
+    expect(part.system).toBe(name.replace(/^(coded(-parted)?|definition3|edited|rounded)-|-(elements|origin|edited)$/g, ''));
     expect([head.points, part.rest.length / 3, part.cage.positions.length / 3]).toEqual([120, 120, 26]);
     expect(part.cage.triangles.length / 3).toBe(48);
     expect(part.cornerCounts.reduce((sum, count) => sum + count, 0)).toBe(part.corners.length);
@@ -30,7 +30,7 @@ describe.each(GOLDEN)('the golden file %s', (name) => {
     expect(capture.frames).toBe(3);
     expect(capture.complete).toBe(true);
     expect(part.report?.generator).toMatch(/^cager /);
-    expect(part.elements !== undefined).toBe(name.includes('elements') || name === 'coded-harmonic');
+    expect(part.elements !== undefined).toBe(name.includes('elements') || /^(coded|rounded)-harmonic$/.test(name));
     expect([capture.errors.l2.length, capture.errors.linf.length]).toEqual([3, 3]);
     const { max_error: bound } = (part.report?.coding ?? {}) as { max_error?: number };
     capture.errors.linf.forEach((linf, k) => {
@@ -59,12 +59,13 @@ describe.each(GOLDEN)('the golden file %s', (name) => {
 /** Φ of the golden files with harmonic coordinates, as `GET …/coordinates` of the service answered for their model and cage. */
 function harmonicPhi(name: string): Float32Array | undefined {
   if (!name.includes('harmonic')) return undefined;
-  const text = name === 'coded-harmonic' ? golden['coded-harmonic'] : golden['definition3-harmonic'];
+  const solved = name === 'coded-harmonic' || name === 'rounded-harmonic' ? name : 'definition3-harmonic';
+  const text = golden[solved];
   return new Float32Array(Uint8Array.from(Buffer.from(text, 'base64')).buffer);
 }
 
 it('has a file of every coordinate system, and coded ones', () => {
   const names = ['mvc', 'harmonic', 'green', 'green-free'].map((system) => `definition3-${system}`);
-  const coded = ['coded-mvc', 'coded-green', 'coded-green-free', 'coded-harmonic', 'coded-parted-mvc'];
+  const coded = ['coded-mvc', 'coded-green', 'coded-green-free', 'coded-harmonic', 'coded-parted-mvc', 'rounded-mvc', 'rounded-harmonic'];
   expect(GOLDEN).toEqual(expect.arrayContaining([...names, ...coded]));
 });
