@@ -50,9 +50,15 @@ pub fn decode_joined(
     }
     let numbers = all.iter().flat_map(|(chosen, _)| &chosen.options.numbers).map(|number| number + shift).collect();
     let frames = all.iter().map(|(chosen, _)| chosen.wanted.len()).sum();
-    let (first, rest) = &mut all[0];
-    let morphs = first.morphs(morphs, rest)?;
-    let options = FrameOptions { numbers, morphs, ..first.options.clone() };
+    // One file takes no more than the guaranteed error of each leaves.
+    let of_each = all.iter_mut().map(|(chosen, rest)| chosen.morphs(morphs, rest)).collect::<Result<Vec<_>, _>>()?;
+    let guaranteed = of_each.iter().filter(|morphs| morphs.is_guarantee);
+    let morphs = guaranteed.min_by(|a, b| a.max_error.unwrap_or(0.0).total_cmp(&b.max_error.unwrap_or(0.0)));
+    let morphs = *morphs.unwrap_or(&of_each[0]);
+    let placed = all.iter().map(|(chosen, _)| &chosen.options).filter(|options| options.origin.is_some());
+    let rounding = placed.map(|options| options.rounding).reduce(f64::min).unwrap_or(0.0);
+    let (first, rest) = &all[0];
+    let options = FrameOptions { numbers, morphs, rounding, ..first.options.clone() };
     let output = output.into();
     let path = output.path().to_owned();
     let mut writer = create_frames(output, rest.points.len(), frames, &rest.faces, &options)?;

@@ -12,6 +12,7 @@ use axum::body::Body;
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use cager_capture::coding::GroupDecoder;
+use cager_codec::BasisRecord;
 use cager_core::inversion::BATCH;
 use cager_proto::le;
 use http::header;
@@ -79,7 +80,10 @@ pub(super) async fn respond(
     let solver = service.solver(&session).await?;
     let of = Arc::clone(&session);
     let source = match session.goal() {
-        Some(goal) => Source::Groups(blocking(move || of.decoder_of_groups(&solver, goal)).await??),
+        Some(goal) => {
+            let prepared = Arc::clone(&solver);
+            Source::Groups(blocking(move || of.decoder_of_groups(&solver, goal)).await??, prepared)
+        }
         None => Source::Cages(solver),
     };
     let (ready, source) = (VecDeque::new(), Arc::new(source));
@@ -111,7 +115,7 @@ enum Source {
     /// Cages as they were solved.
     Cages(Arc<Prepared>),
     /// Coded groups.
-    Groups(Arc<GroupDecoder>),
+    Groups(Arc<GroupDecoder>, Arc<Prepared>),
 }
 
 struct LayerDecoding {
@@ -191,7 +195,7 @@ fn decode(
     next: u32,
     wanted: usize,
 ) -> Result<VecDeque<Vec<f32>>, ApiError> {
-    let decoder = match source {
+    let (decoder, prepared) = match source {
         Source::Cages(prepared) => {
             let entries = session.frames().run(next, wanted);
             let mut bytes = Vec::new();
@@ -202,12 +206,13 @@ fn decode(
             prepared.solver.decoder().decode(&cages, &mut positions);
             return Ok(positions.into());
         }
-        Source::Groups(decoder) => decoder,
+        Source::Groups(decoder, prepared) => (decoder, prepared),
     };
     let Some(group) = session.coded_group(next) else { return Ok(VecDeque::new()) };
     let stored = session.read_group(group.first)?;
     let damaged = |error: cager_codec::Error| ApiError::internal(&error);
-    let cages = decoder.cages(group.frames as usize, &stored.cages).map_err(damaged)?;
+    let other = |record: &BasisRecord| session.basis_of_groups(prepared, record);
+    let cages = decoder.cages_in(group.frames as usize, &stored.cages, other).map_err(damaged)?;
     let mut positions = decoder.positions(&cages);
     if let (Layer::All, Some(residual)) = (layer, &stored.residual) {
         decoder.add_residual(residual, &mut positions).map_err(damaged)?;

@@ -11,6 +11,7 @@ use crate::sync::lock;
 use crate::tasks::blocking;
 use cager_capture::capture::StoredError;
 use cager_capture::coding::{Goal, GroupCoder, GroupDecoder, group_frames};
+use cager_codec::{BasisRecord, CageBasis};
 use cager_proto::le;
 use std::io;
 use std::sync::Arc;
@@ -254,6 +255,14 @@ impl Session {
             return Ok(decoder);
         }
         self.group_decoder(prepared, &self.geometry()?, goal)
+    }
+
+    /// The basis of groups that are not in the one that this program codes in on this machine, as of earlier programs. Blocks.
+    pub(crate) fn basis_of_groups(&self, prepared: &Prepared, record: &BasisRecord) -> Option<CageBasis> {
+        let system = ValidOptions::of(&self.meta.options).ok()?.system;
+        let Geometry { cage, rest, .. } = self.geometry().ok()?;
+        let plan = prepared.solver.preparation().plan.as_ref();
+        Some(CageBasis::of(system, &cage, &rest.points, plan, Some(record)).ok()??.0)
     }
 
     /// Forgets what coding keeps in memory.
