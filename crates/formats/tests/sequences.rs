@@ -151,6 +151,12 @@ fn one_array_of_several_is_taken_by_its_name() {
     let said = message(open_frames(&path, 2));
     assert!(said.contains("(vertices, v_template); name the one that is meant, as with --prim vertices"), "{said}");
     assert!(!said.contains("numpy"), "{said}");
+    // A file without the named array is none of its frames, though another array of it fits.
+    fs::write(folder.path().join("body.3.npz"), arrays(&["v_template"])).unwrap();
+    let mut reader = open_selected_frames(folder.path(), 2, &prim("vertices")).unwrap();
+    (0..2).for_each(|_| assert!(reader.read_next(&mut Vec::new()).unwrap()));
+    let said = message(reader.read_next(&mut Vec::new()));
+    assert!(said.contains("body.3.npz: frame 2: has no array \"vertices\", as "), "{said}");
     // Another name leaves the choice open.
     assert!(message(open_selected_frames(&path, 2, &prim("gone"))).contains("--prim vertices"));
     // Arrays that are numbered may be the frames of one capture.

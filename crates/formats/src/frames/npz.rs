@@ -1,6 +1,7 @@
 //! NumPy's archives: a zip file with one `.npy` file for each array.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use zip::result::ZipError;
@@ -71,6 +72,12 @@ pub(super) fn open<'a>(
     layout.times.frame_rate = fps;
     let unpacked = Unpacked::new(source, entry).map_err(|cause| Error::read(path, cause))?;
     cache::open_layout(path, unpacked, layout, entry.length, expected_points)
+}
+
+/// Whether a file is an archive that has an array of this name.
+pub(super) fn holds(path: &Path, name: &str) -> bool {
+    let archive = File::open(path).ok().and_then(|file| ZipArchive::new(BufReader::new(file)).ok());
+    archive.is_some_and(|archive| archive.index_for_name(&format!("{name}.npy")).is_some())
 }
 
 /// An array of an archive, and whether frames can be read from it.

@@ -7,7 +7,7 @@ use cager_geometry::units::Units;
 
 use super::merged::Merged;
 use super::names::Sequence;
-use super::{FrameReader, FrameSelection, cut, single};
+use super::{FrameReader, FrameSelection, cut, npz, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{FrameFaces, MeshFormat, read_frame_file};
 
@@ -18,6 +18,8 @@ pub(super) struct SequenceReader {
     notes: Vec<String>,
     /// The array or the mesh that is read of each file, where it has several.
     prim: Option<String>,
+    /// Whether that is an array of the first file, so that each has one.
+    is_array_named: bool,
     /// What the first file says of all.
     frame_rate: Option<f64>,
     units: Units,
@@ -35,8 +37,11 @@ impl SequenceReader {
         let prim = prim.map(str::to_owned);
         let (faces, merged) = (FrameFaces::default(), Merged::default());
         let (frame_rate, units) = (None, Units::UNKNOWN);
+        let first = sequence.files.first();
+        let is_array_named = first.zip(prim.as_deref()).is_some_and(|(path, name)| npz::holds(path, name));
+        let (next, before) = (0, None);
         let mut opened =
-            Self { sequence, points, notes, prim, frame_rate, units, next: 0, before: None, faces, merged };
+            Self { sequence, points, notes, prim, is_array_named, frame_rate, units, next, before, faces, merged };
         let first = opened.sequence.files.first();
         // All files are of one format. What is wrong with one is said when it is read.
         match first.map(|path| (MeshFormat::guess(path), opened.open(path))) {
@@ -62,6 +67,11 @@ impl SequenceReader {
             Error::NonFinite { path, point, .. } => Error::NonFinite { path, frame, point },
             other => other.in_frame(frame),
         };
+        if let Some(name) = self.prim.as_deref().filter(|name| self.is_array_named && !npz::holds(path, name)) {
+            let first = self.sequence.files[0].display();
+            let what = format!("has no array {name:?}, as {first} has; leave it out, or save the array in it");
+            return Err(named(Fault::invalid(what).at(path)));
+        }
         let mut reader = self.open(path).map_err(named)?;
         if reader.frames() != 1 {
             let cure = if single::is_array(path) {
