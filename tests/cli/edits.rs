@@ -316,4 +316,8 @@ fn a_file_that_was_cut_in_its_layers_has_its_frames_and_says_what_is_lost() {
     dir.write("damaged.cager", &damaged);
     refused(&dir, "decode damaged.cager -o x.npy", &["damaged.cager", "is damaged at byte"]);
     refused(&dir, "inspect damaged.cager", &["damaged.cager", "is damaged at byte"]);
+    let said = dir.cager("decode damaged.cager --salvage -o whole.npy").succeeds().stderr;
+    assert!(said.contains("damaged.cager: 1 of its layers of edits are damaged and left out"), "{said}");
+    let found = read_frames(&dir.path("whole.npy"), small.rest.points.len());
+    assert!(found[3] == before[3] && found[8] == after[8]);
 }

@@ -200,6 +200,13 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(self.layers.all.as_deref().unwrap_or_default())
     }
 
+    /// Lets layers that cannot be read be passed over, and counted, instead of refusing every frame.
+    #[must_use]
+    pub fn passing_over_damaged_layers(mut self) -> Self {
+        self.layers.passes_over_damage = true;
+        self
+    }
+
     /// How many layers of a damaged file cannot be read and are not applied; known once a frame was read.
     pub fn lost_layers(&self) -> usize {
         self.layers.lost

@@ -138,7 +138,7 @@ pub fn open_cut(path: &Path) -> Result<Container, DecodeError> {
         Err(DecodeError::Container { cause: container::Error::Corrupt { .. }, .. }) => {
             open_with(path, ContainerReader::open_cut)
         }
-        opened => opened,
+        opened => opened.map(ContainerReader::passing_over_damaged_layers),
     }
 }
 
