@@ -366,6 +366,9 @@ fn valid_documents_that_stricter_readers_refuse_are_read() {
 fn scenes_without_a_mesh_and_documents_of_the_first_version_are_called_that() {
     let text = |json: &str| message(read("a.gltf", json));
     assert!(text(r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"name":"Scene"}]}"#).contains("has no points"));
+    let elsewhere = glb_json(r#","nodes":[{"mesh":0}],"scene":0,"scenes":[{"name":"Empty"},{"nodes":[0]}]"#);
+    let said = message(read("a.glb", glb_file(&elsewhere, &glb_data())));
+    assert!(said.contains("has meshes, but none in the scene that it shows, scene 0"), "{said}");
     let first = r#"{"asset":{"version":"1.0"},"meshes":{"a":{}},"scenes":{"b":{"nodes":[]}}}"#;
     assert!(text(first).contains("is glTF 1.0; export the mesh as glTF 2.0"));
     assert!(text("{}").contains("has JSON that is not glTF 2.0"));

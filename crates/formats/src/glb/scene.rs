@@ -73,6 +73,11 @@ impl Scene {
         if root.nodes.iter().all(|node| node.mesh.is_none()) {
             let alone = |mesh| Placement { mesh, node: None, skin: None, transform: IDENTITY };
             placements.extend((0..root.meshes.len()).map(alone));
+        } else if placements.is_empty() {
+            let scene = root.scene.map_or(0, |scene| scene.value());
+            return Err(Fault::invalid(format!(
+                "has meshes, but none in the scene that it shows, scene {scene}; make the scene with the mesh the active one and export again"
+            )));
         }
         Ok(Self { placements, worlds, parents })
     }
