@@ -157,6 +157,10 @@ pub(super) fn check_capture(
         return Ok(());
     }
     let advice = match found[0] {
+        // It turns the capture to the rest pose's axes, which may be its own.
+        Mismatch::Axes(Some(up)) if turns && files.up.is_some() => {
+            format!("leave out --up, or pass --up {}", up.name())
+        }
         Mismatch::Axes(Some(up)) if turns => format!("pass --up {}", up.name()),
         Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
         Mismatch::Axes(_) => "export both with the same axes".to_owned(),

@@ -30,7 +30,8 @@ pub(super) fn run(args: &EditArgs) -> Result<()> {
     }
     if args.units() != Units::UNKNOWN {
         let file = edit::with_units(&mut container, &args.input, args.units(), &output)?;
-        return finish(args, file, &output, "says what its positions mean");
+        let set: Vec<&str> = args.up.map(|_| "up axis").into_iter().chain(args.unit.map(|_| "unit")).collect();
+        return finish(args, file, &output, &format!("{} set", set.join(" and ")));
     }
     let (kept, told) = changed(args, layers)?;
     let file = edit::with_layers(&mut container, &args.input, &kept, &output)?;

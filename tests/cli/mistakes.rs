@@ -67,6 +67,10 @@ fn a_capture_with_its_points_in_another_order_is_refused_unless_forced() {
 fn a_capture_with_exchanged_axes_is_refused_with_the_option_that_turns_it() {
     let (dir, small) = Dir::with_capture();
     dir.cager(&format!("{ENCODE} --report straight.json")).succeeds();
+    // It has the axes of the rest pose: both are turned by neither.
+    for up in ["y", "z"] {
+        refused_unless_forced(&dir, &format!("{ENCODE} --up {up}"), &["leave out --up, or pass --up"]);
+    }
     dir.frames("frames.npy", &changed(&small, |[x, y, z]| [x, -z, y]));
     refused_unless_forced(&dir, ENCODE, &["frames.npy", "axes y and z look exchanged", "--up z"]);
     dir.cager(&format!("{ENCODE} --up z --report turned.json")).succeeds();

@@ -85,7 +85,7 @@ fn open(args: &StoreArgs) -> Result<Vec<Opened>> {
     let config = ServeConfig::load_stored(args.config.as_deref(), std::env::vars(), &flags)?;
     match args.shard {
         Some(number) if number >= config.shards => {
-            bail!("--shard {number}: there are {} shards, from 0", config.shards)
+            bail!("--shard {number}: the last one has the number {}", config.shards - 1)
         }
         Some(number) => Ok(vec![open_shard(&config, Shard { number, of: config.shards })?]),
         None => {
@@ -255,7 +255,7 @@ fn export(all: &[Opened], output: &Path, wanted: &[String]) -> Result<()> {
         "wrote {written} containers, and {there} were there already; {running} sessions are not completed and have none\n"
     ))?;
     if left > 0 {
-        bail!("{left} containers were left out, for the reasons above");
+        bail!("containers left out, for the reasons above: {left}");
     }
     Ok(())
 }

@@ -40,6 +40,10 @@ export const editPanelStyle = css`
   li .name {
     justify-content: space-between;
   }
+  li .name .figures {
+    flex: none;
+    white-space: nowrap;
+  }
   li .layer {
     display: flex;
     gap: var(--cager-space-2);
