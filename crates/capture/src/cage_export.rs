@@ -76,13 +76,17 @@ pub fn write_cages(
     })
 }
 
-/// The file beside `output` that holds the rest cage: `walk.cage.obj` beside `walk.npy`, `walk/` and `walk/*.ply`.
+/// The file beside `output` that holds the rest cage: `walk.cage.obj` beside `walk.npy`, `walk/`, `walk/*.ply` and `walk.####.obj`.
 pub fn rest_cage_path(output: &Path) -> PathBuf {
-    let pattern = |name: &str| name.contains(['*', '#', '%']);
     let name = output.file_name().and_then(|name| name.to_str());
-    let named = match output.parent() {
-        Some(folder) if name.is_some_and(pattern) && folder.file_name().is_some() => folder,
-        _ => output,
+    let before = name.and_then(|name| name.find(['*', '#', '%']).map(|at| &name[..at]));
+    let named = match (before, output.parent()) {
+        (Some(_), Some(folder)) if folder.file_name().is_some() => folder.to_owned(),
+        (Some(before), _) => {
+            let before = before.trim_end_matches(['.', '_', '-', ' ']);
+            output.with_file_name(if before.is_empty() { "frames" } else { before }.to_owned() + ".obj")
+        }
+        _ => output.to_owned(),
     };
     named.with_extension("cage.obj")
 }
@@ -121,6 +125,8 @@ mod tests {
             ("out/walk/", "out/walk.cage.obj"),
             ("out/walk/*.ply", "out/walk.cage.obj"),
             ("walk/f.####.obj", "walk.cage.obj"),
+            ("walk.1.####.obj", "walk.1.cage.obj"),
+            ("####.obj", "frames.cage.obj"),
         ] {
             assert_eq!(rest_cage_path(Path::new(output)), Path::new(rest), "{output}");
         }
