@@ -30,8 +30,8 @@ export interface DecodedBlock {
 
 export class BlockDecoder {
   private basis: Promise<void> | null = null;
-  /** Whether that basis is of the given coordinates. */
-  private basisIsGiven = false;
+  /** Whether that basis is rounded, so that it is of coordinates in closed form. */
+  private basisIsRounded = true;
   /** Φ of all points, where the basis is of all of them, until it is handed on. */
   private computed: Promise<Float32Array> | null = null;
   private onProgress: ((fraction: number) => void) | undefined;
@@ -95,9 +95,9 @@ export class BlockDecoder {
       return new Float32Array(decodePayload(entry, payload, 3 * this.part.rowsPerFrame).buffer);
     if (this.part.rowsPerFrame > MAX_ROWS)
       throw damaged(entry.offset, `a coded frame has ${this.part.rowsPerFrame} rows`);
-    // Groups whose basis is rounded have it of coordinates in closed form.
-    const isGiven = this.given !== null && payload.length > 0 && payload[0] < 2;
-    if (this.basis === null || this.basisIsGiven !== isGiven) this.basis = this.prepareBasis(isGiven);
+    const isRounded = payload.length === 0 || payload[0] >= 2;
+    if (this.basis === null || (this.part.system === 'harmonic' && this.basisIsRounded !== isRounded))
+      this.basis = this.prepareBasis(isRounded);
     await this.basis;
     return located(entry, this.codec.call('cages', [payload, count, restRows(this.part)], signal));
   }
@@ -116,10 +116,10 @@ export class BlockDecoder {
     return located(entry, this.codec.call('residual', [payload, entry.fields.count, most], signal));
   }
 
-  private prepareBasis(isGiven = false): Promise<void> {
+  private prepareBasis(isRounded = true): Promise<void> {
     const { given } = this;
-    this.basisIsGiven = isGiven;
-    this.basis = given === null || !isGiven ? this.computeBasis() : this.addGiven(given);
+    this.basisIsRounded = isRounded;
+    this.basis = given === null || isRounded ? this.computeBasis(isRounded) : this.addGiven(given);
     return this.basis.catch((error: unknown) => {
       this.basis = null;
       this.computed = null;
@@ -128,10 +128,10 @@ export class BlockDecoder {
   }
 
   /** Computes the coordinates of the sampled points, and hands them to the codec as they come. */
-  private async computeBasis(): Promise<void> {
+  private async computeBasis(isRounded: boolean): Promise<void> {
     const { part, codec } = this;
     const { cage, rowsPerFrame } = part;
-    const system = part.system === 'harmonic' ? 'mvc' : part.system;
+    const system = isRounded && part.system === 'harmonic' ? 'mvc' : part.system;
     const rest = pointsAt(part.rest, sampledPoints(part));
     let isFirst = true;
     const onRows = async (rows: Float64Array): Promise<void> => {

@@ -20,7 +20,9 @@ describe.each(GOLDEN)('the golden file %s', (name) => {
     const capture = await open();
     const { head, static: part } = capture;
     expect(capture.problem).toBeNull();
-    expect(part.system).toBe(name.replace(/^(coded(-parted)?|definition3|edited|rounded)-|-(elements|origin|edited)$/g, ''));
+    expect(part.system).toBe(
+      name.replace(/^(coded(-parted)?|definition3|edited|rounded)-|-(elements|origin|edited)$/g, ''),
+    );
     expect([head.points, part.rest.length / 3, part.cage.positions.length / 3]).toEqual([120, 120, 26]);
     expect(part.cage.triangles.length / 3).toBe(48);
     expect(part.cornerCounts.reduce((sum, count) => sum + count, 0)).toBe(part.corners.length);
@@ -66,6 +68,20 @@ function harmonicPhi(name: string): Float32Array | undefined {
 
 it('has a file of every coordinate system, and coded ones', () => {
   const names = ['mvc', 'harmonic', 'green', 'green-free'].map((system) => `definition3-${system}`);
-  const coded = ['coded-mvc', 'coded-green', 'coded-green-free', 'coded-harmonic', 'coded-parted-mvc', 'rounded-mvc', 'rounded-harmonic'];
+  const coded = [
+    'coded-mvc',
+    'coded-green',
+    'coded-green-free',
+    'coded-harmonic',
+    'coded-parted-mvc',
+    'rounded-mvc',
+    'rounded-harmonic',
+  ];
   expect(GOLDEN).toEqual(expect.arrayContaining([...names, ...coded]));
+});
+
+it('shows no cages of harmonic files of earlier programs without the coordinates that they are in', async () => {
+  const capture = await openBytes(goldenBytes('coded-harmonic'));
+  await expect(allBlocks(capture)).rejects.toThrow(/Harmonic coordinates cannot be computed/);
+  expect(await allBlocks(await openBytes(goldenBytes('rounded-harmonic')))).not.toEqual([]);
 });
