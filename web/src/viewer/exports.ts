@@ -42,6 +42,7 @@ export function exportPanel(player: Player, viewer: CagerViewer, close: () => vo
           </ul>`
         : html`<p class="muted">When the session is complete.</p>`
     }
+    ${viewer.editing.hasEdits ? html`<p class="muted">Unsaved edits are left out. Save them in Edit cage.</p>` : nothing}
     ${capture.complete && !capture.downloads ? html`<p class="muted">Other formats: <code>cager decode</code>.</p>` : nothing}
   </aside>`;
 }
