@@ -86,7 +86,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         let section = self.coded_entry(entry)?;
         let record = section.basis_record()?;
         if self.groups.basis(&record).is_none() {
-            if !self.groups.may_compute() {
+            if !self.groups.may_begin() {
                 return Err(Error::corrupt(entry.offset, "the groups have too many bases"));
             }
             let basis = self.binding(entry.offset)?.basis(&record)?.0;

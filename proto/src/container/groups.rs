@@ -11,8 +11,8 @@ const MAX_BASES: usize = 8;
 pub(super) struct Groups {
     /// Those that groups say they have, two at the most.
     bases: Vec<CageBasis>,
-    /// How many were computed.
-    computed: usize,
+    /// How many were begun to be computed, also in vain.
+    begun: usize,
     pub(super) hierarchy: Option<Hierarchy>,
     /// The residuals decoded last, each with the entry that it was read from.
     pub(super) residuals: Vec<(Entry, Residual)>,
@@ -23,13 +23,14 @@ impl Groups {
         self.bases.iter().find(|basis| basis.record() == record)
     }
 
-    /// Whether a file may have one more basis.
-    pub(super) fn may_compute(&self) -> bool {
-        self.computed < MAX_BASES
+    /// Whether a file may have one more basis, which is to be computed now beside one that is kept.
+    pub(super) fn may_begin(&mut self) -> bool {
+        self.bases.truncate(1);
+        self.begun += 1;
+        self.begun <= MAX_BASES
     }
 
     pub(super) fn keep_basis(&mut self, basis: CageBasis) {
-        self.computed += 1;
         self.bases.retain(|other| other.record() != basis.record());
         self.bases.truncate(1);
         self.bases.insert(0, basis);
