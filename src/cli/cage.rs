@@ -1,7 +1,7 @@
 //! `cager cage`: generates, designs and improves cages.
 
 use super::cage_args::{CageArgs, GeneralArg};
-use super::cage_file::{dropped_of_cage, read_cage_like};
+use super::cage_file::{dropped_of_cage, read_welded_cage};
 use super::cage_outputs::{Targets, cage_bytes, complete_file};
 use super::checks::{check_capture, checked_files, warn_of_departures};
 use super::design;
@@ -113,7 +113,7 @@ struct Motion<'a> {
 impl<'a> Motion<'a> {
     fn new(args: &'a CageArgs, (rest, units): (&Model, Units), frames: &Path) -> Result<Self> {
         let start =
-            args.improve.as_ref().map(|path| read_cage_like(path, units).map(|model| (path, model))).transpose()?;
+            args.improve.as_ref().map(|path| read_welded_cage(path, units).map(|model| (path, model))).transpose()?;
         let options = DesignOptions {
             goal: design::goal(args.vertices, args.mean_error, rest.points.len())?,
             style: args.style.unwrap_or(Style::Editable),

@@ -14,6 +14,9 @@ fn a_cage_whose_faces_were_split_is_checked_as_it_is_encoded_with() {
     assert_eq!((report["usable"].as_bool(), report["vertices"].as_u64()), (Some(true), Some(8)));
     let encoded = dir.cager("encode --rest rest.obj --frames frames.npy --cage split.obj -o a.cager").succeeds();
     assert!(encoded.stderr.contains(merged), "{}", encoded.stderr);
+    let line = "cage --rest rest.obj --frames frames.npy --improve split.obj --time-limit 1 -o better.obj";
+    let improved = dir.cager(line).succeeds();
+    assert!(improved.stderr.contains(merged), "{}", improved.stderr);
 }
 
 #[test]
