@@ -141,8 +141,8 @@ fn is_gone(error: &ClientError) -> bool {
 fn passes(error: &ClientError) -> bool {
     match error {
         ClientError::Broken { .. } | ClientError::Connect { .. } | ClientError::NotReady { .. } => true,
-        ClientError::GaveUp { last, .. } => last.status().is_none_or(|status| matches!(status, 408 | 425 | 429 | 503)),
-        error => matches!(error.status(), Some(408 | 425 | 429 | 503)),
+        ClientError::GaveUp { last, .. } => last.status().is_none_or(|status| matches!(status, 408 | 425 | 429 | 502..=504)),
+        error => matches!(error.status(), Some(408 | 425 | 429 | 502..=504)),
     }
 }
 
@@ -176,6 +176,7 @@ mod tests {
             broken(),
             ClientError::Connect { address: String::new(), cause: String::new() },
             ClientError::GaveUp { attempts: 9, last: Box::new(refused(503, "storage-failed")) },
+            ClientError::GaveUp { attempts: 9, last: Box::new(refused(502, "bad-gateway")) },
             ClientError::GaveUp { attempts: 9, last: Box::new(broken()) },
             refused(429, "share-taken"),
             ClientError::NotReady { id: "s-1".to_owned(), waited: Duration::ZERO },
