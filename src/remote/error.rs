@@ -141,7 +141,9 @@ fn is_gone(error: &ClientError) -> bool {
 fn passes(error: &ClientError) -> bool {
     match error {
         ClientError::Broken { .. } | ClientError::Connect { .. } | ClientError::NotReady { .. } => true,
-        ClientError::GaveUp { last, .. } => last.status().is_none_or(|status| matches!(status, 408 | 425 | 429 | 502..=504)),
+        ClientError::GaveUp { last, .. } => {
+            last.status().is_none_or(|status| matches!(status, 408 | 425 | 429 | 502..=504))
+        }
         error => matches!(error.status(), Some(408 | 425 | 429 | 502..=504)),
     }
 }
