@@ -396,7 +396,7 @@ fn decoded_as_one(dir: &Dir) {
 
     refused(dir, "decode two.stretches.json -o whole.npy", &["whole.npy", "one mesh", "folder"]);
     refused(dir, "decode two.stretches.json -o whole.abc", &["whole.abc", "one mesh"]);
-    refused(dir, "decode two.stretches.json -o none/ --frame 14", &["frames 0 to 13"]);
+    refused(dir, "decode two.stretches.json -o none/ --frame 14", &["counted from 0", "0 to 13"]);
     refused(dir, "decode two.stretches.json -o none/ --model rest.obj", &["--model", "one by one"]);
     refused(dir, "decode two.stretches.json -o none/ --cages", &["--cages", "one by one"]);
     let list = std::fs::read_to_string(dir.path("two.stretches.json")).expect("list");

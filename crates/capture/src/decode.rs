@@ -160,7 +160,8 @@ fn bind(
         let Survey { outside, mut beside } = Survey::of(pointwise, &cage, &rest.points);
         // Other coordinates have no poles.
         beside.retain(|_| header.coordinates == MeanValue.name());
-        let bound = Bound::new(pointwise, &cage, &fitted, &rest.points, &beside);
+        let bound = Bound::new(pointwise, &cage, &fitted, &rest.points, &beside)
+            .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
         let count = bound.places.len();
         return Ok(BoundModel { rest, decoder: decoder.with_bound(bound), outside, bound: count });
     }

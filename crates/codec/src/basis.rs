@@ -30,7 +30,7 @@ const TOLERANCE: f64 = 1e-9;
 pub struct BasisRecord {
     /// Whether it is rotated to eigenvectors.
     pub rotated: bool,
-    /// How the Gram matrix is rounded; `None` in files of programs before 0.3, which did not.
+    /// How the Gram matrix is rounded; `None` in files of programs up to 0.2, which did not.
     pub rounding: Option<GramRounding>,
 }
 

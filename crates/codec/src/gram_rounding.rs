@@ -9,6 +9,8 @@ use faer::{Mat, MatRef};
 
 /// Steps in the mean of the diagonal, at least: what rounding adds to the matrix is small beside the floor of its eigenvalues.
 const STEPS: f64 = 16_384.0;
+/// Steps are from two to the power of less this to two to the power of this.
+const MAX_EXPONENT: f64 = 1000.0;
 /// Entries are counted in so many steps at the most, so that they are exact in double precision.
 const MAX_STEPS: f64 = 9.0e15;
 
@@ -29,7 +31,10 @@ impl GramRounding {
         if !mean.is_finite() {
             return None;
         }
-        let exponent = (mean.max(f64::MIN_POSITIVE) / STEPS).log2().floor().max(-1000.0);
+        let exponent = (mean.max(f64::MIN_POSITIVE) / STEPS).log2().floor().max(-MAX_EXPONENT);
+        if exponent > MAX_EXPONENT {
+            return None;
+        }
         let step = exponent.exp2();
         let margin = tolerance * mean / step;
         let mut between = Vec::new();
@@ -86,7 +91,7 @@ impl GramRounding {
         let (exponent, rest) = bytes.split_first_chunk().ok_or_else(damaged)?;
         *bytes = rest;
         let exponent = i16::from_le_bytes(*exponent);
-        if !(-1000..=1000).contains(&exponent) {
+        if f64::from(exponent).abs() > MAX_EXPONENT {
             return Err(damaged());
         }
         let count = read_number(bytes).ok_or_else(damaged)?;

@@ -153,7 +153,7 @@ mod tests {
         let cage = Cage::new(TriMesh { vertices, triangles }).unwrap();
         let points = (0..8).map(|k| [0.5, 0.6, 0.8].map(|x| x + 0.1 * f64::from(k % 3))).collect();
         let rest = Model { points, ..Model::default() };
-        let solver = Solver::prepare(&MeanValue, &cage, &rest.points, SolverOptions::PAPER).unwrap();
+        let solver = Solver::prepare(&MeanValue, &cage, &rest.points, SolverOptions::for_unknowns(4)).unwrap();
         let decoder = GroupDecoder::new(&MeanValue, &cage, &rest, &solver).unwrap();
         let basis = |record: &BasisRecord| CageBasis::of(&MeanValue, &cage, &rest.points, None, Some(record));
         let earlier = BasisRecord { rotated: false, rounding: None };

@@ -7,6 +7,7 @@
 use super::phi::for_each_chunk;
 use crate::cage::Cage;
 use crate::coordinates::PointwiseCoordinates;
+use crate::inversion::PrepareError;
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Aabb, Bvh, Surface};
@@ -23,7 +24,7 @@ const CANDIDATES: usize = 20_000;
 /// Step of the derivative, and the longest way that needs none, as shares of the cage's diagonal.
 const STEP: f64 = 1e-5;
 const NO_WAY: f64 = 1e-12;
-/// Coordinates that are bound, at the most: 128 MB. A model with more is in another place than the cage.
+/// Coordinates that are bound, at the most: 128 MB of rows, and up to three times that of derivatives. A model with more is in another place than the cage.
 const MAX_ENTRIES: usize = 1 << 24;
 
 /// What is to be known of another model's points in a cage.
@@ -78,18 +79,24 @@ impl Bound {
     }
 
     /// Binds those of some `points` that are `beside` poles to the model that the cages were fitted to: they get the coordinates of the nearest place on
-    /// it, and for the way from there the first order of a good point's. Affine motions stay exact. The model's own points keep theirs, as do all where there
-    /// are too many.
+    /// it, and for the way from there the first order of a good point's. Affine motions stay exact. The model's own points keep theirs.
+    ///
+    /// # Errors
+    /// [`PrepareError::TooManyBesidePoles`].
     pub fn new(
         pointwise: PointwiseCoordinates,
         cage: &Cage,
         fitted: &TriMesh,
         points: &[Point],
         beside: &[u32],
-    ) -> Self {
+    ) -> Result<Self, PrepareError> {
         let columns = cage.vertices().len();
-        if beside.is_empty() || fitted.vertices.is_empty() || beside.len() * columns > MAX_ENTRIES {
-            return Self::none();
+        if beside.is_empty() || fitted.vertices.is_empty() {
+            return Ok(Self::none());
+        }
+        let most = MAX_ENTRIES / columns;
+        if beside.len() > most {
+            return Err(PrepareError::TooManyBesidePoles { first: beside[0] as usize, points: beside.len(), most });
         }
         let own = tree(&fitted.vertices);
         let others = |&place: &u32| {
@@ -103,7 +110,7 @@ impl Bound {
         for (i, &place) in places.iter().enumerate() {
             model.row(points[place as usize]).into_iter().enumerate().for_each(|(j, value)| rows[(i, j)] = value);
         }
-        Self { places, rows }
+        Ok(Self { places, rows })
     }
 
     /// Those of the points from `first` on, as many as there are rows, with their rows.
@@ -248,7 +255,10 @@ mod tests {
         let pointwise = MeanValue.pointwise().expect("mean values");
         let Survey { beside, .. } = Survey::of(pointwise, &cage, &dense);
         assert_eq!(beside, beside_poles(pointwise(&cage, &dense).phi.as_ref()));
-        let bound = Bound::new(pointwise, &cage, &fitted, &dense, &beside);
+        let bound = Bound::new(pointwise, &cage, &fitted, &dense, &beside).unwrap();
+        let many = vec![0; MAX_ENTRIES / cage.vertices().len() + 1];
+        let refused = Bound::new(pointwise, &cage, &fitted, &dense, &many).err();
+        assert!(matches!(refused, Some(PrepareError::TooManyBesidePoles { .. })), "{refused:?}");
         assert!(bound.places.len() > 3 && bound.places.iter().all(|&place| (place as usize) < off), "{bound:?}");
         for (at, &place) in bound.places.iter().enumerate() {
             let row: Vec<f64> = bound.rows.row(at).iter().copied().collect();

@@ -54,6 +54,18 @@ pub enum PrepareError {
         /// Distance from the first vertex of the cage over the diagonal of the cage.
         distance: f64,
     },
+    /// More points of another model beside poles of the coordinates than can be bound to the capture's own model.
+    #[error(
+        "{points} points, {first} the first, lie beside poles of the cage's coordinates, and at most {most} can follow the capture's own model there; move the model to where the capture is, or encode the capture with an editable cage"
+    )]
+    TooManyBesidePoles {
+        /// The first of them, counted from 0.
+        first: usize,
+        /// How many there are.
+        points: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// A point whose coordinates are dominated by rounding.
     #[error(
         "rest point {point} is not reproduced by the cage (off by {error:.1e} of its diagonal), as happens far outside it; move the cage around the model or delete the point"
