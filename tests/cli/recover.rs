@@ -460,7 +460,6 @@ fn parts_that_leave_their_surface_in_frames_that_are_not_lost_are_told_with_fram
         }
         let line = "recover --template rest.obj --frames scan_*.obj --overwrite";
         let said = dir.cager(&format!("{line} -o {name}.cager --report {name}.json")).succeeds();
-        println!("{name}: {}{}", said.stderr, said.stdout);
         (said, dir.json(&format!("{name}.json"))["departures"].clone())
     };
     let with = |frame: usize| together(&dance.posed(frame), &held(frame, 0.0));

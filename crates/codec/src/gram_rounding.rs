@@ -40,7 +40,7 @@ impl GramRounding {
         let mut between = Vec::new();
         for (at, (i, j)) in lower(m).enumerate() {
             let steps = products[(i, j)] / step;
-            if !(steps.abs() < MAX_STEPS) {
+            if steps.is_nan() || steps.abs() >= MAX_STEPS {
                 return None;
             }
             if ((steps - steps.floor()) - 0.5).abs() <= margin {
@@ -56,7 +56,7 @@ impl GramRounding {
         let mut between = self.between.iter().peekable();
         for (at, (i, j)) in lower(products.nrows()).enumerate() {
             let steps = products[(i, j)] / step;
-            if !(steps.abs() < MAX_STEPS) {
+            if steps.is_nan() || steps.abs() >= MAX_STEPS {
                 return None;
             }
             let whole = match between.next_if(|(place, _)| *place as usize == at) {

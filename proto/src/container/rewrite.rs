@@ -145,11 +145,14 @@ impl<W: Write> ContainerWriter<W> {
     }
 }
 
-/// The section of a new layer: its header without checksums, its payload, and its bytes before they were compressed.
+/// A layer's header without checksums, its payload, and its bytes before they were compressed.
+type EncodedLayer = (SectionHeader, Vec<u8>, Option<Vec<u8>>);
+
+/// The section of a new layer.
 fn encoded<R: Read + Seek>(
     layer: &EditLayer,
     of: &ContainerReader<R>,
-) -> Result<(SectionHeader, Vec<u8>, Option<Vec<u8>>), Error> {
+) -> Result<EncodedLayer, Error> {
     let frames = layer.frames();
     let fits = layer.check(of.vertex_rows());
     fits.map_err(|what| Error::Invalid(what.to_owned()))?;

@@ -10,7 +10,8 @@ const CASE: &str = "32-mirrored-capture";
 fn a_mirrored_capture_is_refused_with_what_mirrors_it_and_what_to_do() {
     let dir = Dir::with_case(CASE);
     let frames = read_frames(&dir.path("same_hand.npy"), 82);
-    let changes: [(fn([f64; 3]) -> [f64; 3], &str, &str); 5] = [
+    type Change = fn([f64; 3]) -> [f64; 3];
+    let changes: [(Change, &str, &str); 5] = [
         (|[x, y, z]| [-x, y, z], "x of the rest pose is -x in all of them", "negate x in one of them"),
         (|[x, y, z]| [x, -y, z], "y of the rest pose is -y in all of them", "negate y in one of them"),
         (|[x, y, z]| [x, y, -z], "z of the rest pose is -z in all of them", "negate z in one of them"),

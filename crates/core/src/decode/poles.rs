@@ -51,7 +51,7 @@ impl Survey {
 /// Those of some points whose coordinates are beside a pole, ascending.
 pub fn beside_poles(phi: MatRef<'_, f64>) -> Vec<u32> {
     // Not a number counts as well.
-    sums(phi).iter().zip(0..).filter(|(sum, _)| !(**sum <= LARGE)).map(|(_, place)| place).collect()
+    sums(phi).iter().zip(0..).filter(|(sum, _)| sum.is_nan() || **sum > LARGE).map(|(_, place)| place).collect()
 }
 
 /// Sums of the sizes of each point's coordinates.

@@ -27,7 +27,7 @@ pub(super) fn of(root: &Root, placements: &[Placement], has_colors: bool) -> Dro
         .iter()
         .filter_map(|&skin| root.skins.get(skin))
         .flat_map(|skin| &skin.joints)
-        .map(|j| j.value())
+        .map(gltf::json::Index::value)
         .collect();
     if !skins.is_empty() {
         let its = if skins.len() == 1 { "its skin".to_owned() } else { counted(skins.len(), "skin") };

@@ -32,7 +32,9 @@ impl<'a> Unread<'a> {
             b"usemtl" => drop(self.materials.insert(rest())),
             b"g" => drop(self.groups.insert(rest())),
             b"o" => drop(self.objects.insert(rest())),
-            b"s" => drop(self.smoothing.extend(words(rest()).next())),
+            b"s" => {
+                self.smoothing.extend(words(rest()).next());
+            }
             b"l" => self.lines += 1,
             b"curv" | b"curv2" | b"surf" => self.free_form = true,
             _ => {}

@@ -47,10 +47,12 @@ pub(super) fn add<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32, dropped: &mut 
     if !normals.is_empty() {
         dropped.add_on_faces(told("normals", &normals));
     }
-    let others: [(&str, &dyn Fn(&str, &str) -> bool); 3] =
-        [("colours", &is_color), ("a skin", &|name, _| is_skin(name)), ("primvars", &is_other)];
-    for (what, wanted) in others {
-        let names = of_type(wanted);
+    let others = [
+        ("colours", of_type(&is_color)),
+        ("a skin", of_type(&|name: &str, _: &str| is_skin(name))),
+        ("primvars", of_type(&is_other)),
+    ];
+    for (what, names) in others {
         if !names.is_empty() {
             dropped.add_on_faces(told(what, &names));
         }

@@ -5,6 +5,8 @@ use crate::vector::{cross, dot, norm, sub};
 
 /// Triangles of less than this share of the polygon's area have none.
 const NO_AREA: f64 = 1e-12;
+/// Corners of a polygon whose ears are looked for, which takes their square or more; larger ones are fans.
+const MOST_CORNERS: usize = 8192;
 
 /// Appends the triangles of a face: two fewer than it has corners, oriented as it is.
 pub(super) fn triangulate(face: &[u32], points: &[Point], triangles: &mut Vec<[u32; 3]>) {
@@ -12,7 +14,9 @@ pub(super) fn triangulate(face: &[u32], points: &[Point], triangles: &mut Vec<[u
         triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
     };
     let place = |v: &u32| points.get(*v as usize).copied().filter(|p| p.iter().all(|x| x.is_finite()));
-    let Some(at) = face.iter().map(place).collect::<Option<Vec<Point>>>().filter(|at| at.len() > 3) else {
+    let Some(at) =
+        face.iter().map(place).collect::<Option<Vec<Point>>>().filter(|at| (4..=MOST_CORNERS).contains(&at.len()))
+    else {
         return fan(face, triangles);
     };
     let Some((flat, area)) = flattened(&at) else { return fan(face, triangles) };

@@ -37,7 +37,7 @@ struct PackedTooWell;
 pub(crate) fn is_packed_too_well(error: &(dyn Error + 'static)) -> bool {
     let of_io = |error: &(dyn Error + 'static)| {
         let inner = error.downcast_ref::<io::Error>().and_then(io::Error::get_ref);
-        inner.is_some_and(|inner| inner.is::<PackedTooWell>())
+        matches!(inner, Some(inner) if inner.is::<PackedTooWell>())
     };
     std::iter::successors(Some(error), |&error| error.source()).any(|error| error.is::<PackedTooWell>() || of_io(error))
 }
