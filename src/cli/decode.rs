@@ -5,7 +5,7 @@ use super::dry_run::{size, tell_dry_run};
 use super::edit::DETAIL_LOST;
 use super::outputs::Outputs;
 use super::stretches::StretchList;
-use super::{grouped, plain, progress, read_like, tell, warn};
+use super::{counted, grouped, plain, progress, read_like, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::cage_export::write_cages;
 use cager_capture::decode::joined::{Joining, decode_joined};
@@ -127,10 +127,10 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     }
     tell_notes(&found.notes)?;
     tell(&format!(
-        "{}: {} frames of {} points in {:.3} s\n",
+        "{}: {} of {} in {:.3} s\n",
         output.path().display(),
-        grouped(found.frames),
-        grouped(found.points),
+        counted(found.frames, "frame"),
+        counted(found.points, "point"),
         clock.elapsed().as_secs_f64()
     ))
 }
@@ -192,7 +192,7 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
     let result = decode_joined(&parts, &output, what, &mut |done| bar.done(done));
     bar.finish();
     let (frames, notes) = result?;
-    let told = format!("{} frames of {} files", grouped(frames), grouped(parts.len()));
+    let told = format!("{} of {}", counted(frames, "frame"), counted(parts.len(), "file"));
     if what.dry_run {
         return tell_dry_run(&output, &told, &[]);
     }

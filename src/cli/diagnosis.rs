@@ -148,7 +148,12 @@ fn repair_cage(
         let _ = writeln!(text, "  changed  {change}");
     }
     if repaired.changes.is_empty() {
-        text += "  changed  nothing: there was nothing to repair\n";
+        let is_sound = unfit.is_none() && repaired.remaining.messages().is_empty();
+        text += if is_sound {
+            "  changed  nothing: there was nothing to repair\n"
+        } else {
+            "  changed  nothing: what was found stays, and is nothing that repairing can mend\n"
+        };
     }
     print(&format!("{}{text}", verdict(output.path(), &repaired.remaining, unfit.as_ref())))
 }

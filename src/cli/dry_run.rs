@@ -1,6 +1,6 @@
 //! `--dry-run`: checks and reports without writing anything.
 
-use super::{grouped, human_bytes, progress, tell};
+use super::{counted, grouped, human_bytes, progress, tell};
 use anyhow::Result;
 use cager_capture::encode::EncodeError;
 use cager_capture::frames::CaptureFiles;
@@ -42,5 +42,5 @@ pub(super) fn tell_dry_run(output: &Target, what: &str, others: &[Option<Target>
 /// `20 frames of 600 points, about 144.0 kB`: what frames take in single precision.
 pub(super) fn size(frames: usize, rows: usize, of: &str) -> String {
     let bytes = 12 * frames as u64 * rows as u64;
-    format!("{} frames of {} {of}, about {}", grouped(frames), grouped(rows), human_bytes(bytes))
+    format!("{} of {} {of}, about {}", counted(frames, "frame"), grouped(rows), human_bytes(bytes))
 }

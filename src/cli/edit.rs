@@ -3,13 +3,13 @@
 use super::dry_run::{size, tell_dry_run};
 use super::outputs::Outputs;
 use super::transfer_args::{EditArgs, LayerChoice};
-use super::{grouped, plain, progress, tell, warn};
+use super::{counted, grouped, plain, progress, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::decode::{self, Container, DecodeError};
 use cager_capture::edit::{self, Editing};
 use cager_capture::edited::EditedCages;
 use cager_formats::{AtomicFile, Target, Units, commit_together};
-use cager_proto::container::{EditLayer, LayerSource};
+use cager_proto::container::{self, EditLayer, LayerSource};
 use std::path::Path;
 
 /// Said where a container has more than cages and its frames are others.
@@ -21,7 +21,20 @@ pub(super) fn run(args: &EditArgs) -> Result<()> {
     let inputs = args.with_cages.iter().chain((!replaces_input).then_some(&args.input));
     let output = Outputs::new(args.outputs, inputs)?.container(&args.output, "edited.cager")?;
     let mut container = decode::open(&args.input)?;
-    let layers = container.layers().map_err(|cause| DecodeError::container(&args.input, cause))?.to_vec();
+    let (mut layers, mut damaged) = (Vec::new(), Vec::new());
+    for (k, layer) in container.each_layer().into_iter().enumerate() {
+        layers.push(match layer {
+            Ok(layer) => layer,
+            Err(container::Error::Corrupt { .. }) if args.remove.is_some() => {
+                damaged.push(k);
+                EditLayer::default()
+            }
+            Err(cause) => {
+                let what = DecodeError::container(&args.input, cause);
+                bail!("{what}; this is layer {0} of its edits, and --remove {0} takes back just that", k + 1);
+            }
+        });
+    }
     if args.flatten {
         return flatten(args, container, &layers, &output);
     }
@@ -34,6 +47,14 @@ pub(super) fn run(args: &EditArgs) -> Result<()> {
         return finish(args, file, &output, &format!("{} set", set.join(" and ")));
     }
     let (kept, told) = changed(args, layers)?;
+    let stays = |k: &&usize| kept.iter().any(|layer| matches!(layer, LayerSource::Kept(kept) if kept == *k));
+    if let Some(k) = damaged.iter().find(stays) {
+        bail!(
+            "{}: layer {} is damaged, so it cannot be kept; take it back, or all (--remove all)",
+            args.input.display(),
+            k + 1
+        );
+    }
     let file = edit::with_layers(&mut container, &args.input, &kept, &output)?;
     finish(args, file, &output, &told)
 }
@@ -53,7 +74,7 @@ fn changed(args: &EditArgs, mut layers: Vec<EditLayer>) -> Result<(Vec<LayerSour
         ),
     };
     match args.remove {
-        Some(LayerChoice::All) => return Ok((Vec::new(), format!("{} taken back", counted(count)))),
+        Some(LayerChoice::All) => return Ok((Vec::new(), format!("{} taken back", counted(count, "layer")))),
         Some(LayerChoice::Number(number)) => {
             let taken = place("--remove", number)?;
             let kept = all().enumerate().filter(|&(k, _)| k != taken).map(|(_, layer)| layer);
@@ -110,7 +131,7 @@ fn add(args: &EditArgs, mut container: Container, there: usize, output: &Target)
             grouped(rows)
         ),
     };
-    finish(args, found.container, output, &format!("{} frames{told}", grouped(found.frames)))
+    finish(args, found.container, output, &format!("{}{told}", counted(found.frames, "frame")))
 }
 
 /// Writes all layers into the cages.
@@ -128,11 +149,20 @@ fn flatten(args: &EditArgs, mut container: Container, layers: &[EditLayer], outp
     }
     let off = layers.iter().filter(|layer| !layer.is_on).count();
     if off > 0 {
-        warn(&[format!("{}: {} switched off, and not in what is written", args.input.display(), counted(off))]);
+        warn(&[format!(
+            "{}: {} switched off, and not in what is written",
+            args.input.display(),
+            counted(off, "layer")
+        )]);
     }
     let applied = layers.len() - off + usize::from(more.is_some());
     let file = edit::flattened(container, &args.input, more, output)?;
-    finish(args, file, output, &format!("{} in its cages; errors of these frames are not measured", counted(applied)))
+    let told = match (applied, layers.len()) {
+        (0, 0) => "it has no layer, so nothing is changed".to_owned(),
+        (0, _) => "no layer was on, so the layers are gone and nothing else is changed".to_owned(),
+        _ => format!("{} in its cages; errors of these frames are not measured", counted(applied, "layer")),
+    };
+    finish(args, file, output, &told)
 }
 
 fn finish(args: &EditArgs, file: AtomicFile, output: &Target, told: &str) -> Result<()> {
@@ -154,10 +184,6 @@ fn check_range(args: &EditArgs, container: &mut Container) -> Result<()> {
 
 fn is_same(input: &Path, output: &Path) -> bool {
     input.canonicalize().is_ok_and(|input| output.canonicalize().is_ok_and(|output| input == output))
-}
-
-fn counted(layers: usize) -> String {
-    format!("{} {}", grouped(layers), if layers == 1 { "layer" } else { "layers" })
 }
 
 fn named(layer: &EditLayer) -> String {

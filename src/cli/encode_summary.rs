@@ -1,7 +1,7 @@
 //! Summary and report of `cager encode`.
 
 use super::cage::judged;
-use super::{grouped, human_bytes, is_verbose};
+use super::{counted, grouped, human_bytes, is_verbose};
 use anyhow::Result;
 use cager_formats::AtomicFile;
 use cager_proto::report::{Errors, Report, json_file};
@@ -65,14 +65,14 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
         String::new()
     };
     format!(
-        "{}: {} frames of {} points as cages of {} vertices\n\
+        "{}: {} of {} as cages of {} vertices\n\
          \x20 size    {} from {}: {:.1} times smaller, {:.2} bits per point and frame\n\
          \x20 error   {}\n{worst}{alone}\
          \x20 system  condition {:.1} (all points {:.1}), rank {} of {}, affine reproduction {:.1e}\n\
          {refined}{chosen}{again}\x20 time    {:.3} s{designed}\n{steps}",
         output.display(),
-        grouped(report.frames),
-        grouped(report.points),
+        counted(report.frames, "frame"),
+        counted(report.points, "point"),
         grouped(report.cage_vertices),
         human_bytes(report.bytes.output),
         human_bytes(report.bytes.capture),

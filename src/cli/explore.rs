@@ -5,7 +5,7 @@ use super::dry_run::tell_dry_run;
 use super::outputs::{OutputArgs, Outputs, folder_of};
 use super::poses::{PoseFile, Poses};
 use super::solver_options::with_input_name;
-use super::{grouped, progress, tell};
+use super::{counted, grouped, progress, tell};
 use anyhow::{Context, Result, bail};
 use cager_capture::origin::{LOST, move_to, own_origin};
 use cager_core::cage::Cage;
@@ -185,9 +185,4 @@ fn named(error: &ShapeError, leg: usize, poses: &Poses) -> anyhow::Error {
         _ => leg,
     };
     anyhow::anyhow!("{}: {error}", poses.file(pose))
-}
-
-/// `1 shape`, `1,234 shapes`.
-fn counted(count: usize, what: &str) -> String {
-    format!("{} {what}{}", grouped(count), if count == 1 { "" } else { "s" })
 }

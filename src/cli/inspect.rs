@@ -3,7 +3,7 @@
 use super::args::InspectArgs;
 use super::encode_summary::errors;
 use super::stretches::StretchList;
-use super::{grouped, human_bytes, plain, print, warn};
+use super::{counted, grouped, human_bytes, plain, print, warn};
 use anyhow::Result;
 use cager_capture::decode::{self, Container, DecodeError};
 use cager_formats::missing_frames;
@@ -74,8 +74,8 @@ impl Inspected {
         let Self { report, layers, sections } = self;
         let mut out = String::new();
         writeln!(out, "{name}: {}, every checksum matches", human_bytes(report.bytes.output))?;
-        let (frames, points) = (grouped(report.frames), grouped(report.points));
-        writeln!(out, "  capture   {frames} frames of {points} points")?;
+        let (frames, points) = (counted(report.frames, "frame"), counted(report.points, "point"));
+        writeln!(out, "  capture   {frames} of {points}")?;
         numbers(&mut out, report)?;
         if let Some([x, y, z]) = report.origin {
             writeln!(out, "  origin    {x} {y} {z}, added to all positions")?;
@@ -102,7 +102,7 @@ impl Inspected {
             report.lambda
         )?;
         if !report.generator.is_empty() {
-            encoded(&mut out, report)?;
+            encoded(&mut out, report, layers.iter().any(|layer| layer.on))?;
         }
         for layer in layers {
             let Layer { number, on, first, last, vertices, bytes, .. } = layer;
@@ -176,8 +176,8 @@ fn numbers(out: &mut String, report: &Report) -> Result<()> {
     Ok(())
 }
 
-/// What only the encoder can tell.
-fn encoded(out: &mut String, report: &Report) -> Result<()> {
+/// What only the encoder can tell, of frames that are edited or not.
+fn encoded(out: &mut String, report: &Report, is_edited: bool) -> Result<()> {
     let e = &report.error;
     writeln!(out, "  written   by {}", plain(&report.generator))?;
     let capture = human_bytes(report.bytes.capture);
@@ -189,8 +189,9 @@ fn encoded(out: &mut String, report: &Report) -> Result<()> {
     }
     if let Some(coding) = &report.coding {
         let percent = |x: f64| format!("{:.4} %", 100.0 * x);
+        let from = if is_edited { " from the captured motion with its edits added" } else { "" };
         let bound = coding.max_error.map_or_else(String::new, |error| {
-            format!("every point of every frame guaranteed within {} of the diagonal; ", percent(error))
+            format!("every point of every frame guaranteed within {} of the diagonal{from}; ", percent(error))
         });
         let residual = coding.residual_step.map_or_else(String::new, |step| format!(", residual {}", percent(step)));
         writeln!(

@@ -203,6 +203,11 @@ fn grouped(number: impl ToString + Copy) -> String {
     out
 }
 
+/// `1 shape`, `1,234 shapes`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{} {what}{}", grouped(count), if count == 1 { "" } else { "s" })
+}
+
 /// A number of bytes with a unit people read.
 fn human_bytes(bytes: u64) -> String {
     match bytes {

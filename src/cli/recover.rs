@@ -7,7 +7,7 @@ use super::recover_args::{Align, JointsKind, RecoverArgs};
 use super::recover_stretch::{Beside, Done, Stretching};
 use super::rig::{read_manifold, read_rig};
 use super::stretches::{Stretch, StretchList, cut, numbered};
-use super::{grouped, read_whole, recover_remote, tell, warn};
+use super::{counted, read_whole, recover_remote, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::origin::{move_to, own_origin};
 use cager_formats::{
@@ -57,7 +57,8 @@ pub(super) fn run(args: &RecoverArgs) -> Result<()> {
         let mut others = vec![list, joints.map(|(target, _)| target), gait];
         for (((output, report), (template, ..)), files) in targets.iter().zip(&templates).zip(&stretches) {
             others.push(report.clone());
-            let what = format!("{} frames of {} points", grouped(files.files.len()), grouped(template.points.len()));
+            let what =
+                format!("{} of {}", counted(files.files.len(), "frame"), counted(template.points.len(), "point"));
             tell_dry_run(output, &what, &std::mem::take(&mut others))?;
         }
         return Ok(());

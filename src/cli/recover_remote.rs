@@ -4,7 +4,7 @@ use super::cage_file::cage_file;
 use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
-use super::{grouped, human_bytes, is_container, plain, progress, tell, warn};
+use super::{counted, grouped, human_bytes, is_container, plain, progress, tell, warn};
 use crate::remote::{RemoteRecovery, RemoteRecoveryProgress, mesh_file, recover_remotely};
 use anyhow::Result;
 use cager_client::NewRecovery;
@@ -59,10 +59,10 @@ pub(super) fn run(
     commit_together(report.into_iter().chain(joints.map(|(_, file)| file)).chain([container]).collect())?;
     warn(&done.warnings);
     tell(&format!(
-        "{}: {} frames of {} points as cages of {} vertices\n  frames  {} lost\n  size    {}\n  service {}\n",
+        "{}: {} of {} as cages of {} vertices\n  frames  {} lost\n  size    {}\n  service {}\n",
         output.path().display(),
-        grouped(done.frames.received as usize),
-        grouped(done.points as usize),
+        counted(done.frames.received as usize, "frame"),
+        counted(done.points as usize, "point"),
         grouped(done.cage_vertices.unwrap_or(0) as usize),
         grouped(done.frames.lost as usize),
         human_bytes(bytes),

@@ -4,7 +4,7 @@ use super::cage_file::read_cage;
 use super::coding_args::goal;
 use super::outputs::folder_of;
 use super::recover_args::{Align, JointsKind, PersonMethod, RecoverArgs};
-use super::{grouped, human_bytes, progress};
+use super::{counted, grouped, human_bytes, progress};
 use anyhow::{Context, Result};
 use cager_capture::encode::{EncodeProgress, Encoded};
 use cager_core::cage::Cage;
@@ -183,14 +183,14 @@ fn summary(report: &RecoveryReport, encoded: &cager_proto::report::Report, outpu
     };
     let s = report.seconds;
     format!(
-        "{}: {} frames of {} points as cages of {} vertices\n\
+        "{}: {} of {} as cages of {} vertices\n\
          {placed}\x20 frames  {} followed from the one before, {} found by a wider search, {} lost{apart}\n\
          \x20 surface template to surface {}, surface to template {} of the diagonal, on average\n\
          \x20 size    {}; errors of encoding: L2 {} on average, L∞ {} at most\n\
          \x20 time    {:.3} s: {:.3} s to prepare, {:.3} s to follow, {:.3} s to refine\n",
         output.display(),
-        grouped(report.frames.len()),
-        grouped(report.points),
+        counted(report.frames.len(), "frame"),
+        counted(report.points, "point"),
         grouped(report.cage_vertices),
         grouped(count("followed")),
         grouped(count("wider_search")),

@@ -9,7 +9,7 @@ use super::encode_summary::write_report;
 use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
 use super::transfer_source::MotionSource;
-use super::{grouped, human_bytes, progress, read_whole, tell, transfer_remote, warn};
+use super::{counted, grouped, human_bytes, progress, read_whole, tell, transfer_remote, warn};
 use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
 use cager_capture::design::FRAMES;
@@ -57,7 +57,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let given = cage(args, method, &source.rest, (&target, origin, units))?;
     if args.outputs.dry_run {
         let frames = source.check_frames()?;
-        let what = format!("{} frames of {} points", grouped(frames), grouped(target.points.len()));
+        let what = format!("{} of {}", counted(frames, "frame"), counted(target.points.len(), "point"));
         tell_dry_run(&output, &what, &[report])?;
         source.warn_of_departures();
         return Ok(());
@@ -198,13 +198,13 @@ fn summary(report: &TransferReport, encoded: &cager_proto::report::Report, cage:
         .runner_up
         .map_or_else(String::new, |times| format!("; the next best alignment leaves {times:.2} times the distance"));
     format!(
-        "{}: {} frames of {} points as cages of {} vertices\n\
+        "{}: {} of {} as cages of {} vertices\n\
          \x20 aligned turned by {:.1} degrees, scaled by {:.4}{runner_up}\n\
          {laid}{}\x20 size    {}; errors of encoding: L2 {:.3} % on average, L∞ {:.3} % at most\n\
          \x20 time    {:.3} s to prepare, {:.3} s to move, {:.3} s to measure\n",
         output.display(),
-        grouped(report.frames),
-        grouped(report.points),
+        counted(report.frames, "frame"),
+        counted(report.points, "point"),
         grouped(cage),
         report.turned_degrees,
         report.scale,

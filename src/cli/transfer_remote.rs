@@ -5,7 +5,7 @@ use super::coding_args::goal;
 use super::encode_remote::{coding_options, session_name};
 use super::motion_args::TransferMotionArgs;
 use super::transfer_source::MotionSource;
-use super::{grouped, human_bytes, is_scene, plain, progress, tell, warn};
+use super::{counted, grouped, human_bytes, is_scene, plain, progress, tell, warn};
 use crate::remote::{RemoteTransfer, mesh_file, transfer_remotely};
 use anyhow::{Result, bail};
 use cager_capture::coding::Goal;
@@ -69,10 +69,10 @@ pub(super) fn run(
     commit_together(report.into_iter().chain([container]).collect())?;
     warn(&done.warnings);
     tell(&format!(
-        "{}: {} frames of {} points as cages of {} vertices\n  size    {}\n  service {}\n",
+        "{}: {} of {} as cages of {} vertices\n  size    {}\n  service {}\n",
         output.path().display(),
-        grouped(done.frames as usize),
-        grouped(done.points as usize),
+        counted(done.frames as usize, "frame"),
+        counted(done.points as usize, "point"),
         grouped(done.cage_vertices.unwrap_or(0) as usize),
         human_bytes(bytes),
         plain(address),

@@ -120,6 +120,7 @@ fn layers_stack_are_switched_taken_back_and_listed() {
     for line in ["layer 1   on smile: frames 1004 to 1005, 1 vertex", "layer 2   on: frames 1005 to 1020, 1 vertex"] {
         assert!(told.contains(line), "{told}");
     }
+    assert!(told.contains("of the diagonal from the captured motion with its edits added;"), "{told}");
     assert!(told.contains("guaranteed") && told.contains("not measured") && told.contains("EDIT"), "{told}");
     let json = inspected(&dir, "b.cager");
     assert_eq!(json["layers"][0]["name"], "smile");
@@ -137,6 +138,16 @@ fn layers_stack_are_switched_taken_back_and_listed() {
     dir.cager("edit off.cager --on 1 -o on.cager").succeeds();
     assert!(dir.read("on.cager") == dir.read("b.cager"));
     assert!(dir.cager("edit on.cager --on 1 -o same.cager").succeeds().stdout.contains("is on already"));
+    // A damaged one is taken back by its number, and none of those that stay may be.
+    let mut bytes = dir.read("b.cager");
+    let at = bytes.windows(4).position(|tag| tag == b"EDIT").expect("a layer");
+    bytes[at + 40] ^= 1;
+    dir.write("hurt.cager", &bytes);
+    dir.cager("edit b.cager --remove 1 -o sound.cager").succeeds();
+    refused(&dir, "edit hurt.cager --off 2 -o x.cager", &["hurt.cager", "--remove 1 takes back just that"]);
+    refused(&dir, "edit hurt.cager --remove 2 -o x.cager", &["hurt.cager: layer 1 is damaged", "--remove all"]);
+    dir.cager("edit hurt.cager --remove 1 -o mended.cager").succeeds();
+    assert!(dir.read("mended.cager") == dir.read("sound.cager"));
     // In any order, all at once, and in place of the file itself.
     dir.cager("edit b.cager --remove 1 -o second.cager").succeeds();
     dir.cager("edit second.cager --remove -o none.cager").succeeds();
@@ -189,6 +200,7 @@ fn a_flattened_file_decodes_to_the_same_positions_without_layers() {
         dir.cager("edit edited.cager --off 1 -o off.cager --overwrite").succeeds();
         let said = dir.cager("edit off.cager --flatten -o plain.cager --overwrite").succeeds();
         assert!(said.stderr.contains("off.cager: 1 layer switched off"), "{}", said.stderr);
+        assert!(said.stdout.contains("no layer was on, so the layers are gone"), "{}", said.stdout);
         assert!(decoded(&dir, &small, "plain.cager").1 == before, "{options}");
     }
 }

@@ -200,6 +200,12 @@ impl<R: Read + Seek> ContainerReader<R> {
         Ok(self.layers.all.as_deref().unwrap_or_default())
     }
 
+    /// Each layer of edits, or what is wrong with it, so that the others can be told from one that is damaged.
+    pub fn each_layer(&mut self) -> Vec<Result<EditLayer, Error>> {
+        let entries: Vec<Entry> = self.sections_of(tag::EDIT).collect();
+        entries.into_iter().map(|entry| self.layer(entry)).collect()
+    }
+
     /// Lets layers that cannot be read be passed over, and counted, instead of refusing every frame.
     #[must_use]
     pub fn passing_over_damaged_layers(mut self) -> Self {
