@@ -5,12 +5,13 @@ use crate::auth::Access;
 use crate::http::listen::tls_config;
 use crate::webhooks;
 use anyhow::{Context as _, Result, bail};
+use cager_formats::ScratchDir;
 use cager_store::{Blobs, PostgresCatalog};
 use rustix::fs::{Access as Right, access};
 use std::path::Path;
 
 impl ServeConfig {
-    /// Reads the files that the service reads at its start, looks at the addresses of what it uses without asking there, and changes nothing.
+    /// Reads the files that the service reads at its start, looks at the addresses of what it uses without asking there, and leaves everything as it was.
     ///
     /// # Errors
     /// One that cannot be used.
@@ -25,7 +26,10 @@ impl ServeConfig {
         if let Some(url) = &self.blobs {
             Blobs::check_address(url, std::env::vars()).context("blobs")?;
         }
-        check_data(&self.data)?;
+        check_folder("data", &self.data)?;
+        if let Some(folder) = self.blobs.as_deref().and_then(|url| url.strip_prefix("file://")) {
+            check_folder("blobs", Path::new(folder))?;
+        }
         if let Some(file) = &self.webhooks {
             webhooks::check(file)?;
         }
@@ -44,12 +48,18 @@ impl ServeConfig {
     }
 }
 
-/// Refuses what cannot be a data folder, or be made one.
-fn check_data(data: &Path) -> Result<()> {
-    let there = data.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
+/// Refuses what cannot be a folder to write into, or be made one.
+fn check_folder(setting: &str, folder: &Path) -> Result<()> {
+    let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
     if !there.is_dir() {
-        bail!("data: {}: {} is no folder; name another one", data.display(), there.display());
+        bail!("{setting}: {}: {} is no folder; name another one", folder.display(), there.display());
     }
     let may = access(there, Right::WRITE_OK | Right::EXEC_OK);
-    may.with_context(|| format!("data: {}: cannot be written by this user", data.display()))
+    let refused = || format!("{setting}: {}: cannot be written by this user", folder.display());
+    may.with_context(refused)?;
+    // Some file systems refuse all the same what rights allow.
+    if there != folder {
+        ScratchDir::create(there).with_context(refused)?;
+    }
+    Ok(())
 }

@@ -148,6 +148,12 @@ fn files_that_are_missing_are_told_before_the_start() {
         ("--catalog postgres://u@h/d --blobs s3://k@b/path", "keys and endpoints do not belong into it"),
         (&format!("--data {good}/data"), "tokens.toml is no folder"),
         (&format!("--data {good}"), "tokens.toml is no folder"),
+        ("--data /proc/none/data", "data: /proc/none/data: cannot be written by this user"),
+        (
+            "--catalog postgres://u@h/d --blobs file:///proc/none/b",
+            "blobs: /proc/none/b: cannot be written by this user",
+        ),
+        (&format!("--catalog postgres://u@h/d --blobs file://{good}"), "tokens.toml is no folder"),
         ("--set oidc_issuer=login.studio --set oidc_audience=cager", "oidc_issuer: "),
         ("--set oidc_issuer=http://login.studio --set oidc_audience=cager", "oidc_issuer: "),
         ("--set oidc_issuer=https://a --set oidc_audience=c --set oidc_keys=keys.json", "oidc_keys: "),
