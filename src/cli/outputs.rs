@@ -1,9 +1,11 @@
 //! Validation of output paths.
 
-use super::{global_args, interrupt};
+use super::{global_args, interrupt, warn};
 use anyhow::{Result, bail};
 use cager_formats::atomic::destination;
-use cager_formats::{AtomicFile, CacheFormat, MeshFormat, Target, frame_files, frames_path, names_beside_others};
+use cager_formats::{
+    AtomicFile, CacheFormat, MeshFormat, Target, frame_files, frames_path, is_numbered_in_vain, names_beside_others,
+};
 use clap::Args;
 use std::fs;
 use std::io::IsTerminal;
@@ -66,6 +68,12 @@ impl Outputs {
         }
         let place = frames_path(path);
         let target = self.target(path, place)?;
+        if is_numbered_in_vain(path) {
+            warn(&[format!(
+                "{}: a file of this format holds all frames, so one of just this name is written; end the name in .obj or .ply for one of each frame",
+                path.display()
+            )]);
+        }
         let here = std::env::current_dir().and_then(|here| here.canonicalize());
         if place.canonicalize().is_ok_and(|folder| here.is_ok_and(|here| here.starts_with(folder))) {
             bail!(
@@ -94,7 +102,7 @@ impl Outputs {
         if let Some(file) = there.filter(|file| is_one(file)).min().filter(|_| !self.overwrite) {
             let file = file.strip_prefix(".").unwrap_or(&file);
             bail!(
-                "{}: is there already; name other files than {shown}, or give --overwrite to replace all that have such a name",
+                "{}: is there already; name other files than {shown}, or give --overwrite to replace those that are written",
                 file.display()
             );
         }

@@ -71,14 +71,31 @@ fn numbered_names_in_a_folder_that_holds_others_are_written_beside_them() {
     for pattern in ["d.####.obj", "./e.%04d.ply", "sub/f_##.obj"] {
         dir.cager(&format!("decode out.cager -o {pattern}")).succeeds();
         assert!(same(&read_frames(&dir.path(pattern), points), &all) && kept(&dir), "{pattern}");
-        // Those that are there go with --overwrite alone, all of them and nothing else.
+        // Those that are there are replaced with --overwrite alone, and none that would stay among the new ones goes.
         let first = pattern.replace("####", "0003").replace("%04d", "0003").replace("##", "03");
         let line = format!("decode out.cager --range 3-5 -o {pattern}");
         refused(&dir, &line, &["is there already", pattern, "--overwrite"]);
-        dir.cager(&format!("{line} --overwrite")).succeeds();
-        assert_eq!(read_frames(&dir.path(pattern), points).len(), 3, "{pattern}");
+        let there = dir.contents();
+        refused(
+            &dir,
+            &format!("{line} --overwrite"),
+            &["and 16 more with such a name are no frames of what is written"],
+        );
+        assert!(dir.contents() == there, "{pattern}");
+        dir.cager(&format!("decode out.cager -o {pattern} --overwrite")).succeeds();
+        assert_eq!(read_frames(&dir.path(pattern), points).len(), 20, "{pattern}");
         assert!(dir.path(&first).exists() && kept(&dir), "{pattern}");
     }
+    // Also in a folder with nothing but frames, and of more digits than are written.
+    dir.cager("decode out.cager --range 3-5 -o own/d.####.obj").succeeds();
+    dir.cager("decode out.cager --range 3-5 -o own/d.####.obj --overwrite").succeeds();
+    dir.write("own/d.12345.obj", "v 0 0 0\n");
+    let line = "decode out.cager --range 3-5 -o own/d.####.obj --overwrite";
+    refused(&dir, line, &["d.12345.obj: is no frame of what is written"]);
+    assert_eq!(dir.names("own").len(), 4);
+    let said = dir.cager("decode out.cager --frame 3 -o i.####.npy").succeeds();
+    assert!(said.stderr.contains("i.####.npy: a file of this format holds all frames"), "{}", said.stderr);
+    assert!(said.stdout.contains("1 frame of "), "{}", said.stdout);
     assert!(dir.path("sub/notes.txt").exists());
     // Read from there again, and not written over what is read.
     dir.cager("decode out.cager --cages -o c.####.obj").succeeds();

@@ -90,6 +90,9 @@ fn attributes_materials_and_skins_of_a_gltf_are_told() {
         of("", r#","targets":[{"POSITION":0}]"#, skin),
         "a.glb: 1 morph target and its skin of 1 joint are not kept"
     );
+    // Those that an animation drives are the motion that is read.
+    let driven = r#","nodes":[{"mesh":0}],"animations":[{"channels":[{"sampler":0,"target":{"node":0,"path":"weights"}}],"samplers":[{"input":0,"output":0}]}]"#;
+    assert_eq!(of("", r#","targets":[{"POSITION":0}]"#, driven), "");
     // Of what is read alone.
     let two = glb_json(r#","nodes":[{"mesh":0}]"#).replace(
         &format!("[{primitive}]"),

@@ -158,7 +158,22 @@ fn one_array_of_several_is_taken_by_its_name() {
     let said = message(reader.read_next(&mut Vec::new()));
     assert!(said.contains("body.3.npz: frame 2: has no array \"vertices\", as "), "{said}");
     // Another name leaves the choice open.
-    assert!(message(open_selected_frames(&path, 2, &prim("gone"))).contains("--prim vertices"));
+    let said = message(open_selected_frames(&path, 2, &prim("gone")));
+    assert!(said.contains("has no array \"gone\", and has 2 arrays of") && said.contains("--prim vertices"), "{said}");
+    let notes = |arrays: &[u8]| {
+        fs::write(&path, arrays).unwrap();
+        open_selected_frames(&path, 2, &prim("gone")).unwrap().notes()
+    };
+    assert!(notes(&arrays(&["vertices"])).is_empty());
+    // Where nobody names one, each file has the one that is read of the first.
+    for (k, name) in [(1, "vertices"), (2, "vertices"), (3, "other")] {
+        fs::write(folder.path().join(format!("body.{k}.npz")), arrays(&[name])).unwrap();
+    }
+    let mut reader = open_frames(folder.path(), 2).unwrap();
+    (0..2).for_each(|_| assert!(reader.read_next(&mut Vec::new()).unwrap()));
+    let said = message(reader.read_next(&mut Vec::new()));
+    assert!(said.contains("body.3.npz: frame 2: has no array \"vertices\", as "), "{said}");
+    assert!(said.contains("but \"other\""), "{said}");
     // Arrays that are numbered may be the frames of one capture.
     fs::write(&path, arrays(&["arr_0", "arr_1"])).unwrap();
     let said = message(open_frames(&path, 2));

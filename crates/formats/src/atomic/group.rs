@@ -1,5 +1,6 @@
 //! Files of one pattern in a folder that holds others too.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,26 +23,33 @@ pub struct AtomicGroup {
 }
 
 impl AtomicGroup {
-    /// Begins files in a folder that is there. Those there whose names `is_own` go once the new ones take theirs, where that is allowed.
+    /// Begins files of these names in a folder that is there. Those of the same names go once the new ones take theirs, where that is allowed.
     ///
     /// # Errors
-    /// [`Error::Target`] for a file that is in the way, [`Error::Io`] where the folder is missing or closed to writing.
-    pub fn create(folder: &Path, replaces: bool, is_own: impl Fn(&str) -> bool) -> Result<Self, Error> {
+    /// [`Error::Target`] for a file that is in the way, and for others that `is_own` and would stay among the new ones; [`Error::Io`] where the folder is missing or closed to writing.
+    pub fn create(
+        folder: &Path,
+        replaces: bool,
+        new: &BTreeSet<String>,
+        is_own: impl Fn(&str) -> bool,
+    ) -> Result<Self, Error> {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let failed = |cause| Error::write(folder, cause);
-        let mut replaced = Vec::new();
+        let (mut replaced, mut others) = (Vec::new(), Vec::new());
         for entry in fs::read_dir(folder).map_err(failed)? {
             let entry = entry.map_err(failed)?;
-            if !entry.file_name().to_str().is_some_and(&is_own) {
-                continue;
-            }
+            let name = entry.file_name();
+            let Some(name) = name.to_str().filter(|name| new.contains(*name) || is_own(name)) else { continue };
             let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
             if !is_file || !replaces {
                 return Err(in_the_way(&entry.path(), is_file));
             }
-            replaced.push(entry.path());
+            if new.contains(name) { &mut replaced } else { &mut others }.push(entry.path());
         }
         replaced.sort();
+        if let Some(other) = others.iter().min() {
+            return Err(no_frame(other, others.len() - 1));
+        }
         let begun = temporary::lock().begin(folder, |path| fs::create_dir(path));
         let ((), written) = begun.map_err(|cause| hide_temporary(folder, &cause))?;
         Ok(Self { folder: folder.to_owned(), written, replaced, names: Vec::new() })
@@ -125,6 +133,16 @@ fn in_the_way(path: &Path, is_file: bool) -> Error {
     }
 }
 
+/// Frames that would stay would pass for some of those that are written.
+fn no_frame(path: &Path, more: usize) -> Error {
+    let path = path.strip_prefix(".").unwrap_or(path);
+    let are = match more {
+        0 => "is no frame of what is written, and has such a name".to_owned(),
+        more => format!("and {more} more with such a name are no frames of what is written"),
+    };
+    Error::target(path, are + "; remove what is not wanted, or give another name")
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::ScratchDir;
@@ -151,21 +169,29 @@ mod tests {
         let scratch = ScratchDir::create(std::env::temp_dir()).expect("a folder");
         let folder = scratch.path();
         fs::write(folder.join("notes.txt"), "kept").expect("a file");
-        let is_own = |name: &str| name.starts_with("f.");
-        let mut group = AtomicGroup::create(folder, false, is_own).expect("a group");
+        let create = |replaces: bool, new: &[&str]| {
+            let new = new.iter().map(|&name| name.to_owned()).collect();
+            AtomicGroup::create(folder, replaces, &new, |name| name.starts_with("f."))
+        };
+        let mut group = create(false, &["f.1", "f.2", "f.3"]).expect("a group");
         write(&mut group, &["f.1", "f.2", "f.3"]);
         group.commit().expect("names");
         assert_eq!(names(folder), ["f.1", "f.2", "f.3", "notes.txt"]);
-        assert!(AtomicGroup::create(folder, false, is_own).unwrap_err().to_string().contains("f.1"));
+        assert!(create(false, &["f.9"]).unwrap_err().to_string().contains("f.1"));
+        // Those that would stay among the new ones are told, and nothing is written.
+        let said = create(true, &["f.2", "f.9"]).unwrap_err().to_string();
+        assert!(said.contains("f.1: and 1 more with such a name are no frames of what is written"), "{said}");
+        assert_eq!(names(folder), ["f.1", "f.2", "f.3", "notes.txt"]);
         // Dropped, they leave nothing; committed, the old ones go.
-        drop(AtomicGroup::create(folder, true, is_own).expect("a group"));
-        let mut group = AtomicGroup::create(folder, true, is_own).expect("a group");
+        let new = ["f.1", "f.2", "f.3", "f.9"];
+        drop(create(true, &new).expect("a group"));
+        let mut group = create(true, &new).expect("a group");
         write(&mut group, &["f.2", "f.9"]);
         assert_eq!(fs::read(folder.join("f.1")).expect("a file"), b"new");
         group.commit().expect("names");
         assert_eq!(names(folder), ["f.2", "f.9", "notes.txt"]);
         // What someone else puts there meanwhile stays, and all the rest.
-        let mut group = AtomicGroup::create(folder, true, is_own).expect("a group");
+        let mut group = create(true, &["f.2", "f.5", "f.9"]).expect("a group");
         write(&mut group, &["f.2", "f.5"]);
         fs::write(folder.join("f.5"), "theirs").expect("a file");
         group.commit().expect_err("a file in the way");

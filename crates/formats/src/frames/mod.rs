@@ -45,7 +45,10 @@ pub use source::{
 };
 pub(crate) use times::{Times, nominal};
 pub(crate) use widen::{Scalar, half_precision};
-pub use write::{CageMesh, FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path, names_beside_others};
+pub use write::{
+    CageMesh, FrameOptions, FrameWriter, MorphOptions, create_frames, frames_path, is_numbered_in_vain,
+    names_beside_others,
+};
 
 /// Frames per second that files hold: beyond, times are infinite, or frames no longer apart.
 pub const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;

@@ -30,11 +30,36 @@ const MAX_DEFLATE_RATIO: u64 = 1032;
 /// the archive is one of many, each of which has a frame.
 pub(super) fn open<'a>(
     path: &Path,
-    mut source: impl Read + Seek + Send + 'a,
+    source: impl Read + Seek + Send + 'a,
     expected_points: usize,
     prim: Option<&str>,
     is_frame: bool,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    let (source, found) = find(path, source, expected_points, prim, is_frame)?;
+    let unpacked = Unpacked::new(source, &found.entry).map_err(|cause| Error::read(path, cause))?;
+    cache::open_layout(path, unpacked, found.layout, found.entry.length, expected_points)
+}
+
+/// What the array of a file of one frame is called that is read where none is named; none of what is no archive, or cannot be read.
+pub(super) fn array_read(path: &Path, expected_points: usize) -> Option<String> {
+    let source = BufReader::new(File::open(path).ok()?);
+    find(path, source, expected_points, None, true).ok().map(|(_, found)| found.name)
+}
+
+/// The array that is read.
+struct Found {
+    name: String,
+    entry: Entry,
+    layout: Layout,
+}
+
+fn find<R: Read + Seek>(
+    path: &Path,
+    mut source: R,
+    expected_points: usize,
+    prim: Option<&str>,
+    is_frame: bool,
+) -> Result<(R, Found), Error> {
     let length = source.seek(SeekFrom::End(0)).map_err(|cause| Error::read(path, cause))?;
     let mut start = Vec::new();
     source
@@ -67,11 +92,15 @@ pub(super) fn open<'a>(
         source = back;
     }
     let wanted = Wanted { points: expected_points as u64, prim, is_frame };
-    let Array { entry, layout, .. } = chosen(found, &arrays, &wanted, path)?;
+    let count = found.len();
+    let Array { name, entry, layout, .. } = chosen(found, &arrays, &wanted, path)?;
     let mut layout = layout.map_err(|fault| fault.at(path))?;
     layout.times.frame_rate = fps;
-    let unpacked = Unpacked::new(source, entry).map_err(|cause| Error::read(path, cause))?;
-    cache::open_layout(path, unpacked, layout, entry.length, expected_points)
+    // The only one is taken whatever it is called, as the only mesh is.
+    if let Some(prim) = prim.filter(|prim| *prim != name && count > 1) {
+        layout.times.note = Some(format!("has no array {prim:?}; {name:?} is read"));
+    }
+    Ok((source, Found { name: name.to_owned(), entry: entry.clone(), layout }))
 }
 
 /// Whether a file is an archive that has an array of this name.
@@ -164,7 +193,11 @@ fn chosen<'a>(
             listed(all)
         )
     };
-    Err(Fault::unsupported(what).at(path))
+    let gone = wanted
+        .prim
+        .filter(|_| arrays.unreadable.is_none())
+        .map_or_else(String::new, |prim| format!("has no array {prim:?}, and "));
+    Err(Fault::unsupported(gone + &what).at(path))
 }
 
 /// How one of several arrays is taken.

@@ -71,7 +71,10 @@ impl FrameRange {
             if (first, last) == (0.0, (frames - 1) as f64) {
                 String::new()
             } else {
-                format!(", with the numbers {first} to {last}")
+                let step = number(1.min(frames - 1)) - first;
+                let is_even = (1..frames).all(|k| number(k) - number(k - 1) == step);
+                let steps = if is_even && step > 1.0 { format!(" in steps of {step}") } else { String::new() };
+                format!(", with the numbers {first} to {last}{steps}")
             }
         };
         let there = match frames {
@@ -281,7 +284,11 @@ mod tests {
         // Every second frame of a shot.
         let twos = |place: usize| 1001.0 + 2.0 * place as f64;
         assert!(told("1003-1007x2", 6, &twos).unwrap_err().contains("are frames 1-3; give 1-3"));
-        assert!(told("1003-1007", 6, &twos).unwrap_err().contains("give frames that it has"));
+        let error = told("1003-1007", 6, &twos).unwrap_err();
+        assert!(
+            error.contains("the numbers 1001 to 1011 in steps of 2, so") && error.contains("give frames"),
+            "{error}"
+        );
         assert_eq!(told("2-4", 6, &from_1001), Ok(()));
         let note = |range: &str, number: &dyn Fn(usize) -> f64| range.parse::<FrameRange>().unwrap().numbered(number);
         assert_eq!(note("2-4", &|place| place as f64), None);

@@ -34,10 +34,13 @@ pub(super) struct SequenceReader {
 impl SequenceReader {
     /// `notes` are what the user should know of the choice of these files.
     pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>, prim: Option<&str>) -> Self {
-        let prim = prim.map(str::to_owned);
+        let first = sequence.files.first();
+        // Each file has the array that is read of the first.
+        let unnamed = first.filter(|path| single::is_array(path) && !prim.is_some_and(|name| npz::holds(path, name)));
+        let read_first = unnamed.and_then(|path| npz::array_read(path, points));
+        let prim = read_first.or_else(|| prim.map(str::to_owned));
         let (faces, merged) = (FrameFaces::default(), Merged::default());
         let (frame_rate, units) = (None, Units::UNKNOWN);
-        let first = sequence.files.first();
         let is_array_named = first.zip(prim.as_deref()).is_some_and(|(path, name)| npz::holds(path, name));
         let (next, before) = (0, None);
         let mut opened =
@@ -69,7 +72,9 @@ impl SequenceReader {
         };
         if let Some(name) = self.prim.as_deref().filter(|name| self.is_array_named && !npz::holds(path, name)) {
             let first = self.sequence.files[0].display();
-            let what = format!("has no array {name:?}, as {first} has; leave it out, or save the array in it");
+            let own = npz::array_read(path, self.points);
+            let own = own.map_or_else(String::new, |own| format!(" and is read there, but {own:?}"));
+            let what = format!("has no array {name:?}, as {first} has{own}; leave it out, or save the array in it");
             return Err(named(Fault::invalid(what).at(path)));
         }
         let mut reader = self.open(path).map_err(named)?;

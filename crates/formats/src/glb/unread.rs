@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashSet};
 
 use gltf::json::Root;
+use gltf::json::animation::Property;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
@@ -12,6 +13,12 @@ use crate::dropped::{Dropped, counted};
 /// Of chosen meshes, where colours of points are kept or not.
 pub(super) fn of(root: &Root, placements: &[Placement], has_colors: bool) -> Dropped {
     let mut unread = Unread::default();
+    // Targets that an animation drives are the motion, which is read.
+    let channels = root.animations.iter().flat_map(|animation| &animation.channels);
+    let weights = channels.filter(|channel| channel.target.path == Checked::Valid(Property::MorphTargetWeights));
+    let driven: HashSet<usize> = weights.map(|channel| channel.target.node.value()).collect();
+    let is_driven = |placement: &Placement| placement.node.is_some_and(|node| driven.contains(&node));
+    let moving: HashSet<usize> = placements.iter().filter(|p| is_driven(p)).map(|p| p.mesh).collect();
     let mut meshes = HashSet::new();
     let mut skins = HashSet::new();
     for placement in placements {
@@ -19,7 +26,8 @@ pub(super) fn of(root: &Root, placements: &[Placement], has_colors: bool) -> Dro
         if meshes.insert(placement.mesh)
             && let Some(mesh) = root.meshes.get(placement.mesh)
         {
-            mesh.primitives.iter().for_each(|primitive| unread.note(primitive));
+            let is_moving = moving.contains(&placement.mesh);
+            mesh.primitives.iter().for_each(|primitive| unread.note(primitive, is_moving));
         }
     }
     let mut dropped = unread.told(root, has_colors);
@@ -52,7 +60,7 @@ struct Unread {
 }
 
 impl Unread {
-    fn note(&mut self, primitive: &Primitive) {
+    fn note(&mut self, primitive: &Primitive, is_moving: bool) {
         if matches!(primitive.mode, Checked::Valid(Mode::Lines | Mode::LineLoop | Mode::LineStrip)) {
             self.lines += 1;
             return;
@@ -72,7 +80,8 @@ impl Unread {
             Some(material) => drop(self.materials.insert(material.value())),
             None => self.is_plain = true,
         }
-        self.targets = self.targets.max(primitive.targets.as_ref().map_or(0, Vec::len));
+        let targets = primitive.targets.as_ref().filter(|_| !is_moving);
+        self.targets = self.targets.max(targets.map_or(0, Vec::len));
     }
 
     fn told(self, root: &Root, has_colors: bool) -> Dropped {

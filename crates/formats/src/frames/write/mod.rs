@@ -48,6 +48,14 @@ pub fn names_beside_others(path: &Path) -> Option<impl Fn(&Path) -> bool> {
     })
 }
 
+/// Whether a name has a place for the number of a frame, and a format that holds all frames in one file, which then has just this name.
+pub fn is_numbered_in_vain(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str());
+    CacheFormat::from_path(path).is_some()
+        && NumberedNames::of(path).is_none()
+        && name.and_then(NumberedNames::parse).is_some()
+}
+
 fn mesh_pattern(path: &Path) -> Option<&str> {
     path.file_name()?.to_str().filter(|name| matches!(*name, "*.ply" | "*.obj"))
 }
@@ -58,8 +66,8 @@ fn mesh_pattern(path: &Path) -> Option<&str> {
 /// images that move it, as OpenVAT has them. Without an extension, with
 /// a `/` at the end, or as an existing folder it becomes a folder of files `frame_0000.obj`, …, each with `faces` and its number;
 /// `FOLDER/*.ply` makes them `.ply` files, and `FOLDER/NAME.%04d.obj` or `FOLDER/NAME.####.ply` gives their names.
-/// A folder with nothing but such files is replaced as a whole where the target may be; in the current folder, and in one that holds something else, the
-/// files of such a name are. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
+/// A folder with nothing but such files is replaced as a whole where the target may be; of a `NAME` of one's own, only the files that are written are, and
+/// others of such a name are refused. Of one frame, `.obj`, `.ply`, `.off` or `.stl` becomes
 /// a mesh file. Standard output gets `.npy`.
 ///
 /// # Errors

@@ -25,7 +25,7 @@ pub(super) struct SequenceWriter {
 enum Place {
     /// Into a folder of their own, which is new or replaced as a whole.
     Own(AtomicDir),
-    /// Into one with other files.
+    /// Into one with files.
     Shared(AtomicGroup),
 }
 
@@ -50,7 +50,8 @@ impl SequenceWriter {
         let mesh = FrameMesh::new(format, &announced, faces, options)?;
         let (path, is_frame) = (&announced.path, |name: &str| names.number(name).is_some());
         let place = if shares_folder(target.path()) {
-            Place::Shared(AtomicGroup::create(path, target.replaces(), is_frame)?)
+            let new = (0..announced.frames).map(|frame| names.name(options.number(frame))).collect();
+            Place::Shared(AtomicGroup::create(path, target.replaces(), &new, is_frame)?)
         } else {
             Place::Own(AtomicDir::create(path, |name| target.replaces() && is_frame(name))?)
         };
@@ -87,13 +88,14 @@ impl FrameWriter for SequenceWriter {
     }
 }
 
-/// Whether the files that a path names go beside others: those of a numbered name in the current folder, or in one that holds something else.
+/// Whether the files that a path names go beside others: those of a numbered name in the current folder, or in one that holds something.
 pub(super) fn shares_folder(path: &Path) -> bool {
-    let Some(names) = NumberedNames::of(path) else { return false };
+    if NumberedNames::of(path).is_none() {
+        return false;
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Ok(place) = folder.canonicalize() else { return false };
     let holds_current =
         std::env::current_dir().and_then(|here| here.canonicalize()).is_ok_and(|here| here.starts_with(&place));
-    let mut entries = place.read_dir().into_iter().flatten().flatten();
-    holds_current || entries.any(|entry| entry.file_name().to_str().is_none_or(|name| names.number(name).is_none()))
+    holds_current || place.read_dir().is_ok_and(|mut entries| entries.next().is_some())
 }
