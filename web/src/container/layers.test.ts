@@ -1,8 +1,9 @@
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { allBlocks, goldenBytes, openBytes, putTogether, rawPart, takeApart } from '../../tests/support/containers';
-import { encodeLayer, layerBetween } from './layers';
-import { viewOf } from './section';
+import { encodeLayer, layerBetween, type StoredLayer } from './layers';
+import { withEdits } from './rewrite';
+import { HEADER_BYTES, viewOf } from './section';
 
 const golden = goldenBytes('definition3-mvc');
 const layer = {
@@ -50,7 +51,19 @@ describe('a layer of edits', () => {
     const capture = await openBytes(edited(raw));
     expect(capture.problem).toMatch(problem);
     expect(capture.layers).toEqual([]);
+    await expect(withEdits(await capture.container!(), [])).rejects.toThrow(/Layer 1 .* --remove 1 first/);
     expect(await allBlocks(capture)).toEqual(await allBlocks(await openBytes(golden)));
+  });
+
+  it('whose bytes changed is left out, and not lost where others are saved', async () => {
+    const bytes = edited(encodeLayer(layer), 1, 2, 2);
+    const first = await openBytes(bytes);
+    bytes[(first.layers![1] as StoredLayer).stored.entry.offset + HEADER_BYTES + 20] ^= 1;
+    const capture = await openBytes(bytes);
+    expect(capture.layers).toHaveLength(1);
+    await expect(withEdits(await capture.container!(), capture.layers!)).rejects.toThrow(/--remove 2 first/);
+    // Those that can be read are taken out where somebody wants that.
+    expect((await withEdits(await first.container!(), first.layers!.slice(1))).size).toBeLessThan(bytes.length);
   });
 
   it('of frames that there are not is left out; of more than there may be the file is refused', async () => {

@@ -14,7 +14,7 @@ import { decodeStatic, OPTIONAL_TAGS, type Section, STATIC_TAGS } from './meshes
 import { readContents, readSections, scanSections } from './sectionReader';
 import { checkPrelude, CODEC, type Entry, PRELUDE_BYTES, KNOWN_TAGS } from './section';
 import { EndsCache, type Source } from './source';
-import { decodeErrors, decodeFrameNumbers, decodeReport, NO_ERRORS } from './tail';
+import { decodeErrors, decodeFrameNumbers, decodeReport, heldToBound, NO_ERRORS } from './tail';
 
 /** Bytes at either end that are read at once: most of the static part of coded captures, and all that comes behind the frames of most. */
 const FIRST_BYTES = 1 << 16;
@@ -75,7 +75,7 @@ async function readLayout(source: Source, signal?: AbortSignal): Promise<{ layou
   }
 }
 
-async function readHead(source: Source, layout: Layout, signal?: AbortSignal): Promise<Head> {
+export async function readHead(source: Source, layout: Layout, signal?: AbortSignal): Promise<Head> {
   const entry = layout.get('HEAD');
   if (entry === undefined) throw damaged(layout.end, 'the section HEAD is missing');
   checkHeadSection(entry);
@@ -191,6 +191,7 @@ class FileCapture implements ContainerCapture {
     await this.readOptional(this.layout.get('ERRS'), takeErrors, signal);
     await this.readOptional(this.layout.get('fnum'), takeNumbers, signal);
     await this.readOptional(this.layout.get('summ'), takeReport, signal);
+    this.measured = heldToBound(this.measured, this.static.report);
     for (const entry of this.layout.layers) await this.readOptional(entry, takeLayer, signal);
   }
 

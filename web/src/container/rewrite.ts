@@ -2,8 +2,11 @@
 
 import type { EditLayer } from '../capture';
 import { crc32c } from './crc32c';
-import { encodeLayer, type StoredLayer } from './layers';
-import { readContents } from './sectionReader';
+import { ContainerError, isDamage } from './error';
+import { decodeLayer, encodeLayer, type StoredLayer } from './layers';
+import type { Layout } from './layout';
+import { readHead } from './open';
+import { readContents, readSections } from './sectionReader';
 import {
   ENTRY_BYTES,
   FOOTER_BYTES,
@@ -27,7 +30,7 @@ export interface RewriteOptions {
 /**
  * A container again, with these layers of edits in place of those that it has, behind all other sections. Those that are as they were in the file keep their bytes too.
  *
- * @throws {ContainerError} where the container is damaged
+ * @throws {ContainerError} where the container is damaged, also one of its layers alone: nobody who left that out chose to
  */
 export async function withEdits(
   source: Source,
@@ -35,6 +38,7 @@ export async function withEdits(
   { signal, onProgress }: RewriteOptions = {},
 ): Promise<Blob> {
   const layout = await readContents(source, signal);
+  await checkLayersLeftOut(source, layout, layers, signal);
   // Blobs may leave memory; an array of the whole file would not.
   const pieces: Blob[] = [];
   const contents: Uint8Array[] = [];
@@ -82,6 +86,30 @@ export async function withEdits(
   const fields = { codec: 0, width: 1, first: 0, count: 0, payloadBytes: table.length, rawBytes: table.length };
   push(headerOf({ tag: 'TOC_', ...fields }, table), table, footer);
   return new Blob(pieces, { type: 'application/vnd.cager' });
+}
+
+/** Checks that layers of the file that are not among these can be read, so that they were shown and taken out. */
+async function checkLayersLeftOut(
+  source: Source,
+  layout: Layout,
+  layers: readonly (EditLayer | StoredLayer)[],
+  signal?: AbortSignal,
+): Promise<void> {
+  const kept = new Set(layers.map((layer) => ('stored' in layer ? layer.stored.entry.offset : null)));
+  const leftOut = layout.layers.filter(({ offset }) => !kept.has(offset));
+  if (leftOut.length === 0) return;
+  const head = await readHead(source, layout, signal);
+  for (const entry of leftOut) {
+    try {
+      const [section] = await readSections(source, [entry], signal);
+      decodeLayer(section, head, layout.frames);
+    } catch (error) {
+      if (!isDamage(error)) throw error;
+      const number = layout.layers.indexOf(entry) + 1;
+      const what = `Layer ${number} of the file's edits is damaged and would be lost.`;
+      throw new ContainerError('damaged', `${what} Take it out with cager edit --remove ${number} first.`);
+    }
+  }
 }
 
 /** The header of a section; without its payload, what of it the table of contents has. */

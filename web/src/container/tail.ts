@@ -1,11 +1,13 @@
 /** The sections after the frames: errors, numbers and the report. */
 
-import type { FrameErrors } from '../capture';
+import type { FrameErrors, StaticPart } from '../capture';
 import type { Codec } from '../codec/client';
 import { decodePayload } from './codecs';
 import { damaged } from './error';
 import { located, type Section } from './meshes';
 import { CODEC } from './section';
+
+const ROUNDED = 1 + 1 / 1024;
 
 export const NO_ERRORS: FrameErrors = { l2: new Float32Array(0), linf: new Float32Array(0) };
 
@@ -15,6 +17,14 @@ export async function decodeErrors({ entry, payload }: Section, frames: number, 
   const pairs = new Float32Array(decodePayload(entry, payload).buffer);
   const take = (place: number) => Float32Array.from({ length: pairs.length / 2 }, (_, k) => pairs[2 * k + place]);
   return { l2: take(0), linf: take(1) };
+}
+
+/** Files keep few digits of an error, rounded up: what passes a guaranteed error by that alone is the guaranteed one. */
+export function heldToBound({ l2, linf }: FrameErrors, report: StaticPart['report']): FrameErrors {
+  const bound = (report?.coding as { max_error?: unknown } | null | undefined)?.max_error;
+  if (typeof bound !== 'number') return { l2, linf };
+  const held = (error: number) => (error >= bound && error < bound * ROUNDED ? bound : error);
+  return { l2: l2.map(held), linf: linf.map(held) };
 }
 
 /** `fnum`: the number of each frame where it comes from. */
