@@ -99,7 +99,7 @@ function identity(n: number): Float64Array {
 const TILE = 4;
 
 /** Sums up `ΦᵀΦ` of some points at a time. */
-export class GramMatrix {
+class GramMatrix {
   /** The lower half, diagonal included, of the matrix rows × rows. */
   readonly lower: Float64Array;
   points = 0;

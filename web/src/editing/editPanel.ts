@@ -79,7 +79,7 @@ export class EditPanel extends LitElement {
           count === 0
             ? html`<p class="muted">No edits yet: drag a vertex of the cage.</p>`
             : html`<ul>
-                ${layers.map((layer, k) => layerRow(model, layer, k))}
+                ${layers.map((layer, k) => layerRow(this.editor, layer, k))}
                 ${edits.map((edit) => editRow(this.editor, edit))}
               </ul>`
         }

@@ -46,9 +46,13 @@ export const editPanelStyle = css`
   }
   li .layer {
     display: flex;
+    justify-content: start;
     gap: var(--cager-space-2);
     min-width: 0;
     padding: 0 var(--cager-space-2);
+  }
+  li .layer .figures {
+    margin-left: auto;
   }
   .range {
     display: grid;

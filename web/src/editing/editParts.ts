@@ -5,12 +5,13 @@ import type { CageEditor } from './editor';
 import { angleOf, type Motion, degrees, timesAs } from './motion';
 import type { EditLayer, StaticPart } from '../capture';
 import { nameOf } from './editLayers';
-import type { EditModel } from './editModel';
 import type { Keeping } from './keptEdits';
+import { frameText, placeOf, rangeText } from '../viewer/frameNumbers';
 
 /** An edit in the list: whether it counts, its vertices and frames; of the one that is worked on, fields for its range. */
 export function editRow(editor: CageEditor, edit: CageEdit) {
-  const { model } = editor;
+  const { model, player } = editor;
+  const { numbers } = player.transport;
   const { id, motion, range, enabled } = edit;
   const name = nameOf(edit);
   const isActive = model.active?.id === id;
@@ -19,13 +20,13 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
     <div class="row">
       <input
         type="checkbox"
-        aria-label=${`Enable edit of ${name}, frames ${range.first} to ${range.last}`}
+        aria-label=${`Enable edit of ${name}, frames ${frameText(numbers, range.first)} to ${frameText(numbers, range.last)}`}
         .checked=${enabled}
         @change=${() => model.setEnabled(id, !enabled)}
       />
       <button class="quiet name grow" aria-expanded=${isActive} @click=${activate}>
         <span>${name}<span class="muted">${amountOf(motion)}</span></span>
-        <span class="muted figures">${framesText(range.first, range.last)}</span>
+        <span class="muted figures">${rangeText(numbers, range.first, range.last)}</span>
       </button>
       ${iconButton('trash', `Remove edit of ${name}`, () => model.remove(id), 'Remove')}
     </div>
@@ -34,7 +35,8 @@ export function editRow(editor: CageEditor, edit: CageEdit) {
 }
 
 /** An edit that the file has, with this place among them. */
-export function layerRow(model: EditModel, layer: EditLayer, place: number) {
+export function layerRow({ model, player }: CageEditor, layer: EditLayer, place: number) {
+  const { numbers } = player.transport;
   const { first, count, isOn } = layer;
   const name = layer.name || `Edit ${place + 1}`;
   const last = first + count - 1;
@@ -42,20 +44,18 @@ export function layerRow(model: EditModel, layer: EditLayer, place: number) {
     <div class="row">
       <input
         type="checkbox"
-        aria-label=${`Enable ${name} of the file, frames ${first} to ${last}`}
+        aria-label=${`Enable ${name} of the file, frames ${frameText(numbers, first)} to ${frameText(numbers, last)}`}
         .checked=${isOn}
         @change=${() => model.switchLayer(layer)}
       />
       <span class="name layer grow">
-        <span class="clip">${name}<span class="muted"> · saved</span></span>
-        <span class="muted figures">${framesText(first, last)}</span>
+        <span class="clip" title=${name}>${name}</span><span class="muted">saved</span>
+        <span class="muted figures">${rangeText(numbers, first, last)}</span>
       </span>
       ${iconButton('trash', `Remove ${name} of the file`, () => model.removeLayer(layer), 'Remove')}
     </div>
   </li>`;
 }
-
-const framesText = (first: number, last: number) => (first === last ? String(first) : `${first}–${last}`);
 
 /** How far an edit rotates or scales; nothing of one that moves. */
 function amountOf(motion: Motion): string {
@@ -66,22 +66,29 @@ function amountOf(motion: Motion): string {
 
 function rangeFields({ model, player }: CageEditor, { id, range }: CageEdit) {
   const frames = player.capture.frames;
-  const field = (key: keyof FrameRange, label: string) =>
-    html`<label class="muted"
+  const { numbers } = player.transport;
+  const field = (key: keyof FrameRange, label: string) => {
+    // Ends are frames, shown by their numbers; eases are how many.
+    const isEnd = key === 'first' || key === 'last';
+    const shown = (value: number) => (isEnd ? frameText(numbers, value) : String(value));
+    return html`<label class="muted"
       >${label}
       <input
         type="number"
         class="figures"
-        min="0"
-        max=${frames - 1}
-        .value=${String(range[key])}
+        min=${shown(0)}
+        max=${shown(frames - 1)}
+        step="any"
+        .value=${shown(range[key])}
         @change=${(event: Event) => {
           const input = event.target as HTMLInputElement;
-          if (input.value !== '') model.setRange(id, { ...range, [key]: Number(input.value) }, frames);
+          const typed = isEnd ? placeOf(numbers, Number(input.value)) : Number(input.value);
+          if (input.value !== '') model.setRange(id, { ...range, [key]: typed }, frames);
           // What does not fit was put right, perhaps to what it was before.
-          input.value = String(model.edits.find((other) => other.id === id)?.range[key] ?? range[key]);
+          input.value = shown(model.edits.find((other) => other.id === id)?.range[key] ?? range[key]);
         }}
     /></label>`;
+  };
   return html`<div class="range">
     ${field('first', 'First')} ${field('last', 'Last')} ${field('easeIn', 'Ease in')} ${field('easeOut', 'Ease out')}
   </div>`;

@@ -12,6 +12,7 @@ import { drawOverlay, type OverlayColors } from './overlay';
 import { placedVertices, vertexAt, vertexTowards, type PlacedVertex } from './picking';
 import type { Vector } from '../coordinates/vector';
 import { Projection } from '../render/projection';
+import { frameText } from '../viewer/frameNumbers';
 import type { ViewerHost } from '../viewer/host';
 
 /** Milliseconds after which another press of an arrow key is a step of its own. */
@@ -190,7 +191,7 @@ export class CageEditor extends EventTarget {
 
   /** Tells screen readers what was done to the chosen vertices. */
   sayChanged(how: MotionKind) {
-    this.say(`${this.named()} ${DONE[how]} in frame ${this.frame}.`);
+    this.say(`${this.named()} ${DONE[how]} in frame ${frameText(this.player.transport.numbers, this.frame)}.`);
   }
 
   private say(sentence: string) {

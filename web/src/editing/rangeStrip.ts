@@ -1,6 +1,7 @@
 import { css, html, LitElement, nothing, svg } from 'lit';
 import { customElement, property, state } from 'lit/decorators.js';
 import { controls } from '../style/controls';
+import { type FrameNumbers, rangeText } from '../viewer/frameNumbers';
 import { weightAt, type FrameRange } from './cageEdit';
 import { draggedRange, partAt, type RangePart } from './rangeDrag';
 
@@ -96,6 +97,7 @@ export class RangeStrip extends LitElement {
 
   @property({ attribute: false }) range!: FrameRange;
   @property({ attribute: false }) frames = 0;
+  @property({ attribute: false }) frameNumbers: FrameNumbers = null;
   /** Where a frame is in the width of the strip, 0 to 1. */
   @property({ attribute: false }) shareOf!: (frame: number) => number;
   @property({ attribute: false }) frameAt!: (event: PointerEvent) => number;
@@ -125,7 +127,7 @@ export class RangeStrip extends LitElement {
       ${
         held
           ? html`<span class="tip figures" .style=${`left: ${share(Math.round((first + last) / 2))}`}>
-              ${first}–${last}, ease in ${easeIn}, out ${easeOut}
+              ${rangeText(this.frameNumbers, first, last)}, ease in ${easeIn}, out ${easeOut}
             </span>`
           : nothing
       }

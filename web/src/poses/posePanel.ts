@@ -2,7 +2,7 @@ import { css, html, LitElement, nothing, svg, type PropertyValues } from 'lit';
 import { customElement, property } from 'lit/decorators.js';
 import { picturePanelStyle } from '../style/picturePanel';
 import { controls } from '../style/controls';
-import { numberAt, numberText } from '../viewer/frameNumbers';
+import { frameText } from '../viewer/frameNumbers';
 import { iconButton } from '../style/parts';
 import type { PoseView } from './poseView';
 import { cornerOf } from './weights';
@@ -142,7 +142,7 @@ export class PosePanel extends LitElement {
   }
 
   private numberOf(frame: number): string {
-    return numberText(numberAt(this.view.player.capture.frameNumbers, frame));
+    return frameText(this.view.player.capture.frameNumbers, frame);
   }
 
   /** Takes the frame that is shown as a pose, once. */

@@ -1,7 +1,7 @@
 import { orbited, zoomed } from '../render/camera';
 import type { Layers } from '../render/drawn';
 import type { CagerViewer } from './cagerViewer';
-import { numberAt, numberText } from './frameNumbers';
+import { frameText } from './frameNumbers';
 import type { Heat } from './heatMap';
 import type { Player } from './player';
 import { save } from '../save';
@@ -91,10 +91,7 @@ function compare(player: Player) {
 
 async function savePicture(viewer: CagerViewer, player: Player) {
   try {
-    save(
-      await pictureOf(viewer, player),
-      `${stem(viewer)}-${numberText(numberAt(player.transport.numbers, viewer.frame))}.png`,
-    );
+    save(await pictureOf(viewer, player), `${stem(viewer)}-${frameText(player.transport.numbers, viewer.frame)}.png`);
   } catch (error) {
     viewer.report(sentence(error));
   }

@@ -2,7 +2,7 @@ import { html, nothing } from 'lit';
 import type { Capture, FrameErrors, UpAxis } from '../capture';
 import type { Dropped } from '../files/classify';
 import { Beside } from './beside';
-import { numberAt, numberText } from './frameNumbers';
+import { frameText } from './frameNumbers';
 import { iconButton } from '../style/parts';
 import { openFile } from './opener';
 import type { Player } from './player';
@@ -187,7 +187,7 @@ export class BesideMode {
 
 function figures({ frame, player }: Beside, lead: Player): string {
   const { numbers, position } = lead.transport;
-  const number = numberText(numberAt(numbers, Math.floor(position)));
+  const number = frameText(numbers, Math.floor(position));
   if (frame === null) return `No frame ${number} here`;
   const { l2, linf } = player.capture.errors;
   return Number.isFinite(linf[frame]) ? `L2 ${percent(l2[frame])} · L∞ ${percent(linf[frame])}` : `frame ${number}`;
@@ -203,7 +203,7 @@ const [DARK, BRIGHT] = [40, 245];
  * @param correspondence the source's point for each of the target's
  * @throws Error with one sentence for a person where it is not of these two
  */
-export function paintCorrespondence(correspondence: readonly number[], first: Player, second: Player) {
+function paintCorrespondence(correspondence: readonly number[], first: Player, second: Player) {
   const pointsOf = ({ capture }: Player) => capture.static.rest.length / 3;
   const [source, target] = pointsOf(second) === correspondence.length ? [first, second] : [second, first];
   const count = pointsOf(source);

@@ -283,18 +283,20 @@ export class CagerViewer extends CaptureElement {
       ${this.panel === 'views' ? viewsPanel(player, this, close) : nothing}
       ${this.panel === 'export' ? exportPanel(player, this, close) : nothing}
       ${legend(player, this.comparisonActs, this.panelShare > 0)}
-      ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
-      ${
-        opening !== null
-          ? progressBox(`Opening ${opening}`, null)
-          : progress
-            ? progressBox(progress.doing, progress.fraction)
-            : this.said !== ''
-              ? progressBox(this.said, null)
-              : player.playback.buffering
-                ? progressBox('Loading', null)
-                : nothing
-      }
+      <div class="messages">
+        ${this.problem !== null ? notice(this.problem, () => (this.problem = null)) : nothing}
+        ${
+          opening !== null
+            ? progressBox(`Opening ${opening}`, null)
+            : progress
+              ? progressBox(progress.doing, progress.fraction)
+              : this.said !== ''
+                ? progressBox(this.said, null)
+                : player.playback.buffering
+                  ? progressBox('Loading', null)
+                  : nothing
+        }
+      </div>
       ${deck(player, act, {
         besideErrors: this.pair.errors,
         range: this.editing.range,

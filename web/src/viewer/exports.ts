@@ -6,7 +6,7 @@ import { iconButton } from '../style/parts';
 import { sentence } from '../text';
 import { perform, stem } from './actions';
 import type { CagerViewer } from './cagerViewer';
-import { numberAt, numberText } from './frameNumbers';
+import { frameText } from './frameNumbers';
 import { objOf } from './objText';
 import type { Player } from './player';
 
@@ -76,8 +76,5 @@ async function saveAs(capture: Capture, ending: string, name: string, onProgress
 async function saveFrame(player: Player, viewer: CagerViewer) {
   const { frame } = viewer;
   const text = objOf(player.capture.static, await player.readPositions(frame));
-  save(
-    new Blob([text], { type: 'model/obj' }),
-    `${stem(viewer)}-${numberText(numberAt(player.transport.numbers, frame))}.obj`,
-  );
+  save(new Blob([text], { type: 'model/obj' }), `${stem(viewer)}-${frameText(player.transport.numbers, frame)}.obj`);
 }

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { numberAt, numberText, placeOf } from './frameNumbers';
+import { numberAt, numberText, placeOf, rangeText } from './frameNumbers';
 import { advanced, standing } from './transport';
 
 const gaps = Float64Array.of(0, 1, 5);
@@ -27,6 +27,11 @@ test('the_last_frame_of_a_cache_that_was_sampled_twice_a_frame_is_shown_for_half
 
 test('numbers_are_written_without_needless_digits', () => {
   expect([1005, 0.5, 1 / 3].map(numberText)).toEqual(['1005', '0.5', '0.333']);
+});
+
+test('ranges_have_the_numbers_of_their_frames', () => {
+  const shot = Float64Array.of(1001, 1002, 1004);
+  expect([rangeText(shot, 0, 2), rangeText(shot, 1, 1), rangeText(null, 0, 2)]).toEqual(['1001–1004', '1002', '0–2']);
 });
 
 test('frames_that_are_missing_take_their_time', () => {

@@ -29,6 +29,16 @@ export function placeOf(numbers: FrameNumbers, number: number): number {
   return low + (number - numbers[low]) / (numbers[high] - numbers[low]);
 }
 
+/** The number of a frame as it is shown. */
+export function frameText(numbers: FrameNumbers, frame: number): string {
+  return numberText(numberAt(numbers, frame));
+}
+
+/** Frames from one to another, by their numbers. */
+export function rangeText(numbers: FrameNumbers, first: number, last: number): string {
+  return first === last ? frameText(numbers, first) : `${frameText(numbers, first)}–${frameText(numbers, last)}`;
+}
+
 export function numberText(number: number): string {
   return String(Number(number.toFixed(3)));
 }

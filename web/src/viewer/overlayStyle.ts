@@ -90,18 +90,26 @@ export const overlayStyle = css`
   .columns h3 {
     margin-bottom: 6px;
   }
-  :is(.legend, .toast, .progress) {
+  :is(.legend, .messages) {
     position: absolute;
     bottom: var(--above-deck);
+  }
+  :is(.legend, .toast, .progress) {
     padding: var(--cager-space-2) var(--cager-space-3);
   }
-  :is(.toast, .progress) {
-    left: 50%;
-    translate: -50% 0;
-    width: max-content;
+  .messages {
+    inset-inline: 0;
+    display: grid;
+    justify-items: center;
+    gap: var(--cager-space-2);
+    pointer-events: none;
+  }
+  .messages > * {
     max-width: min(560px, calc(100% - 24px));
+    pointer-events: auto;
   }
   .toast {
+    position: relative;
     border-color: color-mix(in srgb, var(--cager-bad) 60%, transparent);
     border-left: 5px solid var(--cager-bad);
     background: var(--cager-surface);

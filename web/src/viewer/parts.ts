@@ -2,7 +2,7 @@ import { html, nothing, type TemplateResult } from 'lit';
 import type { FrameErrors, UpAxis } from '../capture';
 import type { FrameRange } from '../editing/cageEdit';
 import { colorScale, comparisonPanel, rangeChoice, type ComparisonActs } from './comparisonParts';
-import { numberAt, numberText } from './frameNumbers';
+import { frameText, numberAt, numberText } from './frameNumbers';
 import { glyphs } from '../style/glyphs';
 import type { Player } from './player';
 import { isLost } from './reports';
@@ -15,7 +15,7 @@ import { sought, SPEEDS, type Repeat, type Transport } from './transport';
 export function titleBox(heading: string, { capture, up }: Player, isEdited: boolean, setUp: (up: UpAxis) => void) {
   const { static: part, frames, tracking, frameNumbers } = capture;
   // Frames are counted from 0 unless they have numbers of their own: the place beside the timeline is one of these.
-  const [first, last] = [0, Math.max(0, frames - 1)].map((frame) => numberText(numberAt(frameNumbers, frame)));
+  const [first, last] = [0, Math.max(0, frames - 1)].map((frame) => frameText(frameNumbers, frame));
   const lost = tracking?.outcomes.filter((_, frame) => isLost(tracking, frame)).length ?? 0;
   return html`<div class="title glass">
     <h1 class="heading clip" title=${heading}>${heading}</h1>

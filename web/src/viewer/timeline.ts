@@ -91,6 +91,7 @@ export class Timeline extends LitElement {
           ? html`<cager-range-strip
               .range=${this.range}
               .frames=${this.frames}
+              .frameNumbers=${this.frameNumbers}
               .shareOf=${(frame: number) => this.shareOf(frame)}
               .frameAt=${(event: PointerEvent) => this.frameAt(event)}
             ></cager-range-strip>`

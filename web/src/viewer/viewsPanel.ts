@@ -1,7 +1,7 @@
 import { html, nothing } from 'lit';
 import { HOME, type CameraState } from '../render/camera';
 import { iconButton, segments } from '../style/parts';
-import { numberAt, numberText } from './frameNumbers';
+import { frameText } from './frameNumbers';
 import type { Player } from './player';
 import { viewFromText } from './viewState';
 import type { Capture } from '../capture';
@@ -55,7 +55,7 @@ export function viewsPanel(player: Player, host: ViewerHost, close: () => void) 
 
 function nameOf(view: string, { transport }: Player): string {
   const { frame, camera } = viewFromText(view);
-  const place = `Frame ${numberText(numberAt(transport.numbers, frame ?? 0))}`;
+  const place = `Frame ${frameText(transport.numbers, frame ?? 0)}`;
   return camera?.isParallel ? `${place}, orthographic` : place;
 }
 

@@ -4,16 +4,16 @@ import { describe, expect, it } from 'vitest';
 import { withEdits } from '../../src/container/rewrite';
 import { bytesSource } from '../../src/container/source';
 import { diagonalOf } from '../../src/coordinates/topology';
-import { allBlocks, goldenBytes, openBytes, positionsOf } from '../support/containers';
+import { allBlocks, goldenBytes, openBytes, positionsOf, rawPart, withPart } from '../support/containers';
 import { seriousFindings } from './harness/axe';
 import { chromium } from './harness/programs';
 import { FilePages, inViewer } from './harness/viewing';
 
 /** The golden file with an edit of frame 1. */
-async function edited() {
+async function edited(golden = goldenBytes('coded-mvc'), name = 'Nose') {
   const offsets = Float32Array.of(0.4, -0.2, 0.1, 0, 0.3, 0);
-  const layer = { name: 'Nose', isOn: true, first: 1, count: 1, vertices: Uint32Array.of(3, 8), offsets };
-  const container = await withEdits(bytesSource(goldenBytes('coded-mvc')), [layer]);
+  const layer = { name, isOn: true, first: 1, count: 1, vertices: Uint32Array.of(3, 8), offsets };
+  const container = await withEdits(bytesSource(golden), [layer]);
   return new Uint8Array(await container.arrayBuffer());
 }
 
@@ -57,6 +57,40 @@ describe.skipIf(chromium === undefined)('a file with edits', { timeout: 90_000 }
     const [file] = await Promise.all([page.waitForEvent('download'), save.click()]);
     expect(new Uint8Array(await readFile(await file.path()))).toEqual(goldenBytes('coded-mvc'));
     expect(pages.errors).toEqual([]);
+  });
+
+  it('of a shot from 1001 is listed by its numbers, with as much of its name as there is room for', async () => {
+    const numbers = rawPart('fnum', new Uint8Array(Float64Array.of(1001, 1002, 1003).buffer), 8);
+    const name = 'Sleeve of the left arm, as the director wanted it on Tuesday';
+    const bytes = await edited(withPart(goldenBytes('coded-mvc'), numbers, 'ERRS'), name);
+    const page = await pages.show({ 'shot.cager': bytes });
+    await page.keyboard.press('e');
+    const panel = page.getByRole('region', { name: 'Edit cage' });
+    await panel.getByRole('checkbox', { name: `Enable ${name} of the file, frames 1002 to 1002` }).waitFor();
+    const row = panel.getByRole('listitem');
+    const clipped = await row.locator('.clip').evaluate((part) => part.scrollWidth > part.clientWidth);
+    expect(clipped).toBe(true);
+    const [list, ...shown] = await Promise.all(
+      [row, row.getByText('saved'), row.getByText('1002', { exact: true })].map((part) => part.boundingBox()),
+    );
+    for (const part of shown) expect(part!.x + part!.width).toBeLessThanOrEqual(list!.x + list!.width);
+    expect(pages.errors).toEqual([]);
+  });
+
+  it('leaves the progress uncovered where there is a message too', async () => {
+    const page = await pages.show({ 'nose.cager': await edited() });
+    await inViewer(
+      page,
+      (viewer) => {
+        viewer.report('A point is not where it was.');
+        viewer.say('Recording');
+      },
+      null,
+    );
+    const [message, progress] = [page.locator('.toast'), page.locator('.progress')];
+    await progress.waitFor();
+    const [above, below] = await Promise.all([message.boundingBox(), progress.boundingBox()]);
+    expect(above!.y + above!.height).toBeLessThanOrEqual(below!.y);
   });
 });
 
