@@ -41,7 +41,9 @@ fn files_of_every_version_decode_to_what_they_always_did() {
     let coded = ["mvc", "harmonic", "green", "green-free", "parted-mvc"].map(|kind| format!("coded-{kind}"));
     let edited = ["edited-mvc".to_owned()];
     let rounded = ["mvc", "harmonic", "green", "green-free"].map(|kind| format!("rounded-{kind}"));
-    for name in kinds.map(|kind| format!("definition{definition}-{kind}")).iter().chain(&coded).chain(&rounded).chain(&edited) {
+    for name in
+        kinds.map(|kind| format!("definition{definition}-{kind}")).iter().chain(&coded).chain(&rounded).chain(&edited)
+    {
         assert!(files.iter().any(|file| file.file_stem().is_some_and(|stem| *stem == **name)), "{name} is missing");
     }
     let dir = Dir::new();

@@ -149,10 +149,7 @@ impl<W: Write> ContainerWriter<W> {
 type EncodedLayer = (SectionHeader, Vec<u8>, Option<Vec<u8>>);
 
 /// The section of a new layer.
-fn encoded<R: Read + Seek>(
-    layer: &EditLayer,
-    of: &ContainerReader<R>,
-) -> Result<EncodedLayer, Error> {
+fn encoded<R: Read + Seek>(layer: &EditLayer, of: &ContainerReader<R>) -> Result<EncodedLayer, Error> {
     let frames = layer.frames();
     let fits = layer.check(of.vertex_rows());
     fits.map_err(|what| Error::Invalid(what.to_owned()))?;

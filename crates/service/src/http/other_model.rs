@@ -118,9 +118,11 @@ pub(super) async fn bind(
             if !beside.is_empty() {
                 let fitted = TriMesh::from(&session.geometry()?.rest);
                 let bind = || decode::Bound::new(pointwise, &cage, &fitted, &model.points, &beside);
-                bound = service.solvers.pool().install(bind).map_err(|error| {
-                    ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}"))
-                })?;
+                bound = service
+                    .solvers
+                    .pool()
+                    .install(bind)
+                    .map_err(|error| ApiError::new(problem::INVALID_GEOMETRY, format!("model: {error}")))?;
             }
         }
         let count = bound.places.len();
