@@ -36,16 +36,18 @@ def test_views_whose_numbers_have_their_own_places_are_filled(small, coded):
     assert np.array_equal(one.decode(out), one.decode())
 
 
-@pytest.mark.parametrize("away, refused", [(1e3, False), (1e6, True)])
-def test_single_precision_is_refused_where_it_loses_the_capture(small, away, refused):
+@pytest.mark.parametrize("away, bound, refused", [(1e3, None, False), (1e3, 1e-4, True), (1e6, None, True)])
+def test_single_precision_is_refused_where_it_loses_more_than_the_bound_leaves(small, away, bound, refused):
     vertices, faces = small.cage
-    capture = cager.encode(small.rest + away, small.faces, small.frames + away, (vertices + away, faces), max_error=1e-4)
+    cage = (vertices + away, faces)
+    capture = cager.encode(small.rest + away, small.faces, small.frames + away, cage, max_error=bound)
     single = np.zeros(small.frames.shape, np.float32)
+    double = capture.decode(np.zeros(small.frames.shape))
     if refused:
         with pytest.raises(cager.CagerError, match="out: holds single precision, which moves points by .* give an array of float64"):
             capture.decode(single)
     else:
-        rounded = capture.decode(single).astype(np.float64) - small.frames - away
-        assert np.linalg.norm(rounded, axis=2).max() < 2e-4 * small.diagonal
-    double = capture.decode(np.zeros(small.frames.shape))
-    assert np.linalg.norm(double - small.frames - away, axis=2).max() <= 1e-4 * small.diagonal
+        rounded = capture.decode(single).astype(np.float64) - double
+        assert np.linalg.norm(rounded, axis=2).max() < 1e-4 * small.diagonal
+    if bound is not None:
+        assert np.linalg.norm(double - small.frames - away, axis=2).max() <= bound * small.diagonal
