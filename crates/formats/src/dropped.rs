@@ -8,10 +8,10 @@ const SHOWN: usize = 40;
 
 /// What the file of a mesh holds that is not read.
 ///
-/// A reader adds a phrase for each kind, with the word of the format in brackets: [`Self::add`] for what belongs to points
-/// or to the whole, such as `normals (NORMAL)`, and [`Self::add_on_faces`] for what belongs to faces and their corners, such as
-/// `texture coordinates (vt)`. Phrases that begin with a number come from [`counted`], lists of names of any length
-/// from [`listed`]. A phrase that is added twice is told once. Commands tell [`Self::sentence`].
+/// A reader adds a phrase for each kind, with the word of the format in brackets: `add` for what belongs to points
+/// or to the whole, such as `normals (NORMAL)`, and `add_on_faces` for what belongs to faces and their corners, such as
+/// `texture coordinates (vt)`. Phrases that begin with a number come from `counted`, lists of names of any length
+/// from `listed`. A phrase that is added twice is told once. Commands tell [`Self::sentence`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     phrases: Vec<String>,
