@@ -192,10 +192,12 @@ describe.skipIf(missing)('an upload', { timeout: 120_000 }, () => {
   test('a_design_goes_on_after_a_reload_and_its_best_cage_so_far_can_be_taken', async () => {
     const { page, close } = await openPage(site.browser, `${site.page}#/upload`, ['404']);
     page.on('dialog', (dialog) => void dialog.accept());
-    const files = { 'rest.obj': capture.rest, 'wave.npy': capture.npy(24) };
+    // So large that its design takes ten seconds on a fast machine, of which this needs three.
+    const dense = new SphereCapture(5);
+    const files = { 'rest.obj': dense.rest, 'wave.npy': dense.npy(24) };
     await drop(page, files);
     await page.getByLabel('Cage', { exact: true }).selectOption('motion');
-    await page.getByLabel('Maximum cage vertices').fill('200');
+    await page.getByLabel('Maximum cage vertices').fill('1200');
     await encodeCages(page);
     await expect.poll(() => designs(site), { timeout: 20_000 }).toBe(1);
     await page.reload();
