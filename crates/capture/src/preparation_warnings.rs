@@ -30,12 +30,16 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
         ));
     }
     let (read, points) = (solver.handles().len(), solver.decoder().points());
-    // Where every point is read, these are the handles of maximum volume.
+    // Where every point is read, these are the handles of maximum volume, or none.
     if options.handles == Handles::All && read > unknowns && read < points {
         warnings.push(format!("of so many points a sample is analysed: {read} of {points} are read"));
     }
     let sigma = &found.singular_values;
-    let weak = unknowns - sigma.len() + sigma.iter().filter(|&&s| s < WEAK_SINGULAR_VALUE * sigma[0]).count();
+    // None are known where the factor of the normal equations alone says that they are large enough.
+    let weak = match sigma.as_slice() {
+        [] => 0,
+        all => unknowns - all.len() + all.iter().filter(|&&s| s < WEAK_SINGULAR_VALUE * all[0]).count(),
+    };
     let strong = unknowns - weak;
     if weak > 0 {
         let consequence = match options.regularizer {

@@ -18,12 +18,20 @@ impl StepClock {
         self.0.borrow_mut().push((step, Instant::now()));
     }
 
-    /// Seconds for the coordinates, for the handles, and for all that came after these up to now.
+    /// Seconds for the coordinates, for the handles, and for all else up to now.
     pub fn seconds(&self) -> [f64; 3] {
         let (now, begun) = (Instant::now(), self.0.borrow());
-        let begin = |step| begun.iter().find(|(one, _)| *one == step).map_or(now, |(_, begin)| *begin);
-        let [coordinates, handles, rest] = [Step::Coordinates, Step::Handles, Step::SingularValues].map(begin);
-        [handles - coordinates, rest - handles, now - rest].map(|time| time.as_secs_f64())
+        let mut seconds = [0.0; 3];
+        for (k, (step, begin)) in begun.iter().enumerate() {
+            let end = begun.get(k + 1).map_or(now, |(_, begin)| *begin);
+            let of = match step {
+                Step::Coordinates => 0,
+                Step::Handles => 1,
+                Step::SingularValues | Step::Operator => 2,
+            };
+            seconds[of] += (end - *begin).as_secs_f64();
+        }
+        seconds
     }
 }
 

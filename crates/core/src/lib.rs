@@ -15,4 +15,4 @@ pub mod sted;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.
-pub const SOLVER_VERSION: u32 = 8;
+pub const SOLVER_VERSION: u32 = 9;

@@ -153,14 +153,18 @@ impl Decoder {
         self.coordinates().map_or(0, |phi| 4 * phi.nrows() * phi.ncols())
     }
 
-    /// Positions of up to [`BATCH`] frames, each n × 3 interleaved, from their cages, each m × 3 interleaved.
+    /// Positions of frames, each n × 3 interleaved, from their cages, each m × 3 interleaved, in batches of [`BATCH`].
     ///
-    /// The result of a frame is bit-identical whatever the other frames of the batch.
+    /// The result of a frame is bit-identical whatever the other frames.
     ///
     /// # Panics
     /// Where the lengths do not fit.
     pub fn decode(&self, cages: &[&[f32]], out: &mut [Vec<f32>]) {
         assert_eq!(cages.len(), out.len(), "one output per cage");
+        cages.chunks(BATCH).zip(out.chunks_mut(BATCH)).for_each(|(cages, out)| self.decode_batch(cages, out));
+    }
+
+    fn decode_batch(&self, cages: &[&[f32]], out: &mut [Vec<f32>]) {
         let (columns, centres) = self.values(cages);
         let n = self.points();
         for positions in out.iter_mut() {
@@ -226,7 +230,7 @@ impl Decoder {
         f64::from(largest)
     }
 
-    /// Errors of up to [`BATCH`] frames: what [`Self::decode`] gives for these cages against the capture's own positions.
+    /// Errors of frames: what [`Self::decode`] gives for these cages against the capture's own positions.
     ///
     /// # Panics
     /// Where the lengths do not fit.
@@ -234,6 +238,12 @@ impl Decoder {
         assert_eq!(cages.len(), frames.len(), "one frame per cage");
         let n = self.points();
         assert!(frames.iter().all(|f| f.len() == 3 * n), "every frame has every point");
+        let batches = cages.chunks(BATCH).zip(frames.chunks(BATCH));
+        batches.flat_map(|(cages, frames)| self.measure_batch(cages, frames)).collect()
+    }
+
+    fn measure_batch<T: Copy + Into<f64> + Sync>(&self, cages: &[&[f32]], frames: &[&[T]]) -> Vec<FrameError> {
+        let n = self.points();
         let (columns, centres) = self.values(cages);
         let mut blocks: Vec<Vec<Sums>> = Vec::with_capacity(n.div_ceil(BLOCK_ROWS));
         self.phi.for_each_part(|first, phi| {

@@ -1,11 +1,12 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
-use super::PrepareError;
-use super::checks::{coordinates_bytes, outside, reject_unreproduced_point, reproduction_error};
-use super::context::PrepareContext;
-use super::spectra::RequiredDecompositions;
+use super::checks::{
+    check, coordinates_bytes, outside, reject_far_points, reject_unreproduced_point, reproduction_error,
+};
+use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions, Step};
+
 use crate::cage::Cage;
-use crate::coordinates::{CageValues, CoordinateSystem, ElementPlan, MeanValue, PointwiseCoordinates, Refinement};
+use crate::coordinates::{CageValues, CoordinateSystem, MeanValue, PointwiseCoordinates};
 use crate::decode::{Decoder, for_each_chunk};
 use crate::handles::Handles;
 use crate::handles::farthest::morton_order;
@@ -23,24 +24,24 @@ const NEAREST: usize = 8;
 pub(super) struct AnalysisCoordinates {
     /// `Φ` of the points analysed, in the system that the inversion starts from.
     pub(super) phi: Mat<f64>,
-    /// The points analysed, ascending, where they are not all.
+    /// The points analysed.
+    pub(super) points: Vec<Point>,
+    /// Their indices in the model, ascending, where they are not all.
     pub(super) sample: Option<Vec<u32>>,
     /// The decoder, where its coordinates are not `phi`.
     pub(super) decoder: Option<Decoder>,
     /// Unknowns of the rest pose, m × 3.
     pub(super) rest: Vec<Point>,
-    /// Largest `|Φ C_R − P_R|`.
-    pub(super) error: f64,
-    /// Points outside, and the largest distance of one over the diagonal.
-    pub(super) outside: (Vec<u32>, f64),
-    pub(super) refinement: Option<Refinement>,
-    pub(super) plan: Option<ElementPlan>,
+    /// Diagonal of the rest pose's bounding box.
+    pub(super) diagonal: f64,
+    /// As far as it follows from the coordinates.
+    pub(super) preparation: PreparationReport,
 }
 
 /// A sample of points spaced evenly along a space-filling curve; `None` where all points are analysed, as for every choice of handles. It has at least as many points as the handles
 /// read, except with [`Handles::All`], for which the sample stands for all. Its density follows that of the model.
-fn sample(points: &[Point], unknowns: usize, required: RequiredDecompositions, entries: usize) -> Option<Vec<u32>> {
-    let read = match required.handles()? {
+fn sample(points: &[Point], unknowns: usize, handles: Option<Handles>, entries: usize) -> Option<Vec<u32>> {
+    let read = match handles? {
         Handles::All => 0,
         handles => handles.count(points.len(), unknowns),
     };
@@ -54,17 +55,28 @@ fn sample(points: &[Point], unknowns: usize, required: RequiredDecompositions, e
     Some(sample)
 }
 
-/// Coordinates of all points, or of a sample of a very large model. In the latter case the decoder stores the coordinates of all points if `keeps`,
-/// or recomputes them.
-pub(super) fn coordinates(
+/// As [`coordinates`], once points and options are checked.
+pub(super) fn checked_coordinates(
+    (system, cage, points): (&dyn CoordinateSystem, &Cage, &[Point]),
+    options: SolverOptions,
+    handles: Option<Handles>,
+    context: &PrepareContext<'_>,
+) -> Result<AnalysisCoordinates, PrepareError> {
+    check(points, system.values(cage).unknowns(), options, context.memory)?;
+    reject_far_points(cage, points)?;
+    context.begin(Step::Coordinates)?;
+    coordinates(system, cage, points, handles, context)
+}
+
+/// Coordinates of all points, or, for a solver that reads these handles, of a sample of a very large model.
+fn coordinates(
     system: &dyn CoordinateSystem,
     cage: &Cage,
     points: &[Point],
-    required: RequiredDecompositions,
+    handles: Option<Handles>,
     context: &PrepareContext<'_>,
 ) -> Result<AnalysisCoordinates, PrepareError> {
-    let everything = required == RequiredDecompositions::Everything;
-    let copies = if everything { 3 } else { 2 };
+    let copies = if handles.is_none() { 3 } else { 2 };
     let values = system.values(cage);
     let (m, columns) = (values.unknowns(), values.columns());
     let check_memory = |rows: usize| {
@@ -75,7 +87,7 @@ pub(super) fn coordinates(
     };
     let sampled = system
         .pointwise()
-        .and_then(|pointwise| Some((pointwise, sample(points, m, required, context.analysed_entries)?)));
+        .and_then(|pointwise| Some((pointwise, sample(points, m, handles, context.analysed_entries)?)));
     if let Some((pointwise, sample)) = sampled {
         check_memory(sample.len())?;
         return of_sample(values, pointwise, cage, points, sample, context.stores_coordinates);
@@ -93,9 +105,10 @@ pub(super) fn coordinates(
         phi = MeanValue.coordinates(cage, points, None)?.phi;
         rest.truncate(m);
     }
-    let outside = outside(cage, points, &found.outside, diagonal(points));
     let (refinement, plan) = (found.refinement, found.plan);
-    Ok(AnalysisCoordinates { phi, sample: None, decoder, rest, error: worst.1, outside, refinement, plan })
+    let preparation = PreparationReport { refinement, plan, ..report(cage, points, &found.outside, worst.1) };
+    let (points, diagonal) = (points.to_vec(), diagonal(points));
+    Ok(AnalysisCoordinates { phi, points, sample: None, decoder, rest, diagonal, preparation })
 }
 
 fn of_sample(
@@ -145,15 +158,27 @@ fn of_sample(
     } else {
         pointwise(cage, &sampled)
     };
-    let outside = outside(cage, points, &found_outside, diagonal(points));
     Ok(AnalysisCoordinates {
         phi: start.phi,
+        points: sampled,
         sample: Some(sample),
         decoder: Some(decoder),
         rest,
-        error: worst.1,
-        outside,
-        refinement: None,
-        plan: None,
+        diagonal: diagonal(points),
+        preparation: report(cage, points, &found_outside, worst.1),
     })
+}
+
+/// What is known of points that were reported as outside, and of the largest `|Φ C_R − P_R|`.
+fn report(cage: &Cage, points: &[Point], found_outside: &[u32], error: f64) -> PreparationReport {
+    let diagonal = diagonal(points);
+    let (outside, outside_distance) = outside(cage, points, found_outside, diagonal);
+    PreparationReport {
+        affine_reproduction_error: error / diagonal,
+        condition_full: f64::NAN,
+        condition_handles: f64::NAN,
+        outside,
+        outside_distance,
+        ..PreparationReport::default()
+    }
 }

@@ -1,8 +1,7 @@
 //! Analysis of a rest pose and its cage: coordinates, maximum-volume handles and singular value decompositions, shared by solvers with different
 //! options.
 
-use super::analysed_coordinates::{AnalysisCoordinates, coordinates};
-use super::checks::{check, reject_far_points};
+use super::analysed_coordinates::{AnalysisCoordinates, checked_coordinates};
 use super::options::drop_zero_weight_regularizer;
 use super::spectra::{RequiredDecompositions, Spectra};
 use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions, Step};
@@ -13,8 +12,8 @@ use crate::maxvol::{MaxVol, RANK_TOLERANCE};
 use crate::row_basis::{RowBasis, deficient_basis, row_basis};
 use cager_geometry::linalg;
 use cager_geometry::linalg::svd;
-use cager_geometry::mesh::{Point, diagonal};
-use faer::{Mat, MatRef};
+use cager_geometry::mesh::Point;
+use faer::MatRef;
 
 /// Analysis of a rest pose and its cage, from which solvers with any options follow at the cost of their operator alone.
 ///
@@ -23,22 +22,14 @@ use faer::{Mat, MatRef};
 /// For a system whose normals are functions of the vertices, it analyses mean value coordinates of the same cage and points, from which the nonlinear
 /// inversion starts. Only the decoder and the reproduction errors are the system's own.
 pub struct Analysis {
-    /// `Φ` of the points analysed.
-    pub(super) phi: Mat<f64>,
+    /// Without a decoder.
+    pub(super) found: AnalysisCoordinates,
     pub(super) cage: Cage,
-    /// The points analysed.
-    pub(super) points: Vec<Point>,
-    /// Their indices in the model; `None` where all points are analysed.
-    sample: Option<Vec<u32>>,
-    /// Unknowns of the rest pose, m × 3.
-    pub(super) rest: Vec<Point>,
     pub(super) basis: RowBasis,
     pub(super) spectra: Spectra,
     pub(super) decoder: Decoder,
-    pub(super) diagonal: f64,
     /// See [`PrepareContext::memory`].
     pub(super) memory: u64,
-    pub(super) preparation: PreparationReport,
 }
 
 impl Analysis {
@@ -53,7 +44,8 @@ impl Analysis {
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
         let options = SolverOptions { spectrum: 0, ..SolverOptions::PAPER };
-        Self::of(system, cage, points, options, RequiredDecompositions::Everything, context)
+        let found = checked_coordinates((system, cage, points), options, None, context)?;
+        Self::of(found, cage, RequiredDecompositions::Everything, context)
     }
 
     /// As [`Self::new`], computing only what solvers with these handles need. A model of very many points is analysed on a sample.
@@ -67,91 +59,64 @@ impl Analysis {
         options: SolverOptions,
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        Self::of(system, cage, points, options, RequiredDecompositions::For(options.handles), context)
+        let found = checked_coordinates((system, cage, points), options, Some(options.handles), context)?;
+        Self::of(found, cage, RequiredDecompositions::For(options.handles), context)
     }
 
-    /// As [`Self::for_options`], for the solver with these options alone.
+    /// As [`Self::for_options`], for the solver with these options alone, from its coordinates.
     pub(super) fn for_solver(
-        system: &dyn CoordinateSystem,
+        found: AnalysisCoordinates,
         cage: &Cage,
-        points: &[Point],
         options: SolverOptions,
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
+        let is_dependent = found.decoder.as_ref().is_some_and(|decoder| decoder.dependent_normals().is_some());
         // An unregularised start is regularised nevertheless, in as many directions as are ill-conditioned.
-        let required = if system.values(cage).dependent_normals.is_some() {
+        let required = if is_dependent {
             RequiredDecompositions::For(options.handles)
         } else {
             RequiredDecompositions::of_solver(drop_zero_weight_regularizer(options))
         };
-        Self::of(system, cage, points, options, required, context)
+        Self::of(found, cage, required, context)
     }
 
     fn of(
-        system: &dyn CoordinateSystem,
+        mut found: AnalysisCoordinates,
         cage: &Cage,
-        points: &[Point],
-        options: SolverOptions,
         required: RequiredDecompositions,
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        let (m, diagonal) = (system.values(cage).unknowns(), diagonal(points));
-        check(points, m, options, context.memory)?;
-        reject_far_points(cage, points)?;
-        context.begin(Step::Coordinates)?;
-        let AnalysisCoordinates {
-            phi,
-            sample,
-            decoder,
-            rest,
-            error,
-            outside: (outside, outside_distance),
-            refinement,
-            plan,
-        } = coordinates(system, cage, points, required, context)?;
         context.begin(Step::Handles)?;
+        let (phi, m) = (found.phi.as_ref(), found.phi.ncols());
         let no_handles = PrepareError::NoSolution { what: "choice of handles" };
-        let mut basis = row_basis(phi.as_ref()).ok_or(no_handles.clone())?;
+        let mut basis = row_basis(phi).ok_or(no_handles.clone())?;
 
         context.begin(Step::SingularValues)?;
         // Built only now, since memory use peaks in maxvol.
-        let decoder = || decoder.unwrap_or_else(|| Decoder::new(phi.as_ref(), cage.vertices().len()));
-        let (decoder, spectra) = rayon::join(decoder, || Spectra::of(phi.as_ref(), &basis, required));
+        let decoder = found.decoder.take();
+        let decoder = || decoder.unwrap_or_else(|| Decoder::new(phi, cage.vertices().len()));
+        let (decoder, spectra) = rayon::join(decoder, || Spectra::of(phi, &basis, required));
         let mut spectra = spectra?;
         if basis.rank == m && spectra.full_ends[2] <= RANK_TOLERANCE * spectra.full_ends[0] {
-            basis = deficient_basis(phi.as_ref()).ok_or(no_handles)?;
-            spectra = Spectra::of(phi.as_ref(), &basis, required)?;
+            basis = deficient_basis(phi).ok_or(no_handles)?;
+            spectra = Spectra::of(phi, &basis, required)?;
         }
-        let rank = basis.rank;
-        let preparation = PreparationReport {
-            rank,
-            affine_reproduction_error: error / diagonal,
-            condition_full: spectra.full_ends[0] / spectra.full_ends[1],
-            condition_handles: spectra.handles_ends.map_or(f64::NAN, |[first, last]| first / last),
-            singular_values: Vec::new(),
-            maxvol: basis.handles.volume,
-            outside,
-            outside_distance,
-            refinement,
-            plan,
-        };
-        let points = match &sample {
-            Some(sample) => sample.iter().map(|&i| points[i as usize]).collect(),
-            None => points.to_vec(),
-        };
-        let cage = cage.clone();
-        let memory = context.memory;
-        Ok(Self { phi, cage, points, sample, rest, basis, spectra, decoder, diagonal, memory, preparation })
+        let preparation = &mut found.preparation;
+        preparation.rank = basis.rank;
+        preparation.condition_full = spectra.full_ends[0] / spectra.full_ends[1];
+        preparation.condition_handles = spectra.handles_ends.map_or(f64::NAN, |[first, last]| first / last);
+        preparation.maxvol = basis.handles.volume;
+        Ok(Self { found, cage: cage.clone(), basis, spectra, decoder, memory: context.memory })
     }
 
     /// Indices of the points analysed; `None` where all are.
     pub(super) fn sample(&self) -> Option<&[u32]> {
-        self.sample.as_deref()
+        self.found.sample.as_deref()
     }
 
     /// Results of the preparation; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].
     pub fn preparation(&self) -> &PreparationReport {
-        &self.preparation
+        &self.found.preparation
     }
 
     /// The decoder from cages to positions.
@@ -161,7 +126,7 @@ impl Analysis {
 
     /// `Φ` of the points analysed, n × m.
     pub fn coordinates(&self) -> MatRef<'_, f64> {
-        self.phi.as_ref()
+        self.found.phi.as_ref()
     }
 
     /// Rows of maximum volume, and how they were found.
@@ -187,6 +152,6 @@ impl Analysis {
 
     /// Singular values of the given rows of `Φ`, descending; `None` where they do not converge.
     pub fn spectrum_of(&self, rows: &[u32]) -> Option<Vec<f64>> {
-        svd::singular_values(linalg::rows_of(self.phi.as_ref(), rows).as_ref())
+        svd::singular_values(linalg::rows_of(self.found.phi.as_ref(), rows).as_ref())
     }
 }

@@ -128,10 +128,14 @@ pub(super) fn reproduction_error(
     points: &[Point],
 ) -> (usize, f64) {
     let o = cage.vertices()[0];
-    let positions = cage.vertices().len();
-    let c = Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { o[k] } else { 0.0 });
+    let c = about_first(unknowns, cage.vertices().len());
     let product = tall_product(phi, c.as_ref());
     let error =
         |(i, p): (usize, &Point)| (i, (0..3).map(|k| (product[(i, k)] - (p[k] - o[k])).powi(2)).sum::<f64>().sqrt());
     points.iter().enumerate().map(error).fold((0, 0.0), |a, b| if b.1 > a.1 || b.1.is_nan() { b } else { a })
+}
+
+/// Unknowns relative to the first vertex, m × 3, which keeps precision; the target does not depend on translations.
+pub(super) fn about_first(unknowns: &[Point], positions: usize) -> Mat<f64> {
+    Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { unknowns[0][k] } else { 0.0 })
 }

@@ -55,7 +55,7 @@ impl FactoredInversion {
         let ones = Mat::from_fn(handle_system.rows_read(), 1, |_, _| 1.0);
         let sums = factors.cages(
             handle_system,
-            &handle_system.decomposition.project(handle_system.analysis.phi.as_ref(), ones.as_ref()),
+            &handle_system.decomposition.project(handle_system.analysis.found.phi.as_ref(), ones.as_ref()),
         );
         let positions = handle_system.analysis.decoder.positions();
         factors.missing = (0..m).map(|j| if j < positions { 1.0 } else { 0.0 } - sums[(j, 0)]).collect();
@@ -120,7 +120,7 @@ impl HandleSystem<'_> {
     }
 
     fn rows_read(&self) -> usize {
-        if self.decomposition.reads_all { self.analysis.phi.nrows() } else { self.decomposition.handles.len() }
+        if self.decomposition.reads_all { self.analysis.found.phi.nrows() } else { self.decomposition.handles.len() }
     }
 
     /// Projects frames, each n × 3 interleaved: all points of the model, also where a sample of them was analysed.
@@ -128,7 +128,7 @@ impl HandleSystem<'_> {
     /// # Panics
     /// Where a frame's length does not fit.
     pub fn project(&self, frames: &[&[f64]]) -> ProjectedFrames {
-        let phi = self.analysis.phi.as_ref();
+        let phi = self.analysis.found.phi.as_ref();
         assert!(frames.iter().all(|f| f.len() == 3 * self.decoder().points()), "every frame has every point");
         let count = self.rows_read();
         let sample = self.analysis.sample();

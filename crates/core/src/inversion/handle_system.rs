@@ -1,9 +1,9 @@
 //! From a choice of handles to solvers: the regularised map of singular directions, and the regularisation target.
 
-use super::checks::check_options;
+use super::checks::{about_first, check_options};
 use super::consistent::Consistent;
 use super::error::failed;
-use super::nearness::{Nearness, NearnessParts, max_distance};
+use super::nearness::Nearness;
 use super::operator::{Decomposition, Directions, padded_to_tiles};
 use super::options::drop_zero_weight_regularizer;
 use super::target::RegularizationTarget;
@@ -15,8 +15,6 @@ use crate::regularize::{
     Reference, RegularizationOperator, Regularizer, SpectralMap, Spectrum, WEAK_SINGULAR_VALUE, last_map, spectral_map,
 };
 use cager_geometry::linalg::{self, SparseMatrix};
-use cager_geometry::mesh::Point;
-use cager_geometry::spatial::Aabb;
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
 
@@ -36,8 +34,9 @@ impl Analysis {
     /// As [`Solver::prepare`].
     pub fn handle_system(&self, handles: Handles) -> Result<HandleSystem<'_>, PrepareError> {
         let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
-        check_options(self.phi.nrows(), self.phi.ncols(), options, self.memory)?;
-        let decomposition = Decomposition::new(self.phi.as_ref(), &self.points, &self.basis, &self.spectra, handles)?;
+        check_options(self.found.phi.nrows(), self.found.phi.ncols(), options, self.memory)?;
+        let decomposition =
+            Decomposition::new(self.found.phi.as_ref(), &self.found.points, &self.basis, &self.spectra, handles)?;
         Ok(HandleSystem::new(self, decomposition))
     }
 
@@ -46,7 +45,8 @@ impl Analysis {
     /// # Errors
     /// [`PrepareError::NoSolution`] where the rows determine nothing.
     pub fn handle_system_of(&self, rows: &[u32]) -> Result<HandleSystem<'_>, PrepareError> {
-        let decomposition = Decomposition::of_given_rows(self.phi.as_ref(), rows.to_vec(), self.phi.ncols())?;
+        let decomposition =
+            Decomposition::of_given_rows(self.found.phi.as_ref(), rows.to_vec(), self.found.phi.ncols())?;
         Ok(HandleSystem::new(self, decomposition))
     }
 
@@ -83,13 +83,13 @@ impl<'a> HandleSystem<'a> {
     pub fn solver(&self, options: SolverOptions, matrix: Option<&SparseMatrix>) -> Result<Solver, PrepareError> {
         let analysis = self.analysis;
         let (map, target, consistent) = self.parts(options, matrix)?;
-        let operator = self.decomposition.operator(analysis.phi.as_ref(), &map.data);
+        let operator = self.decomposition.operator(analysis.found.phi.as_ref(), &map.data);
         let operator = padded_to_tiles(with_unit_row_sums(operator, analysis.decoder.positions()));
         let (handles, reads_all) = self.points_read();
         // The baselines and inversions without a term go where the data take them.
         let held = options.regularizer.is_sub_spectral() && !is_unregularized(drop_zero_weight_regularizer(options));
         let nearness = if held { self.nearness().map(Arc::new) } else { None };
-        let mut preparation = analysis.preparation.clone();
+        let mut preparation = analysis.found.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
         preparation.singular_values = self.singular_values();
         Ok(Solver {
@@ -100,7 +100,7 @@ impl<'a> HandleSystem<'a> {
             consistent,
             nearness,
             decoder: analysis.decoder.clone(),
-            diagonal: analysis.diagonal,
+            diagonal: analysis.found.diagonal,
             preparation,
         })
     }
@@ -108,19 +108,13 @@ impl<'a> HandleSystem<'a> {
     /// What brings cages back to their frames.
     fn nearness(&self) -> Option<Nearness> {
         let analysis = self.analysis;
-        let rest = Aabb::around_all(&analysis.points);
-        Nearness::from_parts(NearnessParts {
-            factor: self.scaled_factor(),
-            rest: Mat::from_fn(analysis.rest.len(), 3, |i, k| analysis.rest[i][k]),
-            faces: analysis.cage.mesh().triangles.clone(),
-            margin: max_distance(&rest, analysis.cage.vertices()),
-        })
+        Nearness::new(self.scaled_factor(), &analysis.found.rest, &analysis.cage, &analysis.found.points)
     }
 
     /// F with `FᵀF = AᵀA · m/K` for the K rows of what is inverted, so that weights beside it are relative to the mean square error.
     pub(super) fn scaled_factor(&self) -> Mat<f64> {
         let Decomposition { directions, rank, rows, .. } = &self.decomposition;
-        let scale = (self.analysis.phi.ncols() as f64 / *rows as f64).sqrt();
+        let scale = (self.analysis.found.phi.ncols() as f64 / *rows as f64).sqrt();
         match directions {
             Directions::All { sigma, v } => Mat::from_fn(*rank, v.nrows(), |k, j| scale * sigma[k] * v[(j, k)]),
             Directions::Last(_) => {
@@ -148,8 +142,8 @@ impl<'a> HandleSystem<'a> {
         matrix: Option<&SparseMatrix>,
     ) -> Result<(SpectralMap, RegularizationTarget, Option<Arc<Consistent>>), PrepareError> {
         let analysis = self.analysis;
-        let m = analysis.phi.ncols();
-        check_options(analysis.phi.nrows(), m, options, analysis.memory)?;
+        let m = analysis.found.phi.ncols();
+        check_options(analysis.found.phi.nrows(), m, options, analysis.memory)?;
         let options = drop_zero_weight_regularizer(options);
         let dependent = analysis.decoder.dependent_normals().is_some();
         // Without regularisation the Gauss–Newton steps are held to their start by the small weight of `start_weight` only; the start itself is
@@ -187,7 +181,7 @@ impl<'a> HandleSystem<'a> {
         lambda: f64,
     ) -> Result<SpectralMap, PrepareError> {
         let found = &self.decomposition;
-        let unknowns = self.analysis.phi.ncols();
+        let unknowns = self.analysis.found.phi.ncols();
         let squared = if regularizer == Regularizer::Tikhonov { lambda * lambda } else { lambda };
         let weight = squared * found.rows as f64 / unknowns as f64;
         let map = match &found.directions {
@@ -208,16 +202,15 @@ impl<'a> HandleSystem<'a> {
         let Some(target) = &map.target else { return RegularizationTarget::None };
         let to_cage = self.decomposition.directions.to_cage(target.as_ref());
         let positions = self.analysis.decoder.positions();
-        let operator = with_zero_row_sums(to_cage, positions);
-        let rest = &self.analysis.rest;
+        let rest = &self.analysis.found.rest;
         if reference == Reference::RestCage {
+            let operator = with_zero_row_sums(to_cage, positions);
             return RegularizationTarget::Constant(linalg::product(
                 operator.as_ref(),
                 about_first(rest, positions).as_ref(),
             ));
         }
-        let first = rest.iter().flatten().map(|&x| x as f32).collect();
-        RegularizationTarget::Previous { operator, first }
+        RegularizationTarget::towards_previous(to_cage, rest, positions)
     }
 }
 
@@ -234,9 +227,4 @@ fn start_weight(options: SolverOptions) -> f64 {
     const WITHOUT_TERM: f64 = 1e-3;
     let has_term = options.regularizer.is_sub_spectral() || options.regularizer == Regularizer::Global;
     if has_term && !is_unregularized(options) { options.lambda } else { WITHOUT_TERM }
-}
-
-/// Unknowns relative to the first vertex, m × 3, which keeps precision; the target does not depend on translations.
-pub(super) fn about_first(unknowns: &[Point], positions: usize) -> Mat<f64> {
-    Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { unknowns[0][k] } else { 0.0 })
 }

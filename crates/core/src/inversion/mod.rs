@@ -9,6 +9,7 @@ mod context;
 mod error;
 mod factored;
 mod handle_system;
+mod least_squares;
 mod nearness;
 mod operator;
 mod options;

@@ -3,7 +3,7 @@
 //! held to the shape of the rest cage over the whole spectrum, `min ‖A (C' − C)‖² + λ ‖Δ (C' − C_R)‖²`, with the smallest λ that keeps the cage near.
 
 use crate::cage::Cage;
-use crate::regularize::cage_laplacian;
+use crate::regularize::{add_term, cage_laplacian};
 use cager_geometry::linalg;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::Aabb;
@@ -45,6 +45,16 @@ pub struct NearnessParts {
 }
 
 impl Nearness {
+    /// For the points of a rest pose, from F with `FᵀF = AᵀA`; `None` where there is no cage.
+    pub(super) fn new(factor: Mat<f64>, unknowns: &[Point], cage: &Cage, points: &[Point]) -> Option<Self> {
+        Self::from_parts(NearnessParts {
+            factor,
+            rest: Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k]),
+            faces: cage.mesh().triangles.clone(),
+            margin: max_distance(&Aabb::around_all(points), cage.vertices()),
+        })
+    }
+
     /// `None` where the parts are no cage.
     pub(super) fn from_parts(data: NearnessParts) -> Option<Self> {
         let last = data.faces.iter().flatten().max()?;
@@ -128,16 +138,13 @@ impl Nearness {
         let mut system = gram.clone();
         for i in 0..m {
             system[(i, i)] += weight * DISPLACEMENT;
-            let entries: Vec<(usize, f64)> = (0..m).map(|j| (j, delta[(i, j)])).filter(|&(_, x)| x != 0.0).collect();
-            for &(a, x) in &entries {
-                entries.iter().for_each(|&(b, y)| system[(a, b)] += weight * x * y);
-            }
         }
+        add_term(&mut system, delta.as_ref(), weight);
         linalg::cholesky(system)
     }
 }
 
 /// Largest distance of a point from a box.
-pub(super) fn max_distance(from: &Aabb, places: &[Point]) -> f64 {
+fn max_distance(from: &Aabb, places: &[Point]) -> f64 {
     places.iter().map(|&p| from.distance2(p.into())).fold(0.0, f64::max).sqrt()
 }

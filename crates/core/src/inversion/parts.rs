@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// The data of a solver as plain arrays.
 #[derive(Clone, Debug)]
 pub struct SolverParts {
-    /// Indices of the points read; where every point is read, those of maximum volume.
+    /// Indices of the points read; where every point is read, those of maximum volume, if they were chosen.
     pub handles: Vec<u32>,
     /// Whether the inversion reads every point instead of the handles.
     pub reads_all: bool,
@@ -92,7 +92,7 @@ impl Solver {
             && (1..=columns).contains(&positions)
             && operator.ncols() == m
             && operator.nrows() == if reads_all { n } else { handles.len() }
-            && (1..=n).contains(&handles.len())
+            && (reads_all || (1..=n).contains(&handles.len()))
             && handles.iter().all(|&h| (h as usize) < n)
             && target.fits(m)
             && dependent.as_ref().is_none_or(|dependent| dependent.fits(columns, positions))

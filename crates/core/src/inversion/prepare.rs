@@ -1,7 +1,8 @@
 //! Preparation of a solver: coordinates, handles, spectrum and operator.
 
+use super::analysed_coordinates::checked_coordinates;
 use super::checks::{check, reject_far_points};
-use super::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions, Step};
+use super::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions, Step, least_squares};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
 use cager_geometry::mesh::Point;
@@ -48,8 +49,18 @@ impl Solver {
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
         // A matrix that does not fit the cage is refused before anything is computed.
-        options.regularizer.delta(context.matrix, cage, system.values(cage).unknowns())?;
-        let analysis = Analysis::for_solver(system, cage, points, options, context)?;
+        let values = system.values(cage);
+        let unknowns = values.unknowns();
+        let delta = options.regularizer.delta(context.matrix, cage, unknowns)?;
+        let mut found = checked_coordinates((system, cage, points), options, Some(options.handles), context)?;
+        if values.dependent_normals.is_none() && least_squares::applies(options, unknowns) {
+            match least_squares::solver(found, cage, delta.as_ref(), options, context)? {
+                Ok(solver) => return Ok(solver),
+                Err(ill_conditioned) => found = ill_conditioned,
+            }
+        }
+        drop(delta);
+        let analysis = Analysis::for_solver(found, cage, options, context)?;
         context.begin(Step::Operator)?;
         analysis.handle_system(options.handles)?.solver(options, context.matrix)
     }

@@ -4,7 +4,7 @@ use super::consistent::Consistent;
 use super::context::PreparationReport;
 use super::nearness::Nearness;
 use super::{Convergence, RegularizationTarget};
-use crate::batch::product_columns;
+use crate::batch::{BATCH, product_columns};
 use crate::decode::Decoder;
 use cager_geometry::linalg::{self, BLOCK_ROWS};
 use cager_geometry::mesh::Point;
@@ -55,8 +55,9 @@ impl Solver {
         &self.preparation
     }
 
-    /// Indices of the points read, K, in the order in which they are read. With [`Handles::All`](crate::handles::Handles::All) these are those of
-    /// maximum volume, although every point is read; for a very large model they are its sample, and no other point is read.
+    /// Indices of the points read, K, in the order in which they are read. With [`Handles::All`](crate::handles::Handles::All) every point is
+    /// read: these are those of maximum volume, or none where no handles were chosen; for a very large model they are its sample, and no
+    /// other point is read.
     pub fn handles(&self) -> &[u32] {
         &self.handles
     }
@@ -84,14 +85,29 @@ impl Solver {
         self.target.is_previous()
     }
 
-    /// The cages of up to [`BATCH`](super::BATCH) frames. Where cages depend on the previous frame, these are consecutive frames, and `previous` is the cage of the
-    /// frame before them, `None` at the beginning. Other solvers ignore it.
+    /// The cages of frames, in batches of [`BATCH`]. Where cages depend on the previous frame, these are consecutive frames, and `previous` is the
+    /// cage of the frame before them, `None` at the beginning. Other solvers ignore it.
     ///
-    /// The cage of a frame is bit-identical whatever the other frames of the batch, and whichever rows are given.
+    /// The cage of a frame is bit-identical whatever the other frames, and whichever rows are given.
     ///
     /// # Panics
-    /// Where lengths do not fit, more frames come than a batch holds, or the solver reads every point and only handles are given.
+    /// Where lengths do not fit, or the solver reads every point and only handles are given.
     pub fn invert<T: Copy + Into<f64>>(
+        &self,
+        rows: Rows,
+        previous: Option<&[f32]>,
+        frames: &[&[T]],
+    ) -> Vec<InvertedFrame> {
+        let mut solved: Vec<InvertedFrame> = Vec::with_capacity(frames.len());
+        for batch in frames.chunks(BATCH) {
+            let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
+            let batch = self.invert_batch(rows, before, batch);
+            solved.extend(batch);
+        }
+        solved
+    }
+
+    fn invert_batch<T: Copy + Into<f64>>(
         &self,
         rows: Rows,
         previous: Option<&[f32]>,

@@ -1,5 +1,7 @@
 //! Regularisation towards a reference cage: what it adds to `R · H`.
 
+use super::translations::with_zero_row_sums;
+use cager_geometry::mesh::Point;
 use faer::Mat;
 
 /// The cage towards which solutions are regularised, as its contribution to the solution.
@@ -19,6 +21,12 @@ pub enum RegularizationTarget {
 }
 
 impl RegularizationTarget {
+    /// Towards the previous frame's cage by this linear map of it, and at first towards the rest cage.
+    pub(super) fn towards_previous(to_cage: Mat<f64>, rest: &[Point], positions: usize) -> Self {
+        let first = rest.iter().flatten().map(|&x| x as f32).collect();
+        Self::Previous { operator: with_zero_row_sums(to_cage, positions), first }
+    }
+
     /// Whether frames depend on their predecessors.
     pub fn is_previous(&self) -> bool {
         matches!(self, Self::Previous { .. })

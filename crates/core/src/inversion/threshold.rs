@@ -44,7 +44,7 @@ impl HandleSystem<'_> {
         bound: f64,
     ) -> Result<Threshold, PrepareError> {
         assert!(!frames.is_empty(), "a frame to measure");
-        let m = self.analysis.phi.ncols();
+        let m = self.analysis.found.phi.ncols();
         let error = |spectrum: usize| -> Result<f64, PrepareError> {
             Ok(mean_error(&self.solver(SolverOptions { spectrum, ..options }, matrix)?, frames))
         };

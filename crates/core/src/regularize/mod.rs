@@ -12,7 +12,7 @@ pub(crate) use spectral::{DataMap, RegularizationOperator, SpectralMap, Spectrum
 
 use crate::cage::Cage;
 use cager_geometry::linalg::SparseMatrix;
-use faer::Mat;
+use faer::{Mat, MatRef};
 
 /// How the unstable end of the spectrum is treated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -153,3 +153,13 @@ fn expected(vertices: usize, unknowns: usize) -> String {
 
 /// Directions with a singular value below this fraction of the largest amplify single-precision cages beyond use.
 pub const WEAK_SINGULAR_VALUE: f64 = 1e-6;
+
+/// Adds `weight · ΔᵀΔ`, for a Δ of few entries in each row.
+pub(crate) fn add_term(system: &mut Mat<f64>, delta: MatRef<'_, f64>, weight: f64) {
+    for row in delta.row_iter() {
+        let entries: Vec<(usize, f64)> = row.iter().copied().enumerate().filter(|&(_, x)| x != 0.0).collect();
+        for &(a, x) in &entries {
+            entries.iter().for_each(|&(b, y)| system[(b, a)] += weight * x * y);
+        }
+    }
+}
