@@ -1,20 +1,18 @@
 //! Alembic archives in the Ogawa container: one polygon mesh that moves, read frame by frame and written frame by frame.
 //!
-//! An archive is a tree of objects; a mesh is a `PolyMesh` or a `SubD`, and lies below transforms, which are applied. Alembic winds faces clockwise;
-//! they are turned around on the way in and on the way out. An archive says neither its unit nor which axis points up.
+//! An archive is a tree of objects; a mesh is a `PolyMesh` or a `SubD`, and lies below transforms, which are applied. Alembic
+//! winds faces clockwise; they are turned around on the way in and on the way out. An archive says neither its unit nor which
+//! axis points up.
 
-mod choice;
 mod fields;
-mod frames;
 mod mesh;
 mod objects;
 mod ogawa;
 mod properties;
 mod sampling;
 mod timing;
-mod transform;
 mod unread;
 mod write;
 
-pub(crate) use frames::{open_frames, read_model};
+pub(crate) use mesh::open;
 pub(crate) use write::{MeshWriter, Numbers, Schedule};

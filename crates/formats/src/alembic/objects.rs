@@ -1,13 +1,14 @@
 //! The tree of objects of an archive: what each is called, what it is, what it lies below.
 
 use std::io::{Read, Seek};
+use std::sync::Arc;
 
 use super::fields::Fields;
 use super::ogawa::{Container, DATA, damaged};
 use super::sampling::Sampling;
 use crate::error::Fault;
 use crate::frames::nominal;
-use crate::scene::Failure;
+use crate::scene::{Failure, Node};
 
 /// Objects of an archive, and how deep they nest; programs write far fewer.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -49,12 +50,7 @@ impl Kind {
 
 #[derive(Debug)]
 pub(super) struct Object {
-    pub(super) name: Vec<u8>,
     pub(super) kind: Kind,
-    /// Index of the object that it lies below; none for those at the top.
-    pub(super) parent: Option<usize>,
-    /// How many names its path has.
-    pub(super) depth: usize,
     /// Offset of its group.
     pub(super) group: u64,
 }
@@ -66,6 +62,7 @@ pub(super) struct Archive<R> {
     /// Frames per second of the program that wrote it.
     pub(super) frame_rate: Option<f64>,
     /// Each comes before what lies below it, and that before its next sibling.
+    pub(super) nodes: Vec<Node>,
     pub(super) objects: Vec<Object>,
 }
 
@@ -80,14 +77,15 @@ impl<R: Read + Seek> Archive<R> {
         let samplings = Sampling::table(&container.contents(times)?)?;
         let metadata = container.contents(metadata)?;
         let kinds = kinds(&metadata)?;
-        let mut objects = Vec::new();
+        let (mut nodes, mut objects) = (Vec::new(), Vec::new());
         // Objects that are yet to be entered, the next one last.
         let mut waiting = children_of(&mut container, (top, None, 1), &kinds)?;
-        while let Some(object) = waiting.pop() {
+        while let Some((node, object)) = waiting.pop() {
             if object.group & DATA == 0 {
-                let place = (object.group, Some(objects.len()), object.depth + 1);
+                let place = (object.group, Some(objects.len()), node.depth + 1);
                 waiting.extend(children_of(&mut container, place, &kinds)?);
             }
+            nodes.push(node);
             objects.push(object);
             if objects.len() + waiting.len() > MOST_OBJECTS {
                 return Err(too_many().into());
@@ -95,7 +93,7 @@ impl<R: Read + Seek> Archive<R> {
         }
         // What follows reads the properties of some objects, some of them twice.
         container.allow(4);
-        Ok(Self { container, samplings, frame_rate, objects })
+        Ok(Self { container, samplings, frame_rate, nodes, objects })
     }
 }
 
@@ -108,7 +106,7 @@ fn children_of<R: Read + Seek>(
     container: &mut Container<R>,
     (group, parent, depth): (u64, Option<usize>, usize),
     kinds: &[Kind],
-) -> Result<Vec<Object>, Failure> {
+) -> Result<Vec<(Node, Object)>, Failure> {
     let children = container.children(group)?;
     // The first are its own properties, the last are the headers of the others.
     let [_, groups @ .., headers] = children.as_slice() else { return Ok(Vec::new()) };
@@ -127,7 +125,7 @@ fn children_of<R: Read + Seek>(
     let mut objects = Vec::new();
     for &group in groups {
         let length = fields.number(2)?;
-        let name = fields.take(length)?.to_vec();
+        let name = Arc::from(fields.take(length)?);
         let kind = match fields.number(0)? {
             INLINE => {
                 let length = fields.number(2)?;
@@ -135,7 +133,7 @@ fn children_of<R: Read + Seek>(
             }
             index => *kinds.get(index).ok_or_else(|| damaged("an object has metadata that are not there"))?,
         };
-        objects.push(Object { name, kind, parent, depth, group });
+        objects.push((Node { name, parent, depth }, Object { kind, group }));
     }
     objects.reverse();
     Ok(objects)

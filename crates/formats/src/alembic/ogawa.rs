@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom};
 
 use crate::error::Fault;
 use crate::frames::{Scalar, read_values};
-use crate::scene::Failure;
+use crate::scene::{Failure, MOST_OPERATIONS, Points, Value, Values};
 use crate::signature::Signature;
 
 /// Set in the offset of a block of data, clear in that of a group.
@@ -36,6 +36,9 @@ pub(super) struct Container<R> {
     length: u64,
     /// Bytes of tables that may still be read: in an archive that is whole no two of them overlap.
     allowance: u64,
+    /// How positions are stored.
+    pub(super) scalar: Scalar,
+    block: Vec<u8>,
 }
 
 impl<R: Read + Seek> Container<R> {
@@ -63,7 +66,8 @@ impl<R: Read + Seek> Container<R> {
         }
         let [.., a, b, c, d, e, f, g, h] = *header;
         let root = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
-        Ok((Self { source, length, allowance: length }, root))
+        let (scalar, block) = (Scalar::F32Little, Vec::new());
+        Ok((Self { source, length, allowance: length, scalar, block }, root))
     }
 
     /// Bytes of the file.
@@ -77,35 +81,16 @@ impl<R: Read + Seek> Container<R> {
     }
 
     /// Reads what is known to be there.
-    pub(super) fn read(&mut self, start: u64, out: &mut [u8]) -> Result<(), Failure> {
+    fn read_bytes(&mut self, start: u64, out: &mut [u8]) -> Result<(), Failure> {
         self.source.seek(SeekFrom::Start(start))?;
         Ok(self.source.read_exact(out)?)
     }
 
-    /// Reads values that are known to be there; gives whether all are finite.
-    pub(super) fn read_values(
-        &mut self,
-        start: u64,
-        scalar: Scalar,
-        block: &mut Vec<u8>,
-        out: &mut [f64],
-    ) -> Result<bool, Failure> {
-        Ok(read_values(&mut self.source, start, scalar, block, out)?)
-    }
-
-    /// The children of a group that is a table, not the samples of a property.
+    /// The children of a group.
     pub(super) fn children(&mut self, group: u64) -> Result<Vec<u64>, Failure> {
         let Some(block) = self.group(group)? else { return Ok(Vec::new()) };
         let bytes = self.table(block)?;
         Ok(bytes.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
-    }
-
-    /// The `index`-th child of a group.
-    pub(super) fn child(&mut self, group: u64, index: u64) -> Result<u64, Failure> {
-        match self.group(group)? {
-            Some(Block { start, length }) if index < length / 8 => self.number(start + 8 * index),
-            _ => Err(damaged("a sample is missing").into()),
-        }
     }
 
     /// A block of data that is a table, not a sample.
@@ -115,7 +100,7 @@ impl<R: Read + Seek> Container<R> {
     }
 
     /// Where the bytes of data are.
-    pub(super) fn data(&mut self, data: u64) -> Result<Block, Failure> {
+    fn data(&mut self, data: u64) -> Result<Block, Failure> {
         if data & DATA == 0 {
             return Err(damaged("a group lies where data belong").into());
         }
@@ -147,7 +132,7 @@ impl<R: Read + Seek> Container<R> {
 
     fn number(&mut self, at: u64) -> Result<u64, Failure> {
         let mut bytes = [0; 8];
-        self.read(at, &mut bytes)?;
+        self.read_bytes(at, &mut bytes)?;
         Ok(u64::from_le_bytes(bytes))
     }
 
@@ -157,7 +142,59 @@ impl<R: Read + Seek> Container<R> {
         let overlap = || damaged("its tables overlap");
         self.allowance = self.allowance.checked_sub(block.length.saturating_add(8)).ok_or_else(overlap)?;
         let mut bytes = vec![0; usize::try_from(block.length).map_err(|_| overlap())?];
-        self.read(block.start, &mut bytes)?;
+        self.read_bytes(block.start, &mut bytes)?;
         Ok(bytes)
+    }
+
+    /// Where the numbers of a sample are, behind what tells its contents apart from others.
+    pub(super) fn sample(&mut self, value: Value) -> Result<Block, Failure> {
+        let Block { start, length } = self.data(value.0)?;
+        if length > 0 && length < DIGEST {
+            return Err(damaged("a sample is too short").into());
+        }
+        let digest = DIGEST.min(length);
+        Ok(Block { start: start + digest, length: length - digest })
+    }
+
+    /// The bytes of a sample that is small: `most` at the most. They cost nothing, as some are read for every frame.
+    pub(super) fn small(&mut self, value: Value, most: u64, name: &str) -> Result<Vec<u8>, Failure> {
+        let block = self.sample(value)?;
+        if block.length > most {
+            return Err(damaged(&format!("{name} has {} bytes where {most} are the most", block.length)).into());
+        }
+        let mut bytes = vec![0; block.length as usize];
+        self.read_bytes(block.start, &mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+impl<R: Read + Seek + Send> Values for Container<R> {
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
+        let bytes = self.small(value, 8 * 16 * MOST_OPERATIONS as u64, ".vals")?;
+        Ok(bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+    }
+
+    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {
+        let block = self.sample(value)?;
+        if block.length / 4 > most {
+            return Err(
+                damaged(&format!("it has {} numbers of faces where {most} are the most", block.length / 4)).into()
+            );
+        }
+        Ok(self.table(block)?.as_chunks().0.iter().map(|bytes| i32::from_le_bytes(*bytes)).collect())
+    }
+
+    fn points(&mut self, value: Value) -> Result<Points, Failure> {
+        let Block { start, length } = self.sample(value)?;
+        let size = 3 * self.scalar.size() as u64;
+        if length % size != 0 {
+            return Err(damaged("its positions end within a point").into());
+        }
+        let count = usize::try_from(length / size).unwrap_or(usize::MAX);
+        Ok(Points { start, count, scalar: self.scalar })
+    }
+
+    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure> {
+        Ok(read_values(&mut self.source, points.start, points.scalar, &mut self.block, out)?)
     }
 }

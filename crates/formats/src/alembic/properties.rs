@@ -4,9 +4,8 @@ use std::io::{Read, Seek};
 
 use super::fields::Fields;
 use super::objects::{Archive, INLINE};
-use super::ogawa::{Block, Container, DATA, DIGEST, damaged};
-use super::sampling::Sampling;
-use crate::scene::Failure;
+use super::ogawa::{Container, DATA, damaged};
+use crate::scene::{Failure, Track, Value, check_held};
 
 /// Types of numbers, as headers tell them.
 pub(super) const BOOL: u8 = 0;
@@ -50,47 +49,21 @@ impl Property {
         self.samples < 2 || (self.first, self.last) == (0, 0)
     }
 
-    /// The sample at a time in seconds, and how far that is on its way to the next.
-    pub(super) fn find(&self, seconds: f64, samplings: &[Sampling]) -> (usize, f64) {
-        samplings[self.sampling].find(seconds, self.samples)
-    }
-
     /// Where a sample lies among those that are stored: repetitions at the beginning and the end are not.
-    fn place(&self, sample: usize) -> u64 {
-        if self.is_constant() || sample < self.first {
-            return 0;
-        }
-        (sample.min(self.last) + 1).saturating_sub(self.first) as u64
+    fn place(&self, sample: usize) -> usize {
+        if sample < self.first { 0 } else { (sample.min(self.last) + 1).saturating_sub(self.first) }
     }
 
-    /// Where the values of a sample are.
-    pub(super) fn sample<R: Read + Seek>(&self, container: &mut Container<R>, sample: usize) -> Result<Block, Failure> {
-        // Arrays have their sizes between.
-        let step = if self.kind == Kind::Array { 2 } else { 1 };
-        let data = container.child(self.group, self.place(sample) * step)?;
-        let Block { start, length } = container.data(data)?;
-        let digest = DIGEST.min(length);
-        if length > 0 && length < DIGEST {
-            return Err(damaged("a sample is too short").into());
-        }
-        Ok(Block { start: start + digest, length: length - digest })
+    /// The bytes of the first sample, `most` at the most.
+    pub(super) fn small<R: Read + Seek>(&self, container: &mut Container<R>, most: u64) -> Result<Vec<u8>, Failure> {
+        let first = self.first(container)?;
+        container.small(first, most, &String::from_utf8_lossy(&self.name))
     }
 
-    /// The bytes of a sample that is small: `most` at the most. They cost nothing, as some are read for every frame.
-    pub(super) fn table<R: Read + Seek>(
-        &self,
-        container: &mut Container<R>,
-        sample: usize,
-        most: usize,
-    ) -> Result<Vec<u8>, Failure> {
-        let block = self.sample(container, sample)?;
-        if block.length > most as u64 {
-            let name = String::from_utf8_lossy(&self.name);
-            return Err(damaged(&format!("{name} has {} bytes where {most} are the most", block.length)).into());
-        }
-        let mut bytes = vec![0; block.length as usize];
-        container.read(block.start, &mut bytes)?;
-        Ok(bytes)
+    /// Where the first sample is.
+    pub(super) fn first<R: Read + Seek>(&self, container: &mut Container<R>) -> Result<Value, Failure> {
+        let children = container.children(self.group)?;
+        Ok(children.first().map(|&data| Value(data)).ok_or_else(|| damaged("a sample is missing"))?)
     }
 }
 
@@ -100,6 +73,24 @@ pub(super) fn find<'a>(properties: &'a [Property], name: &str, kind: Kind) -> Op
 }
 
 impl<R: Read + Seek> Archive<R> {
+    /// Where the samples of a property are, and when.
+    pub(super) fn track(&mut self, property: &Property) -> Result<Track, Failure> {
+        let &Property { samples, kind, .. } = property;
+        if property.is_constant() {
+            return Ok(Track { default: Some(property.first(&mut self.container)?), ..Track::default() });
+        }
+        // Arrays have their sizes between.
+        let step = if kind == Kind::Array { 2 } else { 1 };
+        let children = self.container.children(property.group)?;
+        check_held(samples, samples / 2 <= children.len() / step)?;
+        let times = self.samplings[property.sampling].times(samples)?;
+        let value = |sample| {
+            let data = children.get(property.place(sample) * step);
+            data.map(|&data| Value(data)).ok_or_else(|| damaged("a sample is missing"))
+        };
+        Ok(Track { default: None, times, values: (0..samples).map(value).collect::<Result<_, _>>()? })
+    }
+
     /// The properties of an object.
     pub(super) fn top_properties(&mut self, object: usize) -> Result<Vec<Property>, Failure> {
         let children = self.container.children(self.objects[object].group)?;

@@ -39,73 +39,45 @@ impl Sampling {
         Ok(found)
     }
 
-    /// The times of all that has samples, of each so many; and how many these are.
-    pub(super) fn union(all: &[(&Self, usize)]) -> (Self, usize) {
-        let Some(&(most, count)) = all.iter().max_by_key(|(_, samples)| *samples) else {
-            return (Self { cycle: ACYCLIC, stored: vec![0.0] }, 1);
-        };
-        if all.iter().all(|(other, _)| *other == most) {
-            return (most.clone(), count);
-        }
-        let mut times: Vec<f64> =
-            all.iter().flat_map(|(sampling, samples)| (0..*samples).map(|sample| sampling.time(sample))).collect();
-        times.sort_by(f64::total_cmp);
-        let length = times.last().unwrap_or(&0.0) - times[0];
-        let near = NEAR * length / times.len() as f64;
-        times.dedup_by(|later, earlier| *later - *earlier <= near);
-        // As they are stored where others are at the same times.
-        if times.len() == count {
-            return (most.clone(), count);
-        }
-        let (step, start) = (length / (times.len() - 1).max(1) as f64, times[0]);
-        let is_even = |(k, time): (usize, &f64)| (time - start - step * k as f64).abs() <= NEAR * step;
-        let count = times.len();
-        if count > 1 && times.iter().enumerate().all(is_even) {
-            return (Self { cycle: step, stored: vec![start] }, count);
-        }
-        (Self { cycle: ACYCLIC, stored: times }, count)
-    }
-
     fn is_acyclic(&self) -> bool {
         self.cycle >= NO_CYCLE
     }
 
-    /// Seconds between samples, where that is the same for all, and the time of the first.
-    pub(super) fn even(&self) -> Option<(f64, f64)> {
-        let (step, start) = (self.cycle / self.stored.len() as f64, self.stored[0]);
-        let is_even = |(k, time): (usize, &f64)| (time - start - step * k as f64).abs() <= NEAR * step.abs();
-        (!self.is_acyclic() && self.stored.iter().enumerate().all(is_even)).then_some((step, start))
+    /// Seconds between samples, where that is the same for all.
+    pub(super) fn step(&self) -> Option<f64> {
+        let step = self.cycle / self.stored.len() as f64;
+        (!self.is_acyclic() && is_even(&self.stored, step)).then_some(step)
     }
 
-    /// Whether so many samples have a time.
-    pub(super) fn covers(&self, samples: usize) -> bool {
-        !self.is_acyclic() || samples <= self.stored.len()
+    /// Seconds between times, where that is the same for all of several.
+    pub(super) fn step_of(times: &[f64]) -> Option<f64> {
+        let step = (times.last()? - times[0]) / (times.len() - 1) as f64;
+        is_even(times, step).then_some(step)
     }
 
-    /// The time of a sample.
-    pub(super) fn time(&self, sample: usize) -> f64 {
+    /// The times of so many samples.
+    pub(super) fn times(&self, samples: usize) -> Result<Vec<f64>, Fault> {
         let count = self.stored.len();
-        if self.is_acyclic() {
-            return self.stored[sample.min(count - 1)];
+        if self.is_acyclic() && samples > count {
+            return Err(damaged(&format!("it promises {samples} frames, of which not all can be there")));
         }
-        self.stored[sample % count] + self.cycle * (sample / count) as f64
+        let cycle = if self.is_acyclic() { 0.0 } else { self.cycle };
+        let times: Vec<f64> = (0..samples).map(|k| self.stored[k % count] + cycle * (k / count) as f64).collect();
+        match times.windows(2).find(|pair| pair[0] >= pair[1]) {
+            None => Ok(times),
+            Some(pair) => {
+                let what = format!(
+                    "has a sample at {} s after one at {} s; export it again with times in seconds",
+                    pair[1], pair[0]
+                );
+                Err(Fault::invalid(what))
+            }
+        }
     }
+}
 
-    /// The last of `samples` samples that is not after a time, and how far the time is on its way to the next, from 0 to 1.
-    pub(super) fn find(&self, time: f64, samples: usize) -> (usize, f64) {
-        let last = samples.saturating_sub(1);
-        let (mut low, mut high) = (0, last);
-        while low < high {
-            let middle = low + (high - low).div_ceil(2);
-            if self.time(middle) <= time { low = middle } else { high = middle - 1 }
-        }
-        let (before, after) = (self.time(low), self.time((low + 1).min(last)));
-        let share = if after > before { (time - before) / (after - before) } else { 0.0 };
-        if share > 1.0 - NEAR {
-            return (low + usize::from(low < last), 0.0);
-        }
-        (low, if share > NEAR { share } else { 0.0 })
-    }
+fn is_even(times: &[f64], step: f64) -> bool {
+    times.iter().enumerate().all(|(k, time)| (time - times[0] - step * k as f64).abs() <= NEAR * step.abs())
 }
 
 #[cfg(test)]
@@ -121,35 +93,13 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_found_by_their_times() {
+    fn samples_have_times() {
         let all = [table(0.5, &[1.0]), table(1.0, &[0.0, 0.75]), table(ACYCLIC, &[0.0, 1.0, 4.0])].concat();
         let [even, cyclic, acyclic] = &Sampling::table(&all).unwrap()[..] else { panic!("three samplings") };
-        assert_eq!((even.even(), cyclic.even(), acyclic.even()), (Some((0.5, 1.0)), None, None));
-        assert_eq!((even.time(4), cyclic.time(3), acyclic.time(2)), (3.0, 1.75, 4.0));
-        assert!(even.covers(1000) && acyclic.covers(3) && !acyclic.covers(4));
-        for sampling in [even, cyclic, acyclic] {
-            for sample in 0..3 {
-                assert_eq!(sampling.find(sampling.time(sample), 3), (sample, 0.0));
-            }
-        }
-        assert_eq!(acyclic.find(2.5, 3), (1, 0.5));
-        assert_eq!((acyclic.find(-7.0, 3), acyclic.find(7.0, 3)), ((0, 0.0), (2, 0.0)));
-        assert_eq!(even.find(1.0 + 1e-9, 1), (0, 0.0));
-    }
-
-    #[test]
-    fn a_union_has_all_times_once() {
-        let all = [table(0.2, &[1.0]), table(1.0, &[1.0]), table(ACYCLIC, &[1.0, 1.5, 4.0])].concat();
-        let [fine, coarse, own] = &Sampling::table(&all).unwrap()[..] else { panic!("three samplings") };
-        assert_eq!(Sampling::union(&[(fine, 11), (coarse, 3)]), (fine.clone(), 11));
-        assert_eq!(Sampling::union(&[(coarse, 3), (coarse, 2)]), (coarse.clone(), 3));
-        let times = |all: &[(&Sampling, usize)]| {
-            let (sampling, count) = Sampling::union(all);
-            (0..count).map(|sample| sampling.time(sample)).collect::<Vec<_>>()
-        };
-        assert_eq!(times(&[(coarse, 2), (own, 3)]), [1.0, 1.5, 2.0, 4.0]);
-        // Those behind the points as well.
-        assert_eq!(times(&[(fine, 3), (coarse, 3)]), [1.0, 1.2, 1.4, 2.0, 3.0]);
+        assert_eq!((even.step(), cyclic.step(), acyclic.step()), (Some(0.5), None, None));
+        let last = |sampling: &Sampling, samples| sampling.times(samples).unwrap().pop().unwrap();
+        assert_eq!((last(even, 5), last(cyclic, 4), last(acyclic, 3)), (3.0, 1.75, 4.0));
+        assert!(even.times(1000).is_ok() && acyclic.times(4).is_err());
     }
 
     #[test]

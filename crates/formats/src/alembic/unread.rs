@@ -5,7 +5,7 @@ use std::io::{Read, Seek};
 use super::objects::{Archive, Kind as ObjectKind};
 use super::properties::{Kind, Property, find};
 use crate::dropped::{Dropped, counted, listed};
-use crate::scene::{Failure, Objects};
+use crate::scene::{Failure, ancestry};
 
 /// Adds what a mesh has beside points and faces.
 pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped: &mut Dropped) -> Result<(), Failure> {
@@ -31,8 +31,7 @@ pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped
             dropped.add(what);
         }
     }
-    let is_set =
-        |k: &usize| archive.objects[*k].kind == ObjectKind::FaceSet && archive.objects[*k].parent == Some(mesh);
+    let is_set = |k: &usize| archive.objects[*k].kind == ObjectKind::FaceSet && archive.nodes[*k].parent == Some(mesh);
     let sets: Vec<usize> = (0..archive.objects.len()).filter(is_set).collect();
     let mut has_material = false;
     for &object in sets.iter().take(1).chain([&mesh]) {
@@ -42,7 +41,7 @@ pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped
         dropped.add_on_faces("materials");
     }
     if !sets.is_empty() {
-        let names = listed(sets.iter().map(|&set| archive.objects[set].name.as_slice()));
+        let names = listed(sets.iter().map(|&set| &*archive.nodes[set].name));
         dropped.add_on_faces(format!("{} of faces ({names})", counted(sets.len(), "set")));
     }
     Ok(())
@@ -50,7 +49,7 @@ pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped
 
 /// A note of a mesh that is hidden in some frames.
 pub(super) fn visibility<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize) -> Result<Option<String>, Failure> {
-    for object in archive.ancestry(mesh).collect::<Vec<_>>() {
+    for object in ancestry(&archive.nodes, mesh).collect::<Vec<_>>() {
         let properties = archive.top_properties(object)?;
         if find(&properties, "visible", Kind::Scalar).is_some_and(|visible| !visible.is_constant()) {
             return Ok(Some("its visibility is animated, which is not kept".to_owned()));

@@ -12,6 +12,7 @@ use super::{CacheFormat, FrameReader, FrameSelection, maya, mdd, npy, pc2};
 use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::glb;
+use crate::scene::{self, Failure, MovingMesh};
 use crate::signature::Signature;
 use crate::usd;
 
@@ -40,13 +41,13 @@ pub(super) fn open<'a>(
         CacheFormat::Mdd => mdd::layout(&head),
         CacheFormat::Mcx | CacheFormat::Mc => return maya::open(path, source, length, expected_points, (prim, folder)),
         CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usda | CacheFormat::Usd => {
-            return usd::open_frames(path, source, length, expected_points, prim);
+            return open_scene(path, usd::open(source, length, prim, None), expected_points);
         }
         CacheFormat::Glb | CacheFormat::Gltf => {
             let kind = glb::Source { is_text: format == CacheFormat::Gltf, folder };
             return glb::open_frames(path, (source, length), &kind, expected_points, selection);
         }
-        CacheFormat::Abc => return alembic::open_frames(path, source, length, expected_points, prim),
+        CacheFormat::Abc => return open_scene(path, alembic::open(source, length, prim, None), expected_points),
     };
     let mut layout = layout.map_err(|fault| fault.at(path))?;
     if format == CacheFormat::Mdd && layout.check(length, expected_points, path).is_ok() {
@@ -56,6 +57,14 @@ pub(super) fn open<'a>(
         layout.times = mdd::times(&times).map_err(|fault| fault.at(path))?;
     }
     open_layout(path, source, layout, length, expected_points)
+}
+
+fn open_scene<'a>(
+    path: &Path,
+    opened: Result<MovingMesh<'a>, Failure>,
+    expected_points: usize,
+) -> Result<Box<dyn FrameReader + 'a>, Error> {
+    scene::open(path, opened.map_err(|failure| failure.at(path))?, expected_points)
 }
 
 /// Opens a cache of `length` bytes whose header was read.

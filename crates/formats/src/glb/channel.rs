@@ -1,5 +1,6 @@
 //! One value that an animation moves: its keys, and what lies between them.
 
+use glam::DQuat;
 use gltf::json::animation::{Channel as Stored, Interpolation, Property, Sampler};
 use gltf::json::validation::Checked;
 use gltf::json::{Animation, Node, Root};
@@ -132,25 +133,13 @@ impl Channel {
                     + step * (t3 - t2) * n;
             }
         } else if self.property == Property::Rotation {
-            spherical(out, b, share);
+            let from = DQuat::from_slice(out);
+            let to = DQuat::from_array(std::array::from_fn(|k| b[k].into()));
+            out.copy_from_slice(&from.slerp(to, share).to_array());
         } else {
             out.iter_mut().zip(b).for_each(|(out, &b)| *out += share * (f64::from(b) - *out));
         }
     }
-}
-
-/// Turns from one unit quaternion to another on the shorter way.
-fn spherical(from: &mut [f64], to: &[f32], share: f64) {
-    let dot: f64 = from.iter().zip(to).map(|(a, &b)| a * f64::from(b)).sum();
-    let (sign, cosine) = (dot.signum(), dot.abs().min(1.0));
-    let angle = cosine.acos();
-    // The limit, where both are the same but for rounding.
-    let [a, b] = if angle < 1e-6 {
-        [1.0 - share, share]
-    } else {
-        [(1.0 - share) * angle, share * angle].map(|part| part.sin() / angle.sin())
-    };
-    from.iter_mut().zip(to).for_each(|(from, &to)| *from = a * *from + sign * b * f64::from(to));
 }
 
 /// How many morph targets the mesh of a node has.

@@ -7,8 +7,8 @@ use gltf::json::Root;
 use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
 
-use super::scene::{Placement, Scene};
-use crate::scene::{Failure, Objects, choose as choose_object, list};
+use super::scene::Scene;
+use crate::scene::{Failure, Node, Tree, choose as choose_mesh, list};
 
 /// The placements that are read: the one that `prim` names, or all as one mesh.
 pub(super) fn choose(root: &Root, scene: &Scene, prim: Option<&str>) -> Result<Range<usize>, Failure> {
@@ -16,88 +16,52 @@ pub(super) fn choose(root: &Root, scene: &Scene, prim: Option<&str>) -> Result<R
     if prim.is_none() || all.is_empty() {
         return Ok(all);
     }
-    let mut tree = Tree::of(root, scene);
-    let meshes = tree.meshes();
-    let chosen = choose_object(&mut tree, &meshes, prim)? - root.nodes.len();
+    let (mut tree, meshes) = Meshes::of(root, scene);
+    let chosen = choose_mesh(&mut tree, &meshes, prim)? - root.nodes.len();
     Ok(chosen..chosen + 1)
 }
 
 /// All meshes with their points, as messages have them.
 pub(super) fn listed(root: &Root, scene: &Scene) -> String {
-    let mut tree = Tree::of(root, scene);
-    let meshes = tree.meshes();
+    let (mut tree, meshes) = Meshes::of(root, scene);
     list(&mut tree, &meshes)
 }
 
-/// Nodes, and below them the meshes that they place.
-struct Tree<'a> {
+/// The nodes of a scene, and below them the meshes that they place.
+struct Meshes<'a> {
     root: &'a Root,
     scene: &'a Scene,
-    names: Vec<String>,
-    depths: Vec<usize>,
+    nodes: Vec<Node>,
 }
 
-impl<'a> Tree<'a> {
-    fn of(root: &'a Root, scene: &'a Scene) -> Self {
-        let called =
-            |name: &Option<String>, kind: &str, k: usize| name.clone().unwrap_or_else(|| format!("{kind}_{k}"));
-        let mut names: Vec<String> =
-            root.nodes.iter().enumerate().map(|(k, node)| called(&node.name, "node", k)).collect();
-        names.extend(scene.placements.iter().map(|placement| {
+impl<'a> Meshes<'a> {
+    /// These, and the indices of the meshes among them.
+    fn of(root: &'a Root, scene: &'a Scene) -> (Self, Vec<usize>) {
+        let called = |name: &Option<String>, kind: &str, k: usize| {
+            name.as_ref().map_or_else(|| format!("{kind}_{k}"), String::clone).into_bytes().into()
+        };
+        let places = scene.parents.iter().zip(&scene.depths);
+        let mut nodes: Vec<Node> = (root.nodes.iter().enumerate().zip(places))
+            .map(|((k, node), (&parent, &depth))| Node { name: called(&node.name, "node", k), parent, depth })
+            .collect();
+        let meshes = (nodes.len()..nodes.len() + scene.placements.len()).collect();
+        for placement in &scene.placements {
             let name = root.meshes.get(placement.mesh).and_then(|mesh| mesh.name.clone());
-            called(&name, "mesh", placement.mesh)
-        }));
-        let mut tree = Self { root, scene, names, depths: Vec::new() };
-        tree.depths = tree.find_depths();
-        tree
-    }
-
-    fn find_depths(&self) -> Vec<usize> {
-        let mut depths = vec![0; self.names.len()];
-        let mut above = Vec::new();
-        for object in 0..depths.len() {
-            let mut next = Some(object);
-            while let Some(k) = next.filter(|&k| depths[k] == 0) {
-                above.push(k);
-                next = self.parent(k);
-            }
-            let mut depth = next.map_or(0, |k| depths[k]);
-            for k in above.drain(..).rev() {
-                depth += 1;
-                depths[k] = depth;
-            }
+            let depth = 1 + placement.node.map_or(0, |node| scene.depths[node]);
+            nodes.push(Node { name: called(&name, "mesh", placement.mesh), parent: placement.node, depth });
         }
-        depths
-    }
-
-    fn placement(&self, object: usize) -> Option<&'a Placement> {
-        self.scene.placements.get(object.checked_sub(self.root.nodes.len())?)
-    }
-
-    fn meshes(&self) -> Vec<usize> {
-        (self.root.nodes.len()..self.names.len()).collect()
+        (Self { root, scene, nodes }, meshes)
     }
 }
 
-impl Objects for Tree<'_> {
-    fn name(&self, object: usize) -> &[u8] {
-        self.names[object].as_bytes()
+impl Tree for Meshes<'_> {
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
-    fn parent(&self, object: usize) -> Option<usize> {
-        match self.placement(object) {
-            Some(placement) => placement.node,
-            None => self.scene.parents[object],
-        }
-    }
-
-    fn depth(&self, object: usize) -> usize {
-        self.depths[object]
-    }
-
-    fn told(&mut self, object: usize) -> String {
-        let mesh = self.placement(object).and_then(|placement| placement.mesh_in(self.root).ok());
-        let positions = mesh.into_iter().flat_map(|mesh| &mesh.primitives);
+    fn describe(&mut self, mesh: usize) -> String {
+        let placement = &self.scene.placements[mesh - self.root.nodes.len()];
+        let positions = placement.mesh_in(self.root).into_iter().flat_map(|mesh| &mesh.primitives);
         let positions =
             positions.filter_map(|primitive| primitive.attributes.get(&Checked::Valid(Semantic::Positions)));
         let distinct: HashSet<usize> = positions.map(gltf::json::Index::value).collect();

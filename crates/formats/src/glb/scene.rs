@@ -1,24 +1,21 @@
 //! Where the meshes of a scene stand.
 
 use cager_geometry::mesh::Point;
-use cager_geometry::vector::{add, combination, cross, dot};
+use glam::{DAffine3, DQuat, DVec3, Vec3};
 use gltf::json::{Index, Mesh, Node, Root};
 
 use super::faults::dangling;
 use crate::error::Fault;
 
-/// Columns of a 4 × 4 matrix without its last row, which is 0 0 0 1.
-pub(super) type Affine = [[f64; 3]; 4];
-
-pub(super) const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]];
-
 /// The meshes of the default scene.
 pub(super) struct Scene {
     pub(super) placements: Vec<Placement>,
     /// From each node's space to the world's; none for nodes outside the scene.
-    worlds: Vec<Option<Affine>>,
+    worlds: Vec<Option<DAffine3>>,
     /// The node above each.
     pub(super) parents: Vec<Option<usize>>,
+    /// How many nodes are in the path of each.
+    pub(super) depths: Vec<usize>,
 }
 
 /// A mesh at its place in the scene.
@@ -28,7 +25,7 @@ pub(super) struct Placement {
     pub(super) node: Option<usize>,
     /// The skin whose joints say where the mesh is.
     pub(super) skin: Option<usize>,
-    transform: Affine,
+    transform: DAffine3,
 }
 
 impl Placement {
@@ -38,7 +35,7 @@ impl Placement {
     }
 
     pub(super) fn apply(&self, p: Point) -> Point {
-        if self.transform == IDENTITY { p } else { apply(&self.transform, p) }
+        if self.transform == DAffine3::IDENTITY { p } else { self.transform.transform_point3(p.into()).into() }
     }
 
     /// Whether triangles turn around, so that they must be turned back.
@@ -50,7 +47,7 @@ impl Placement {
 impl Scene {
     /// The meshes of the default scene that are shown, or all of it where none is, in the order of their nodes, or all meshes as they are where no node has one.
     pub(super) fn of(root: &Root) -> Result<Self, Fault> {
-        let Tree { worlds, parents, hidden } = Tree::of(root)?;
+        let Tree { worlds, parents, depths, hidden } = Tree::of(root)?;
         let mut placements = Vec::new();
         let all_hidden =
             (0..root.nodes.len()).all(|k| root.nodes[k].mesh.is_none() || worlds[k].is_none() || hidden[k]);
@@ -67,11 +64,11 @@ impl Scene {
             }
             // The joints of a skin, not its node, say where it is.
             let skin = node.skin.map(|skin| skin.value());
-            let transform = if skin.is_some() { IDENTITY } else { *world };
+            let transform = if skin.is_some() { DAffine3::IDENTITY } else { *world };
             placements.push(Placement { mesh: mesh.value(), node: Some(k), skin, transform });
         }
         if root.nodes.iter().all(|node| node.mesh.is_none()) {
-            let alone = |mesh| Placement { mesh, node: None, skin: None, transform: IDENTITY };
+            let alone = |mesh| Placement { mesh, node: None, skin: None, transform: DAffine3::IDENTITY };
             placements.extend((0..root.meshes.len()).map(alone));
         } else if placements.is_empty() {
             let scene = root.scene.map_or(0, |scene| scene.value());
@@ -79,11 +76,11 @@ impl Scene {
                 "has meshes, but none in the scene that it shows, scene {scene}; make the scene with the mesh the active one and export again"
             )));
         }
-        Ok(Self { placements, worlds, parents })
+        Ok(Self { placements, worlds, parents, depths })
     }
 
     /// From a node's space to the world's.
-    pub(super) fn world(&self, node: usize) -> Result<&Affine, Fault> {
+    pub(super) fn world(&self, node: usize) -> Result<&DAffine3, Fault> {
         let world = self.worlds.get(node).ok_or_else(|| dangling(&format!("node {node}"), self.worlds.len()))?;
         world.as_ref().ok_or_else(|| {
             Fault::unsupported(format!("node {node} moves a skin but is not in the scene; export the mesh again"))
@@ -98,22 +95,17 @@ fn hides(node: &Node) -> bool {
     visible == Some(false)
 }
 
-pub(super) fn apply(transform: &Affine, p: Point) -> Point {
-    let [a, b, c, d] = *transform;
-    add(combination(p, [a, b, c]), d)
-}
-
-pub(super) fn mirrors(transform: &Affine) -> bool {
-    let [a, b, c, _] = *transform;
-    dot(a, cross(b, c)) < 0.0
+/// Whether triangles turn around.
+pub(super) fn mirrors(transform: &DAffine3) -> bool {
+    transform.matrix3.determinant() < 0.0
 }
 
 /// All nodes of the default scene.
 struct Tree {
     /// From each node's space to the world's; none for nodes outside the scene.
-    worlds: Vec<Option<Affine>>,
-    /// The node above each.
+    worlds: Vec<Option<DAffine3>>,
     parents: Vec<Option<usize>>,
+    depths: Vec<usize>,
     /// Whether the node, or one above it, is switched off.
     hidden: Vec<bool>,
 }
@@ -121,8 +113,10 @@ struct Tree {
 impl Tree {
     fn of(root: &Root) -> Result<Self, Fault> {
         let count = root.nodes.len();
-        let mut tree = Self { worlds: vec![None; count], parents: vec![None; count], hidden: vec![false; count] };
-        let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, IDENTITY, None, false)).collect();
+        let (worlds, parents, depths, hidden) =
+            (vec![None; count], vec![None; count], vec![0; count], vec![false; count]);
+        let mut tree = Self { worlds, parents, depths, hidden };
+        let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, DAffine3::IDENTITY, None, false)).collect();
         while let Some((index, parent, above, is_hidden)) = open.pop() {
             let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), count))?;
             if tree.worlds[index].is_some() {
@@ -130,8 +124,9 @@ impl Tree {
                     "node {index} is reached twice, but nodes make a tree; export the mesh again"
                 )));
             }
-            let (world, is_hidden) = (compose(&parent, &local(node)), is_hidden || hides(node));
+            let (world, is_hidden) = (parent * local(node), is_hidden || hides(node));
             (tree.worlds[index], tree.parents[index], tree.hidden[index]) = (Some(world), above, is_hidden);
+            tree.depths[index] = 1 + above.map_or(0, |above: usize| tree.depths[above]);
             open.extend(children(node).map(|child| (child, world, Some(index), is_hidden)));
         }
         Ok(tree)
@@ -159,23 +154,18 @@ fn children(node: &Node) -> impl Iterator<Item = usize> {
     node.children.iter().flatten().map(Index::value)
 }
 
-fn local(node: &Node) -> Affine {
+fn local(node: &Node) -> DAffine3 {
     if let Some(m) = &node.matrix {
-        return [0, 4, 8, 12].map(|column| [0, 1, 2].map(|row| f64::from(m[column + row])));
+        return affine(&m.map(f64::from));
     }
-    let [x, y, z, w] = node.rotation.unwrap_or_default().0.map(f64::from);
-    let rotation = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],
-        [2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)],
-        [2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ];
-    let scale = node.scale.unwrap_or([1.0; 3]).map(f64::from);
-    let [a, b, c] = [0, 1, 2].map(|k| rotation[k].map(|x| x * scale[k]));
-    [a, b, c, node.translation.unwrap_or_default().map(f64::from)]
+    let [scale, translation] = [node.scale.unwrap_or([1.0; 3]), node.translation.unwrap_or_default()]
+        .map(|vector| Vec3::from(vector).as_dvec3());
+    let rotation = DQuat::from_array(node.rotation.unwrap_or_default().0.map(f64::from));
+    DAffine3::from_scale_rotation_translation(scale, rotation, translation)
 }
 
-pub(super) fn compose(outer: &Affine, inner: &Affine) -> Affine {
-    let [a, b, c, d] = *outer;
-    let [i, j, k, moved] = inner.map(|p| combination(p, [a, b, c]));
-    [i, j, k, add(moved, d)]
+/// From the columns of a 4 × 4 matrix, whose last row is 0 0 0 1.
+pub(super) fn affine(columns: &[f64; 16]) -> DAffine3 {
+    let [a, b, c, d] = [0, 4, 8, 12].map(|column| DVec3::from_slice(&columns[column..]));
+    DAffine3::from_cols(a, b, c, d)
 }

@@ -3,20 +3,20 @@
 use std::collections::BTreeMap;
 
 use cager_geometry::mesh::Point;
-use cager_geometry::vector::along;
+use glam::{DAffine3, DVec3};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::buffers::Buffers;
 use super::faults::{dangling, too_large};
-use super::scene::{Affine, IDENTITY, Scene, apply, compose, mirrors};
+use super::scene::{Scene, affine, mirrors};
 use crate::error::Fault;
 
 /// Sets of four joints that vertices may have: enough for any skin, and few enough that sets that repeat an accessor cost little.
 const MAX_SETS: u32 = 8;
 
 /// From the space that the mesh was bound in to the world's, for each joint of a skin.
-pub(super) struct Joints(Vec<Affine>);
+pub(super) struct Joints(Vec<DAffine3>);
 
 /// The joints of each skin, once it was asked for.
 pub(super) type Skins = BTreeMap<usize, Joints>;
@@ -37,8 +37,8 @@ impl Joints {
         }
         let joint = |(k, node): (usize, &gltf::json::Index<_>)| {
             let inverse = match bound.get(k) {
-                Some(m) => [0, 4, 8, 12].map(|column| [0, 1, 2].map(|row| m[column + row])),
-                None if bound.is_empty() => IDENTITY,
+                Some(columns) => affine(columns),
+                None if bound.is_empty() => DAffine3::IDENTITY,
                 None => {
                     return Err(Fault::damaged(format!(
                         "{place}: has {} inverse bind matrices for {} joints; export the mesh again",
@@ -47,7 +47,7 @@ impl Joints {
                     )));
                 }
             };
-            Ok(compose(scene.world(node.value())?, &inverse))
+            Ok(*scene.world(node.value())? * inverse)
         };
         Ok((Self(skin.joints.iter().enumerate().map(joint).collect::<Result<_, _>>()?), read))
     }
@@ -65,7 +65,7 @@ impl Joints {
         buffers: &Buffers<'_>,
         place: &str,
     ) -> Result<(), Fault> {
-        let mut moved = vec![([0.0; 3], 0.0); points.len()];
+        let mut moved = vec![(DVec3::ZERO, 0.0); points.len()];
         let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(gltf::json::Index::value);
         if attribute(Semantic::Joints(MAX_SETS)).is_some() {
             return Err(Fault::unsupported(format!(
@@ -92,14 +92,14 @@ impl Joints {
                             self.0.len()
                         ))
                     })?;
-                    moved.0 = along(moved.0, weight, apply(transform, points[k]));
+                    moved.0 += weight * transform.transform_point3(points[k].into());
                     moved.1 += weight;
                 }
             }
         }
         for (point, (sum, weight)) in points.iter_mut().zip(moved).filter(|(_, (_, weight))| *weight != 0.0) {
             // Weights of few bits do not always add up to 1.
-            *point = sum.map(|x| x / weight);
+            *point = (sum / weight).into();
         }
         Ok(())
     }

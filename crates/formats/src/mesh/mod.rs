@@ -281,12 +281,12 @@ fn read_scene(
         return finished(format, name, &bytes, glb::read(&bytes, &kind, prim).map(Parsed::of_gltf));
     }
     let mut dropped = Dropped::default();
-    let (model, left_out, units) = if format == MeshFormat::Abc {
-        let (model, left_out) = alembic::read_model(name, source, length, prim, &mut dropped)?;
-        (model, left_out, Units::UNKNOWN)
+    let opened = if format == MeshFormat::Abc {
+        alembic::open(source, length, prim, Some(&mut dropped))
     } else {
-        usd::read_model(name, source, length, prim, &mut dropped)?
+        usd::open(source, length, prim, Some(&mut dropped))
     };
+    let (model, left_out, units) = opened.map_err(|failure| failure.at(name))?.into_model(name)?;
     Ok(Parsed { model, left_out, units, dropped })
 }
 

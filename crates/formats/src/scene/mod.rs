@@ -1,13 +1,17 @@
-//! What readers of scenes share, whatever the format: one mesh of several is chosen, transforms above it are applied, and its frames are read one by one.
+//! What readers of scenes share, so that each is a parser: a tree of nodes, of whose meshes one is chosen; values at times,
+//! which are read when a frame is asked for; transforms above the mesh; and its frames, one by one.
 
-mod choice;
 mod faces;
 mod failure;
-mod matrix;
+mod mesh;
+mod node;
 mod reader;
+mod track;
+mod transform;
 
-pub(crate) use choice::{Objects, choose, list, named, shown, shown_path};
-pub(crate) use faces::{Faces, most_corners, topology_changes};
 pub(crate) use failure::Failure;
-pub(crate) use matrix::{IDENTITY, Matrix, between, determinant, inverse, multiply, rotation, rows_of, slerp};
-pub(crate) use reader::{Animation, MOST_REPEATED, check_held, open, placed};
+pub(crate) use mesh::{MeshTracks, MovingMesh, no_points};
+pub(crate) use node::{Node, Tree, ancestry, choose, list, named, shown, shown_path};
+pub(crate) use reader::{Animation, open};
+pub(crate) use track::{Points, Timeline, Track, Value, Values, check_held, union};
+pub(crate) use transform::{Chain, MOST_OPERATIONS, Operation};

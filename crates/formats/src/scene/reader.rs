@@ -6,23 +6,8 @@ use cager_geometry::mesh::Polygons;
 use cager_geometry::units::Units;
 
 use super::failure::Failure;
-use super::matrix::{Matrix, apply};
-use crate::error::{Error, Fault};
+use crate::error::Error;
 use crate::frames::{FrameReader, Times};
-
-/// Frames that a scene may have however few of them it holds: repetitions take no room, nor do the points of what a transform moves. Of more it
-/// holds every other one.
-pub(crate) const MOST_REPEATED: usize = 1 << 14;
-
-/// Refuses frames of which the scene holds fewer than half.
-pub(crate) fn check_held(frames: usize, is_held: bool) -> Result<(), Fault> {
-    if frames <= MOST_REPEATED || is_held {
-        return Ok(());
-    }
-    Err(Fault::unsupported(format!(
-        "promises {frames} frames, of which it holds fewer than half; export {MOST_REPEATED} frames at the most, or all of them as positions"
-    )))
-}
 
 /// A mesh that moves.
 pub(crate) trait Animation: Send {
@@ -47,13 +32,6 @@ pub(crate) trait Animation: Send {
 
     /// Reads a frame; gives whether all is finite.
     fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure>;
-}
-
-/// Moves points by a matrix, where there is one; gives whether all is finite, as they `were`.
-pub(crate) fn placed(matrix: Option<&Matrix>, points: &mut [f64], were: bool) -> bool {
-    let Some(matrix) = matrix else { return were };
-    apply(matrix, points);
-    were && points.iter().all(|x| x.is_finite())
 }
 
 /// The frames of a mesh of so many points.

@@ -15,51 +15,25 @@ mod unread;
 mod write;
 
 use std::io::{Read, Seek};
-use std::path::Path;
-
-use cager_geometry::mesh::Model;
-use cager_geometry::units::Units;
 
 use crate::dropped::Dropped;
-use crate::error::{Error, Fault};
-use crate::frames::FrameReader;
-use crate::scene::{self, Animation, Failure};
+use crate::error::Fault;
+use crate::scene::{Failure, MovingMesh};
 use crate::signature::Signature;
 use binary::Binary;
 use layer::Layer;
-use mesh::MeshFrames;
 use text::Text;
 pub(crate) use write::{MeshWriter, Scene};
 
-/// Opens the frames of a mesh in a file of `length` bytes; `prim` chooses one of several.
-pub(crate) fn open_frames<'a>(
-    path: &Path,
+/// Opens the mesh in a file of `length` bytes that `prim` names, or the only one; of its first frame alone where what is not
+/// read is to be told.
+pub(crate) fn open<'a>(
     source: impl Read + Seek + Send + 'a,
     length: u64,
-    expected_points: usize,
     prim: Option<&str>,
-) -> Result<Box<dyn FrameReader + 'a>, Error> {
-    let open = || MeshFrames::open(open_layer(source, length)?, prim, false);
-    scene::open(path, open().map_err(|failure: Failure| failure.at(path))?, expected_points)
-}
-
-/// The first frame of a mesh, how many of its faces were left out, and its units.
-pub(crate) fn read_model(
-    path: &Path,
-    source: impl Read + Seek + Send,
-    length: u64,
-    prim: Option<&str>,
-    dropped: &mut Dropped,
-) -> Result<(Model, usize, Units), Error> {
-    let open = || MeshFrames::open(open_layer(source, length)?, prim, true);
-    let mut mesh = open().map_err(|failure: Failure| failure.at(path))?;
-    // What cannot be named is no reason to refuse a mesh.
-    mesh.add_unread(dropped).unwrap_or_default();
-    let (points, left_out, units, mut values) = (mesh.points(), mesh.left_out(), mesh.units(), Vec::new());
-    let mut reader = scene::open(path, mesh, points)?;
-    reader.read_next(&mut values)?;
-    let faces = reader.mesh().map(|(_, faces)| faces.clone()).unwrap_or_default();
-    Ok((Model { points: values.as_chunks().0.to_vec(), faces, ..Model::default() }, left_out, units))
+    dropped: Option<&mut Dropped>,
+) -> Result<MovingMesh<'a>, Failure> {
+    mesh::open(open_layer(source, length)?, prim, dropped)
 }
 
 /// The layer that a file is, or the first one in a package, whatever its name.

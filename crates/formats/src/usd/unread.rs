@@ -2,7 +2,7 @@
 
 use super::layer::{Kind, Layer};
 use crate::dropped::{Dropped, counted, listed};
-use crate::scene::{Failure, Objects};
+use crate::scene::{Failure, ancestry};
 
 /// Attributes beside points and faces, and what they are.
 const KINDS: [(&str, &str); 9] = [
@@ -18,7 +18,7 @@ const KINDS: [(&str, &str); 9] = [
 ];
 
 /// Adds what a mesh has beside points and faces.
-pub(super) fn add<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32, dropped: &mut Dropped) -> Result<(), Failure> {
+pub(super) fn add<'a>(layer: &mut (dyn Layer + 'a), mesh: usize, dropped: &mut Dropped) -> Result<(), Failure> {
     let mut properties = layer.properties(mesh);
     properties.sort_unstable();
     properties.dedup();
@@ -68,10 +68,10 @@ pub(super) fn add<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32, dropped: &mut 
             dropped.add(told("the subdivision scheme", &[&scheme]));
         }
     }
-    let is_subset = |k: &usize| layer.prims()[*k].kind == Kind::Subset && layer.prims()[*k].parent == Some(mesh);
+    let is_subset = |k: &usize| layer.prims()[*k].kind == Kind::Subset && layer.nodes()[*k].parent == Some(mesh);
     let subsets: Vec<usize> = (0..layer.prims().len()).filter(is_subset).collect();
-    let bound = |k: usize| layer.properties(k as u32).iter().any(|(name, _)| name.starts_with("material:binding"));
-    if subsets.iter().copied().chain(layer.ancestry(mesh as usize)).any(bound) {
+    let bound = |k: usize| layer.properties(k).iter().any(|(name, _)| name.starts_with("material:binding"));
+    if subsets.iter().copied().chain(ancestry(layer.nodes(), mesh)).any(bound) {
         dropped.add_on_faces("materials (material:binding)");
     }
     if !subsets.is_empty() {
@@ -81,9 +81,9 @@ pub(super) fn add<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32, dropped: &mut 
 }
 
 /// A note of a mesh that is hidden in some frames.
-pub(super) fn visibility<'a>(layer: &mut Box<dyn Layer + 'a>, mesh: u32) -> Result<Option<String>, Failure> {
-    for prim in layer.ancestry(mesh as usize).collect::<Vec<_>>() {
-        let said = layer.attribute(prim as u32, "visibility")?;
+pub(super) fn visibility<'a>(layer: &mut (dyn Layer + 'a), mesh: usize) -> Result<Option<String>, Failure> {
+    for prim in ancestry(layer.nodes(), mesh).collect::<Vec<_>>() {
+        let said = layer.attribute(prim, "visibility")?;
         let mut tokens = Vec::new();
         for value in said.values {
             tokens.extend(layer.tokens(value, 1)?);

@@ -5,12 +5,14 @@ mod pack;
 mod paths;
 mod sections;
 
+use std::collections::HashMap;
 use std::io::{Read, Seek};
+use std::sync::Arc;
 
-use super::layer::{Attribute, COMPOSED, DEEPEST, Kind, Layer, Points, Prim, Stage, Value, composed, damaged, spline};
+use super::layer::{COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, composed, damaged, spline};
 use crate::error::Fault;
 use crate::frames::{Scalar, half_precision};
-use crate::scene::Failure;
+use crate::scene::{Failure, Node, Points, Track, Value, Values};
 pub(super) use file::MAGIC;
 use file::{File, Rep};
 use pack::integers;
@@ -51,6 +53,7 @@ pub(super) struct Binary<R> {
     file: File<R>,
     sections: Sections,
     stage: Stage,
+    nodes: Vec<Node>,
     prims: Vec<Prim>,
     /// Attributes and relationships: the paths that they lie below, ascending, and the index of each among the specs.
     attributes: Vec<(u32, u32)>,
@@ -72,7 +75,8 @@ impl<R: Read + Seek> Binary<R> {
         file.version = minor;
         let contents = file.number(16)?;
         let sections = Sections::read(&mut file, contents)?;
-        let mut layer = Self { file, sections, stage: Stage::default(), prims: Vec::new(), attributes: Vec::new() };
+        let (stage, nodes, prims, attributes) = (Stage::default(), Vec::new(), Vec::new(), Vec::new());
+        let mut layer = Self { file, sections, stage, nodes, prims, attributes };
         let specs = &layer.sections.specs;
         for (index, spec) in specs.iter().enumerate().filter(|(_, spec)| [ATTRIBUTE, RELATIONSHIP].contains(&spec.kind))
         {
@@ -86,13 +90,15 @@ impl<R: Read + Seek> Binary<R> {
 
     fn list_prims(&mut self) -> Result<(), Failure> {
         let sections = &self.sections;
-        let mut places = vec![u32::MAX; sections.paths.len()];
+        let mut places = vec![usize::MAX; sections.paths.len()];
+        // Many prims may share one.
+        let mut names: HashMap<u32, Arc<[u8]>> = HashMap::new();
         for (index, &spec) in sections.specs.iter().enumerate().filter(|(_, spec)| spec.kind == PRIM) {
             let path = sections.paths[spec.path as usize];
-            places[spec.path as usize] = self.prims.len() as u32;
-            let (spec_index, name, depth) = (index as u32, path.name, path.depth);
-            let kind = Kind::Other;
-            let mut prim = Prim { parent: None, depth, spec: spec_index, name, kind, is_there: false, composed: None };
+            places[spec.path as usize] = self.prims.len();
+            let name = names.entry(path.name).or_insert_with(|| Arc::from(sections.token(path.name)));
+            self.nodes.push(Node { name: Arc::clone(name), parent: None, depth: path.depth as usize });
+            let mut prim = Prim { spec: index as u32, kind: Kind::Other, is_there: false, composed: None };
             let mut is_active = true;
             for field in sections.fields(spec) {
                 let (name, value) = field?;
@@ -106,15 +112,15 @@ impl<R: Read + Seek> Binary<R> {
                     }
                 }
             }
-            prim.is_there &= is_active && depth <= DEEPEST;
+            prim.is_there &= is_active && path.depth <= DEEPEST;
             self.prims.push(prim);
         }
-        for prim in &mut self.prims {
+        for (prim, node) in self.prims.iter_mut().zip(&mut self.nodes) {
             let path = sections.paths[sections.specs[prim.spec as usize].path as usize];
             let parent = places[path.parent as usize];
             // What lies below a variant is there in that variant alone.
-            prim.is_there &= prim.depth == 1 || parent != u32::MAX;
-            prim.parent = Some(parent).filter(|&parent| prim.depth > 1 && parent != u32::MAX);
+            prim.is_there &= node.depth == 1 || parent != usize::MAX;
+            node.parent = Some(parent).filter(|&parent| node.depth > 1 && parent != usize::MAX);
         }
         Ok(())
     }
@@ -149,7 +155,7 @@ impl<R: Read + Seek> Binary<R> {
         Ok(place.ok_or_else(|| damaged("an offset leads out of the file"))?)
     }
 
-    fn samples(&mut self, value: Rep, attribute: &mut Attribute) -> Result<(), Failure> {
+    fn samples(&mut self, value: Rep, attribute: &mut Track) -> Result<(), Failure> {
         let at = self.told(value.offset())?;
         let times = Rep(self.file.number(at)?);
         if value.kind() != kind::TIME_SAMPLES || times.kind() != kind::DOUBLES {
@@ -170,13 +176,13 @@ impl<R: Read + Seek> Binary<R> {
         Ok(())
     }
 
-    fn find(&self, prim: u32, name: &str) -> Option<Spec> {
+    fn find(&self, prim: usize, name: &str) -> Option<Spec> {
         self.below(prim).find(|(found, _)| *found == name.as_bytes()).map(|(_, spec)| spec)
     }
 
     /// The names of attributes and relationships of a prim, and what they are.
-    fn below(&self, prim: u32) -> impl Iterator<Item = (&[u8], Spec)> {
-        let path = self.sections.specs[self.prims[prim as usize].spec as usize].path;
+    fn below(&self, prim: usize) -> impl Iterator<Item = (&[u8], Spec)> {
+        let path = self.sections.specs[self.prims[prim].spec as usize].path;
         let first = self.attributes.partition_point(|&(above, _)| above < path);
         let below = self.attributes[first..].iter().take_while(move |&&(above, _)| above == path);
         let specs = below.map(|&(_, spec)| self.sections.specs[spec as usize]);
@@ -193,12 +199,12 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
         &self.prims
     }
 
-    fn name(&self, prim: &Prim) -> &[u8] {
-        self.sections.token(prim.name)
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
-    fn attribute(&mut self, prim: u32, name: &str) -> Result<Attribute, Failure> {
-        let mut attribute = Attribute::default();
+    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Failure> {
+        let mut attribute = Track::default();
         let Some(spec) = self.find(prim, name) else { return Ok(attribute) };
         let field = |name| self.sections.field(spec, name);
         let (default, samples, curve) = (field("default")?, field("timeSamples")?, field("spline")?);
@@ -212,17 +218,13 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
         Ok(attribute)
     }
 
-    fn properties(&self, prim: u32) -> Vec<(String, String)> {
+    fn properties(&self, prim: usize) -> Vec<(String, String)> {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         let type_name = |spec| {
             let told = self.sections.field(spec, "typeName").ok().flatten();
             told.map_or_else(String::new, |told| text(self.sections.token(u32::from_le_bytes(told.inlined()))))
         };
         self.below(prim).map(|(name, spec)| (text(name), type_name(spec))).collect()
-    }
-
-    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
-        numbers(&mut self.file, Rep(value.0))
     }
 
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure> {
@@ -247,6 +249,12 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
             names.push(String::from_utf8_lossy(self.sections.token(index)).into_owned());
         }
         Ok(names)
+    }
+}
+
+impl<R: Read + Seek + Send> Values for Binary<R> {
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
+        numbers(&mut self.file, Rep(value.0))
     }
 
     fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {

@@ -5,10 +5,10 @@ mod scanner;
 
 use std::io::{Read, Seek};
 
-use super::layer::{Attribute, Layer, Points, Prim, Stage, Value, damaged, spline};
+use super::layer::{Layer, Prim, Stage, damaged, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
-use crate::scene::Failure;
+use crate::scene::{Failure, Node, Points, Track, Value, Values};
 use parser::{Contents, Parser, Stored};
 use scanner::Scanner;
 
@@ -83,11 +83,11 @@ impl<R: Read + Seek + Send> Layer for Text<R> {
         &self.contents.prims
     }
 
-    fn name(&self, prim: &Prim) -> &[u8] {
-        self.contents.names[prim.name as usize].as_bytes()
+    fn nodes(&self) -> &[Node] {
+        &self.contents.nodes
     }
 
-    fn attribute(&mut self, prim: u32, name: &str) -> Result<Attribute, Failure> {
+    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Failure> {
         let key = (prim, name.to_owned());
         if self.contents.splines.contains(&key) {
             return Err(spline(name).into());
@@ -95,10 +95,27 @@ impl<R: Read + Seek + Send> Layer for Text<R> {
         Ok(self.contents.attributes.get(&key).cloned().unwrap_or_default())
     }
 
-    fn properties(&self, prim: u32) -> Vec<(String, String)> {
+    fn properties(&self, prim: usize) -> Vec<(String, String)> {
         self.contents.properties.get(&prim).cloned().unwrap_or_default()
     }
 
+    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure> {
+        self.enter(value)?;
+        if !self.scanner.has(b'[')? {
+            return Ok(vec![self.scanner.string()?]);
+        }
+        let mut names = Vec::new();
+        while self.follows()? {
+            if names.len() == most {
+                return Err(damaged(&format!("it has a list of more names than {most}, which are the most")).into());
+            }
+            names.push(self.scanner.string()?);
+        }
+        Ok(names)
+    }
+}
+
+impl<R: Read + Seek + Send> Values for Text<R> {
     fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
         let Stored { is_double, is_quaternion, .. } = self.enter(value)?;
         let (mut numbers, mut depth) = (Vec::new(), 0_usize);
@@ -121,21 +138,6 @@ impl<R: Read + Seek + Send> Layer for Text<R> {
             numbers.rotate_left(1);
         }
         Ok(numbers)
-    }
-
-    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure> {
-        self.enter(value)?;
-        if !self.scanner.has(b'[')? {
-            return Ok(vec![self.scanner.string()?]);
-        }
-        let mut names = Vec::new();
-        while self.follows()? {
-            if names.len() == most {
-                return Err(damaged(&format!("it has a list of more names than {most}, which are the most")).into());
-            }
-            names.push(self.scanner.string()?);
-        }
-        Ok(names)
     }
 
     fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {

@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::io::{Read, Seek};
 
 use super::scanner::{Place, Scanner, is_letter};
-use crate::scene::Failure;
-use crate::usd::layer::{Attribute, COMPOSED, DEEPEST, Kind, Prim, Stage, Value, composed, too_deep};
+use crate::scene::{Failure, Node, Track, Value};
+use crate::usd::layer::{COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep};
 
 /// Words in front of the type of a property or of the key of a field.
 const MODIFIERS: [&str; 9] =
@@ -39,21 +39,20 @@ pub(super) struct Stored {
 pub(super) struct Contents {
     pub(super) stage: Stage,
     pub(super) prims: Vec<Prim>,
-    /// Names of prims.
-    pub(super) names: Vec<String>,
+    pub(super) nodes: Vec<Node>,
     pub(super) values: Vec<Stored>,
-    pub(super) attributes: HashMap<(u32, String), Attribute>,
+    pub(super) attributes: HashMap<(usize, String), Track>,
     /// Of meshes their names and types, of others those of materials.
-    pub(super) properties: HashMap<u32, Vec<(String, String)>>,
+    pub(super) properties: HashMap<usize, Vec<(String, String)>>,
     /// Attributes that splines animate.
-    pub(super) splines: HashSet<(u32, String)>,
+    pub(super) splines: HashSet<(usize, String)>,
 }
 
 pub(super) struct Parser<'a, R> {
     scanner: &'a mut Scanner<R>,
     contents: Contents,
     /// The prims that are open, from the outside to the inside.
-    open: Vec<u32>,
+    open: Vec<usize>,
 }
 
 /// What fields in brackets belong to.
@@ -104,7 +103,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         match (word.as_str(), self.open.last()) {
             ("def" | "over" | "class", _) => self.prim(word == "def"),
             ("variantSet", Some(&prim)) => {
-                self.contents.prims[prim as usize].composed = Some("variants");
+                self.contents.prims[prim].composed = Some("variants");
                 self.scanner.string()?;
                 self.scanner.expect(b'=')?;
                 self.scanner.pass().map(|_| ())
@@ -120,20 +119,13 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         let kind = Kind::of(self.word()?.as_bytes());
         let name = self.scanner.string()?;
         let index = self.contents.prims.len();
-        self.contents.names.push(name);
-        self.contents.prims.push(Prim {
-            parent: self.open.last().copied(),
-            depth: self.open.len() as u32 + 1,
-            spec: index as u32,
-            name: index as u32,
-            kind,
-            is_there: is_defined,
-            composed: None,
-        });
+        let (parent, depth) = (self.open.last().copied(), self.open.len() + 1);
+        self.contents.nodes.push(Node { name: name.into_bytes().into(), parent, depth });
+        self.contents.prims.push(Prim { spec: index as u32, kind, is_there: is_defined, composed: None });
         if self.scanner.solid()? == Some(b'(') {
             self.fields(Owner::Prim(index))?;
         }
-        self.open.push(index as u32);
+        self.open.push(index);
         self.scanner.expect(b'{')
     }
 
@@ -212,7 +204,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         }
         let name = self.word()?;
         if let Some(&prim) = self.open.last()
-            && (self.contents.prims[prim as usize].kind == Kind::Mesh || name.starts_with("material:binding"))
+            && (self.contents.prims[prim].kind == Kind::Mesh || name.starts_with("material:binding"))
         {
             let plain = name.split('.').next().unwrap_or_default().to_owned();
             self.contents.properties.entry(prim).or_default().push((plain, type_name.to_owned()));

@@ -1,0 +1,163 @@
+//! The frames of one mesh of a scene, whatever file it is in.
+
+use std::path::Path;
+
+use cager_geometry::mesh::{Model, Polygons};
+use cager_geometry::units::Units;
+
+use super::faces::{Faces, most_corners, topology_changes};
+use super::failure::Failure;
+use super::reader::{Animation, open};
+use super::track::{MOST_REPEATED, Timeline, Track, Value, Values};
+use super::transform::{Chain, place};
+use crate::error::{Error, Fault};
+use crate::frames::Times;
+
+/// What a parser finds of a mesh.
+#[derive(Default)]
+pub(crate) struct MeshTracks {
+    pub(crate) positions: Track,
+    /// How many corners faces have, and which.
+    pub(crate) faces: [Track; 2],
+    /// Whether faces wind clockwise.
+    pub(crate) is_clockwise: bool,
+    pub(crate) chain: Chain,
+    pub(crate) timeline: Timeline,
+    pub(crate) units: Units,
+    /// What the user should know of how it is read.
+    pub(crate) notes: Vec<String>,
+}
+
+/// A mesh that moves.
+pub(crate) struct MovingMesh<'a> {
+    source: Box<dyn Values + 'a>,
+    tracks: MeshTracks,
+    /// Whether faces are turned around as they are read.
+    turned: bool,
+    /// Those of the first frame, with which all others are compared.
+    faces: Faces,
+    /// Where faces are stored that are equal to these, the last ones first.
+    equal: [[Option<Value>; 2]; 2],
+    points: usize,
+    /// The points of the next sample, where a frame lies between two.
+    next: Vec<f64>,
+}
+
+/// The fault of a mesh that begins with nothing.
+pub(crate) fn no_points() -> Fault {
+    Fault::invalid("has a mesh without points in its first frame; export it with its points")
+}
+
+impl<'a> MovingMesh<'a> {
+    pub(crate) fn new(mut source: Box<dyn Values + 'a>, tracks: MeshTracks) -> Result<Self, Failure> {
+        let points = match tracks.positions.at(tracks.timeline.at[0]) {
+            Some((first, ..)) => source.points(first)?.count,
+            None => 0,
+        };
+        if points == 0 {
+            return Err(no_points().into());
+        }
+        let mut turned = tracks.is_clockwise;
+        // What is not there yet is often scaled to nothing.
+        for &time in tracks.timeline.at.iter().take(MOST_REPEATED) {
+            let matrix = tracks.chain.matrix(source.as_mut(), time)?;
+            let scale = matrix.map_or(1.0, |matrix| matrix.matrix3.determinant());
+            if scale != 0.0 {
+                turned ^= scale < 0.0;
+                break;
+            }
+        }
+        let (faces, equal, next) = (Faces::default(), [[None; 2]; 2], Vec::new());
+        let mut mesh = Self { source, tracks, turned, faces, equal, points, next };
+        let places = mesh.places(0);
+        mesh.faces = mesh.read_faces(places)?;
+        mesh.equal = [places; 2];
+        Ok(mesh)
+    }
+
+    /// The first frame, and how many faces were left out that have fewer than three corners.
+    pub(crate) fn into_model(self, path: &Path) -> Result<(Model, usize, Units), Error> {
+        let (points, left_out, units, mut values) = (self.points, self.faces.left_out, self.units(), Vec::new());
+        let mut reader = open(path, self, points)?;
+        reader.read_next(&mut values)?;
+        let faces = reader.mesh().map(|(_, faces)| faces.clone()).unwrap_or_default();
+        Ok((Model { points: values.as_chunks().0.to_vec(), faces, ..Model::default() }, left_out, units))
+    }
+
+    /// Where the faces of a frame are stored.
+    fn places(&self, frame: usize) -> [Option<Value>; 2] {
+        let time = self.tracks.timeline.at[frame];
+        self.tracks.faces.each_ref().map(|part| part.at(time).map(|(value, ..)| value))
+    }
+
+    fn read_faces(&mut self, places: [Option<Value>; 2]) -> Result<Faces, Failure> {
+        let [Some(counts), Some(corners)] = places else { return Ok(Faces::default()) };
+        let most = most_corners(self.points);
+        let [counts, corners] = [self.source.integers(counts, most)?, self.source.integers(corners, most)?];
+        let [counts, corners] = [counts, corners].map(|numbers| numbers.into_iter().map(|number| number as u32));
+        Ok(Faces::of(counts, corners, self.points, self.turned)?)
+    }
+
+    /// Refuses a frame whose faces are others than those of the first.
+    fn check_faces(&mut self, frame: usize) -> Result<(), Failure> {
+        let places = self.places(frame);
+        if self.equal.contains(&places) {
+            return Ok(());
+        }
+        if self.read_faces(places)?.polygons != self.faces.polygons {
+            return Err(topology_changes("its faces are not those of frame 0").into());
+        }
+        self.equal = [places, self.equal[0]];
+        Ok(())
+    }
+}
+
+impl Animation for MovingMesh<'_> {
+    fn points(&self) -> usize {
+        self.points
+    }
+
+    fn frames(&self) -> usize {
+        self.tracks.timeline.at.len()
+    }
+
+    fn times(&self) -> &Times {
+        &self.tracks.timeline.times
+    }
+
+    fn faces(&self) -> &Polygons {
+        &self.faces.polygons
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.tracks.notes
+    }
+
+    fn units(&self) -> Units {
+        self.tracks.units
+    }
+
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
+        let time = self.tracks.timeline.at[frame];
+        let Some((value, next, share)) = self.tracks.positions.at(time) else { return Ok(false) };
+        let points = self.source.points(value)?;
+        if points.count != self.points {
+            let what = format!("it has {} points, and {} in frame 0", points.count, self.points);
+            return Err(topology_changes(&what).into());
+        }
+        self.check_faces(frame)?;
+        let matrix = self.tracks.chain.matrix(self.source.as_mut(), time)?;
+        // Every value is overwritten below.
+        out.resize(3 * self.points, 0.0);
+        let mut finite = self.source.read(points, out)?;
+        let following = if share > 0.0 { Some(self.source.points(next)?) } else { None };
+        // Where the number of points changes, those before hold.
+        if let Some(following) = following.filter(|following| following.count == self.points) {
+            self.next.resize(out.len(), 0.0);
+            finite &= self.source.read(following, &mut self.next)?;
+            out.iter_mut().zip(&self.next).for_each(|(value, next)| *value += share * (next - *value));
+            finite &= out.iter().all(|x| x.is_finite());
+        }
+        Ok(place(matrix, out, finite))
+    }
+}
