@@ -609,7 +609,7 @@ fn a_shot_from_1001_plays_at_once_and_keeps_its_numbers() {
                 assert!(
                     root.accessors
                         .iter()
-                        .any(|accessor| accessor.min.as_ref().is_some_and(|min| min[0] == 0 && min[1].is_null()))
+                        .any(|accessor| accessor.min.as_ref().is_some_and(|min| min[0].as_f64() == Some(0.0) && min[1].is_null()))
                 );
             }
             let reader = open_frames(&path, 48).unwrap();

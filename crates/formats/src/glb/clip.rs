@@ -12,7 +12,7 @@ use super::channel::{Channel, NEAR};
 use super::faults::dangling;
 use super::scene::Scene;
 use crate::error::Fault;
-use crate::scene::shown;
+use crate::scene::{shown, union};
 
 /// Names of other animations that a message lists.
 const LISTED: usize = 4;
@@ -86,10 +86,7 @@ impl Clip {
 
     /// The times of all keys, ascending, none twice.
     pub(super) fn key_times(&self) -> Vec<f64> {
-        let mut times: Vec<f64> = self.channels.iter().flat_map(|channel| &channel.times).copied().collect();
-        times.sort_by(f64::total_cmp);
-        times.dedup_by(|b, a| *b - *a <= NEAR);
-        times
+        union(self.channels.iter().flat_map(|channel| &channel.times).copied().collect(), NEAR)
     }
 
     /// Whether anything is elsewhere between two keys.

@@ -16,7 +16,7 @@ use super::scene::Scene;
 use crate::error::{Error, Fault};
 use crate::faces::Contents;
 use crate::frames::{FrameReader, FrameSelection, Times};
-use crate::scene::{self, Animation, Failure, check_held};
+use crate::scene::{self, Animation, Failure, Timeline, check_held};
 
 /// Frames per second that programs have.
 const RATES: [f64; 10] =
@@ -61,7 +61,7 @@ struct MeshFrames {
     /// Of the placements in the scene.
     chosen: Range<usize>,
     clip: Option<Clip>,
-    grid: Grid,
+    timeline: Timeline,
     faces: Polygons,
     points: usize,
 }
@@ -95,12 +95,12 @@ impl MeshFrames {
         let held = buffers.most_zeros().saturating_mul(POINTS_PER_ITEM);
         let is_held = |frames: usize| frames.saturating_mul(points) <= held;
         let is_smooth = clip.as_ref().is_some_and(Clip::moves_between_keys);
-        let mut grid = Grid::of(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
+        let mut timeline = timeline(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
         if let Some(note) = clip.as_ref().and_then(|clip| clip.note.clone()) {
-            let others = &mut grid.times.note;
+            let others = &mut timeline.times.note;
             *others = Some(others.take().map_or(note.clone(), |told| format!("{told}; {note}")));
         }
-        Ok(Self { buffers, chosen, clip, grid, faces: rest.faces, points })
+        Ok(Self { buffers, chosen, clip, timeline, faces: rest.faces, points })
     }
 }
 
@@ -110,11 +110,11 @@ impl Animation for MeshFrames {
     }
 
     fn frames(&self) -> usize {
-        self.grid.frames
+        self.timeline.at.len()
     }
 
     fn times(&self) -> &Times {
-        &self.grid.times
+        &self.timeline.times
     }
 
     fn faces(&self) -> &Polygons {
@@ -127,7 +127,7 @@ impl Animation for MeshFrames {
 
     fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
         if let Some(clip) = &self.clip {
-            clip.apply(self.grid.seconds(frame), &mut self.buffers.root);
+            clip.apply(self.timeline.at[frame], &mut self.buffers.root);
         }
         let scene = Scene::of(&self.buffers.root)?;
         let placements = &scene.placements[self.chosen.clone()];
@@ -138,65 +138,50 @@ impl Animation for MeshFrames {
     }
 }
 
-/// When frames are.
-struct Grid {
-    times: Times,
-    frames: usize,
-    /// Seconds of frames at keys.
+/// At the times of keys, or at whole numbers of frames of a rate as far as these go. `said` is the number of the frame at 0 s and the rate of all, where the file
+/// says them: it then has a key for every frame. Otherwise far keys are told where something moves between them.
+fn timeline(
     keys: Vec<f64>,
-    /// Frames per second of those that are not.
-    rate: f64,
-}
-
-impl Grid {
-    /// At the times of keys, or at whole numbers of frames of a rate as far as these go. `said` is the number of the frame at 0 s and the rate of all, where the file
-    /// says them: it then has a key for every frame. Otherwise far keys are told where something moves between them.
-    fn of(
-        keys: Vec<f64>,
-        rate: Option<f64>,
-        (said, is_smooth): (Option<[f64; 2]>, bool),
-        is_held: impl Fn(usize) -> bool,
-    ) -> Result<Self, Fault> {
-        let (Some(&first), Some(&last)) = (keys.first(), keys.last()) else {
-            let times = Times { frame_rate: rate, ..Times::default() };
-            return Ok(Self { times, frames: 1, keys: vec![0.0], rate: 1.0 });
-        };
-        let Some(rate) = rate.filter(|_| keys.len() > 1) else {
-            check_held(keys.len(), is_held(keys.len()))?;
-            let mut times = Times::of(&keys, said.map(|[_, rate]| rate).or_else(|| usual_rate(&keys)))?;
-            if let Some([first, _]) = said {
-                times.begin_at(first);
-            }
-            let far = far_keys(&keys).filter(|_| said.is_none() && is_smooth);
-            times.note = match (times.note, far) {
-                (Some(uneven), None) => {
-                    Some(uneven + "; with --sample-rate, where the command has it, they are evenly spaced")
-                }
-                (Some(uneven), Some(far)) => Some(format!("{uneven}; {far}")),
-                (None, far) => far,
-            };
-            return Ok(Self { times, frames: keys.len(), keys, rate: 1.0 });
-        };
-        const SLACK: f64 = 1e-3;
-        let [start, end] =
-            [(first * rate - SLACK).ceil(), (last * rate + SLACK).floor().max((first * rate - SLACK).ceil())];
-        if [start, end].iter().any(|number| number.abs() > FARTHEST) {
-            return Err(Fault::invalid(format!(
-                "has times from {first} s to {last} s, too far for {rate} frames per second; export it again with times in seconds"
-            )));
-        }
-        let count = (end - start) as usize + 1;
-        check_held(count, keys.len() >= count / 2)?;
-        let mut times = Times { frame_rate: Some(rate), first: start, ..Times::default() };
-        if let Some([first, _]) = said.filter(|[_, told]| (told - rate).abs() < 1e-9 * rate) {
+    rate: Option<f64>,
+    (said, is_smooth): (Option<[f64; 2]>, bool),
+    is_held: impl Fn(usize) -> bool,
+) -> Result<Timeline, Fault> {
+    let (Some(&first), Some(&last)) = (keys.first(), keys.last()) else {
+        let times = Times { frame_rate: rate, ..Times::default() };
+        return Ok(Timeline { times, at: vec![0.0] });
+    };
+    let Some(rate) = rate.filter(|_| keys.len() > 1) else {
+        check_held(keys.len(), is_held(keys.len()))?;
+        let mut times = Times::of(&keys, said.map(|[_, rate]| rate).or_else(|| usual_rate(&keys)))?;
+        if let Some([first, _]) = said {
             times.begin_at(first);
         }
-        Ok(Self { times, frames: count, keys: Vec::new(), rate })
+        let far = far_keys(&keys).filter(|_| said.is_none() && is_smooth);
+        times.note = match (times.note, far) {
+            (Some(uneven), None) => {
+                Some(uneven + "; with --sample-rate, where the command has it, they are evenly spaced")
+            }
+            (Some(uneven), Some(far)) => Some(format!("{uneven}; {far}")),
+            (None, far) => far,
+        };
+        return Ok(Timeline { times, at: keys });
+    };
+    const SLACK: f64 = 1e-3;
+    let [start, end] =
+        [(first * rate - SLACK).ceil(), (last * rate + SLACK).floor().max((first * rate - SLACK).ceil())];
+    if [start, end].iter().any(|number| number.abs() > FARTHEST) {
+        return Err(Fault::invalid(format!(
+            "has times from {first} s to {last} s, too far for {rate} frames per second; export it again with times in seconds"
+        )));
     }
-
-    fn seconds(&self, frame: usize) -> f64 {
-        self.keys.get(frame).copied().unwrap_or_else(|| self.times.number(frame) / self.rate)
+    let count = (end - start) as usize + 1;
+    check_held(count, keys.len() >= count / 2)?;
+    let at = (0..count).map(|frame| (start + frame as f64) / rate).collect();
+    let mut times = Times { frame_rate: Some(rate), first: start, ..Times::default() };
+    if let Some([first, _]) = said.filter(|[_, told]| (told - rate).abs() < 1e-9 * rate) {
+        times.begin_at(first);
     }
+    Ok(Timeline { times, at })
 }
 
 /// Points of frames for each number in the file: more are a bomb, not a capture.

@@ -1,7 +1,8 @@
 //! The container: a chunk of JSON, and one of positions, corners, times and weights.
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
+
+use serde_json::{Value, json};
 
 use super::super::lenient::{FIRST_FRAME, FRAME_RATE};
 use super::Scene;
@@ -116,114 +117,97 @@ impl Document<'_> {
     }
 
     fn json(&self, data: Option<&str>) -> String {
-        let Scene { name, triangles, .. } = self.scene;
-        let (targets, has_faces) = (self.stored.parts() - 1, !triangles.is_empty());
-        let mut text = String::from(r#"{"asset":{"version":"2.0","generator":"cager"},"#);
-        if !self.is_float() {
-            text += r#""extensionsUsed":["KHR_mesh_quantization"],"extensionsRequired":["KHR_mesh_quantization"],"#;
-        }
-        let place = place(self.stored, self.scene);
-        let step = f64::from(self.stored.step);
-        let _ = write!(
-            text,
-            r#""scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"name":"{name}","mesh":0,"translation":{},"scale":[{step},{step},{step}]}}],"#,
-            list(place.map(|x| f64::from(x as f32)))
-        );
-        // Accessors: positions of the base and the targets, then corners, times and weights as far as there are any, and normals.
-        let first_normals = targets + 1 + usize::from(has_faces) + if targets > 0 { 2 } else { 0 };
-        let normal = |k: usize| match self.normals {
-            [] => String::new(),
-            _ => format!(r#","NORMAL":{}"#, first_normals + k),
-        };
-        let primitive = if has_faces { format!(r#","indices":{}"#, targets + 1) } else { r#","mode":0"#.to_owned() };
-        let _ = write!(
-            text,
-            r#""meshes":[{{"name":"{name}","primitives":[{{"attributes":{{"POSITION":0{}}}{primitive}"#,
-            normal(0)
-        );
-        if targets > 0 {
-            let all: Vec<String> = (1..=targets).map(|k| format!(r#"{{"POSITION":{k}{}}}"#, normal(k))).collect();
-            let _ = write!(
-                text,
-                r#","targets":[{}]}}],"weights":{}}}],"#,
-                all.join(","),
-                list(self.weights[..targets].iter().map(|&x| f64::from(x)))
-            );
-            let times = targets + 1 + usize::from(has_faces);
-            let [first, rate] = self.scene.numbering;
-            let _ = write!(
-                text,
-                r#""animations":[{{"name":"{name}","extras":{{"{FIRST_FRAME}":{first},"{FRAME_RATE}":{rate}}},"channels":[{{"sampler":0,"target":{{"node":0,"path":"weights"}}}}],"samplers":[{{"input":{times},"interpolation":"LINEAR","output":{}}}]}}],"#,
-                times + 1
-            );
-        } else {
-            text += "}]}],";
-        }
-        let _ = write!(text, r#""accessors":[{}],"bufferViews":[{}],"#, self.accessors(), self.views());
-        let uri = data.map_or_else(String::new, |name| format!(r#","uri":"{}""#, escaped(name)));
-        let _ = write!(text, r#""buffers":[{{"byteLength":{}{uri}}}]}}"#, self.lengths().iter().sum::<usize>());
-        text
-    }
-
-    fn accessors(&self) -> String {
-        let (points, stride) = (self.stored.points(), self.stride());
-        let kind = if self.is_float() { FLOAT } else { SHORT };
-        let accessor = |view: usize, offset: usize, kind: u32, count: usize, rest: &str| {
-            format!(r#"{{"bufferView":{view},"byteOffset":{offset},"componentType":{kind},"count":{count},{rest}}}"#)
-        };
-        let mut all: Vec<String> = (0..self.stored.parts())
-            .map(|part| {
-                let [low, high] = self.stored.bounds(part);
-                let rest = format!(r#""type":"VEC3","min":{},"max":{}"#, list(low), list(high));
-                accessor(0, part * points * stride, kind, points, &rest)
-            })
-            .collect();
-        let scalar = r#""type":"SCALAR""#;
-        let mut view = 1;
-        if !self.scene.triangles.is_empty() {
-            let kind = if self.corner_size() == 2 { UNSIGNED_SHORT } else { UNSIGNED_INT };
-            all.push(accessor(view, 0, kind, 3 * self.scene.triangles.len(), scalar));
-            view += 1;
-        }
-        let times = &self.scene.times;
-        if let (Some(first), Some(last)) = (times.first(), times.last()) {
-            let bounds = format!(r#"{scalar},"min":[{}],"max":[{}]"#, f64::from(*first), f64::from(*last));
-            all.push(accessor(view, 0, FLOAT, times.len(), &bounds));
-            all.push(accessor(view, 4 * times.len(), FLOAT, self.weights.len(), scalar));
-            view += 1;
-        }
-        all.extend(
-            (0..self.normals.len() / points)
-                .map(|part| accessor(view, 12 * part * points, FLOAT, points, r#""type":"VEC3""#)),
-        );
-        all.join(",")
-    }
-
-    fn views(&self) -> String {
+        let Scene { name, triangles, times, numbering: [first, rate], .. } = self.scene;
+        let (points, targets, stride) = (self.stored.points(), self.stored.parts() - 1, self.stride());
+        let mut layout = Layout::default();
         let [positions, corners, animation, normals] = self.lengths();
-        let stride = self.stride();
-        let mut all =
-            vec![format!(r#"{{"buffer":0,"byteLength":{positions},"byteStride":{stride},"target":{VERTICES}}}"#)];
-        if corners > 0 {
-            all.push(format!(r#"{{"buffer":0,"byteOffset":{positions},"byteLength":{corners},"target":{CORNERS}}}"#));
+        let view = layout.view(positions, json!({ "byteStride": stride, "target": VERTICES }));
+        let kind = if self.is_float() { FLOAT } else { SHORT };
+        for part in 0..=targets {
+            let [low, high] = self.stored.bounds(part);
+            let rest = json!({ "type": "VEC3", "min": low, "max": high });
+            layout.accessor(view, part * points * stride, kind, points, rest);
         }
-        if animation > 0 {
-            all.push(format!(r#"{{"buffer":0,"byteOffset":{},"byteLength":{animation}}}"#, positions + corners));
+        let mut primitive = json!({});
+        if triangles.is_empty() {
+            primitive["mode"] = json!(0);
+        } else {
+            let kind = if self.corner_size() == 2 { UNSIGNED_SHORT } else { UNSIGNED_INT };
+            let view = layout.view(corners, json!({ "target": CORNERS }));
+            let rest = json!({ "type": "SCALAR" });
+            primitive["indices"] = json!(layout.accessor(view, 0, kind, 3 * triangles.len(), rest));
         }
+        let mut document =
+            json!({ "asset": { "version": "2.0", "generator": "cager" }, "scene": 0, "scenes": [{ "nodes": [0] }] });
+        let mut mesh = json!({ "name": name });
+        if let (Some(start), Some(end), true) = (times.first(), times.last(), targets > 0) {
+            let view = layout.view(animation, json!({}));
+            let rest = json!({ "type": "SCALAR", "min": [start], "max": [end] });
+            let input = layout.accessor(view, 0, FLOAT, times.len(), rest);
+            let rest = json!({ "type": "SCALAR" });
+            let output = layout.accessor(view, 4 * times.len(), FLOAT, self.weights.len(), rest);
+            mesh["weights"] = json!(self.weights[..targets]);
+            document["animations"] = json!([{
+                "name": name,
+                "extras": { FIRST_FRAME: first, FRAME_RATE: rate },
+                "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }],
+                "samplers": [{ "input": input, "interpolation": "LINEAR", "output": output }],
+            }]);
+        }
+        let mut attributes: Vec<Value> = (0..=targets).map(|part| json!({ "POSITION": part })).collect();
         if normals > 0 {
-            let start = positions + corners + animation;
-            all.push(format!(
-                r#"{{"buffer":0,"byteOffset":{start},"byteLength":{normals},"byteStride":12,"target":{VERTICES}}}"#
-            ));
+            let view = layout.view(normals, json!({ "byteStride": 12, "target": VERTICES }));
+            for (part, attributes) in attributes.iter_mut().enumerate() {
+                let offset = 12 * part * points;
+                attributes["NORMAL"] = json!(layout.accessor(view, offset, FLOAT, points, json!({ "type": "VEC3" })));
+            }
         }
-        all.join(",")
+        primitive["attributes"] = attributes.remove(0);
+        if targets > 0 {
+            primitive["targets"] = attributes.into();
+        }
+        mesh["primitives"] = json!([primitive]);
+        if !self.is_float() {
+            document["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
+            document["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+        }
+        let (place, scale) = (place(self.stored, self.scene).map(|x| x as f32), [self.stored.step; 3]);
+        document["nodes"] = json!([{ "name": name, "mesh": 0, "translation": place, "scale": scale }]);
+        document["meshes"] = json!([mesh]);
+        document["accessors"] = layout.accessors.into();
+        document["bufferViews"] = layout.views.into();
+        document["buffers"] = json!([{ "byteLength": layout.length }]);
+        if let Some(name) = data {
+            document["buffers"][0]["uri"] = escaped(name).into();
+        }
+        document.to_string()
     }
 }
 
-/// Numbers as JSON has them.
-fn list(numbers: impl IntoIterator<Item = f64>) -> String {
-    let words: Vec<String> = numbers.into_iter().map(|x| x.to_string()).collect();
-    format!("[{}]", words.join(","))
+/// Where the numbers are in the file.
+#[derive(Default)]
+struct Layout {
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+    length: usize,
+}
+
+impl Layout {
+    /// Adds the next view; gives its index.
+    fn view(&mut self, length: usize, mut view: Value) -> usize {
+        (view["buffer"], view["byteOffset"], view["byteLength"]) = (json!(0), json!(self.length), json!(length));
+        self.length += length;
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    /// Adds an accessor of some numbers in a view; gives its index.
+    fn accessor(&mut self, view: usize, offset: usize, kind: u32, count: usize, mut accessor: Value) -> usize {
+        (accessor["bufferView"], accessor["byteOffset"]) = (json!(view), json!(offset));
+        (accessor["componentType"], accessor["count"]) = (json!(kind), json!(count));
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
 }
 
 /// A file name as an address has it.
