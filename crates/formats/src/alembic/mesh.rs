@@ -3,7 +3,6 @@
 use std::io::{Read, Seek};
 
 use super::objects::{Archive, Kind as ObjectKind};
-use super::ogawa::damaged;
 use super::properties::{BOOL, F32, F64, I32, Kind, Property, U8, U32, find};
 use super::sampling::Sampling;
 use super::timing::timing;
@@ -13,7 +12,7 @@ use crate::error::Fault;
 use crate::frames::Scalar;
 use crate::scene::{
     Chain, Failure, MOST_OPERATIONS, MeshTracks, MovingMesh, Operation, Timeline, Tree, Values, ancestry, check_held,
-    choose, no_points, shown, shown_path, union,
+    choose, damaged, no_points, shown, shown_path, union,
 };
 
 /// Bytes of the path of what an instance is of.
@@ -177,7 +176,7 @@ fn timeline<R: Read + Seek + Send>(
     tracks: &MeshTracks,
     mut moving: Vec<usize>,
 ) -> Result<Timeline, Failure> {
-    let length = archive.container.length();
+    let length = archive.container.source.length;
     let first = positions.first(&mut archive.container)?;
     let bytes = archive.container.sample(first)?.length;
     if bytes == 0 {

@@ -4,7 +4,6 @@
 //! winds faces clockwise; they are turned around on the way in and on the way out. An archive says neither its unit nor which
 //! axis points up.
 
-mod fields;
 mod mesh;
 mod objects;
 mod ogawa;

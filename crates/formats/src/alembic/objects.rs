@@ -3,12 +3,11 @@
 use std::io::{Read, Seek};
 use std::sync::Arc;
 
-use super::fields::Fields;
-use super::ogawa::{Container, DATA, damaged};
+use super::ogawa::{Container, DATA};
 use super::sampling::Sampling;
 use crate::error::Fault;
 use crate::frames::nominal;
-use crate::scene::{Failure, Node};
+use crate::scene::{Failure, Fields, Node, damaged};
 
 /// Objects of an archive, and how deep they nest; programs write far fewer.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -124,11 +123,11 @@ fn children_of<R: Read + Seek>(
     let mut fields = Fields(&headers[..headers.len().saturating_sub(HASHES)]);
     let mut objects = Vec::new();
     for &group in groups {
-        let length = fields.number(2)?;
+        let length = fields.short(2)?;
         let name = Arc::from(fields.take(length)?);
-        let kind = match fields.number(0)? {
+        let kind = match fields.short(0)? {
             INLINE => {
-                let length = fields.number(2)?;
+                let length = fields.short(2)?;
                 Kind::of(fields.take(length)?)
             }
             index => *kinds.get(index).ok_or_else(|| damaged("an object has metadata that are not there"))?,
@@ -142,8 +141,8 @@ fn children_of<R: Read + Seek>(
 /// What objects are by the index of their metadata; the first index says that there are none.
 fn kinds(table: &[u8]) -> Result<Vec<Kind>, Fault> {
     let (mut fields, mut kinds) = (Fields(table), vec![Kind::Other]);
-    while !fields.is_empty() {
-        let length = fields.number(0)?;
+    while !fields.0.is_empty() {
+        let length = fields.short(0)?;
         kinds.push(Kind::of(fields.take(length)?));
     }
     Ok(kinds)

@@ -1,11 +1,10 @@
-//! The Ogawa container: blocks of data, and groups of the offsets of their children; all little-endian. Every offset and size is compared with the
-//! length of the file before it is followed.
+//! The Ogawa container: blocks of data, and groups of the offsets of their children; all little-endian.
 
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Read, Seek};
 
 use crate::error::Fault;
-use crate::frames::{Scalar, read_values};
-use crate::scene::{Failure, MOST_OPERATIONS, Points, Value, Values};
+use crate::frames::Scalar;
+use crate::scene::{Allowance, Failure, MOST_OPERATIONS, Points, Source, Value, Values, damaged};
 use crate::signature::Signature;
 
 /// Set in the offset of a block of data, clear in that of a group.
@@ -19,11 +18,6 @@ pub(super) const HEADER: usize = 16;
 /// Bytes at the beginning of every sample that tell its contents apart from others.
 pub(super) const DIGEST: u64 = 16;
 
-/// The fault of whatever only damage explains.
-pub(super) fn damaged(what: &str) -> Fault {
-    Fault::damaged(format!("{what}, so the archive is damaged; copy or export it again"))
-}
-
 /// Bytes of the file that are known to be there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
@@ -32,13 +26,9 @@ pub(super) struct Block {
 }
 
 pub(super) struct Container<R> {
-    source: R,
-    length: u64,
-    /// Bytes of tables that may still be read: in an archive that is whole no two of them overlap.
-    allowance: u64,
+    pub(super) source: Source<R>,
     /// How positions are stored.
     pub(super) scalar: Scalar,
-    block: Vec<u8>,
 }
 
 impl<R: Read + Seek> Container<R> {
@@ -66,24 +56,12 @@ impl<R: Read + Seek> Container<R> {
         }
         let [.., a, b, c, d, e, f, g, h] = *header;
         let root = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
-        let (scalar, block) = (Scalar::F32Little, Vec::new());
-        Ok((Self { source, length, allowance: length, scalar, block }, root))
-    }
-
-    /// Bytes of the file.
-    pub(super) fn length(&self) -> u64 {
-        self.length
+        Ok((Self { source: Source::new(source, length, length), scalar: Scalar::F32Little }, root))
     }
 
     /// Lets as many bytes of tables be read as the file has, `times` over.
     pub(super) fn allow(&mut self, times: u64) {
-        self.allowance = self.length.saturating_mul(times);
-    }
-
-    /// Reads what is known to be there.
-    fn read_bytes(&mut self, start: u64, out: &mut [u8]) -> Result<(), Failure> {
-        self.source.seek(SeekFrom::Start(start))?;
-        Ok(self.source.read_exact(out)?)
+        self.source.allowance = Allowance(self.source.length.saturating_mul(times));
     }
 
     /// The children of a group.
@@ -121,29 +99,13 @@ impl<R: Read + Seek> Container<R> {
 
     /// What follows its number of elements of `size` bytes.
     fn sized(&mut self, at: u64, size: u64) -> Result<Block, Failure> {
-        let outside = || damaged("an offset leads out of the file");
-        if at.checked_add(8).is_none_or(|start| start > self.length) {
-            return Err(outside().into());
-        }
-        let (start, count) = (at + 8, self.number(at)?);
-        let length = count.checked_mul(size).filter(|&length| length <= self.length - start).ok_or_else(outside)?;
-        Ok(Block { start, length })
+        let count = self.source.number(at)?;
+        self.source.check(at + 8, count, size)?;
+        Ok(Block { start: at + 8, length: count * size })
     }
 
-    fn number(&mut self, at: u64) -> Result<u64, Failure> {
-        let mut bytes = [0; 8];
-        self.read_bytes(at, &mut bytes)?;
-        Ok(u64::from_le_bytes(bytes))
-    }
-
-    /// The bytes of a table.
-    pub(super) fn table(&mut self, block: Block) -> Result<Vec<u8>, Failure> {
-        // The number before the bytes counts too, so that empty tables are not free.
-        let overlap = || damaged("its tables overlap");
-        self.allowance = self.allowance.checked_sub(block.length.saturating_add(8)).ok_or_else(overlap)?;
-        let mut bytes = vec![0; usize::try_from(block.length).map_err(|_| overlap())?];
-        self.read_bytes(block.start, &mut bytes)?;
-        Ok(bytes)
+    fn table(&mut self, Block { start, length }: Block) -> Result<Vec<u8>, Failure> {
+        self.source.bytes(start, length, 1)
     }
 
     /// Where the numbers of a sample are, behind what tells its contents apart from others.
@@ -163,7 +125,7 @@ impl<R: Read + Seek> Container<R> {
             return Err(damaged(&format!("{name} has {} bytes where {most} are the most", block.length)).into());
         }
         let mut bytes = vec![0; block.length as usize];
-        self.read_bytes(block.start, &mut bytes)?;
+        self.source.fill(block.start, &mut bytes)?;
         Ok(bytes)
     }
 }
@@ -195,6 +157,6 @@ impl<R: Read + Seek + Send> Values for Container<R> {
     }
 
     fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure> {
-        Ok(read_values(&mut self.source, points.start, points.scalar, &mut self.block, out)?)
+        self.source.values(points.start, points.scalar, out)
     }
 }

@@ -2,10 +2,9 @@
 
 use std::io::{Read, Seek};
 
-use super::fields::Fields;
 use super::objects::{Archive, INLINE};
-use super::ogawa::{Container, DATA, damaged};
-use crate::scene::{Failure, Track, Value, check_held};
+use super::ogawa::{Container, DATA};
+use crate::scene::{Failure, Fields, Track, Value, check_held, damaged};
 
 /// Types of numbers, as headers tell them.
 pub(super) const BOOL: u8 = 0;
@@ -122,7 +121,10 @@ impl<R: Read + Seek> Archive<R> {
     /// The next header. Its first four bytes are bits: 0–1 the kind, 2–3 the width of its numbers, 4–7 the type of the values, 8 whether times are
     /// told, 9 whether the first and the last change are, 11 whether there is none, 12–19 the extent, 20–27 the metadata.
     fn property(&self, fields: &mut Fields<'_>, group: u64) -> Result<Property, Failure> {
-        let bits = fields.number(2)?;
+        let bits = fields.short(2)?;
+        if bits >> 2 & 3 == 3 {
+            return Err(damaged("a table has numbers of eight bytes").into());
+        }
         let (width, bit) = ((bits >> 2 & 3) as u32, |k: u32| bits >> k & 1 == 1);
         let kind = match bits & 3 {
             0 => Kind::Compound,
@@ -131,23 +133,23 @@ impl<R: Read + Seek> Archive<R> {
         };
         let (mut samples, mut first, mut last, mut sampling) = (0, 0, 0, 0);
         if kind != Kind::Compound {
-            samples = fields.number(width)?;
+            samples = fields.short(width)?;
             if bit(9) {
-                (first, last) = (fields.number(width)?, fields.number(width)?);
+                (first, last) = (fields.short(width)?, fields.short(width)?);
             } else if !bit(11) {
                 (first, last) = (1, samples.saturating_sub(1));
             }
             if bit(8) {
-                sampling = fields.number(width)?;
+                sampling = fields.short(width)?;
             }
             if sampling >= self.samplings.len() {
                 return Err(damaged("a property has times that are not there").into());
             }
         }
-        let length = fields.number(width)?;
+        let length = fields.short(width)?;
         let name = fields.take(length)?.to_vec();
         if bits >> 20 & 0xff == INLINE {
-            let length = fields.number(width)?;
+            let length = fields.short(width)?;
             fields.take(length)?;
         }
         let (number, extent) = ((bits >> 4 & 15) as u8, (bits >> 12 & 0xff) as u8);

@@ -1,8 +1,7 @@
 //! When samples are: evenly, in a cycle that repeats, or at times of their own.
 
-use super::fields::Fields;
-use super::ogawa::damaged;
 use crate::error::Fault;
+use crate::scene::{Fields, damaged};
 
 /// The length of a cycle that says that there is none: Alembic's largest number over 32, and what rounds to it.
 const NO_CYCLE: f64 = f64::MAX / 64.0;
@@ -25,10 +24,10 @@ impl Sampling {
     pub(super) fn table(bytes: &[u8]) -> Result<Vec<Self>, Fault> {
         let mut fields = Fields(bytes);
         let mut found = Vec::new();
-        while !fields.is_empty() {
+        while !fields.0.is_empty() {
             // How many samples use it, which these tell themselves.
-            fields.number(2)?;
-            let (cycle, count) = (fields.real()?, fields.number(2)?);
+            fields.short(2)?;
+            let (cycle, count) = (f64::from_le_bytes(fields.array()?), fields.short(2)?);
             let times = fields.take(count.saturating_mul(8))?;
             let stored: Vec<f64> = times.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
             if stored.is_empty() || cycle.is_nan() || stored.iter().any(|time| !time.is_finite()) {

@@ -11,10 +11,20 @@ use super::faults::{dangling, too_large};
 use crate::error::Fault;
 
 impl Buffers<'_> {
-    /// The positions of an accessor, which must have no more than `most`.
-    pub(super) fn positions(&self, index: usize, most: usize, place: &str) -> Result<Vec<Point>, Fault> {
-        let kind = self.position_kind(index, place)?;
-        self.read(index, kind, most, place, |point| point)
+    /// The first `N` numbers of each element of an accessor, which must be what is wanted, and no more than `most`.
+    pub(super) fn values<const N: usize>(
+        &self,
+        index: usize,
+        wanted: &Wanted,
+        most: usize,
+        place: &str,
+    ) -> Result<Vec<[f64; N]>, Fault> {
+        self.read(index, self.kind(index, wanted, place)?, most, place, |numbers| numbers)
+    }
+
+    /// The vertex indices of an accessor, which must have no more than `most`.
+    pub(super) fn indices(&self, index: usize, most: usize, place: &str) -> Result<Vec<u32>, Fault> {
+        self.read(index, self.kind(index, &INDICES, place)?, most, place, |[index]: [f64; 1]| index as u32)
     }
 
     /// The points that a sparse accessor names among so many, and where it moves them; none where all are stored.
@@ -28,7 +38,7 @@ impl Buffers<'_> {
         let Some(sparse) = accessor.sparse.as_ref().filter(|_| accessor.buffer_view.is_none()) else {
             return Ok(None);
         };
-        let kind = self.position_kind(index, place)?;
+        let kind = self.kind(index, &POSITIONS, place)?;
         let at = self.sparse_indices(sparse, most, place)?;
         if let Some(outside) = at.iter().find(|&&at| at >= most) {
             return Err(Fault::damaged(format!(
@@ -40,93 +50,27 @@ impl Buffers<'_> {
         Ok(Some(at.into_iter().zip(found.bytes.chunks(found.stride).map(|element| kind.numbers(element))).collect()))
     }
 
-    fn position_kind(&self, index: usize, place: &str) -> Result<Kind, Fault> {
-        let kind = self.kind(index, place)?;
-        if kind.shape != Type::Vec3 || kind.component == ComponentType::U32 {
-            return Err(kind.unexpected("positions", place));
-        }
-        Ok(kind)
-    }
-
-    /// Numbers of an animation, `width` to an element: fractions, or as they are; no more than `most` elements.
-    pub(super) fn numbers<const N: usize>(
-        &self,
-        index: usize,
-        most: usize,
-        place: &str,
-    ) -> Result<Vec<[f32; N]>, Fault> {
-        let kind = self.kind(index, place)?;
-        let shape = [Type::Scalar, Type::Scalar, Type::Scalar, Type::Vec3, Type::Vec4][N.min(4)];
-        if kind.shape != shape || kind.component == ComponentType::U32 {
-            return Err(kind.unexpected("values of an animation", place));
-        }
-        let kind = Kind { normalized: kind.component != ComponentType::F32, ..kind };
-        self.read(index, kind, most, place, |numbers: [f64; N]| numbers.map(|x| x as f32))
-    }
-
-    /// The colours of an accessor in linear light, which must have no more than `most`; an opacity is passed over.
-    pub(super) fn colors(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f32; 3]>, Fault> {
-        let mut kind = self.kind(index, place)?;
-        if !matches!(kind.component, ComponentType::U8 | ComponentType::U16 | ComponentType::F32)
-            || !matches!(kind.shape, Type::Vec3 | Type::Vec4)
-        {
-            return Ok(Vec::new());
-        }
-        // Not all files say so of colours, for which nothing else has a meaning.
-        kind.normalized = true;
-        self.read(index, kind, most, place, |color: [f64; 3]| color.map(|x| x as f32))
-    }
-
-    /// The vertex indices of an accessor, which must have no more than `most`.
-    pub(super) fn indices(&self, index: usize, most: usize, place: &str) -> Result<Vec<u32>, Fault> {
-        let kind = self.kind(index, place)?;
-        if kind.shape != Type::Scalar || !kind.is_unsigned() {
-            return Err(kind.unexpected("indices", place));
-        }
-        self.read(index, Kind { normalized: false, ..kind }, most, place, |[index]: [f64; 1]| index as u32)
-    }
-
-    /// Which joints move each vertex, four at a time.
-    pub(super) fn joints(&self, index: usize, most: usize, place: &str) -> Result<Vec<[usize; 4]>, Fault> {
-        let kind = self.kind(index, place)?;
-        if kind.shape != Type::Vec4 || !kind.is_unsigned() {
-            return Err(kind.unexpected("joints", place));
-        }
-        let kind = Kind { normalized: false, ..kind };
-        self.read(index, kind, most, place, |joints: [f64; 4]| joints.map(|joint| joint as usize))
-    }
-
-    /// How much each of those joints does.
-    pub(super) fn weights(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f64; 4]>, Fault> {
-        let kind = self.kind(index, place)?;
-        if kind.shape != Type::Vec4 {
-            return Err(kind.unexpected("weights", place));
-        }
-        self.read(index, Kind { normalized: true, ..kind }, most, place, |weights| weights)
-    }
-
-    /// Matrices of 4 × 4 numbers, column after column.
-    pub(super) fn matrices(&self, index: usize, most: usize, place: &str) -> Result<Vec<[f64; 16]>, Fault> {
-        let kind = self.kind(index, place)?;
-        if (kind.shape, kind.component) != (Type::Mat4, ComponentType::F32) {
-            return Err(kind.unexpected("matrices", place));
-        }
-        self.read(index, kind, most, place, |matrix| matrix)
-    }
-
     fn accessor(&self, index: usize) -> Result<&Accessor, Fault> {
         let accessors = &self.root.accessors;
         accessors.get(index).ok_or_else(|| dangling(&format!("accessor {index}"), accessors.len()))
     }
 
-    fn kind(&self, index: usize, place: &str) -> Result<Kind, Fault> {
+    /// What the elements of an accessor are, if that is what is wanted.
+    fn kind(&self, index: usize, wanted: &Wanted, place: &str) -> Result<Kind, Fault> {
         let accessor = self.accessor(index)?;
-        match (accessor.component_type, accessor.type_) {
-            (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) => {
-                Ok(Kind { component, shape, normalized: accessor.normalized })
-            }
-            _ => Err(Fault::damaged(format!("{place}: accessor {index} has an unknown type; export the mesh again"))),
+        let (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) =
+            (accessor.component_type, accessor.type_)
+        else {
+            let what = format!("{place}: accessor {index} has an unknown type; export the mesh again");
+            return Err(Fault::damaged(what));
+        };
+        if !wanted.shapes.contains(&shape) || !wanted.components.contains(&component) {
+            let what = wanted.what;
+            return Err(Fault::damaged(format!(
+                "{place}: {what} are {shape:?} of {component:?}; export the mesh again"
+            )));
         }
+        Ok(Kind { component, shape, normalized: wanted.normalized.unwrap_or(accessor.normalized) })
     }
 
     /// The first `N` numbers of every element, converted.
@@ -204,6 +148,41 @@ impl Buffers<'_> {
     }
 }
 
+use ComponentType::{F32, I8, I16, U8, U16, U32};
+
+/// What elements may be.
+pub(super) struct Wanted {
+    what: &'static str,
+    shapes: &'static [Type],
+    components: &'static [ComponentType],
+    /// Whether whole numbers are fractions, where that is not for the file to say.
+    normalized: Option<bool>,
+}
+
+impl Wanted {
+    const fn new(
+        what: &'static str,
+        shapes: &'static [Type],
+        components: &'static [ComponentType],
+        normalized: Option<bool>,
+    ) -> Self {
+        Self { what, shapes, components, normalized }
+    }
+
+    /// Values of an animation.
+    pub(super) const fn animation(shapes: &'static [Type]) -> Self {
+        Self::new("values of an animation", shapes, &[I8, U8, I16, U16, F32], Some(true))
+    }
+}
+
+pub(super) const POSITIONS: Wanted = Wanted::new("positions", &[Type::Vec3], &[I8, U8, I16, U16, F32], None);
+const INDICES: Wanted = Wanted::new("indices", &[Type::Scalar], &[U8, U16, U32], Some(false));
+pub(super) const JOINTS: Wanted = Wanted::new("joints", &[Type::Vec4], &[U8, U16, U32], Some(false));
+pub(super) const WEIGHTS: Wanted = Wanted::new("weights", &[Type::Vec4], &[I8, U8, I16, U16, U32, F32], Some(true));
+pub(super) const MATRICES: Wanted = Wanted::new("matrices", &[Type::Mat4], &[F32], None);
+/// Not all files say that they are fractions, while nothing else has a meaning; an opacity is passed over.
+pub(super) const COLORS: Wanted = Wanted::new("colours", &[Type::Vec3, Type::Vec4], &[U8, U16, F32], Some(true));
+
 /// The largest element: sixteen numbers of four bytes.
 const MAX_ELEMENT_BYTES: usize = 64;
 
@@ -229,10 +208,6 @@ impl Kind {
         self.component.size() * self.shape.multiplicity()
     }
 
-    fn is_unsigned(self) -> bool {
-        matches!(self.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
-    }
-
     /// The first numbers of an element that has as many or more.
     fn numbers<const N: usize>(self, element: &[u8]) -> [f64; N] {
         let size = self.component.size();
@@ -244,18 +219,13 @@ impl Kind {
             bytes.first_chunk().copied().unwrap_or([0; N])
         }
         let (value, most) = match self.component {
-            ComponentType::I8 => (i8::from_le_bytes(first(bytes)).into(), 127.0),
-            ComponentType::U8 => (u8::from_le_bytes(first(bytes)).into(), 255.0),
-            ComponentType::I16 => (i16::from_le_bytes(first(bytes)).into(), 32767.0),
-            ComponentType::U16 => (u16::from_le_bytes(first(bytes)).into(), 65535.0),
-            ComponentType::U32 => return u32::from_le_bytes(first(bytes)).into(),
-            ComponentType::F32 => return f32::from_le_bytes(first(bytes)).into(),
+            I8 => (i8::from_le_bytes(first(bytes)).into(), 127.0),
+            U8 => (u8::from_le_bytes(first(bytes)).into(), 255.0),
+            I16 => (i16::from_le_bytes(first(bytes)).into(), 32767.0),
+            U16 => (u16::from_le_bytes(first(bytes)).into(), 65535.0),
+            U32 => return u32::from_le_bytes(first(bytes)).into(),
+            F32 => return f32::from_le_bytes(first(bytes)).into(),
         };
         if self.normalized { f64::max(value / most, -1.0) } else { value }
-    }
-
-    fn unexpected(self, what: &str, place: &str) -> Fault {
-        let Self { component, shape, .. } = self;
-        Fault::damaged(format!("{place}: {what} are {shape:?} of {component:?}; export the mesh again"))
     }
 }

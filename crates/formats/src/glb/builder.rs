@@ -8,6 +8,7 @@ use cager_geometry::vector::along;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
+use super::accessor::{COLORS, POSITIONS};
 use super::buffers::Buffers;
 use super::container;
 use super::faults::too_large;
@@ -133,7 +134,7 @@ impl<'a, 'b> Builder<'a, 'b> {
         placement: &Placement,
         place: &str,
     ) -> Result<(usize, usize), Fault> {
-        let mut points = self.buffers.positions(index, self.room() / POINT_BYTES, place)?;
+        let mut points = self.buffers.values(index, &POSITIONS, self.room() / POINT_BYTES, place)?;
         self.morph(&mut points, primitive, placement, place)?;
         if let Some(skin) = placement.skin {
             self.joints(skin)?;
@@ -175,7 +176,7 @@ impl<'a, 'b> Builder<'a, 'b> {
                 continue;
             }
             self.take(MOVED_BYTES * (points.len() + 1))?;
-            let moved = self.buffers.positions(target, points.len(), place)?;
+            let moved: Vec<Point> = self.buffers.values(target, &POSITIONS, points.len(), place)?;
             for (point, moved) in points.iter_mut().zip(moved) {
                 *point = along(*point, weight, moved);
             }
@@ -185,9 +186,9 @@ impl<'a, 'b> Builder<'a, 'b> {
 
     /// Colours that cannot be read leave the model without any.
     fn add_colors(&mut self, index: usize, points: usize, place: &str) {
-        let colors = self.buffers.colors(index, points, place).unwrap_or_default();
+        let colors: Vec<[f64; 3]> = self.buffers.values(index, &COLORS, points, place).unwrap_or_default();
         if colors.len() == points {
-            colors.into_iter().for_each(|color| self.colors.push(color.map(|x| srgb(x.clamp(0.0, 1.0)))));
+            colors.into_iter().for_each(|color| self.colors.push(color.map(|x| srgb(x.clamp(0.0, 1.0) as f32))));
         }
     }
 

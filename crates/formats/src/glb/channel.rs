@@ -1,10 +1,12 @@
 //! One value that an animation moves: its keys, and what lies between them.
 
-use glam::DQuat;
+use glam::{DQuat, DVec3};
+use gltf::json::accessor::Type;
 use gltf::json::animation::{Channel as Stored, Interpolation, Property, Sampler};
 use gltf::json::validation::Checked;
 use gltf::json::{Animation, Node, Root};
 
+use super::accessor::Wanted;
 use super::buffers::Buffers;
 use super::faults::dangling;
 use crate::error::Fault;
@@ -22,7 +24,7 @@ pub(super) struct Channel {
     /// Numbers of a value.
     width: usize,
     /// A value for each time, or with [`Interpolation::CubicSpline`] its tangent before, itself and its tangent behind.
-    values: Vec<f32>,
+    values: Vec<f64>,
 }
 
 impl Channel {
@@ -52,19 +54,20 @@ impl Channel {
         if width == 0 {
             return Ok(None);
         }
-        let times: Vec<[f32; 1]> = buffers.numbers(sampler.input.value(), *room, place)?;
+        let scalars = Wanted::animation(&[Type::Scalar]);
+        let times = buffers.values::<1>(sampler.input.value(), &scalars, *room, place)?.into_flattened();
         *room -= times.len();
-        let times: Vec<f64> = times.into_iter().map(|[time]| time.into()).collect();
         if let Some(k) = times.iter().position(|time| !time.is_finite()).or_else(|| descent(&times)) {
             return Err(Fault::invalid(format!(
                 "{place}: its time {k} is not after the one before; export the animation again"
             )));
         }
         let output = sampler.output.value();
+        let (vectors, turns) = (Wanted::animation(&[Type::Vec3]), Wanted::animation(&[Type::Vec4]));
         let values = match property {
-            Property::MorphTargetWeights => buffers.numbers::<1>(output, *room, place)?.into_flattened(),
-            Property::Rotation => buffers.numbers::<4>(output, *room / 4, place)?.into_flattened(),
-            Property::Translation | Property::Scale => buffers.numbers::<3>(output, *room / 3, place)?.into_flattened(),
+            Property::MorphTargetWeights => buffers.values::<1>(output, &scalars, *room, place)?.into_flattened(),
+            Property::Rotation => buffers.values::<4>(output, &turns, *room / 4, place)?.into_flattened(),
+            _ => buffers.values::<3>(output, &vectors, *room / 3, place)?.into_flattened(),
         };
         *room -= values.len();
         if let Some(k) = values.iter().position(|value| !value.is_finite()) {
@@ -89,23 +92,21 @@ impl Channel {
 
     /// Puts the value at a time into a node.
     pub(super) fn apply(&self, time: f64, node: &mut Node) {
-        let mut value = vec![0.0; self.width];
-        self.value(time, &mut value);
+        let value = self.value(time);
         match self.property {
             Property::MorphTargetWeights => node.weights = Some(value.iter().map(|&x| x as f32).collect()),
             Property::Rotation => {
-                let [x, y, z, w] = std::array::from_fn(|k| value[k]);
-                let length = (x * x + y * y + z * z + w * w).sqrt();
-                let turn = if length > 0.0 { [x, y, z, w].map(|x| (x / length) as f32) } else { [0.0, 0.0, 0.0, 1.0] };
-                node.rotation = Some(gltf::json::scene::UnitQuaternion(turn));
+                let turn = DQuat::from_slice(&value);
+                let turn = if turn.length() > 0.0 { turn.normalize() } else { DQuat::IDENTITY };
+                node.rotation = Some(gltf::json::scene::UnitQuaternion(turn.as_quat().to_array()));
             }
-            Property::Translation => node.translation = Some(std::array::from_fn(|k| value[k] as f32)),
-            Property::Scale => node.scale = Some(std::array::from_fn(|k| value[k] as f32)),
+            Property::Translation => node.translation = Some(DVec3::from_slice(&value).as_vec3().to_array()),
+            Property::Scale => node.scale = Some(DVec3::from_slice(&value).as_vec3().to_array()),
         }
     }
 
     /// The value at a time; before the first and behind the last, theirs.
-    fn value(&self, time: f64, out: &mut [f64]) {
+    fn value(&self, time: f64) -> Vec<f64> {
         let last = self.times.len() - 1;
         let before = self.times.partition_point(|&key| key <= time + NEAR).saturating_sub(1);
         let step = self.times[(before + 1).min(last)] - self.times[before];
@@ -117,28 +118,24 @@ impl Channel {
             &self.values[first..first + self.width]
         };
         let (a, b) = (part(before, 1), part((before + 1).min(last), 1));
-        out.iter_mut().zip(a).for_each(|(out, &a)| *out = a.into());
         if share == 0.0 || self.interpolation == Interpolation::Step {
-            return;
+            return a.to_vec();
         }
-        if cubic {
-            // The cubic Hermite spline; tangents are stored for a step of one second.
-            let (t, [behind, ahead]) = (share, [part(before, 2), part(before + 1, 0)]);
-            let (t2, t3) = (t * t, t * t * t);
-            for (k, out) in out.iter_mut().enumerate() {
-                let [a, b, m, n] = [a[k], b[k], behind[k], ahead[k]].map(f64::from);
-                *out = (2.0 * t3 - 3.0 * t2 + 1.0) * a
-                    + step * (t3 - 2.0 * t2 + t) * m
-                    + (3.0 * t2 - 2.0 * t3) * b
-                    + step * (t3 - t2) * n;
+        if self.property == Property::Rotation && !cubic {
+            return DQuat::from_slice(a).slerp(DQuat::from_slice(b), share).to_array().to_vec();
+        }
+        let mixed = |k: usize| {
+            if !cubic {
+                return a[k] + share * (b[k] - a[k]);
             }
-        } else if self.property == Property::Rotation {
-            let from = DQuat::from_slice(out);
-            let to = DQuat::from_array(std::array::from_fn(|k| b[k].into()));
-            out.copy_from_slice(&from.slerp(to, share).to_array());
-        } else {
-            out.iter_mut().zip(b).for_each(|(out, &b)| *out += share * (f64::from(b) - *out));
-        }
+            // The cubic Hermite spline; tangents are stored for a step of one second.
+            let (t, t2, t3) = (share, share * share, share * share * share);
+            (2.0 * t3 - 3.0 * t2 + 1.0) * a[k]
+                + step * (t3 - 2.0 * t2 + t) * part(before, 2)[k]
+                + (3.0 * t2 - 2.0 * t3) * b[k]
+                + step * (t3 - t2) * part(before + 1, 0)[k]
+        };
+        (0..self.width).map(mixed).collect()
     }
 }
 

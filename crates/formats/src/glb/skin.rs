@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 
+use super::accessor::{JOINTS, MATRICES, WEIGHTS};
 use super::buffers::Buffers;
 use super::faults::{dangling, too_large};
 use super::scene::{Scene, affine, mirrors};
@@ -28,7 +29,7 @@ impl Joints {
         let skin = skins.get(index).ok_or_else(|| dangling(&format!("skin {index}"), skins.len()))?;
         let place = format!("skin {index}");
         let bound = match skin.inverse_bind_matrices {
-            Some(accessor) => buffers.matrices(accessor.value(), most, &place)?,
+            Some(accessor) => buffers.values(accessor.value(), &MATRICES, most, &place)?,
             None => Vec::new(),
         };
         let read = bound.len().max(skin.joints.len());
@@ -79,14 +80,14 @@ impl Joints {
             else {
                 break;
             };
-            let joints = buffers.joints(joints, points.len(), place)?;
-            let weights = buffers.weights(weights, points.len(), place)?;
+            let joints: Vec<[f64; 4]> = buffers.values(joints, &JOINTS, points.len(), place)?;
+            let weights: Vec<[f64; 4]> = buffers.values(weights, &WEIGHTS, points.len(), place)?;
             if joints.len().min(weights.len()) < points.len() {
                 return Err(Fault::damaged(format!("{place}: not every vertex has joints; export the mesh again")));
             }
             for (k, (moved, (joints, weights))) in moved.iter_mut().zip(joints.iter().zip(&weights)).enumerate() {
                 for (&joint, &weight) in joints.iter().zip(weights).filter(|&(_, &weight)| weight != 0.0) {
-                    let transform = self.0.get(joint).ok_or_else(|| {
+                    let transform = self.0.get(joint as usize).ok_or_else(|| {
                         Fault::damaged(format!(
                             "{place}: vertex {k} names joint {joint}, but the skin has {}; export the mesh again",
                             self.0.len()

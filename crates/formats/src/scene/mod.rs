@@ -1,6 +1,7 @@
 //! What readers of scenes share, so that each is a parser: a tree of nodes, of whose meshes one is chosen; values at times,
 //! which are read when a frame is asked for; transforms above the mesh; and its frames, one by one.
 
+mod bytes;
 mod faces;
 mod failure;
 mod mesh;
@@ -9,6 +10,7 @@ mod reader;
 mod track;
 mod transform;
 
+pub(crate) use bytes::{Allowance, Fields, Source, damaged};
 pub(crate) use failure::Failure;
 pub(crate) use mesh::{MeshTracks, MovingMesh, no_points};
 pub(crate) use node::{Node, Tree, ancestry, choose, list, named, shown, shown_path};

@@ -83,11 +83,6 @@ pub(super) trait Layer: Values {
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure>;
 }
 
-/// The fault of whatever only damage explains.
-pub(super) fn damaged(what: &str) -> Fault {
-    Fault::damaged(format!("{what}, so the file is damaged; copy or export it again"))
-}
-
 /// The fault of what is composed of other prims or files.
 pub(super) fn composed(what: &str, of: &str) -> Fault {
     Fault::unsupported(format!(

@@ -4,9 +4,8 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use zip::{CompressionMethod, ZipArchive};
 
-use super::layer::damaged;
 use crate::error::Fault;
-use crate::scene::Failure;
+use crate::scene::{Failure, damaged};
 
 /// What a package begins with.
 pub(super) const MAGIC: &[u8; 4] = b"PK\x03\x04";

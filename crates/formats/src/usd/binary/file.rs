@@ -1,11 +1,11 @@
-//! The bytes of a binary layer: every offset and size is compared with the length of the file before it is followed.
+//! Values of a binary layer: what they are, and where.
 
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Read, Seek};
 
-use super::pack::Allowance;
-use crate::frames::{Scalar, read_values};
-use crate::scene::Failure;
-use crate::usd::layer::damaged;
+use super::kind;
+use crate::error::Fault;
+use crate::frames::{Scalar, half_precision};
+use crate::scene::{Failure, Source, damaged};
 
 /// What a layer begins with.
 pub(crate) const MAGIC: &[u8; 8] = b"PXR-USDC";
@@ -42,72 +42,55 @@ impl Rep {
     }
 }
 
+/// The file of a layer.
 pub(super) struct File<R> {
-    source: R,
-    length: u64,
+    pub(super) source: Source<R>,
     /// The minor version of the format, of which the major one is 0.
     pub(super) version: u8,
-    /// Bytes of tables that may still be read: the same one is read a few times at the most.
-    pub(super) allowance: Allowance,
-    block: Vec<u8>,
 }
 
 impl<R: Read + Seek> File<R> {
-    pub(super) fn new(source: R, length: u64, version: u8) -> Self {
-        // The sections once; then times and lists, many of which may be the same.
-        let allowance = Allowance(length.saturating_mul(64).saturating_add(1 << 16));
-        Self { source, length, version, allowance, block: Vec::new() }
-    }
-
-    pub(super) fn length(&self) -> u64 {
-        self.length
-    }
-
-    /// Whether so many elements of a size are there.
-    pub(super) fn check(&self, start: u64, count: u64, size: u64) -> Result<(), Failure> {
-        let end = count.checked_mul(size).and_then(|length| start.checked_add(length));
-        if end.is_none_or(|end| end > self.length) {
-            return Err(damaged("an offset leads out of the file").into());
-        }
-        Ok(())
-    }
-
-    /// Bytes of a table of so many elements.
-    pub(super) fn bytes(&mut self, start: u64, count: u64, size: u64) -> Result<Vec<u8>, Failure> {
-        self.check(start, count, size)?;
-        let length = self.allowance.take(count * size, 1)?;
-        let mut bytes = vec![0; length];
-        self.source.seek(SeekFrom::Start(start))?;
-        self.source.read_exact(&mut bytes)?;
-        Ok(bytes)
-    }
-
-    /// A few bytes.
-    pub(super) fn array<const N: usize>(&mut self, start: u64) -> Result<[u8; N], Failure> {
-        self.check(start, N as u64, 1)?;
-        let mut bytes = [0; N];
-        self.source.seek(SeekFrom::Start(start))?;
-        self.source.read_exact(&mut bytes)?;
-        Ok(bytes)
-    }
-
-    pub(super) fn number(&mut self, start: u64) -> Result<u64, Failure> {
-        Ok(u64::from_le_bytes(self.array(start)?))
-    }
-
     /// Where the elements of an array begin, and how many they are.
     pub(super) fn elements(&mut self, rep: Rep) -> Result<(u64, u64), Failure> {
         let start = rep.offset();
         match (start, self.version) {
             (0, _) => Ok((0, 0)),
             // Behind the number of dimensions.
-            (_, ..5) => Ok((start + 8, u32::from_le_bytes(self.array(start + 4)?).into())),
-            (_, ..7) => Ok((start + 4, u32::from_le_bytes(self.array(start)?).into())),
-            _ => Ok((start + 8, self.number(start)?)),
+            (_, ..5) => Ok((start + 8, u32::from_le_bytes(self.source.array(start + 4)?).into())),
+            (_, ..7) => Ok((start + 4, u32::from_le_bytes(self.source.array(start)?).into())),
+            _ => Ok((start + 8, self.source.number(start)?)),
         }
     }
 
-    pub(super) fn read_values(&mut self, start: u64, scalar: Scalar, out: &mut [f64]) -> Result<bool, Failure> {
-        Ok(read_values(&mut self.source, start, scalar, &mut self.block, out)?)
+    /// The numbers of one value.
+    pub(super) fn numbers(&mut self, rep: Rep) -> Result<Vec<f64>, Failure> {
+        let small = rep.inlined();
+        let bytes = small.map(|byte| f64::from(byte as i8));
+        let (scalar, count) = match (rep.kind(), rep.is_inlined()) {
+            _ if rep.is_array() => return Err(damaged("it has an array where one value belongs").into()),
+            (kind::INT, true) => return Ok(vec![i32::from_le_bytes(small).into()]),
+            (kind::HALF, true) => return Ok(vec![half_precision(u16::from_le_bytes([small[0], small[1]]))]),
+            (kind::FLOAT | kind::DOUBLE, true) => return Ok(vec![f32::from_le_bytes(small).into()]),
+            (kind::VEC3D | kind::VEC3F | kind::VEC3H, true) => return Ok(bytes[..3].to_vec()),
+            (kind::MATRIX4D, true) => {
+                return Ok((0..16).map(|k| if k % 5 == 0 { bytes[k / 5] } else { 0.0 }).collect());
+            }
+            (kind::DOUBLE, false) => (Scalar::F64Little, 1),
+            (kind::VEC3D, false) => (Scalar::F64Little, 3),
+            (kind::QUATD, false) => (Scalar::F64Little, 4),
+            (kind::MATRIX4D, false) => (Scalar::F64Little, 16),
+            (kind::VEC3F, false) => (Scalar::F32Little, 3),
+            (kind::QUATF, false) => (Scalar::F32Little, 4),
+            (kind::VEC3H, false) => (Scalar::F16Little, 3),
+            (kind::QUATH, false) => (Scalar::F16Little, 4),
+            (kind::BLOCKED, _) => {
+                return Err(Fault::unsupported("has a value that is blocked at a time; export it again").into());
+            }
+            (kind, _) => return Err(damaged(&format!("it has a value of type {kind} where numbers belong")).into()),
+        };
+        self.source.check(rep.offset(), count, scalar.size() as u64)?;
+        let mut numbers = vec![0.0; count as usize];
+        self.source.values(rep.offset(), scalar, &mut numbers)?;
+        Ok(numbers)
     }
 }

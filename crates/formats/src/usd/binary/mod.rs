@@ -1,6 +1,7 @@
 //! Binary layers, which OpenUSD calls crate files: values are read when they are asked for.
 
 mod file;
+pub(super) mod kind;
 mod pack;
 mod paths;
 mod sections;
@@ -9,36 +10,14 @@ use std::collections::HashMap;
 use std::io::{Read, Seek};
 use std::sync::Arc;
 
-use super::layer::{COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, composed, damaged, spline};
+use super::layer::{COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, composed, spline};
 use crate::error::Fault;
-use crate::frames::{Scalar, half_precision};
-use crate::scene::{Failure, Node, Points, Track, Value, Values};
+use crate::frames::Scalar;
+use crate::scene::{Failure, Node, Points, Source, Track, Value, Values, damaged};
 pub(super) use file::MAGIC;
 use file::{File, Rep};
 use pack::integers;
 use sections::{Sections, Spec};
-
-/// Types of values.
-pub(super) mod kind {
-    pub(crate) const INT: u8 = 3;
-    pub(crate) const HALF: u8 = 7;
-    pub(crate) const FLOAT: u8 = 8;
-    pub(crate) const DOUBLE: u8 = 9;
-    pub(crate) const TOKEN: u8 = 11;
-    pub(crate) const MATRIX4D: u8 = 15;
-    pub(crate) const QUATD: u8 = 16;
-    pub(crate) const QUATF: u8 = 17;
-    pub(crate) const QUATH: u8 = 18;
-    pub(crate) const VEC3D: u8 = 23;
-    pub(crate) const VEC3F: u8 = 24;
-    pub(crate) const VEC3H: u8 = 25;
-    pub(crate) const TOKENS: u8 = 41;
-    pub(crate) const SPECIFIER: u8 = 42;
-    pub(crate) const VARIABILITY: u8 = 44;
-    pub(crate) const TIME_SAMPLES: u8 = 46;
-    pub(crate) const DOUBLES: u8 = 48;
-    pub(crate) const BLOCKED: u8 = 51;
-}
 
 /// Kinds of specs.
 pub(super) const ATTRIBUTE: u32 = 1;
@@ -62,8 +41,10 @@ pub(super) struct Binary<R> {
 impl<R: Read + Seek> Binary<R> {
     /// Opens a layer of `length` bytes, which begins as one does.
     pub(super) fn open(source: R, length: u64) -> Result<Self, Failure> {
-        let mut file = File::new(source, length, 0);
-        let [major, minor, patch] = file.array(MAGIC.len() as u64)?;
+        // The sections once; then times and lists, many of which may be the same.
+        let allowance = length.saturating_mul(64).saturating_add(1 << 16);
+        let mut file = File { source: Source::new(source, length, allowance), version: 0 };
+        let [major, minor, patch] = file.source.array(MAGIC.len() as u64)?;
         if major != 0 || !VERSIONS.contains(&minor) {
             let what = format!(
                 "is of version {major}.{minor}.{patch} of USD's binary format, where 0.{}.0 to 0.{}.0 are read; write it again in Python (pip install usd-core): from pxr import Sdf; Sdf.Layer.FindOrOpen(\"in.usd\").Export(\"out.usda\")",
@@ -73,7 +54,7 @@ impl<R: Read + Seek> Binary<R> {
             return Err(Fault::unsupported(what).into());
         }
         file.version = minor;
-        let contents = file.number(16)?;
+        let contents = file.source.number(16)?;
         let sections = Sections::read(&mut file, contents)?;
         let (stage, nodes, prims, attributes) = (Stage::default(), Vec::new(), Vec::new(), Vec::new());
         let mut layer = Self { file, sections, stage, nodes, prims, attributes };
@@ -128,13 +109,13 @@ impl<R: Read + Seek> Binary<R> {
     fn read_stage(&mut self) -> Result<(), Failure> {
         let Some(&root) = self.sections.specs.iter().find(|spec| spec.kind == ROOT) else { return Ok(()) };
         if let Some(list) = self.sections.field(root, "subLayers")?
-            && self.file.number(list.offset())? > 0
+            && self.file.source.number(list.offset())? > 0
         {
             return Err(composed("the layer", "sublayers").into());
         }
         let mut number = |name: &str| -> Result<Option<f64>, Failure> {
             let Some(value) = self.sections.field(root, name)? else { return Ok(None) };
-            Ok(numbers(&mut self.file, value)?.first().copied())
+            Ok(self.file.numbers(value)?.first().copied())
         };
         self.stage = Stage {
             up_is_z: None,
@@ -151,24 +132,24 @@ impl<R: Read + Seek> Binary<R> {
 
     /// A table whose place is told at `at`, counted from there: behind the place, its value.
     fn told(&mut self, at: u64) -> Result<u64, Failure> {
-        let place = at.checked_add(self.file.number(at)?);
+        let place = at.checked_add(self.file.source.number(at)?);
         Ok(place.ok_or_else(|| damaged("an offset leads out of the file"))?)
     }
 
     fn samples(&mut self, value: Rep, attribute: &mut Track) -> Result<(), Failure> {
         let at = self.told(value.offset())?;
-        let times = Rep(self.file.number(at)?);
+        let times = Rep(self.file.source.number(at)?);
         if value.kind() != kind::TIME_SAMPLES || times.kind() != kind::DOUBLES {
             return Err(damaged("its time samples are of another type").into());
         }
-        let count = self.file.number(times.offset())?;
+        let count = self.file.source.number(times.offset())?;
         let values = self.told(at + 8)?;
-        if self.file.number(values)? != count {
+        if self.file.source.number(values)? != count {
             return Err(damaged("it has other times than values").into());
         }
-        let bytes = self.file.bytes(times.offset() + 8, count, 8)?;
+        let bytes = self.file.source.bytes(times.offset() + 8, count, 8)?;
         attribute.times = bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
-        let bytes = self.file.bytes(values + 8, count, 8)?;
+        let bytes = self.file.source.bytes(values + 8, count, 8)?;
         attribute.values = bytes.as_chunks().0.iter().map(|bytes| Value(u64::from_le_bytes(*bytes))).collect();
         if !attribute.times.is_sorted() || attribute.times.iter().any(|time| !time.is_finite()) {
             return Err(damaged("it has times that do not ascend").into());
@@ -234,18 +215,18 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
             return Ok(vec![text(u32::from_le_bytes(rep.inlined()))]);
         }
         let (start, count) = match rep.kind() {
-            kind::TOKENS => (rep.offset() + 8, self.file.number(rep.offset())?),
+            kind::TOKENS => (rep.offset() + 8, self.file.source.number(rep.offset())?),
             kind::TOKEN if rep.is_array() => self.file.elements(rep)?,
             _ => return Err(damaged("it has another value where a list of names belongs").into()),
         };
         if count > most as u64 {
             return Err(damaged(&format!("it has a list of {count} names where {most} are the most")).into());
         }
-        let bytes = self.file.bytes(start, count, 4)?;
+        let bytes = self.file.source.bytes(start, count, 4)?;
         let mut names = Vec::new();
         for index in bytes.as_chunks().0 {
             let index = u32::from_le_bytes(*index);
-            self.file.allowance.take(self.sections.token(index).len() as u64, 1)?;
+            self.file.source.allowance.take(self.sections.token(index).len() as u64, 1)?;
             names.push(String::from_utf8_lossy(self.sections.token(index)).into_owned());
         }
         Ok(names)
@@ -254,7 +235,7 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
 
 impl<R: Read + Seek + Send> Values for Binary<R> {
     fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
-        numbers(&mut self.file, Rep(value.0))
+        self.file.numbers(Rep(value.0))
     }
 
     fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {
@@ -267,12 +248,12 @@ impl<R: Read + Seek + Send> Values for Binary<R> {
             return Err(damaged(&format!("it has {count} numbers of faces where {most} are the most")).into());
         }
         if !rep.is_packed() || count == 0 {
-            let bytes = self.file.bytes(start, count, 4)?;
+            let bytes = self.file.source.bytes(start, count, 4)?;
             return Ok(bytes.as_chunks().0.iter().map(|bytes| i32::from_le_bytes(*bytes)).collect());
         }
-        let length = self.file.number(start)?;
-        let packed = self.file.bytes(start + 8, length, 1)?;
-        Ok(integers(&packed, self.file.allowance.take(count, 4)?)?)
+        let length = self.file.source.number(start)?;
+        let packed = self.file.source.bytes(start + 8, length, 1)?;
+        Ok(integers(&packed, self.file.source.allowance.take(count, 4)?)?)
     }
 
     fn points(&mut self, value: Value) -> Result<Points, Failure> {
@@ -291,55 +272,12 @@ impl<R: Read + Seek + Send> Values for Binary<R> {
             }
         };
         let (start, count) = self.file.elements(rep)?;
-        self.file.check(start, count, 3 * scalar.size() as u64)?;
+        self.file.source.check(start, count, 3 * scalar.size() as u64)?;
         let count = usize::try_from(count).map_err(|_| damaged("it has more points than memory"))?;
         Ok(Points { start, count, scalar })
     }
 
     fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure> {
-        self.file.read_values(points.start, points.scalar, out)
+        self.file.source.values(points.start, points.scalar, out)
     }
-}
-
-/// The numbers of one value.
-fn numbers<R: Read + Seek>(file: &mut File<R>, rep: Rep) -> Result<Vec<f64>, Failure> {
-    let small = rep.inlined();
-    let at = rep.offset();
-    let bytes = |small: &[u8]| small.iter().map(|&b| f64::from(b as i8)).collect::<Vec<_>>();
-    Ok(match (rep.kind(), rep.is_inlined()) {
-        _ if rep.is_array() => return Err(damaged("it has an array where one value belongs").into()),
-        (kind::INT, true) => vec![i32::from_le_bytes(small).into()],
-        (kind::HALF, true) => vec![half_precision(u16::from_le_bytes([small[0], small[1]]))],
-        (kind::FLOAT | kind::DOUBLE, true) => vec![f32::from_le_bytes(small).into()],
-        (kind::VEC3D | kind::VEC3F | kind::VEC3H, true) => bytes(&small[..3]),
-        (kind::MATRIX4D, true) => {
-            let mut matrix = vec![0.0; 16];
-            bytes(&small).iter().enumerate().for_each(|(k, &x)| matrix[5 * k] = x);
-            matrix
-        }
-        (kind::DOUBLE, false) => doubles(&file.array::<8>(at)?),
-        (kind::VEC3D, false) => doubles(&file.array::<24>(at)?),
-        (kind::QUATD, false) => doubles(&file.array::<32>(at)?),
-        (kind::MATRIX4D, false) => doubles(&file.array::<128>(at)?),
-        (kind::VEC3F, false) => singles(&file.array::<12>(at)?),
-        (kind::QUATF, false) => singles(&file.array::<16>(at)?),
-        (kind::VEC3H, false) => halves(&file.array::<6>(at)?),
-        (kind::QUATH, false) => halves(&file.array::<8>(at)?),
-        (kind::BLOCKED, _) => {
-            return Err(Fault::unsupported("has a value that is blocked at a time; export it again").into());
-        }
-        (kind, _) => return Err(damaged(&format!("it has a value of type {kind} where numbers belong")).into()),
-    })
-}
-
-fn doubles(bytes: &[u8]) -> Vec<f64> {
-    bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
-}
-
-fn singles(bytes: &[u8]) -> Vec<f64> {
-    bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes).into()).collect()
-}
-
-fn halves(bytes: &[u8]) -> Vec<f64> {
-    bytes.as_chunks().0.iter().map(|bytes| half_precision(u16::from_le_bytes(*bytes))).collect()
 }

@@ -3,58 +3,28 @@
 use lz4_flex::block::decompress_into;
 
 use crate::error::Fault;
-use crate::usd::layer::damaged;
+use crate::scene::{Allowance, Fields, damaged};
 
-/// What is left of a section.
-pub(super) struct Fields<'a>(pub(super) &'a [u8]);
-
-impl<'a> Fields<'a> {
-    pub(super) fn take(&mut self, length: usize) -> Result<&'a [u8], Fault> {
-        let (taken, rest) = self.0.split_at_checked(length).ok_or_else(|| damaged("a table ends too early"))?;
-        self.0 = rest;
-        Ok(taken)
-    }
-
-    pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
-        let mut bytes = [0; N];
-        bytes.copy_from_slice(self.take(N)?);
-        Ok(bytes)
-    }
-
-    /// A number of eight bytes.
-    pub(super) fn number(&mut self) -> Result<u64, Fault> {
-        Ok(u64::from_le_bytes(self.array()?))
-    }
-
-    /// Bytes behind how many they are.
-    fn sized(&mut self) -> Result<&'a [u8], Fault> {
-        let length = self.number()?;
-        self.take(usize::try_from(length).unwrap_or(usize::MAX))
-    }
+/// Bytes behind how many they are.
+fn sized<'a>(fields: &mut Fields<'a>) -> Result<&'a [u8], Fault> {
+    let length = fields.number()?;
+    fields.take(usize::try_from(length).unwrap_or(usize::MAX))
 }
 
-/// Bytes that may still be unpacked, so that a small file takes little memory.
-pub(super) struct Allowance(pub(super) u64);
+/// Bytes of LZ4 behind how many they are, which become at most `most` bytes.
+pub(super) fn unpacked(fields: &mut Fields<'_>, most: u64, allowance: &mut Allowance) -> Result<Vec<u8>, Fault> {
+    let packed = sized(fields)?;
+    unpack(packed, allowance.take(most, 1)?)
+}
 
-impl Allowance {
-    /// So many elements of `size` bytes.
-    pub(super) fn take(&mut self, count: u64, size: u64) -> Result<usize, Fault> {
-        let most = || damaged("its tables unpack to more than such a file holds");
-        self.0 = count.checked_mul(size).and_then(|bytes| self.0.checked_sub(bytes)).ok_or_else(most)?;
-        usize::try_from(count).map_err(|_| most())
-    }
-
-    /// Bytes of LZ4 behind how many they are, which become at most `most` bytes.
-    pub(super) fn bytes(&mut self, fields: &mut Fields<'_>, most: u64) -> Result<Vec<u8>, Fault> {
-        let packed = fields.sized()?;
-        unpack(packed, self.take(most, 1)?)
-    }
-
-    /// So many whole numbers.
-    pub(super) fn integers(&mut self, fields: &mut Fields<'_>, count: u64) -> Result<Vec<i32>, Fault> {
-        let packed = fields.sized()?;
-        integers(packed, self.take(count, 9)?)
-    }
+/// So many whole numbers behind their bytes.
+pub(super) fn unpacked_integers(
+    fields: &mut Fields<'_>,
+    count: u64,
+    allowance: &mut Allowance,
+) -> Result<Vec<i32>, Fault> {
+    let packed = sized(fields)?;
+    integers(packed, allowance.take(count, 9)?)
 }
 
 /// Unpacks LZ4, which may be in several pieces.

@@ -1,7 +1,8 @@
 //! Paths of all that a layer holds, stored as a tree in depth-first order.
 
 use crate::error::Fault;
-use crate::usd::layer::{DEEPEST, damaged, too_deep};
+use crate::scene::damaged;
+use crate::usd::layer::{DEEPEST, too_deep};
 
 /// What a path leads to.
 #[derive(Clone, Copy, Debug, Default)]

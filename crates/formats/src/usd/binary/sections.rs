@@ -3,11 +3,10 @@
 use std::io::{Read, Seek};
 
 use super::file::{File, Rep};
-use super::pack::{Allowance, Fields};
+use super::pack::{unpacked, unpacked_integers};
 use super::paths::{Path, paths};
 use crate::error::Fault;
-use crate::scene::Failure;
-use crate::usd::layer::damaged;
+use crate::scene::{Allowance, Failure, Fields, damaged};
 
 /// Bytes that all sections may unpack to, for each byte of the file and for the smallest of files.
 const UNPACKED: u64 = 64;
@@ -42,28 +41,28 @@ pub(super) struct Sections {
 
 impl Sections {
     pub(super) fn read<R: Read + Seek>(file: &mut File<R>, contents: u64) -> Result<Self, Failure> {
-        let count = file.number(contents)?;
+        let count = file.source.number(contents)?;
         if count > MOST_SECTIONS {
             return Err(damaged("it has more sections than any program writes").into());
         }
-        let table = file.bytes(contents.saturating_add(8), count, 32)?;
+        let table = file.source.bytes(contents.saturating_add(8), count, 32)?;
         let mut read = |name: &str| -> Result<Vec<u8>, Failure> {
             for entry in table.as_chunks::<32>().0 {
                 let mut fields = Fields(entry);
                 if fields.take(16)?.split(|&b| b == 0).next() == Some(name.as_bytes()) {
                     let (start, length) = (fields.number()?, fields.number()?);
-                    return file.bytes(start, length, 1);
+                    return file.source.bytes(start, length, 1);
                 }
             }
             Err(damaged(&format!("it has no section {name}")).into())
         };
         let [tokens, fields, sets, tree, specs] =
             [read("TOKENS")?, read("FIELDS")?, read("FIELDSETS")?, read("PATHS")?, read("SPECS")?];
-        let mut allowance = Allowance(file.length().saturating_mul(UNPACKED).saturating_add(UNPACKED_ALWAYS));
+        let mut allowance = Allowance(file.source.length.saturating_mul(UNPACKED).saturating_add(UNPACKED_ALWAYS));
 
         let mut section = Fields(&tokens);
         let (count, length) = (section.number()?, section.number()?);
-        let text = allowance.bytes(&mut section, length)?;
+        let text = unpacked(&mut section, length, &mut allowance)?;
         allowance.take(count, 4)?;
         if text.len() >= u32::MAX as usize {
             return Err(damaged("it has more names than any program writes").into());
@@ -76,24 +75,24 @@ impl Sections {
 
         let mut section = Fields(&fields);
         let count = section.number()?;
-        let names = allowance.integers(&mut section, count)?;
-        let values = allowance.bytes(&mut section, count.saturating_mul(8))?;
+        let names = unpacked_integers(&mut section, count, &mut allowance)?;
+        let values = unpacked(&mut section, count.saturating_mul(8), &mut allowance)?;
         let values = values.as_chunks().0.iter().map(|bytes| Rep(u64::from_le_bytes(*bytes)));
         let fields = names.iter().map(|&name| name.unsigned_abs()).zip(values).collect();
 
         let mut section = Fields(&sets);
         let count = section.number()?;
-        let sets = allowance.integers(&mut section, count)?;
+        let sets = unpacked_integers(&mut section, count, &mut allowance)?;
 
         let mut section = Fields(&tree);
         let (count, places) = (section.number()?, section.number()?);
-        let mut integers = || allowance.integers(&mut section, places);
+        let mut integers = || unpacked_integers(&mut section, places, &mut allowance);
         let [indices, names, jumps] = [integers()?, integers()?, integers()?];
         let paths = paths(allowance.take(count, 12)?, [&indices, &names, &jumps])?;
 
         let mut section = Fields(&specs);
         let count = section.number()?;
-        let mut integers = || allowance.integers(&mut section, count);
+        let mut integers = || unpacked_integers(&mut section, count, &mut allowance);
         let [at, first, kinds] = [integers()?, integers()?, integers()?];
         let specs = at.iter().zip(&first).zip(&kinds);
         let mut specs: Vec<Spec> = specs

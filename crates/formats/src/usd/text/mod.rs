@@ -5,10 +5,10 @@ mod scanner;
 
 use std::io::{Read, Seek};
 
-use super::layer::{Layer, Prim, Stage, damaged, spline};
+use super::layer::{Layer, Prim, Stage, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
-use crate::scene::{Failure, Node, Points, Track, Value, Values};
+use crate::scene::{Failure, Node, Points, Track, Value, Values, damaged};
 use parser::{Contents, Parser, Stored};
 use scanner::Scanner;
 

@@ -1,9 +1,9 @@
 //! Text byte by byte, block by block: words, strings, what is between them, and whole values that are passed over.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek};
 
 use crate::scene::Failure;
-use crate::usd::layer::damaged;
+use crate::scene::damaged;
 
 const BLOCK: usize = 1 << 16;
 /// Bytes of a word or of a string that is kept; programs write far fewer.
@@ -19,11 +19,9 @@ pub(super) struct Place {
 }
 
 pub(super) struct Scanner<R> {
-    source: R,
-    block: Vec<u8>,
-    /// Where the block begins in the file, and the next byte in the block.
-    start: u64,
-    at: usize,
+    source: BufReader<R>,
+    /// The place of the next byte.
+    at: u64,
     line: u64,
     word: Vec<u8>,
 }
@@ -41,23 +39,18 @@ impl<R: Read + Seek> Scanner<R> {
     /// From the beginning on.
     pub(super) fn new(mut source: R) -> io::Result<Self> {
         source.rewind()?;
-        Ok(Self { source, block: Vec::new(), start: 0, at: 0, line: 1, word: Vec::new() })
+        let source = BufReader::with_capacity(BLOCK, source);
+        Ok(Self { source, at: 0, line: 1, word: Vec::new() })
     }
 
     pub(super) fn place(&self) -> Place {
-        Place { offset: self.start + self.at as u64, line: self.line }
+        Place { offset: self.at, line: self.line }
     }
 
     pub(super) fn go(&mut self, Place { offset, line }: Place) -> io::Result<()> {
-        self.line = line;
-        let end = self.start + self.block.len() as u64;
-        if (self.start..end).contains(&offset) {
-            self.at = (offset - self.start) as usize;
-            return Ok(());
-        }
-        self.block.clear();
-        (self.start, self.at) = (offset, 0);
-        self.source.seek(SeekFrom::Start(offset)).map(|_| ())
+        let distance = offset.wrapping_sub(self.at) as i64;
+        (self.at, self.line) = (offset, line);
+        self.source.seek_relative(distance)
     }
 
     /// The fault of what no text of USD has, with the line.
@@ -65,19 +58,19 @@ impl<R: Read + Seek> Scanner<R> {
         damaged(&format!("line {}: {what}", self.line)).into()
     }
 
-    pub(super) fn peek(&mut self) -> io::Result<Option<u8>> {
-        if self.at == self.block.len() {
-            self.start += self.block.len() as u64;
-            self.at = 0;
-            self.block.clear();
-            self.source.by_ref().take(BLOCK as u64).read_to_end(&mut self.block)?;
-        }
-        Ok(self.block.get(self.at).copied())
+    fn peek(&mut self) -> io::Result<Option<u8>> {
+        Ok(self.source.fill_buf()?.first().copied())
+    }
+
+    /// Passes over bytes that were peeked at.
+    fn pass_byte(&mut self) {
+        self.source.consume(1);
+        self.at += 1;
     }
 
     pub(super) fn next(&mut self) -> Result<u8, Failure> {
         let byte = self.peek()?.ok_or_else(|| self.wrong("the text ends too early"))?;
-        self.at += 1;
+        self.pass_byte();
         self.line += u64::from(byte == b'\n');
         Ok(byte)
     }
@@ -96,7 +89,7 @@ impl<R: Read + Seek> Scanner<R> {
                     }
                 }
                 // Between entries, where a line may end as well.
-                b';' => self.at += 1,
+                b';' => self.pass_byte(),
                 byte if byte.is_ascii_whitespace() => {
                     self.next()?;
                 }
@@ -108,7 +101,7 @@ impl<R: Read + Seek> Scanner<R> {
 
     fn pass_line(&mut self) -> Result<(), Failure> {
         while self.peek()?.is_some_and(|byte| byte != b'\n' && byte != b'\r') {
-            self.at += 1;
+            self.pass_byte();
         }
         Ok(())
     }
@@ -125,7 +118,9 @@ impl<R: Read + Seek> Scanner<R> {
     /// Whether this byte is next, which is then passed over.
     pub(super) fn has(&mut self, byte: u8) -> Result<bool, Failure> {
         let is_next = self.solid()? == Some(byte);
-        self.at += usize::from(is_next);
+        if is_next {
+            self.pass_byte();
+        }
         Ok(is_next)
     }
 
@@ -147,7 +142,7 @@ impl<R: Read + Seek> Scanner<R> {
         self.solid()?;
         self.word.clear();
         while let Some(byte) = self.peek()?.filter(|byte| is_letter(*byte) || others.contains(byte)) {
-            self.at += 1;
+            self.pass_byte();
             if self.word.len() == LONGEST {
                 return Err(self.wrong("a word is longer than any program writes"));
             }
@@ -179,11 +174,11 @@ impl<R: Read + Seek> Scanner<R> {
         let mut kept = Vec::new();
         let mut ends = 1;
         if self.peek()? == Some(quote) {
-            self.at += 1;
+            self.pass_byte();
             if self.peek()? != Some(quote) {
                 return Ok(String::new());
             }
-            self.at += 1;
+            self.pass_byte();
             ends = 3;
         }
         let mut found = 0;
@@ -212,18 +207,18 @@ impl<R: Read + Seek> Scanner<R> {
                 Some(b'@') => self.pass_asset()?,
                 Some(b'<') => self.pass_to(b">")?,
                 Some(byte @ (b'(' | b'[' | b'{')) => {
-                    self.at += 1;
+                    self.pass_byte();
                     if depth == DEEPEST {
                         return Err(self.wrong("a value nests deeper than any program writes"));
                     }
                     open.push(if byte == b'(' { b')' } else { byte + 2 });
                 }
                 Some(b',' | b'=' | b':') if depth > 0 => {
-                    self.at += 1;
+                    self.pass_byte();
                     continue;
                 }
                 Some(byte) if open.last() == Some(&byte) => {
-                    self.at += 1;
+                    self.pass_byte();
                     open.pop();
                     if open.is_empty() {
                         break;
@@ -252,9 +247,9 @@ impl<R: Read + Seek> Scanner<R> {
         if self.peek()? != Some(b'@') {
             return self.pass_to(b"@");
         }
-        self.at += 1;
+        self.pass_byte();
         if self.peek()? == Some(b'@') {
-            self.at += 1;
+            self.pass_byte();
             self.pass_to(b"@@@")?;
         }
         Ok(())

@@ -1,0 +1,20 @@
+//! Types of values.
+
+pub(crate) const INT: u8 = 3;
+pub(crate) const HALF: u8 = 7;
+pub(crate) const FLOAT: u8 = 8;
+pub(crate) const DOUBLE: u8 = 9;
+pub(crate) const TOKEN: u8 = 11;
+pub(crate) const MATRIX4D: u8 = 15;
+pub(crate) const QUATD: u8 = 16;
+pub(crate) const QUATF: u8 = 17;
+pub(crate) const QUATH: u8 = 18;
+pub(crate) const VEC3D: u8 = 23;
+pub(crate) const VEC3F: u8 = 24;
+pub(crate) const VEC3H: u8 = 25;
+pub(crate) const TOKENS: u8 = 41;
+pub(crate) const SPECIFIER: u8 = 42;
+pub(crate) const VARIABILITY: u8 = 44;
+pub(crate) const TIME_SAMPLES: u8 = 46;
+pub(crate) const DOUBLES: u8 = 48;
+pub(crate) const BLOCKED: u8 = 51;
