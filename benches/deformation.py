@@ -1,6 +1,6 @@
 """Deformation transfer between meshes whose triangles correspond, and what a pose does to a mesh.
 
-The measures are those of `crates/explore/src/quality.rs`, written a second time so that the program does not judge itself.
+The measures are those of `crates/shape/src/quality/frame.rs`, written a second time so that the program does not judge itself.
 """
 
 import numpy as np

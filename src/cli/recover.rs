@@ -16,8 +16,8 @@ use cager_formats::{
 use cager_geometry::mesh::{Model, Point};
 use cager_motion::recover::placed_units;
 use cager_proto::report::json_file;
-use cager_recover::manifold::Manifold;
-use cager_recover::rig::Rig;
+use cager_shape::people::manifold::Manifold;
+use cager_shape::people::rig::Rig;
 use std::io::Write;
 use std::path::Path;
 

@@ -16,9 +16,9 @@ use cager_motion::recover::{
     gait_svg, recover,
 };
 use cager_proto::report::json_file;
-use cager_recover::manifold::Manifold;
-use cager_recover::people::{FitOptions, Method};
-use cager_recover::rig::Rig;
+use cager_shape::people::manifold::Manifold;
+use cager_shape::people::rig::Rig;
+use cager_shape::people::{FitOptions, Method};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

@@ -10,9 +10,9 @@ use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use cager_geometry::units::Up;
 use cager_geometry::vector::{add, distance};
 use cager_motion::recover::{manifold_of, rig_of};
-use cager_recover::manifold::{Examples, Kind, Manifold};
-use cager_recover::poses::{Naming, SkeletonPoses};
-use cager_recover::rig::{
+use cager_shape::people::manifold::{Examples, Kind, Manifold};
+use cager_shape::people::poses::{Naming, SkeletonPoses};
+use cager_shape::people::rig::{
     CAGE_FACES, CAGE_VERTICES, Corrected, PlacedRig, PlacementOptions, QUAD_NAMES, Rig, correct, place,
 };
 use clap::{Args, ValueEnum};

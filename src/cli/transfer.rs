@@ -17,14 +17,14 @@ use cager_capture::encode::{EncodeProgress, Encoded, sample_frames};
 use cager_capture::origin::{move_to, own_origin};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_explore::TransferError;
-use cager_explore::alignment::AlignBy;
 use cager_formats::{AtomicFile, ReadModel, ScratchDir, Target, Units, commit_together};
 use cager_geometry::mesh::{Model, Point};
 use cager_motion::recover::Encoding;
 use cager_motion::transfer::{
     MethodChoice, TransferFailed, TransferJob, TransferReport, Transferred, about_origin, read_pairs, transfer, words,
 };
+use cager_shape::TransferError;
+use cager_shape::transfer::alignment::AlignBy;
 use std::path::Path;
 
 pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {

@@ -6,7 +6,7 @@ use crate::refused::refused;
 use crate::support::{Dir, measure, read_frames};
 use cager_formats::{open_frames, read_model};
 use cager_geometry::mesh::{Model, Point, TriMesh};
-use cager_registration::{Observation, ObservationOptions};
+use cager_shape::registration::{Observation, ObservationOptions};
 use std::path::Path;
 
 /// Recovers every `step`th frame of a capture from 15,000 points each, with the first as the template. Root mean square errors of the frames, as shares of the

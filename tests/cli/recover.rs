@@ -6,7 +6,7 @@ use cager_demo::{Capture, Options};
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use cager_geometry::vector::{add, centroid, mean as average};
 use cager_proto::container::ContainerReader;
-use cager_registration::{Observation, ObservationOptions};
+use cager_shape::registration::{Observation, ObservationOptions};
 use std::fmt::Write;
 
 /// The built-in figure and some frames of it.

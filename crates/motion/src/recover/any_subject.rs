@@ -8,8 +8,8 @@ use super::{Finished, RecoverError, RecoverProgress, Watch};
 use cager_core::cage::Cage;
 use cager_geometry::linalg::tall_product;
 use cager_geometry::mesh::{Model, Point, TriMesh};
-use cager_recover::track::{SecondPass, TrackedFrame, Tracker, smoothed};
-use cager_registration::{Target, Template, TemplateOptions};
+use cager_shape::registration::{Target, Template, TemplateOptions};
+use cager_shape::tracking::{SecondPass, TrackedFrame, Tracker, smoothed};
 use faer::Mat;
 use std::collections::VecDeque;
 

@@ -2,7 +2,7 @@
 
 use super::surfaces::Colored;
 use cager_geometry::mesh::Point;
-use cager_registration::NearestPoints;
+use cager_shape::registration::NearestPoints;
 use rayon::prelude::*;
 
 /// Colours farther from a point than this share of the diagonal are not its own.

@@ -4,7 +4,7 @@
 use super::distances::Looked;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::vector::distance;
-use cager_registration::{NearestPoints, SurfacePoint};
+use cager_shape::registration::{NearestPoints, SurfacePoint};
 use serde::Serialize;
 
 /// A part that is not where it should be. Lengths are shares of the template's diagonal.

@@ -3,7 +3,7 @@
 use super::surfaces::Followed;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Nearest, Surface};
-use cager_registration::{NearestPoints, welded};
+use cager_shape::registration::{NearestPoints, welded};
 use rayon::prelude::*;
 use std::collections::HashMap;
 

@@ -10,8 +10,8 @@ use super::source::SurfaceSource;
 use super::surfaces::Followed;
 use cager_formats::FrameReader;
 use cager_geometry::mesh::{Point, TriMesh};
-use cager_recover::offsets::OffsetSolver;
-use cager_registration::{SurfacePoint, sample_surface};
+use cager_shape::registration::{SurfacePoint, sample_surface};
+use cager_shape::tracking::OffsetSolver;
 
 /// What is done with every frame in the end.
 pub(super) struct Finisher<'a> {

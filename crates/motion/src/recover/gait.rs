@@ -3,7 +3,7 @@
 use super::RecoveryReport;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::dot;
-use cager_recover::rig::QUAD_NAMES;
+use cager_shape::people::rig::QUAD_NAMES;
 use serde::Serialize;
 use std::fmt::Write;
 

@@ -7,10 +7,10 @@ use super::surfaces::Surfaces;
 use super::{Finished, RecoverError, RecoverProgress, Watch};
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::vector::{distance, norm};
-use cager_recover::joints::{CagedJoints, MarkedJoints};
-use cager_recover::manifold::Manifold;
-use cager_recover::people::{FitOptions, PersonFit, PersonModel, PersonTracker};
-use cager_recover::rig::Rig;
+use cager_shape::people::joints::{CagedJoints, MarkedJoints};
+use cager_shape::people::manifold::Manifold;
+use cager_shape::people::rig::Rig;
+use cager_shape::people::{FitOptions, PersonFit, PersonModel, PersonTracker};
 
 /// What is known of a person.
 pub struct Person<'a> {

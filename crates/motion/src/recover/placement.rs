@@ -5,7 +5,7 @@ use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::units::{Units, Up};
 use cager_geometry::vector::{cross, norm, sub};
-use cager_registration::{
+use cager_shape::registration::{
     AlignOptions, Alignment, FitOptions, Observation, ObservationOptions, RegistrationError, Target, Template, align,
     alignments, least_turned,
 };

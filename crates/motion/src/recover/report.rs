@@ -7,9 +7,9 @@ use super::placement::Placement;
 use super::{FirstLook, RecoverProgress};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Point, TriMesh};
-use cager_recover::change::changed_for_good;
-use cager_recover::track::{Outcome, TrackedFrame};
-use cager_registration::ObservationNotes;
+use cager_shape::registration::ObservationNotes;
+use cager_shape::tracking::changed_for_good;
+use cager_shape::tracking::{Outcome, TrackedFrame};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -116,7 +116,7 @@ impl How {
     }
 
     /// Of a person.
-    pub(super) fn of_person(frame: &cager_recover::people::TrackedFrame) -> Self {
+    pub(super) fn of_person(frame: &cager_shape::people::TrackedFrame) -> Self {
         let outcome = match (frame.lost, frame.searched) {
             (true, _) => "lost",
             (false, true) => "wider_search",

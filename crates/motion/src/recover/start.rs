@@ -6,7 +6,7 @@ use super::placement::seen;
 use super::spread::Spread;
 use cager_geometry::mesh::{Model, Point, diagonal};
 use cager_geometry::vector::distance;
-use cager_registration::{NearestPoints, Observation};
+use cager_shape::registration::{NearestPoints, Observation};
 use std::path::Path;
 
 /// What is brought to the first surface, and so may differ.

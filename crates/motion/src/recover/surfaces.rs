@@ -6,7 +6,9 @@ use super::spread::leave_out_strays;
 use cager_capture::origin::move_to;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::spatial::Surface;
-use cager_registration::{NearestPoints, Observation, ObservationError, ObservationNotes, ObservationOptions, Target};
+use cager_shape::registration::{
+    NearestPoints, Observation, ObservationError, ObservationNotes, ObservationOptions, Target,
+};
 use std::sync::mpsc::sync_channel;
 
 /// The surfaces of a recovery, as they are read.

@@ -11,7 +11,7 @@ pub enum TransferFailed {
     Formats(#[from] cager_formats::Error),
     /// Source, target and frames do not go together.
     #[error(transparent)]
-    Transfer(#[from] cager_explore::TransferError),
+    Transfer(#[from] cager_shape::TransferError),
     /// No cage can be made.
     #[error("no cage can be made around the {whose}: {error}")]
     Enclose {

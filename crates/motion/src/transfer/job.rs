@@ -2,12 +2,12 @@
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
-use cager_explore::TransferError;
-use cager_explore::alignment::AlignBy;
-use cager_explore::public_cage::PublicCage;
-use cager_explore::transfer::{Pose, VertexPair};
 use cager_formats::FrameReader;
 use cager_geometry::mesh::{Model, Point};
+use cager_shape::TransferError;
+use cager_shape::transfer::alignment::AlignBy;
+use cager_shape::transfer::public_cage::PublicCage;
+use cager_shape::transfer::{Pose, VertexPair};
 use std::path::Path;
 
 /// How a motion is moved.

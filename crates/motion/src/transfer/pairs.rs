@@ -1,6 +1,6 @@
 //! Vertices of source and target that correspond, as a text.
 
-use cager_explore::transfer::VertexPair;
+use cager_shape::transfer::VertexPair;
 
 /// Most pairs: each takes a row of coordinates.
 const MAX_PAIRS: usize = 10_000;

@@ -1,9 +1,9 @@
 //! Where a source is to be laid at first, as a user says it.
 
-use cager_explore::Similarity;
-use cager_explore::alignment::AlignBy;
 use cager_geometry::linalg::nearest_rotation;
 use cager_geometry::mesh::Point;
+use cager_shape::Similarity;
+use cager_shape::transfer::alignment::AlignBy;
 use glam::{DMat3, DVec3};
 
 /// The similarity of a matrix of 4 × 4 numbers, row by row; `None` where it does more than turn, scale evenly and move.

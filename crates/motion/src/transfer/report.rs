@@ -1,6 +1,6 @@
 //! What is told of a transfer.
 
-use cager_explore::MotionSummary;
+use cager_shape::quality::MotionSummary;
 use serde::Serialize;
 
 /// How a motion was moved, as JSON.

@@ -2,12 +2,12 @@
 
 use super::job::{MethodChoice, Public};
 use super::placing::similarity;
-use cager_explore::alignment::AlignBy;
-use cager_explore::public_cage::PublicCage;
-use cager_explore::transfer::Pose;
-use cager_explore::transfer::rigid::RIGIDITY;
 use cager_geometry::mesh::Point;
 use cager_proto::transfer_messages::{PublicShape, RestPose, SourceAlignment, TransferMethod, UpAxis};
+use cager_shape::transfer::Pose;
+use cager_shape::transfer::alignment::AlignBy;
+use cager_shape::transfer::public_cage::PublicCage;
+use cager_shape::transfer::rigid::RIGIDITY;
 
 /// How a motion is moved; with the paper's methods by a cage that is given, or by one of a shape.
 pub fn method(

@@ -7,7 +7,7 @@ use cager_geometry::units::Up;
 use cager_motion::recover::RecoverOptions;
 use cager_proto::messages::SessionOptions;
 use cager_proto::recovery_messages::{Placing, RecoveryOptions};
-use cager_recover::people::{FitOptions, Method};
+use cager_shape::people::{FitOptions, Method};
 use std::ops::RangeInclusive;
 
 /// Most frames of a recovery, an hour and more; each takes memory to its end.

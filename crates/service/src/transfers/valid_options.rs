@@ -6,12 +6,12 @@ use cager_cages::DesignOptions;
 use cager_capture::coding::Goal;
 use cager_capture::design::default_vertices;
 use cager_core::coordinates::{self, CoordinateSystem, MeanValue};
-use cager_explore::alignment::AlignBy;
-use cager_explore::transfer::Pose;
 use cager_geometry::mesh::Point;
 use cager_motion::transfer::{MethodChoice, words};
 use cager_proto::messages::SessionOptions;
 use cager_proto::transfer_messages::{TransferMethod, TransferOptions};
+use cager_shape::transfer::Pose;
+use cager_shape::transfer::alignment::AlignBy;
 
 /// Validated options.
 #[derive(Clone, Copy)]

@@ -11,7 +11,7 @@ use cager_demo::{Capture, Options};
 use cager_formats::model_bytes;
 use cager_geometry::mesh::{Model, TriMesh};
 use cager_proto::recovery_messages::{Recovery, RecoveryState};
-use cager_registration::{Observation, ObservationOptions};
+use cager_shape::registration::{Observation, ObservationOptions};
 use reqwest::multipart::Form;
 use serde_json::{Value, json};
 use std::fmt::Write as _;

@@ -1,0 +1,17 @@
+//! Shapes that share nothing: surfaces registered without correspondence, people and other subjects followed through them, motions moved onto other models,
+//! and shapes between the poses of one model. Plain data in, plain data out; knows no files. Results do not depend on the number of threads.
+
+mod canonical;
+pub mod deformation;
+mod error;
+pub mod interpolate;
+pub mod people;
+pub mod quality;
+pub mod registration;
+mod similarity;
+pub mod tracking;
+pub mod transfer;
+
+pub use deformation::{Gradients, Poisson};
+pub use error::{MeshError, ShapeError, TransferError};
+pub use similarity::Similarity;

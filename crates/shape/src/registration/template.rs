@@ -1,0 +1,189 @@
+//! A template made ready to be laid onto surfaces.
+
+use cager_core::cage::Cage;
+use cager_geometry::linalg::{gram, rows_of};
+use cager_geometry::mesh::{TriMesh, diagonal};
+use cager_geometry::vector::Point;
+use faer::{Mat, MatRef};
+use glam::DVec3;
+
+use super::dense_rows::DenseRows;
+use super::orientation::welded;
+use super::rigidity::{Rigidity, node_edges};
+use super::sampling::{SurfacePoint, area_normal, sample_surface, spread, surface_vertices};
+use super::sparse_rows::{SparseRows, points, vectors};
+
+/// How closely a template is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct TemplateOptions {
+    /// Points of its surface that are matched.
+    pub samples: usize,
+    /// Nodes between which it is held as rigid as possible.
+    pub nodes: usize,
+    /// Weight of the cage's own edges beside those between nodes.
+    pub cage_weight: f64,
+    /// What samples are drawn by.
+    pub seed: u64,
+}
+
+impl Default for TemplateOptions {
+    fn default() -> Self {
+        Self { samples: 3000, nodes: 700, cage_weight: 0.1, seed: 0 }
+    }
+}
+
+/// Why a template cannot be laid onto anything.
+#[derive(Debug, thiserror::Error)]
+pub enum RegistrationError {
+    /// No triangles, or none with an area.
+    #[error("the template has no surface: a mesh with faces is needed, not a point cloud")]
+    NoSurface,
+    /// Coordinates of another model or cage.
+    #[error(
+        "the coordinates are of {rows} points and {columns} cage vertices, the template has {points} and its cage {vertices}"
+    )]
+    OtherCoordinates {
+        /// Rows of the coordinates.
+        rows: usize,
+        /// Columns of the coordinates.
+        columns: usize,
+        /// Points of the template.
+        points: usize,
+        /// Vertices of the cage.
+        vertices: usize,
+    },
+}
+
+/// A template, its cage and its coordinates.
+pub struct Template {
+    /// Length of the diagonal of the rest pose's surface.
+    pub(crate) diagonal: f64,
+    pub(crate) samples: Vec<Sample>,
+    /// Coordinates of the corners of the samples' triangles.
+    pub(crate) corner_coordinates: DenseRows,
+    /// Coordinates of the samples, s × m.
+    pub(crate) coordinates: DenseRows,
+    pub(crate) sparse: SparseRows,
+    /// `ΦᵀΦ / (s d²)` of the samples, its lower triangle.
+    pub(crate) gram: Mat<f64>,
+    pub(crate) rigidity: Rigidity,
+}
+
+/// A sample by the rows of its corners.
+pub(crate) struct Sample {
+    pub(crate) corners: [u32; 3],
+    pub(crate) weights: [f64; 3],
+}
+
+/// Coordinates below this are left out where a product need not be exact.
+const SPARSE_THRESHOLD: f64 = 3e-3;
+/// Blocks of rows in which products are summed.
+const BLOCK_ROWS: usize = 512;
+/// What a vertex normal counts where nodes are spread, as a share of the diagonal.
+const NODE_NORMAL: f64 = 0.1;
+
+impl Template {
+    /// From a rest pose, a cage around it and the coordinates, n × m, one column per vertex of the cage. Vertices at the same place count as one.
+    ///
+    /// # Errors
+    /// See [`RegistrationError`].
+    pub fn new(
+        rest: &TriMesh,
+        cage: &Cage,
+        phi: MatRef<'_, f64>,
+        options: &TemplateOptions,
+    ) -> Result<Self, RegistrationError> {
+        let (points, vertices) = (rest.vertices.len(), cage.vertices().len());
+        if (phi.nrows(), phi.ncols()) != (points, vertices) {
+            return Err(RegistrationError::OtherCoordinates {
+                rows: phi.nrows(),
+                columns: phi.ncols(),
+                points,
+                vertices,
+            });
+        }
+        let drawn = sample_surface(&rest.vertices, &rest.triangles, options.samples, options.seed);
+        if drawn.is_empty() {
+            return Err(RegistrationError::NoSurface);
+        }
+        let diagonal = diagonal(&surface_vertices(&rest.vertices, &rest.triangles));
+        let corners_of = |sample: &SurfacePoint| rest.triangles[sample.face as usize];
+        let mut used: Vec<u32> = drawn.iter().flat_map(corners_of).collect();
+        used.sort_unstable();
+        used.dedup();
+        let row_of = |vertex: u32| used.partition_point(|&v| v < vertex) as u32;
+        let samples: Vec<Sample> = drawn
+            .iter()
+            .map(|sample| Sample { corners: corners_of(sample).map(row_of), weights: sample.weights })
+            .collect();
+        let corner_coordinates = rows_of(phi, &used);
+        let coordinates = Mat::from_fn(samples.len(), vertices, |i, j| {
+            let Sample { corners, weights } = &samples[i];
+            (0..3).map(|k| weights[k] * corner_coordinates[(corners[k] as usize, j)]).sum()
+        });
+        let mut scaled = gram(coordinates.as_ref(), BLOCK_ROWS);
+        scaled *= faer::Scale(1.0 / (samples.len() as f64 * diagonal * diagonal));
+        let first = welded(&rest.vertices);
+        let joined: Vec<[u32; 3]> = rest.triangles.iter().map(|t| t.map(|v| first[v as usize])).collect();
+        let joined = TriMesh { vertices: rest.vertices.clone(), triangles: joined };
+        let rigidity = rigidity(&joined, cage, phi, diagonal, options);
+        Ok(Self {
+            diagonal,
+            samples,
+            corner_coordinates: DenseRows::new(corner_coordinates.as_ref()),
+            sparse: SparseRows::new(coordinates.as_ref(), SPARSE_THRESHOLD),
+            coordinates: DenseRows::new(coordinates.as_ref()),
+            gram: scaled,
+            rigidity,
+        })
+    }
+
+    /// Samples in a cage: positions and unit normals.
+    pub(crate) fn samples_in(&self, cage: MatRef<'_, f64>) -> (Vec<DVec3>, Vec<DVec3>) {
+        let corners = self.corner_coordinates.times(&points(cage));
+        self.samples.iter().map(|sample| pose(sample, &corners)).unzip()
+    }
+
+    /// Length of the diagonal of the rest pose's surface.
+    pub fn diagonal(&self) -> f64 {
+        self.diagonal
+    }
+}
+
+fn rigidity(rest: &TriMesh, cage: &Cage, phi: MatRef<'_, f64>, diagonal: f64, options: &TemplateOptions) -> Rigidity {
+    let vertices = vectors(&rest.vertices);
+    let nodes = nodes(rest, options.nodes, NODE_NORMAL * diagonal, options.seed);
+    let model_edges = node_edges(&vertices, &rest.triangles, &nodes);
+    let first = nodes.len();
+    let cage_edges: Vec<[u32; 2]> = cage.edges().iter().map(|edge| edge.vertices.map(|v| v + first as u32)).collect();
+    let coordinates = Mat::from_fn(first + phi.ncols(), phi.ncols(), |i, j| match i.checked_sub(first) {
+        Some(vertex) => f64::from(u8::from(vertex == j)),
+        None => phi[(nodes[i] as usize, j)],
+    });
+    let at_rest: Vec<DVec3> = nodes.iter().map(|&n| vertices[n as usize]).chain(vectors(cage.vertices())).collect();
+    let edges = [&model_edges[..], &cage_edges[..]];
+    Rigidity::new(&at_rest, coordinates.as_ref(), edges, options.cage_weight, diagonal, SPARSE_THRESHOLD)
+}
+
+/// Vertices spread over a mesh, by position and normal.
+fn nodes(rest: &TriMesh, count: usize, normal_length: f64, seed: u64) -> Vec<u32> {
+    let mut normals = vec![DVec3::ZERO; rest.vertices.len()];
+    for triangle in &rest.triangles {
+        let normal = area_normal(triangle.map(|v| rest.vertices[v as usize]));
+        triangle.iter().for_each(|&v| normals[v as usize] += normal);
+    }
+    let normals: Vec<Point> = normals.iter().map(|n| n.normalize_or_zero().to_array()).collect();
+    spread(&rest.vertices, &normals, count, normal_length, seed)
+}
+
+/// The corners of a sample, its position and its unit normal.
+pub(crate) fn pose(sample: &Sample, corners: &[DVec3]) -> (DVec3, DVec3) {
+    let [a, b, c] = sample.corners.map(|row| corners[row as usize]);
+    let [u, v, w] = sample.weights;
+    (u * a + v * b + w * c, (b - a).cross(c - a).normalize_or_zero())
+}
+
+/// As plain points.
+pub(crate) fn plain(points: &[DVec3]) -> Vec<Point> {
+    points.iter().map(DVec3::to_array).collect()
+}
