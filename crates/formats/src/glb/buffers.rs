@@ -10,6 +10,7 @@ use base64::Engine as _;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::Root;
+use percent_encoding::percent_decode_str;
 
 use super::container::{Chunks, document, split};
 use super::faults::{dangling, too_large};
@@ -69,21 +70,17 @@ impl<'a> Buffers<'a> {
             None => Vec::new(),
         };
         let length = length + others.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
-        let buffers = Self { frame_numbers, ..Self::new(root, binary, length) };
-        others.into_iter().for_each(|(k, bytes)| drop(buffers.decoded[k].set(bytes)));
-        Ok(buffers)
-    }
-
-    fn new(root: Root, binary: Cow<'a, [u8]>, file: usize) -> Self {
-        Self {
+        let buffers = Self {
             decoded: vec![OnceCell::new(); root.buffers.len()],
             unpacked: vec![OnceCell::new(); root.buffer_views.len()],
             root,
             binary,
             taken: Cell::new(0),
-            frame_numbers: None,
-            file,
-        }
+            frame_numbers,
+            file: length,
+        };
+        others.into_iter().for_each(|(k, bytes)| drop(buffers.decoded[k].set(bytes)));
+        Ok(buffers)
     }
 
     /// Bytes that what is read of the file may take.
@@ -173,7 +170,7 @@ fn others(root: &Root, folder: &Path) -> Result<Vec<(usize, Vec<u8>)>, Fault> {
     let (mut found, mut room) = (Vec::new(), LARGEST);
     for (k, buffer) in root.buffers.iter().enumerate() {
         let Some(uri) = buffer.uri.as_ref().filter(|uri| !uri.starts_with("data:")) else { continue };
-        let name = decoded_uri(uri);
+        let name = percent_decode_str(uri).decode_utf8_lossy().into_owned();
         let is_below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
         if uri.contains(':') || name.is_empty() || !Path::new(&name).components().all(is_below) {
             return Err(Fault::unsupported(format!(
@@ -191,25 +188,6 @@ fn others(root: &Root, folder: &Path) -> Result<Vec<(usize, Vec<u8>)>, Fault> {
         found.push((k, bytes));
     }
     Ok(found)
-}
-
-/// A URI without its escapes, such as `%20`.
-fn decoded_uri(uri: &str) -> String {
-    let (mut bytes, mut rest) = (Vec::new(), uri.as_bytes());
-    while let [first, behind @ ..] = rest {
-        let digits = behind.get(..2).filter(|_| *first == b'%').and_then(|digits| str::from_utf8(digits).ok());
-        match digits.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
-            Some(byte) => {
-                bytes.push(byte);
-                rest = &behind[2..];
-            }
-            None => {
-                bytes.push(*first);
-                rest = behind;
-            }
-        }
-    }
-    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 /// Bytes that files may have together, as they are held in memory.

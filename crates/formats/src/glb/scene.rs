@@ -16,6 +16,8 @@ pub(super) struct Scene {
     pub(super) parents: Vec<Option<usize>>,
     /// How many nodes are in the path of each.
     pub(super) depths: Vec<usize>,
+    /// Whether each, or one above it, is switched off.
+    hidden: Vec<bool>,
 }
 
 /// A mesh at its place in the scene.
@@ -47,11 +49,12 @@ impl Placement {
 impl Scene {
     /// The meshes of the default scene that are shown, or all of it where none is, in the order of their nodes, or all meshes as they are where no node has one.
     pub(super) fn of(root: &Root) -> Result<Self, Fault> {
-        let Tree { worlds, parents, depths, hidden } = Tree::of(root)?;
+        let mut scene = Self::nodes(root)?;
+        let Self { worlds, hidden, .. } = &scene;
         let mut placements = Vec::new();
         let all_hidden =
             (0..root.nodes.len()).all(|k| root.nodes[k].mesh.is_none() || worlds[k].is_none() || hidden[k]);
-        for (k, (node, world)) in root.nodes.iter().zip(&worlds).enumerate() {
+        for (k, (node, world)) in root.nodes.iter().zip(worlds).enumerate() {
             let (Some(mesh), Some(world)) = (node.mesh, world) else { continue };
             if hidden[k] && !all_hidden {
                 continue;
@@ -76,7 +79,34 @@ impl Scene {
                 "has meshes, but none in the scene that it shows, scene {scene}; make the scene with the mesh the active one and export again"
             )));
         }
-        Ok(Self { placements, worlds, parents, depths })
+        scene.placements = placements;
+        Ok(scene)
+    }
+
+    /// The nodes of the default scene, without meshes.
+    fn nodes(root: &Root) -> Result<Self, Fault> {
+        let count = root.nodes.len();
+        let mut tree = Self {
+            placements: Vec::new(),
+            worlds: vec![None; count],
+            parents: vec![None; count],
+            depths: vec![0; count],
+            hidden: vec![false; count],
+        };
+        let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, DAffine3::IDENTITY, None, false)).collect();
+        while let Some((index, parent, above, is_hidden)) = open.pop() {
+            let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), count))?;
+            if tree.worlds[index].is_some() {
+                return Err(Fault::damaged(format!(
+                    "node {index} is reached twice, but nodes make a tree; export the mesh again"
+                )));
+            }
+            let (world, is_hidden) = (parent * local(node), is_hidden || hides(node));
+            (tree.worlds[index], tree.parents[index], tree.hidden[index]) = (Some(world), above, is_hidden);
+            tree.depths[index] = 1 + above.map_or(0, |above: usize| tree.depths[above]);
+            open.extend(children(node).map(|child| (child, world, Some(index), is_hidden)));
+        }
+        Ok(tree)
     }
 
     /// From a node's space to the world's.
@@ -98,39 +128,6 @@ fn hides(node: &Node) -> bool {
 /// Whether triangles turn around.
 pub(super) fn mirrors(transform: &DAffine3) -> bool {
     transform.matrix3.determinant() < 0.0
-}
-
-/// All nodes of the default scene.
-struct Tree {
-    /// From each node's space to the world's; none for nodes outside the scene.
-    worlds: Vec<Option<DAffine3>>,
-    parents: Vec<Option<usize>>,
-    depths: Vec<usize>,
-    /// Whether the node, or one above it, is switched off.
-    hidden: Vec<bool>,
-}
-
-impl Tree {
-    fn of(root: &Root) -> Result<Self, Fault> {
-        let count = root.nodes.len();
-        let (worlds, parents, depths, hidden) =
-            (vec![None; count], vec![None; count], vec![0; count], vec![false; count]);
-        let mut tree = Self { worlds, parents, depths, hidden };
-        let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, DAffine3::IDENTITY, None, false)).collect();
-        while let Some((index, parent, above, is_hidden)) = open.pop() {
-            let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), count))?;
-            if tree.worlds[index].is_some() {
-                return Err(Fault::damaged(format!(
-                    "node {index} is reached twice, but nodes make a tree; export the mesh again"
-                )));
-            }
-            let (world, is_hidden) = (parent * local(node), is_hidden || hides(node));
-            (tree.worlds[index], tree.parents[index], tree.hidden[index]) = (Some(world), above, is_hidden);
-            tree.depths[index] = 1 + above.map_or(0, |above: usize| tree.depths[above]);
-            open.extend(children(node).map(|child| (child, world, Some(index), is_hidden)));
-        }
-        Ok(tree)
-    }
 }
 
 fn roots(root: &Root) -> Result<Vec<usize>, Fault> {

@@ -17,9 +17,7 @@ pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Fields<'a> {
     pub(crate) fn take(&mut self, length: usize) -> Result<&'a [u8], Fault> {
-        let (taken, rest) = self.0.split_at_checked(length).ok_or_else(|| damaged("a table ends too early"))?;
-        self.0 = rest;
-        Ok(taken)
+        self.0.split_off(..length).ok_or_else(|| damaged("a table ends too early"))
     }
 
     pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Fault> {

@@ -1,6 +1,6 @@
 //! Attributes: differences of consecutive elements, byte by byte, in blocks of up to 256 elements.
 
-use super::bytes::{Bytes, signed};
+use super::bytes::signed;
 
 /// Elements of a group, whose numbers have one width.
 const GROUP: usize = 16;
@@ -20,19 +20,18 @@ pub(super) fn decode(stream: &[u8], count: usize, stride: usize) -> Option<Vec<u
     };
     let channels = stride / 4;
     let tail = stride + if has_controls { channels } else { 0 };
-    let (body, _) = body.split_at_checked(body.len().checked_sub(tail.max(least_tail))?)?;
+    let (mut body, _) = body.split_at_checked(body.len().checked_sub(tail.max(least_tail))?)?;
     let (first, modes) = stream[stream.len() - tail..].split_at(stride);
     let modes = if has_controls { modes } else { &[0; 64][..channels] };
     let per_block = (8192 / stride / GROUP * GROUP).min(BLOCK);
 
-    let mut body = Bytes(body);
     let mut out = vec![0; count * stride];
     let mut columns = [[0; BLOCK]; 4];
     let mut last = [0; 256];
     last[..stride].copy_from_slice(first);
     for block in out.chunks_mut(per_block * stride) {
         let elements = block.len() / stride;
-        let controls = if has_controls { body.take(channels)? } else { &[][..] };
+        let controls = if has_controls { body.split_off(..channels)? } else { &[][..] };
         for (channel, &mode) in modes.iter().enumerate() {
             for (k, column) in columns.iter_mut().enumerate() {
                 let control = controls.get(channel).map(|control| control >> (2 * k) & 3);
@@ -45,11 +44,11 @@ pub(super) fn decode(stream: &[u8], count: usize, stride: usize) -> Option<Vec<u
             }
         }
     }
-    body.0.is_empty().then_some(out)
+    body.is_empty().then_some(out)
 }
 
 /// The numbers of one byte of all elements of a block; `column` has whole groups.
-fn read_column(body: &mut Bytes<'_>, control: Option<u8>, column: &mut [u8], elements: usize) -> Option<()> {
+fn read_column(body: &mut &[u8], control: Option<u8>, column: &mut [u8], elements: usize) -> Option<()> {
     let widths: Widths = match control {
         None => [0, 2, 4, 8],
         Some(0) => [0, 1, 2, 4],
@@ -59,12 +58,12 @@ fn read_column(body: &mut Bytes<'_>, control: Option<u8>, column: &mut [u8], ele
             return Some(());
         }
         Some(_) => {
-            column[..elements].copy_from_slice(body.take(elements)?);
+            column[..elements].copy_from_slice(body.split_off(..elements)?);
             return Some(());
         }
     };
     let groups = column.len() / GROUP;
-    let header = body.take(groups.div_ceil(4))?;
+    let header = body.split_off(..groups.div_ceil(4))?;
     for (g, group) in column.chunks_exact_mut(GROUP).enumerate() {
         read_group(body, widths[usize::from(header[g / 4] >> (2 * (g % 4)) & 3)], group)?;
     }
@@ -72,12 +71,12 @@ fn read_column(body: &mut Bytes<'_>, control: Option<u8>, column: &mut [u8], ele
 }
 
 /// Sixteen numbers of `width` bits; one with all bits set stands for a byte that follows them all.
-fn read_group(body: &mut Bytes<'_>, width: u8, group: &mut [u8]) -> Option<()> {
+fn read_group(body: &mut &[u8], width: u8, group: &mut [u8]) -> Option<()> {
     match width {
         0 => group.fill(0),
-        8 => group.copy_from_slice(body.take(GROUP)?),
+        8 => group.copy_from_slice(body.split_off(..GROUP)?),
         _ => {
-            let packed = body.take(GROUP * usize::from(width) / 8)?;
+            let packed = body.split_off(..GROUP * usize::from(width) / 8)?;
             let (per_byte, all_set) = (8 / width, (1 << width) - 1);
             for (k, value) in (0..).zip(group.iter_mut()) {
                 let place = k % per_byte;
@@ -86,7 +85,7 @@ fn read_group(body: &mut Bytes<'_>, width: u8, group: &mut [u8]) -> Option<()> {
                 *value = packed[usize::from(k / per_byte)] >> shift & all_set;
             }
             for value in group.iter_mut().filter(|value| **value == all_set) {
-                *value = body.byte()?;
+                *value = *body.split_off_first()?;
             }
         }
     }
@@ -119,7 +118,7 @@ mod tests {
     fn numbers_of_four_bits_are_read_as_the_specification_shows_it() {
         let bytes = [0x17, 0x5f, 0xf0, 0xbc, 0x77, 0xa9, 0x21, 0x00, 0x34, 0xb5];
         let mut group = [0; GROUP];
-        read_group(&mut Bytes(&bytes), 4, &mut group).unwrap();
+        read_group(&mut &bytes[..], 4, &mut group).unwrap();
         let found = group.map(|value| signed(value.into()) as u8 as i8);
         assert_eq!(found, [-1, -4, -3, 26, -91, 0, -6, 6, -4, -4, 5, -5, 1, -1, 0, 0]);
     }

@@ -1,6 +1,6 @@
 //! Indices: of triangles that share edges with recent ones, and of anything else.
 
-use super::bytes::{Bytes, signed};
+use super::bytes::{number, signed};
 
 /// Indices of `count` triangles.
 pub(super) fn triangles(stream: &[u8], count: usize) -> Option<Vec<u32>> {
@@ -11,32 +11,31 @@ pub(super) fn triangles(stream: &[u8], count: usize) -> Option<Vec<u32>> {
     if table[14..] != [0, 0] || !table.iter().all(is_free) {
         return None;
     }
-    let mut state =
-        State { data: Bytes(data), next: 0, last: 0, edges: Recent::default(), vertices: Recent::default() };
+    let mut state = State { data, next: 0, last: 0, edges: Recent::default(), vertices: Recent::default() };
     let mut out = Vec::with_capacity(3 * count);
     for &code in codes {
         out.extend(state.triangle(code, table)?);
     }
-    state.data.0.is_empty().then_some(out)
+    state.data.is_empty().then_some(out)
 }
 
 /// `count` indices, each a difference to one of two.
 pub(super) fn sequence(stream: &[u8], count: usize) -> Option<Vec<u32>> {
     let (&0xd1, stream) = stream.split_first()? else { return None };
     let (data, _) = stream.split_last_chunk::<4>()?;
-    let (mut data, mut last) = (Bytes(data), [0_u32; 2]);
+    let (mut data, mut last) = (data, [0_u32; 2]);
     // Every index takes a byte.
-    if count > data.0.len() {
+    if count > data.len() {
         return None;
     }
     let mut out = Vec::with_capacity(count);
     for _ in 0..count {
-        let value = data.number()?;
+        let value = number(&mut data)?;
         let last = &mut last[(value & 1) as usize];
         *last = last.wrapping_add(signed(value >> 1));
         out.push(*last);
     }
-    data.0.is_empty().then_some(out)
+    data.is_empty().then_some(out)
 }
 
 /// The last sixteen of what was pushed.
@@ -59,7 +58,7 @@ impl<T: Copy> Recent<T> {
 }
 
 struct State<'a> {
-    data: Bytes<'a>,
+    data: &'a [u8],
     /// The lowest index that was not used yet.
     next: u32,
     /// The index that was written out last.
@@ -77,7 +76,7 @@ impl State<'_> {
         let (first, corners) = match low {
             0..14 => (0, table[usize::from(low)]),
             _ => {
-                let corners = self.data.byte()?;
+                let corners = *self.data.split_off_first()?;
                 if corners == 0 {
                     self.next = 0;
                 }
@@ -129,7 +128,7 @@ impl State<'_> {
     }
 
     fn written_out(&mut self) -> Option<u32> {
-        let difference = signed(self.data.number()?);
+        let difference = signed(number(&mut self.data)?);
         Some(self.written(difference))
     }
 

@@ -89,11 +89,11 @@ impl Packed {
 
 #[cfg(test)]
 mod tests {
-    use super::bytes::{Bytes, signed};
+    use super::bytes::{number, signed};
 
     #[test]
     fn numbers_take_up_to_five_bytes() {
-        let number = |bytes: &[u8]| Bytes(bytes).number();
+        let number = |mut bytes: &[u8]| number(&mut bytes);
         assert_eq!(number(&[0x7f]), Some(0x7f));
         assert_eq!(number(&[0x81, 0x04]), Some(0x201));
         assert_eq!(number(&[0xff, 0xa0, 0x05]), Some(0x1507f));

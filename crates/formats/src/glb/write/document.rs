@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
 use super::super::lenient::{FIRST_FRAME, FRAME_RATE};
@@ -178,7 +179,7 @@ impl Document<'_> {
         document["bufferViews"] = layout.views.into();
         document["buffers"] = json!([{ "byteLength": layout.length }]);
         if let Some(name) = data {
-            document["buffers"][0]["uri"] = escaped(name).into();
+            document["buffers"][0]["uri"] = utf8_percent_encode(name, &ESCAPED).to_string().into();
         }
         document.to_string()
     }
@@ -210,10 +211,5 @@ impl Layout {
     }
 }
 
-/// A file name as an address has it.
-fn escaped(name: &str) -> String {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
-    name.bytes()
-        .map(|byte| if is_plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
-        .collect()
-}
+/// What file names have as they are in addresses, beside letters and digits.
+const ESCAPED: AsciiSet = NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');

@@ -17,7 +17,7 @@ pub(crate) use components::{LARGEST_SIDE, Wanted};
 pub(crate) use deviation::Deviation;
 use document::Document;
 use frames::Frames;
-use normals::Normals;
+use normals::normals;
 
 /// What is written beside the frames.
 pub(crate) struct Scene {
@@ -40,7 +40,8 @@ pub(crate) struct Scene {
 pub(crate) struct Morphs<'a> {
     scene: &'a Scene,
     components: Components,
-    normals: Option<Normals>,
+    /// Those of the base and of all targets; none where none are wanted.
+    normals: Vec<[f32; 3]>,
 }
 
 impl<'a> Morphs<'a> {
@@ -54,16 +55,23 @@ impl<'a> Morphs<'a> {
         let rounding = |stored: &stored::Stored| document::place(stored, scene).map(|x| f64::from(x as f32) - x);
         let components = Components::of(&frames, scene.floats, wanted, rounding)?;
         let targets = components.deviation.targets;
-        let normals = (scene.normals && !scene.triangles.is_empty())
-            .then(|| Normals::of(values, points, &scene.triangles, &components.weights, targets));
+        let normals = if scene.normals && !scene.triangles.is_empty() {
+            normals(values, points, &scene.triangles, &components.weights, targets)
+        } else {
+            Vec::new()
+        };
         let morphs = Self { scene, components, normals };
         morphs.document().check()?;
         Ok(morphs)
     }
 
     fn document(&self) -> Document<'_> {
-        let normals = self.normals.as_ref().map_or(&[][..], |normals| &normals.0);
-        Document { scene: self.scene, stored: &self.components.stored, weights: &self.components.weights, normals }
+        Document {
+            scene: self.scene,
+            stored: &self.components.stored,
+            weights: &self.components.weights,
+            normals: &self.normals,
+        }
     }
 
     /// Targets, and how far what is written is from the frames.

@@ -4,56 +4,57 @@ use rayon::prelude::*;
 
 use crate::normals::{unit, vertex_normals};
 
-/// Normals of the base and each target, one after another.
-pub(super) struct Normals(pub(super) Vec<[f32; 3]>);
-
-impl Normals {
-    /// Of frames of so many points and the weights of their targets, frame after frame.
-    ///
-    /// Weights of principal components are about orthogonal over the frames but for their means, so a least-squares fit is one product for each target. As programs make
-    /// the sum of a length of 1, what is fitted is normals divided by the length of their mean.
-    pub(super) fn of(frames: &[f32], points: usize, triangles: &[[u32; 3]], weights: &[f32], targets: usize) -> Self {
-        let count = frames.len() / (3 * points);
-        let mut sums = vec![[0.0_f64; 3]; points];
-        let mut fitted = vec![[0.0_f32; 3]; targets * points];
-        let mut normals = Vec::new();
-        let of_frame = |frame: usize| &weights[frame * targets..(frame + 1) * targets];
-        let mean_weight = |k: usize| (0..count).map(|frame| f64::from(of_frame(frame)[k])).sum::<f64>() / count as f64;
-        let means: Vec<f32> = (0..targets).map(|k| mean_weight(k) as f32).collect();
-        for (frame, positions) in frames.chunks_exact(3 * points).enumerate() {
-            vertex_normals(positions, triangles, &mut normals);
-            for (sum, normal) in sums.iter_mut().zip(&normals) {
-                sum.iter_mut().zip(normal).for_each(|(sum, &x)| *sum += f64::from(x));
-            }
-            fitted.par_chunks_mut(points).enumerate().for_each(|(k, fitted)| {
-                let weight = of_frame(frame)[k] - means[k];
-                for (fitted, normal) in fitted.iter_mut().zip(&normals) {
-                    fitted.iter_mut().zip(normal).for_each(|(fitted, x)| *fitted += weight * x);
-                }
-            });
+/// Normals of the base and each target, one after another, of frames of so many points and the weights of their targets, frame after frame.
+///
+/// Weights of principal components are about orthogonal over the frames but for their means, so a least-squares fit is one product for each target. As programs make
+/// the sum of a length of 1, what is fitted is normals divided by the length of their mean.
+pub(super) fn normals(
+    frames: &[f32],
+    points: usize,
+    triangles: &[[u32; 3]],
+    weights: &[f32],
+    targets: usize,
+) -> Vec<[f32; 3]> {
+    let count = frames.len() / (3 * points);
+    let mut sums = vec![[0.0_f64; 3]; points];
+    let mut fitted = vec![[0.0_f32; 3]; targets * points];
+    let mut normals = Vec::new();
+    let of_frame = |frame: usize| &weights[frame * targets..(frame + 1) * targets];
+    let mean_weight = |k: usize| (0..count).map(|frame| f64::from(of_frame(frame)[k])).sum::<f64>() / count as f64;
+    let means: Vec<f32> = (0..targets).map(|k| mean_weight(k) as f32).collect();
+    for (frame, positions) in frames.chunks_exact(3 * points).enumerate() {
+        vertex_normals(positions, triangles, &mut normals);
+        for (sum, normal) in sums.iter_mut().zip(&normals) {
+            sum.iter_mut().zip(normal).for_each(|(sum, &x)| *sum += f64::from(x));
         }
-        let length = |sum: &[f64; 3]| sum.iter().map(|x| x * x).sum::<f64>().sqrt() / count as f64;
         fitted.par_chunks_mut(points).enumerate().for_each(|(k, fitted)| {
-            let squares: f32 = (0..count).map(|frame| (of_frame(frame)[k] - means[k]).powi(2)).sum();
-            for (fitted, sum) in fitted.iter_mut().zip(&sums) {
-                // Where normals turn all around, their mean says nothing.
-                let scale = (squares * (length(sum) as f32).max(SHORTEST)).recip();
-                fitted.iter_mut().for_each(|x| *x = if scale.is_finite() { *x * scale } else { 0.0 });
+            let weight = of_frame(frame)[k] - means[k];
+            for (fitted, normal) in fitted.iter_mut().zip(&normals) {
+                fitted.iter_mut().zip(normal).for_each(|(fitted, x)| *fitted += weight * x);
             }
         });
-        let mut all: Vec<[f32; 3]> = sums.into_iter().map(unit).collect();
-        // Where all weights are 0, and of length 1 again, as the sum may have any.
-        for (point, base) in all.iter_mut().enumerate() {
-            for (fitted, mean) in fitted.iter().skip(point).step_by(points).zip(&means) {
-                base.iter_mut().zip(fitted).for_each(|(base, x)| *base -= mean * x);
-            }
-            let scale = base.iter().map(|x| x * x).sum::<f32>().sqrt().max(SHORTEST).recip();
-            fitted.iter_mut().skip(point).step_by(points).flatten().for_each(|x| *x *= scale);
-            *base = unit(base.map(f64::from));
-        }
-        all.extend(fitted);
-        Self(all)
     }
+    let length = |sum: &[f64; 3]| sum.iter().map(|x| x * x).sum::<f64>().sqrt() / count as f64;
+    fitted.par_chunks_mut(points).enumerate().for_each(|(k, fitted)| {
+        let squares: f32 = (0..count).map(|frame| (of_frame(frame)[k] - means[k]).powi(2)).sum();
+        for (fitted, sum) in fitted.iter_mut().zip(&sums) {
+            // Where normals turn all around, their mean says nothing.
+            let scale = (squares * (length(sum) as f32).max(SHORTEST)).recip();
+            fitted.iter_mut().for_each(|x| *x = if scale.is_finite() { *x * scale } else { 0.0 });
+        }
+    });
+    let mut all: Vec<[f32; 3]> = sums.into_iter().map(unit).collect();
+    // Where all weights are 0, and of length 1 again, as the sum may have any.
+    for (point, base) in all.iter_mut().enumerate() {
+        for (fitted, mean) in fitted.iter().skip(point).step_by(points).zip(&means) {
+            base.iter_mut().zip(fitted).for_each(|(base, x)| *base -= mean * x);
+        }
+        let scale = base.iter().map(|x| x * x).sum::<f32>().sqrt().max(SHORTEST).recip();
+        fitted.iter_mut().skip(point).step_by(points).flatten().for_each(|x| *x *= scale);
+        *base = unit(base.map(f64::from));
+    }
+    all.extend(fitted);
+    all
 }
 
 /// Of a mean of normals: shorter ones are taken as this long.
