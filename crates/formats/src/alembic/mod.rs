@@ -14,4 +14,4 @@ mod unread;
 mod write;
 
 pub(crate) use mesh::open;
-pub(crate) use write::{MeshWriter, Numbers, Schedule};
+pub(crate) use write::{MeshWriter, Schedule};

@@ -43,6 +43,16 @@ pub(crate) struct MovingMesh<'a> {
     next: Vec<f64>,
 }
 
+/// The smallest and the largest coordinates of points, `x y z x y z …`.
+pub(crate) fn bounds(positions: &[f32]) -> [[f32; 3]; 2] {
+    positions.as_chunks().0.iter().fold(
+        [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]],
+        |[low, high], point: &[f32; 3]| {
+            [std::array::from_fn(|k| low[k].min(point[k])), std::array::from_fn(|k| high[k].max(point[k]))]
+        },
+    )
+}
+
 /// The fault of a mesh that begins with nothing.
 pub(crate) fn no_points() -> Fault {
     Fault::invalid("has a mesh without points in its first frame; export it with its points")

@@ -12,7 +12,7 @@ mod transform;
 
 pub(crate) use bytes::{Allowance, Fields, Source, damaged};
 pub(crate) use failure::Failure;
-pub(crate) use mesh::{MeshTracks, MovingMesh, no_points};
+pub(crate) use mesh::{MeshTracks, MovingMesh, bounds, no_points};
 pub(crate) use node::{Node, Tree, ancestry, choose, list, named, shown, shown_path};
 pub(crate) use reader::{Animation, open};
 pub(crate) use track::{Points, Timeline, Track, Value, Values, check_held, union};

@@ -10,6 +10,7 @@ use cager_geometry::mesh::{Point, Polygons};
 use super::ogawa::DATA;
 use super::properties::{BOOL, F32, F64, I32, Kind, U8};
 use super::sampling::ACYCLIC;
+use crate::scene::bounds;
 use ogawa::Sink;
 use tables::{Compound, Metadata, Values, write_object};
 
@@ -30,15 +31,11 @@ const FRAMES: u32 = 1;
 pub(crate) struct Schedule {
     /// Frames per second.
     pub(crate) fps: f64,
-    /// Numbers of all frames, ascending.
-    pub(crate) numbers: Numbers,
-}
-
-/// Numbers of frames: a number over the frame rate is its frame's time in seconds.
-#[derive(Clone, Debug)]
-pub(crate) enum Numbers {
-    Even { first: f64, step: f64 },
-    Uneven(Vec<f64>),
+    /// Numbers of all frames, ascending: a number over the frame rate is its frame's time in seconds. Of frames that are evenly
+    /// spaced the first alone.
+    pub(crate) numbers: Vec<f64>,
+    /// The distance of two that are.
+    pub(crate) step: Option<f64>,
 }
 
 /// A mesh that is being written. Memory does not grow with the frames but by 24 bytes for each.
@@ -74,18 +71,12 @@ impl<W: Write + Seek> MeshWriter<W> {
 
     /// Writes a frame, `x y z x y z …`.
     pub(crate) fn write_frame(&mut self, positions: &[f32]) -> io::Result<()> {
-        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for point in positions.as_chunks::<3>().0 {
-            for k in 0..3 {
-                low[k] = low[k].min(point[k]);
-                high[k] = high[k].max(point[k]);
-            }
-        }
         self.bytes.clear();
         self.bytes.extend(positions.iter().flat_map(|x| x.to_le_bytes()));
         // Arrays have their sizes beside them, where these are not those of a list.
         self.positions.extend([self.sink.sample(&self.bytes)?, DATA]);
-        let bounds: Vec<u8> = low.iter().chain(&high).flat_map(|&x| f64::from(x).to_le_bytes()).collect();
+        let bounds: Vec<u8> =
+            bounds(positions).as_flattened().iter().flat_map(|&x| f64::from(x).to_le_bytes()).collect();
         self.bounds.push(self.sink.sample(&bounds)?);
         Ok(())
     }
@@ -151,11 +142,8 @@ impl<W: Write + Seek> MeshWriter<W> {
 impl Schedule {
     /// The times of what has none, and those of the frames: how many samples they are for, seconds after which they repeat, and those stored.
     fn table(&self, frames: u32) -> Vec<u8> {
-        let seconds = |number: f64| number / self.fps;
-        let (cycle, stored) = match &self.numbers {
-            Numbers::Even { first, step } => (seconds(*step), vec![seconds(*first)]),
-            Numbers::Uneven(numbers) => (ACYCLIC, numbers.iter().map(|&number| seconds(number)).collect()),
-        };
+        let cycle = self.step.map_or(ACYCLIC, |step| step / self.fps);
+        let stored = self.numbers.iter().map(|number| number / self.fps).collect();
         let mut table = Vec::new();
         for (samples, cycle, stored) in [(1, 1.0, vec![0.0]), (frames, cycle, stored)] {
             table.extend(u32::to_le_bytes(samples));

@@ -6,7 +6,7 @@ use cager_geometry::mesh::Polygons;
 
 use super::super::CacheFormat;
 use super::output::{Announced, CageMesh, FrameOptions, FrameWriter, no_cage};
-use crate::alembic::{self, Numbers, Schedule};
+use crate::alembic::{self, Schedule};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 use crate::faces::check_face;
@@ -56,11 +56,9 @@ impl SceneWriter {
             let cage = cage.map(|cage| (cage.points, 0));
             return Ok(Self { announced, mesh: Mesh::Usd(mesh), cage });
         }
-        let numbers = match options.even_step() {
-            Some(step) => Numbers::Even { first: options.number(0), step },
-            None => Numbers::Uneven(options.numbers.clone()),
-        };
-        let schedule = Schedule { fps: options.fps, numbers };
+        let step = options.even_step();
+        let numbers = if step.is_some() { vec![options.number(0)] } else { options.numbers.clone() };
+        let schedule = Schedule { fps: options.fps, numbers, step };
         let mesh = alembic::MeshWriter::new(file, &name, faces, schedule, options.origin).map_err(write)?;
         Ok(Self { announced, mesh: Mesh::Alembic(mesh), cage: None })
     }
@@ -105,7 +103,7 @@ impl FrameWriter for SceneWriter {
         self.announced.admit(positions)?;
         let written = match &mut self.mesh {
             Mesh::Alembic(mesh) => mesh.write_frame(positions),
-            Mesh::Usd(mesh) => mesh.write_frame(positions),
+            Mesh::Usd(mesh) => mesh.write_frame(positions, false),
         };
         written.map_err(|cause| Error::write(&self.announced.path, cause))?;
         self.announced.written += 1;
@@ -119,7 +117,7 @@ impl FrameWriter for SceneWriter {
         let Announced { path, frames, .. } = &self.announced;
         let cage = Announced { path: path.clone(), points: *points, frames: *frames, written: *written };
         cage.admit(positions)?;
-        mesh.write_cage(positions).map_err(|cause| Error::write(path, cause))?;
+        mesh.write_frame(positions, true).map_err(|cause| Error::write(path, cause))?;
         *written += 1;
         Ok(())
     }

@@ -9,6 +9,7 @@ use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::units::{Units, Up};
 
 use super::binary::{ATTRIBUTE, MAGIC, PRIM, ROOT, kind};
+use crate::scene::bounds;
 use sink::Sink;
 use tables::{Next, Tables, integers};
 
@@ -41,15 +42,14 @@ pub(crate) struct Scene {
 pub(crate) struct MeshWriter<W> {
     sink: Sink<W>,
     scene: Scene,
-    mesh: Mesh,
-    cage: Mesh,
-    has_cage: bool,
+    /// The mesh, and its cage where there is one.
+    meshes: Vec<Mesh>,
     bytes: Vec<u8>,
 }
 
 /// Values of what is written of a mesh.
-#[derive(Default)]
 struct Mesh {
+    name: &'static str,
     /// How many corners faces have, and which.
     faces: [u64; 2],
     points: Vec<u64>,
@@ -60,47 +60,26 @@ impl<W: Write + Seek> MeshWriter<W> {
     /// Begins a layer of a mesh of these faces, and of a cage where its faces are given.
     pub(crate) fn new(out: W, faces: &Polygons, cage: Option<&Polygons>, scene: Scene) -> io::Result<Self> {
         let sink = Sink::new(out, scene.is_packed.then(|| format!("{}.usdc", scene.name)))?;
-        let (mesh, has_cage, bytes) = (Mesh::default(), cage.is_some(), Vec::new());
-        let mut writer = Self { sink, scene, mesh, cage: Mesh::default(), has_cage, bytes };
-        writer.mesh.faces = writer.faces(faces)?;
-        if let Some(cage) = cage {
-            writer.cage.faces = writer.faces(cage)?;
+        let mut writer = Self { sink, scene, meshes: Vec::new(), bytes: Vec::new() };
+        for (name, faces) in [("mesh", Some(faces)), (CAGE, cage)] {
+            let Some(faces) = faces else { continue };
+            let counts: Vec<i32> = faces.arities().iter().map(|&count| count as i32).collect();
+            let corners: Vec<i32> = faces.indices().iter().map(|&corner| corner as i32).collect();
+            let faces = [writer.integers(&counts)?, writer.integers(&corners)?];
+            writer.meshes.push(Mesh { name, faces, points: Vec::new(), extents: Vec::new() });
         }
         Ok(writer)
     }
 
-    fn faces(&mut self, faces: &Polygons) -> io::Result<[u64; 2]> {
-        let counts: Vec<i32> = faces.arities().iter().map(|&count| count as i32).collect();
-        let corners: Vec<i32> = faces.indices().iter().map(|&corner| corner as i32).collect();
-        Ok([self.integers(&counts)?, self.integers(&corners)?])
-    }
-
-    /// Writes a frame, `x y z x y z …`.
-    pub(crate) fn write_frame(&mut self, positions: &[f32]) -> io::Result<()> {
-        let [points, extent] = self.positions(positions)?;
-        self.mesh.points.push(points);
-        self.mesh.extents.push(extent);
-        Ok(())
-    }
-
-    /// Writes the cage of a frame, in the order of frames.
-    pub(crate) fn write_cage(&mut self, positions: &[f32]) -> io::Result<()> {
-        let [points, extent] = self.positions(positions)?;
-        self.cage.points.push(points);
-        self.cage.extents.push(extent);
-        Ok(())
-    }
-
-    /// Positions, and their smallest and largest coordinates.
-    fn positions(&mut self, positions: &[f32]) -> io::Result<[u64; 2]> {
-        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for point in positions.as_chunks::<3>().0 {
-            for k in 0..3 {
-                low[k] = low[k].min(point[k]);
-                high[k] = high[k].max(point[k]);
-            }
+    /// Writes a frame, `x y z x y z …`, of the mesh, or of the cage where one was announced.
+    pub(crate) fn write_frame(&mut self, positions: &[f32], is_cage: bool) -> io::Result<()> {
+        let points = self.vectors(positions)?;
+        let extent = self.vectors(bounds(positions).as_flattened())?;
+        if let Some(mesh) = self.meshes.get_mut(usize::from(is_cage)) {
+            mesh.points.push(points);
+            mesh.extents.push(extent);
         }
-        Ok([self.vectors(positions)?, self.vectors([low, high].as_flattened())?])
+        Ok(())
     }
 
     /// Writes what says where the frames are; gives the file back.
@@ -114,7 +93,6 @@ impl<W: Write + Seek> MeshWriter<W> {
         let (name, fps) = (self.scene.name.clone(), self.double(self.scene.fps)?);
         let (start, end) = (self.scene.codes.first().copied(), self.scene.codes.last().copied());
         let up = if self.scene.units.up == Some(Up::Z) { "Z" } else { "Y" };
-        let token = |tables: &mut Tables, text: &str| INLINED | value(kind::TOKEN, tables.token(text).into());
         let root = [
             ("defaultPrim", token(&mut tables, &name)),
             ("endTimeCode", self.double(end.unwrap_or(0.0))?),
@@ -133,8 +111,9 @@ impl<W: Write + Seek> MeshWriter<W> {
         if self.scene.origin.is_some() {
             transform.push(("properties", self.tokens(&mut tables, &[TRANSLATE, ORDER])?));
         }
-        let meshes: &[&str] = if self.has_cage { &["mesh", "cage"] } else { &["mesh"] };
-        transform.push(("primChildren", self.tokens(&mut tables, meshes)?));
+        let meshes = std::mem::take(&mut self.meshes);
+        let names: Vec<&str> = meshes.iter().map(|mesh| mesh.name).collect();
+        transform.push(("primChildren", self.tokens(&mut tables, &names)?));
         tables.spec(PRIM, &name, Next::Child, &transform);
         if let Some(origin) = self.scene.origin {
             self.sink.align()?;
@@ -146,11 +125,10 @@ impl<W: Write + Seek> MeshWriter<W> {
             tables.spec(ATTRIBUTE, ORDER, Next::Sibling, &fields);
         }
 
-        let (mesh, cage) = (std::mem::take(&mut self.mesh), std::mem::take(&mut self.cage));
-        let next = if self.has_cage { Next::ChildAndSibling(1 + PROPERTIES.len() as i32) } else { Next::Child };
-        self.put_mesh(&mut tables, "mesh", next, &mesh, times)?;
-        if self.has_cage {
-            self.put_mesh(&mut tables, "cage", Next::Child, &cage, times)?;
+        for (k, mesh) in meshes.iter().enumerate() {
+            let is_last = k + 1 == meshes.len();
+            let next = if is_last { Next::Child } else { Next::ChildAndSibling(1 + PROPERTIES.len() as i32) };
+            self.put_mesh(&mut tables, next, mesh, times)?;
         }
 
         let contents = tables.write(&mut self.sink)?;
@@ -159,18 +137,17 @@ impl<W: Write + Seek> MeshWriter<W> {
     }
 
     /// A mesh and its properties; the cage is a guide, which programs show and do not render.
-    fn put_mesh(&mut self, tables: &mut Tables, name: &str, next: Next, mesh: &Mesh, times: u64) -> io::Result<()> {
+    fn put_mesh(&mut self, tables: &mut Tables, next: Next, mesh: &Mesh, times: u64) -> io::Result<()> {
         let [points_at, extents_at] = [self.samples(times, &mesh.points)?, self.samples(times, &mesh.extents)?];
         let first = mesh.points.first().copied().unwrap_or(ARRAY | value(kind::VEC3F, 0));
-        let token = |tables: &mut Tables, text: &str| INLINED | value(kind::TOKEN, tables.token(text).into());
         let uniform = ("variability", INLINED | value(kind::VARIABILITY, 1));
-        let is_guide = name == "cage";
+        let is_guide = mesh.name == CAGE;
         let mut names = PROPERTIES.to_vec();
         names.extend(is_guide.then_some(PURPOSE));
         let properties = ("properties", self.tokens(tables, &names)?);
         let prim =
             [("specifier", INLINED | value(kind::SPECIFIER, 0)), ("typeName", token(tables, "Mesh")), properties];
-        tables.spec(PRIM, name, next, &prim);
+        tables.spec(PRIM, mesh.name, next, &prim);
         let kinds = ["float3[]", "int[]", "point3f[]", "token"];
         let [extent, integers, point, text] = kinds.map(|kind| ("typeName", token(tables, kind)));
         let [counts, corners] = mesh.faces;
@@ -241,12 +218,17 @@ impl<W: Write + Seek> MeshWriter<W> {
     }
 }
 
+const CAGE: &str = "cage";
 /// Of meshes; cages have a purpose as well.
 const PROPERTIES: [&str; 5] = ["extent", "faceVertexCounts", "faceVertexIndices", "points", "subdivisionScheme"];
 const PURPOSE: &str = "purpose";
 
 const TRANSLATE: &str = "xformOp:translate";
 const ORDER: &str = "xformOpOrder";
+
+fn token(tables: &mut Tables, text: &str) -> u64 {
+    INLINED | value(kind::TOKEN, tables.token(text).into())
+}
 
 fn value(kind: u8, payload: u64) -> u64 {
     u64::from(kind) << 48 | payload
