@@ -30,7 +30,7 @@ pub(crate) use buffers::Source;
 use builder::Builder;
 pub(crate) use frames::{is_animated, open_frames};
 use scene::Scene;
-pub(crate) use write::{LARGEST_SIDE, Morphs, Scene as MorphScene, Wanted};
+pub(crate) use write::{MOST_FRAMES, Morphs, Scene as MorphScene, Wanted};
 
 /// The meshes of the default scene at rest as one, or the one of several that `prim` names.
 pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prim: Option<&str>) -> Result<(Model, Dropped), Fault> {

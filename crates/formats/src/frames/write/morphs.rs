@@ -11,7 +11,7 @@ use super::scene::name;
 use crate::atomic::{AtomicFile, Target, commit_together};
 use crate::error::{Error, Fault};
 use crate::faces::check_face;
-use crate::glb::{LARGEST_SIDE, MorphScene, Morphs, Wanted};
+use crate::glb::{MOST_FRAMES, MorphScene, Morphs, Wanted};
 
 /// Bytes that frames may have, which are all in memory.
 const MOST_BYTES: usize = 1 << 30;
@@ -112,9 +112,9 @@ fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(),
     let targets = wanted.most().min(frames).min(3 * points);
     // Frames and targets, then weights and errors of each frame.
     let bytes = (frames + targets).saturating_mul(12 * points).saturating_add(frames.saturating_mul(32 * targets));
-    if bytes > MOST_BYTES || frames.min(3 * points) > LARGEST_SIDE {
+    if bytes > MOST_BYTES || frames > MOST_FRAMES {
         return Err(Fault::unsupported(format!(
-            "cannot hold {frames} frames of {points} points as morph targets, which takes more than {} MB or more than {LARGEST_SIDE} frames; take fewer of them (--range), or write .usdc or .abc",
+            "cannot hold {frames} frames of {points} points as morph targets, which takes more than {} MB or more than {MOST_FRAMES} frames; take fewer of them (--range), or write .usdc or .abc",
             MOST_BYTES >> 20
         )));
     }

@@ -1,4 +1,4 @@
-//! Principal components of frames, by eigenvectors of the smaller of their two Gram matrices (the method of snapshots: Sirovich, "Turbulence and the
+//! Principal components of frames, by eigenvectors of their Gram matrix (the method of snapshots: Sirovich, "Turbulence and the
 //! dynamics of coherent structures", 1987).
 
 use std::ops::Range;
@@ -15,8 +15,8 @@ use crate::error::Fault;
 /// Targets that a file has at the most, and where nothing is said.
 const MOST: usize = 255;
 const USUAL: usize = 64;
-/// Frames or coordinates, whichever are fewer, of which eigenvectors are computed.
-pub(crate) const LARGEST_SIDE: usize = 4096;
+/// Frames of which eigenvectors are computed.
+pub(crate) const MOST_FRAMES: usize = 4096;
 
 /// How many targets are wanted.
 #[derive(Clone, Debug, Default)]
@@ -64,7 +64,7 @@ impl Components {
             let mut errors = Errors::new(1.min(most), most, frames.count);
             for rows in frames.row_blocks() {
                 let shapes = directions.shapes(frames, &mean, rows.clone(), most);
-                errors.add(&frames.rows(rows, &mean), &shapes, directions.weights.as_ref());
+                errors.add(&frames.rows(rows, &mean), &shapes, directions.0.as_ref());
             }
             targets = errors.deviations(frames.length / 3, diagonal).find(holds).map_or(most, |found| found.targets);
         }
@@ -96,32 +96,19 @@ impl Components {
     }
 }
 
-/// Frames are about `shapes · weightsᵀ`, as near as so many columns come.
-struct Directions {
-    weights: Mat<f64>,
-    /// Shapes that are orthonormal; otherwise weights are, and tell the shapes.
-    shapes: Option<Mat<f64>>,
-}
+/// Frames are about `shapes · weightsᵀ`, as near as so many columns come; weights are orthonormal and tell the shapes.
+struct Directions(Mat<f64>);
 
 impl Directions {
     fn of(frames: &Frames<'_>, base: &[f64], count: usize) -> Result<Self, Fault> {
         if count == 0 {
-            return Ok(Self { weights: Mat::zeros(frames.count, 0), shapes: None });
+            return Ok(Self(Mat::zeros(frames.count, 0)));
         }
-        let side = frames.count.min(frames.length);
-        let mut sum = Mat::zeros(side, side);
-        if frames.count <= frames.length {
-            frames.row_blocks().for_each(|rows| sum += gram(frames.rows(rows, base).as_ref(), BLOCK_ROWS));
-            return Ok(Self { weights: leading(sum, count)?, shapes: None });
-        }
-        frames.frame_blocks().for_each(|block| sum += gram(frames.columns(block, base).as_ref(), BLOCK_ROWS));
-        let shapes = leading(sum, count)?;
-        let mut weights = Mat::zeros(frames.count, count);
-        for block in frames.frame_blocks() {
-            let differences = frames.columns(block.clone(), base);
-            multiply(weights.as_mut().subrows_mut(block.start, block.len()), differences.as_ref(), shapes.as_ref());
-        }
-        Ok(Self { weights, shapes: Some(shapes) })
+        let mut sum = Mat::zeros(frames.count, frames.count);
+        frames.row_blocks().for_each(|rows| sum += gram(frames.rows(rows, base).as_ref(), BLOCK_ROWS));
+        let found = eigen(mirrored(sum).as_ref());
+        let (_, vectors) = found.ok_or_else(|| Fault::invalid("has no principal components; write .npy instead"))?;
+        Ok(Self(vectors.subcols(0, count).to_owned()))
     }
 
     /// The first targets as they are stored. The base is where all their weights are smallest, so that none is negative.
@@ -134,7 +121,7 @@ impl Directions {
         diagonal: f64,
         rounding: &impl Fn(&Stored) -> [f64; 3],
     ) -> Components {
-        let mut weights = self.weights.subcols(0, targets).to_owned();
+        let mut weights = self.0.subcols(0, targets).to_owned();
         let smallest: Vec<f64> =
             weights.col_iter().map(|weights| weights.iter().copied().fold(f64::INFINITY, f64::min)).collect();
         let ranges: Vec<f64> = (0..targets)
@@ -184,18 +171,8 @@ impl Directions {
 
     /// Some rows of the first `count` shapes.
     fn shapes(&self, frames: &Frames<'_>, base: &[f64], rows: Range<usize>, count: usize) -> Mat<f64> {
-        if let Some(shapes) = &self.shapes {
-            return shapes.submatrix(rows.start, 0, rows.len(), count).to_owned();
-        }
         let mut out = Mat::zeros(rows.len(), count);
-        multiply(out.as_mut(), frames.rows(rows, base).as_ref(), self.weights.subcols(0, count));
+        multiply(out.as_mut(), frames.rows(rows, base).as_ref(), self.0.subcols(0, count));
         out
     }
-}
-
-/// The first eigenvectors of a matrix by its lower triangle.
-fn leading(lower: Mat<f64>, count: usize) -> Result<Mat<f64>, Fault> {
-    let found = eigen(mirrored(lower).as_ref());
-    let (_, vectors) = found.ok_or_else(|| Fault::invalid("has no principal components; write .npy instead"))?;
-    Ok(vectors.subcols(0, count).to_owned())
 }

@@ -36,17 +36,6 @@ impl<'a> Frames<'a> {
         Mat::from_fn(rows.len(), self.count, |i, frame| at(frame, rows.start + i))
     }
 
-    /// The same of some frames: a row each, a column for each coordinate.
-    pub(super) fn columns(&self, frames: Range<usize>, shape: &[f64]) -> Mat<f64> {
-        let at = |frame: usize, row: usize| f64::from(self.values[frame * self.length + row]) - shape[row];
-        Mat::from_fn(frames.len(), self.length, |i, row| at(frames.start + i, row))
-    }
-
-    pub(super) fn frame_blocks(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (count, frames) = (self.count, (BLOCK / self.length).clamp(1, BLOCK_ROWS));
-        (0..count).step_by(frames).map(move |first| first..(first + frames).min(count))
-    }
-
     /// Ranges of whole points whose rows fill a block.
     pub(super) fn row_blocks(&self) -> impl Iterator<Item = Range<usize>> + use<> {
         let (length, rows) = (self.length, 3 * (BLOCK / self.count / 3).clamp(1, BLOCK_ROWS));

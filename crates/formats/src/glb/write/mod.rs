@@ -13,7 +13,7 @@ use cager_geometry::mesh::Point;
 
 use crate::error::Fault;
 use components::Components;
-pub(crate) use components::{LARGEST_SIDE, Wanted};
+pub(crate) use components::{MOST_FRAMES, Wanted};
 pub(crate) use deviation::Deviation;
 use document::Document;
 use frames::Frames;
