@@ -314,11 +314,11 @@ fn of_several_animations_the_first_or_the_chosen_one_is_read() {
         close(&all(&mut *reader)[1], &moved(|[x, y, z]| [x + by, y, z]), 1e-6);
     }
     let note = &take(None).unwrap().notes()[0];
-    let told = "of its 3 animations walk is read, and run, animation 2 left out; choose one with --animation";
+    let told = "of its 3 animations walk is read, run and animation 2 left out; choose one with --animation";
     assert!(note.contains(told), "{note}");
     for gone in ["jump", "3"] {
         let error = message(take(Some(gone)));
-        let listed = format!("holds no animation {gone} that moves the mesh, but walk, run, animation 2; give one of");
+        let listed = format!("holds no animation {gone} that moves the mesh, but walk, run and animation 2; give one of");
         assert!(error.contains(&listed), "{error}");
     }
 }

@@ -82,7 +82,7 @@ fn attributes_materials_and_skins_of_a_gltf_are_told() {
         told("a.glb", glb_file(&glb_json(rest).replace(primitive, &changed), &glb_data()))
     };
     let uvs = of(r#","TEXCOORD_0":0,"TEXCOORD_1":0,"NORMAL":0"#, "", "");
-    assert_eq!(uvs, "a.glb: texture coordinates (TEXCOORD_0, TEXCOORD_1) and normals (NORMAL) are not kept");
+    assert_eq!(uvs, "a.glb: texture coordinates (TEXCOORD_0 and TEXCOORD_1) and normals (NORMAL) are not kept");
     let look = of(r#","TANGENT":0,"_ID":0"#, r#","material":0"#, r#","materials":[{}],"textures":[{},{}]"#);
     assert_eq!(look, "a.glb: 1 material with 2 textures, tangents (TANGENT) and attributes of its own are not kept");
     let skin = r#","nodes":[{"mesh":0,"skin":0},{}],"skins":[{"joints":[1]}]"#;

@@ -11,11 +11,10 @@ use super::buffers::Buffers;
 use super::channel::{Channel, NEAR};
 use super::faults::dangling;
 use super::scene::Scene;
+use crate::dropped::listed;
 use crate::error::Fault;
 use crate::scene::{shown, union};
 
-/// Names of other animations that a message lists.
-const LISTED: usize = 4;
 /// What a number of a channel takes at the most, while it is read.
 const NUMBER_BYTES: usize = 12;
 
@@ -37,7 +36,7 @@ impl Clip {
         let movers = Movers::of(root, scene, chosen);
         let moves = |k: &usize| {
             let channels = &root.animations[*k].channels;
-            channels.iter().any(|channel| movers.move_by(channel.target.node.value(), property(&channel.target.path)))
+            channels.iter().any(|channel| movers.move_by(channel.target.node.value(), &channel.target.path))
         };
         let moving: Vec<usize> = (0..root.animations.len()).filter(moves).collect();
         // The only one is taken whatever it is called, as the only mesh is.
@@ -52,7 +51,7 @@ impl Clip {
         let mut channels = Vec::new();
         for (k, stored) in animation.channels.iter().enumerate() {
             let node = stored.target.node.value();
-            if !movers.move_by(node, property(&stored.target.path)) {
+            if !movers.move_by(node, &stored.target.path) {
                 continue;
             }
             let place = format!("animation {first}, channel {k}");
@@ -75,10 +74,10 @@ impl Clip {
         let others: Vec<usize> = moving.into_iter().filter(|&k| k != first).collect();
         let note = (!others.is_empty() && wanted.is_none()).then(|| {
             format!(
-                "of its {} animations {} is read, and {} left out; choose one with --animation, where the command has it, or export them merged into one (in Blender: Animation mode, Active actions merged)",
+                "of its {} animations {} is read, {} left out; choose one with --animation, where the command has it, or export them merged into one (in Blender: Animation mode, Active actions merged)",
                 others.len() + 1,
                 name(root, first),
-                listed(root, &others)
+                names(root, &others)
             )
         });
         Ok(Some(Self { channels, note }))
@@ -112,7 +111,7 @@ fn find(root: &Root, moving: &[usize], wanted: &str) -> Result<usize, Fault> {
         Fault::invalid(format!(
             "holds no animation {} that moves the mesh, but {}; give one of these with --animation, by its name or number",
             shown(wanted),
-            listed(root, moving)
+            names(root, moving)
         ))
     })
 }
@@ -123,17 +122,9 @@ fn name(root: &Root, k: usize) -> String {
 }
 
 /// Animations as far as a message has room.
-fn listed(root: &Root, animations: &[usize]) -> String {
-    let names: Vec<String> = animations.iter().take(LISTED).map(|&k| name(root, k)).collect();
-    let more = animations.len().saturating_sub(LISTED);
-    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
-}
-
-fn property(path: &Checked<Property>) -> Option<Property> {
-    match path {
-        Checked::Valid(property) => Some(*property),
-        Checked::Invalid => None,
-    }
+fn names(root: &Root, animations: &[usize]) -> String {
+    let names: Vec<String> = animations.iter().map(|&k| name(root, k)).collect();
+    listed(names.iter().map(String::as_bytes))
 }
 
 /// The nodes that say where chosen meshes are.
@@ -171,12 +162,12 @@ impl Movers {
         }
     }
 
-    fn move_by(&self, node: usize, property: Option<Property>) -> bool {
+    fn move_by(&self, node: usize, property: &Checked<Property>) -> bool {
         match property {
-            Some(Property::MorphTargetWeights) => self.weights.contains(&node),
-            Some(_) => self.transforms.get(node) == Some(&true),
+            Checked::Valid(Property::MorphTargetWeights) => self.weights.contains(&node),
+            Checked::Valid(_) => self.transforms.get(node) == Some(&true),
             // Told when it is read.
-            None => true,
+            Checked::Invalid => true,
         }
     }
 }

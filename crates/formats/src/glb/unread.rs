@@ -8,7 +8,7 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::scene::Placement;
-use crate::dropped::{Dropped, counted};
+use crate::dropped::{Dropped, counted, listed};
 
 /// Of chosen meshes, where colours of points are kept or not.
 pub(super) fn of(root: &Root, placements: &[Placement], has_colors: bool) -> Dropped {
@@ -122,12 +122,8 @@ impl Unread {
     }
 }
 
-/// `TEXCOORD_0, TEXCOORD_1`.
+/// `TEXCOORD_0 and TEXCOORD_1`.
 fn sets(name: &str, sets: &BTreeSet<u32>) -> String {
-    const LISTED: usize = 4;
-    let mut names: Vec<String> = sets.iter().take(LISTED).map(|set| format!("{name}_{set}")).collect();
-    if sets.len() > LISTED {
-        names.push(format!("{} more", sets.len() - LISTED));
-    }
-    names.join(", ")
+    let names: Vec<String> = sets.iter().map(|set| format!("{name}_{set}")).collect();
+    listed(names.iter().map(String::as_bytes))
 }
