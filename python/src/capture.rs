@@ -14,7 +14,7 @@ use crate::frames::Cages;
 use crate::geometry::{array, triangles};
 use crate::meaning;
 use crate::own_file::OwnFile;
-use cager_capture::decode::{self, DecodeError, Positions};
+use cager_capture::decode::{self, Animation, DecodeError};
 use cager_capture::edit::{self, Editing, edit};
 use cager_capture::edited::EditedCages;
 use cager_capture::origin::move_from;
@@ -34,7 +34,7 @@ use std::sync::{Arc, Mutex};
 /// A capture in a container.
 #[pyclass(frozen, weakref, module = "cager")]
 pub(crate) struct Capture {
-    positions: Mutex<Option<Positions>>,
+    positions: Mutex<Option<Animation>>,
     path: PathBuf,
     stamp: Stamp,
     /// Of a capture that has no name yet.

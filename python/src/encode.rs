@@ -11,17 +11,17 @@ use crate::handed_frames::{HandingFrames, Next};
 use crate::meaning;
 use crate::own_file::{OwnFile, WorkFolder, temporary};
 use crate::watch::Watch;
-use cager_cages::{DesignOptions, Style};
+use cager_cages::DesignOptions;
 use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
-use cager_capture::design::default_vertices;
-use cager_capture::encode::{EncodeError, EncodeProgress, Job, encode as encode_job, sample_frames};
+use cager_capture::design::{default_vertices, most_vertices, usual_options};
+use cager_capture::encode::{Encode, EncodeError, EncodeProgress, Encoded, sample_frames};
 use cager_capture::memory::Memory;
 use cager_capture::mismatch::cage_mismatch;
 use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareContext, PrepareError, Solver};
-use cager_formats::{Action, Error, Target, Units, commit_together};
+use cager_formats::{Action, Error, Target, Units};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use pyo3::prelude::*;
 
@@ -146,33 +146,19 @@ fn encoded(
     let written = folder.clone();
     let (mut handing, handed) = HandingFrames::new(frames.open());
     let work = move |caller: Caller<Next>| {
-        let choices = InversionChoices { is_coded: goal.is_some(), ..InversionChoices::coded(system) };
-        let job = Job {
-            rest: &rest,
-            cage: &cage,
-            frames: &mut handed(caller.clone()),
-            output: &output,
-            system,
-            options: choices.options(system.values(&cage).unknowns()),
-            matrix: None,
-            choose: None,
-            memory: Memory::half_of_free(),
-            goal,
-            origin,
-            units: asked.units,
-            exact_rest: false,
-        };
-        let done = encode_job(job, &|now| {
+        let progress = |now| {
             // Reading stops where nobody waits any more.
             let _ = match now {
                 EncodeProgress::Preparing(step) => caller.tell(step, 0.0),
                 EncodeProgress::Frames(done) => caller.tell("encoding", done as f64 / total),
             };
-        });
+        };
+        let encode = Encode::new(&rest, &cage).coordinates(system).goal(goal).origin(origin).units(asked.units);
+        let done = encode.progress(&progress).run(&mut handed(caller.clone()), &output);
         (done, written)
     };
     let (done, _written) = apart(watch, "coordinates", work, |next| handing.serve(next))?;
-    commit_together(vec![done.map_err(named)?.container])?;
+    done.and_then(Encoded::commit).map_err(named)?;
     let file = OwnFile::new(temporary()?.into_temp_path());
     let unmoved = |cause| Error::Io { path: file.path().to_owned(), action: Action::Write, cause };
     std::fs::rename(place, file.path()).map_err(unmoved)?;
@@ -220,16 +206,12 @@ pub(crate) fn design_options(
         };
         vertices = apart(watch, TRYING, work, |()| ())?;
     }
-    if vertices.is_none() && asked.system.name() == Green::Free.name() {
-        // Its normals are unknowns too, two for each vertex.
-        vertices = Some(default_vertices(rest.points.len().div_ceil(3)));
-    }
-    Ok(DesignOptions {
-        goal: design_goal(vertices, asked.mean_error, rest.points.len())?,
-        style: if is_mean_value { Style::Free } else { Style::Editable },
-        seed: asked.seed,
-        ..DesignOptions::default()
-    })
+    let vertices = vertices.or_else(|| {
+        let usual = default_vertices(most_vertices(asked.system, rest.points.len()));
+        asked.mean_error.is_none().then_some(usual)
+    });
+    let goal = design_goal(vertices, asked.mean_error, rest.points.len())?;
+    Ok(DesignOptions { goal, seed: asked.seed, ..usual_options(asked.system) })
 }
 
 /// Errors know vertices and points; the user needs the argument.

@@ -8,7 +8,7 @@ use super::stretches::StretchList;
 use super::{counted, grouped, plain, progress, read_like, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::cage_export::write_cages;
-use cager_capture::decode::joined::{Joining, decode_joined};
+use cager_capture::decode::joined::decode_joined;
 use cager_capture::decode::{self, Container, DecodeError, Decoding};
 use cager_capture::edited::EditedCages;
 use cager_formats::{FrameRange, Target};
@@ -179,17 +179,18 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
         parts.extend(range.part(start, stretch.frames).map(|part| (path, part)));
         start += stretch.frames;
     }
-    let what = Joining {
-        fps: args.timing.fps,
-        shift: args.timing.start.map_or(0.0, |start| start - list.stretches[0].first_frame),
+    let shift = args.timing.start.map_or(0.0, |start| start - list.stretches[0].first_frame);
+    let what = Decoding {
+        timing: (&args.timing).into(),
         dry_run: args.outputs.dry_run,
         memory: args.memory,
         layer: args.layer,
         morphs: args.morphs.options(),
         units: transfer.meaning.units(),
+        ..Decoding::default()
     };
     let bar = progress::PreparationBar::new("decoding", range.count());
-    let result = decode_joined(&parts, &output, what, &mut |done| bar.done(done));
+    let result = decode_joined(&parts, &output, (&what, shift), &mut |done| bar.done(done));
     bar.finish();
     let (frames, notes) = result?;
     let told = format!("{} of {}", counted(frames, "frame"), counted(parts.len(), "file"));

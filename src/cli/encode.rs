@@ -13,7 +13,7 @@ use super::{design, encode_remote, grouped, human_bytes, progress, read_whole, t
 use anyhow::{Context, Result};
 use cager_capture::coding::Goal;
 use cager_capture::design::{read_frames, report as design_report};
-use cager_capture::encode::{self, ChooseSpectrum, EncodeProgress, Job, sample_frames};
+use cager_capture::encode::{ChooseSpectrum, Encode, EncodeError, EncodeProgress, sample_frames};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::memory::{Memory, free_bytes};
 use cager_capture::speed::seconds_to_prepare;
@@ -170,25 +170,15 @@ fn encode_locally(
     let bar = progress::PreparationBar::new("encoding", frames.frames())
         .expecting(|| seconds_to_prepare(system, cage, rest.points.len()));
     let (announced, units) = (frames.frames(), frames.units());
-    let job = Job {
-        rest,
-        cage,
-        frames: frames.as_mut(),
-        output: &targets.output,
-        system,
-        options,
-        matrix: matrix.as_ref(),
-        choose,
-        memory,
-        goal: goal(&args.coding, args.coding.units(), codes_mean, rest, announced)?,
-        origin: files.origin,
-        units,
-        exact_rest: args.coding.exact_rest,
-    };
-    let result = encode::encode(job, &|told| match told {
+    let tell_progress = |progress| match progress {
         EncodeProgress::Preparing(step) => bar.preparing(step),
         EncodeProgress::Frames(done) => bar.done(done),
-    });
+    };
+    let goal = goal(&args.coding, args.coding.units(), codes_mean, rest, announced)?;
+    let encode = Encode::new(rest, cage).coordinates(system).solver(options).matrix(matrix.as_ref());
+    let encode = encode.choose_spectrum(choose).memory(memory).goal(goal).origin(files.origin).units(units);
+    let encode = encode.exact_rest(args.coding.exact_rest).progress(&tell_progress);
+    let result = encode.run(frames.as_mut(), &targets.output);
     bar.finish();
     let mut encoded = result.map_err(|error| name_files(error, args))?;
     encoded.report.seconds.read += read_seconds;
@@ -198,6 +188,6 @@ fn encode_locally(
 }
 
 /// Frames to choose a spectrum threshold by: the first ones where cages follow their predecessors.
-fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, encode::EncodeError> {
+fn choosing_frames(frames: &mut dyn FrameReader, first_ones: bool) -> Result<Vec<Vec<f64>>, EncodeError> {
     sample_frames(frames, if first_ones { 96 } else { 24 }, first_ones)
 }

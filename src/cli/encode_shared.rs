@@ -7,13 +7,14 @@ use super::outputs::Outputs;
 use super::solver_options::{check_inversion, inversion_choices, with_input_name};
 use super::{design, progress, tell, warn};
 use anyhow::{Result, bail};
-use cager_cages::{DesignOptions, Style};
+use cager_cages::DesignOptions;
 use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, InversionChoices};
+use cager_capture::design::{most_vertices, usual_options};
 use cager_capture::encode::{self, Encoded, sample_frames};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::memory::{Memory, free_bytes};
 use cager_core::cage::Cage;
-use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 use cager_formats::{AtomicFile, Target, commit_together};
@@ -59,7 +60,7 @@ pub(super) fn finish(
     tell(&summary(&report, targets.output.path()))
 }
 
-/// How a cage is designed. Mean value coordinates do without a tidy one; the others want all points inside.
+/// How a cage is designed.
 pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignOptions> {
     let mean_value = args.solver.coordinates.name() == MeanValue.name();
     if args.coding.mean_error.is_some() && !mean_value {
@@ -67,14 +68,14 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
             "--mean-error: is measured with mean value coordinates; give --cage-vertices, or leave --coordinates out"
         );
     }
-    // Its normals are unknowns too, two for each vertex.
-    let points = if args.solver.coordinates.name() == Green::Free.name() { points.div_ceil(3) } else { points };
+    let points = most_vertices(args.solver.coordinates, points);
+    let usual = usual_options(args.solver.coordinates);
     Ok(DesignOptions {
         goal: design::goal(args.design.cage_vertices, args.coding.mean_error, points)?,
-        style: args.design.style.unwrap_or(if mean_value { Style::Free } else { Style::Editable }),
-        seed: args.design.seed.unwrap_or(0),
+        style: args.design.style.unwrap_or(usual.style),
+        seed: args.design.seed.unwrap_or(usual.seed),
         time_limit: args.design.time_limit,
-        ..DesignOptions::default()
+        ..usual
     })
 }
 

@@ -3,7 +3,7 @@
 use super::outputs::{OutputArgs, Outputs};
 use super::{grouped, human_bytes, progress, read_model, tell, warn};
 use anyhow::{Context, Result, bail};
-use cager_capture::decode::{self, DecodeError, Positions};
+use cager_capture::decode::{self, Animation, DecodeError};
 use cager_formats::biovision::{Clip, read_bvh};
 use cager_formats::{AtomicFile, Target};
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
@@ -198,7 +198,7 @@ fn frames_of(path: &Path, template_path: &Path, template: &Model) -> Result<Vec<
     }
     let most = (MAX_COORDINATES / (3 * template.points.len())).clamp(2, MAX_FRAMES);
     let some: Vec<usize> = (0..frames).step_by(frames.div_ceil(most).max(1)).collect();
-    let mut positions = Positions::open(path)?;
+    let mut positions = Animation::open(path)?;
     let bar = progress::frames("decoding", some.len());
     let mut all = Vec::with_capacity(some.len());
     for &frame in &some {

@@ -1,13 +1,12 @@
 //! The captures of `CAGER_CAPTURES` (default `../shared/data`), which are not part of the project.
 
 use crate::support::{Dir, Output, TestCommand, close, npy_f64, read_cages};
-use cager_capture::encode::{Job, encode};
-use cager_capture::memory::Memory;
+use cager_capture::encode::Encode;
 use cager_capture::mismatch::{FRAMES, Mismatch, mismatches};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{Handles, SolverOptions};
-use cager_formats::{Target, Units, Up, commit_together, open_frames, read_model};
+use cager_formats::{Target, Up, open_frames, read_model};
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal, winding_number};
 use cager_proto::report::Report;
 use serde_json::Value;
@@ -39,7 +38,7 @@ pub(crate) fn run(folder: &Path, rest: &Model, cage: &Cage, options: SolverOptio
 /// Encodes a capture into `out.cager`.
 pub(crate) fn run_with(
     dir: &Dir,
-    system: &dyn CoordinateSystem,
+    system: &'static dyn CoordinateSystem,
     folder: &Path,
     rest: &Model,
     cage: &Cage,
@@ -47,24 +46,9 @@ pub(crate) fn run_with(
 ) -> Report {
     let mut frames = open_frames(folder.join("frames.npy"), rest.points.len()).expect("frames");
     let output = dir.path("out.cager");
-    let job = Job {
-        rest,
-        cage,
-        frames: frames.as_mut(),
-        output: &Target::from(&output),
-        system,
-        options,
-        matrix: None,
-        choose: None,
-        memory: Memory::half_of_free(),
-        goal: None,
-        origin: None,
-        units: Units::UNKNOWN,
-        exact_rest: false,
-    };
-    let encoded = encode(job, &|_| {}).expect("an encoding");
-    commit_together(vec![encoded.container]).expect("a container");
-    encoded.report
+    let encode = Encode::new(rest, cage).coordinates(system).solver(options);
+    let encoded = encode.run(frames.as_mut(), &Target::from(&output)).expect("an encoding");
+    encoded.commit().expect("a container")
 }
 
 /// Every cage of one capture against the independent reference.

@@ -1,14 +1,13 @@
 //! Small captures with everything that a service should answer about them, computed in this process.
 
 use cager_capture::capture::{CaptureWriter, Encoding, StoredError};
-use cager_capture::encode::{Job, encode};
-use cager_capture::memory::Memory;
+use cager_capture::encode::Encode;
 use cager_client::{MeshFile, NewSession, messages::SessionOptions};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
 use cager_core::inversion::{Rows, Solver, SolverOptions};
 use cager_demo::{Capture, Options};
-use cager_formats::{FrameReader, MeshFormat, Target, commit_together, read_model_bytes, write_model};
+use cager_formats::{FrameReader, MeshFormat, Target, read_model_bytes, write_model};
 use cager_geometry::mesh::{Model, TriMesh};
 use std::path::Path;
 
@@ -60,23 +59,8 @@ impl Reference {
 
         let output = folder.path().join("out.cager");
         let mut reader = Narrow { frames: &frames, points: rest.points.len(), next: 0 };
-        let job = Job {
-            rest: &rest,
-            cage: &cage,
-            frames: &mut reader,
-            output: &Target::from(&output),
-            system: &MeanValue,
-            options,
-            matrix: None,
-            choose: None,
-            memory: Memory::half_of_free(),
-            goal: None,
-            origin: None,
-            units: cager_formats::Units::UNKNOWN,
-            exact_rest: false,
-        };
-        let encoded = encode(job, &|_| {}).expect("an encoding");
-        commit_together(vec![encoded.container]).expect("the container");
+        let encoded = Encode::new(&rest, &cage).solver(options).run(&mut reader, &Target::from(&output));
+        encoded.expect("an encoding").commit().expect("the container");
         let container = std::fs::read(&output).expect("the container");
 
         let solver = Solver::prepare(&MeanValue, &cage, &rest.points, options).expect("a solver");

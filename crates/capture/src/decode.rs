@@ -1,25 +1,26 @@
 //! Decodes containers to positions.
 
+mod animation;
+mod bind;
 pub mod joined;
 pub(crate) mod opened;
 pub(crate) mod units;
 
+pub use animation::Animation;
 pub use opened::{Container, DecodeError, open, open_cut};
+
+use bind::{BoundModel, bind};
 
 use crate::edited::EditedCages;
 use crate::memory::{Memory, free_bytes};
-use crate::origin::{LOST, move_to};
+use crate::origin::LOST;
 use crate::timing::Timing;
-use cager_core::cage::Cage;
-use cager_core::coordinates;
-use cager_core::coordinates::{CoordinateSystem as _, Coordinates, DEFINITION, ElementPlan, MeanValue};
-use cager_core::decode::{Bound, Decoder, Survey};
-use cager_core::inversion::{BATCH, coordinates_bytes, reject_far_points};
+use cager_core::inversion::BATCH;
 use cager_formats::{CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
-use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Polygons, diagonal};
 use cager_geometry::units::{Change, Units};
 use cager_proto::container;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What to decode, if not all frames of the container with its own model and cages.
 #[derive(Default)]
@@ -88,153 +89,6 @@ pub struct Decoded {
     pub numbers_lost: bool,
     /// What the user should know of the output, such as what it loses.
     pub notes: Vec<String>,
-}
-
-/// A model in its rest pose with its decoder, and the numbers of its points outside the rest cage and beside poles.
-struct BoundModel {
-    rest: Model,
-    decoder: Decoder,
-    outside: usize,
-    bound: usize,
-}
-
-/// Computes the coordinates of the container's model, if they are not `known`, or of another, in the container's cage; `keeps(points, columns)` decides whether
-/// to keep them in memory.
-///
-/// # Errors
-/// Damage, or coordinates that this program does not compute.
-fn bind(
-    container: &mut Container,
-    path: &Path,
-    other: Option<(&Path, &Model)>,
-    known: Option<Coordinates>,
-    keeps: impl FnOnce(usize, usize) -> bool,
-) -> Result<BoundModel, DecodeError> {
-    let fail = |cause| DecodeError::container(path, cause);
-    let unsupported = |what| DecodeError::Unsupported { path: path.to_owned(), what };
-    let header = container.header().clone();
-    let Some(system) = coordinates::by_name(&header.coordinates) else {
-        return Err(unsupported(format!("its coordinates are {:?}", header.coordinates)));
-    };
-    if header.coordinates_definition != DEFINITION {
-        return Err(unsupported(format!("its coordinates are of definition {}", header.coordinates_definition)));
-    }
-    let own = container.rest().map_err(fail)?;
-    let (model_path, rest, fitted) = match other {
-        None => (path, own, None),
-        Some((path, model)) => {
-            let mut model = model.clone();
-            move_to(header.origin, &mut model.points);
-            (path, model, Some(TriMesh::from(&own)))
-        }
-    };
-    if let Some(face) = rest.faces.arities().iter().position(|&corners| corners < 3) {
-        return Err(fail(container::Error::Corrupt {
-            offset: 0,
-            what: format!("face {face} of the model has fewer than three vertices"),
-        }));
-    }
-    let mesh = container.cage().map_err(fail)?;
-    let cage = Cage::new(mesh).map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
-    let values = system.values(&cage);
-    if values.unknowns() != header.rows_per_frame as usize {
-        return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));
-    }
-    let columns = values.columns();
-    if other.is_some() {
-        reject_far_points(&cage, &rest.points)
-            .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
-    }
-    let plan = container.elements().map_err(fail)?.map(ElementPlan::from_bytes);
-    let keeps = keeps(rest.points.len(), columns);
-    let known = known.filter(|_| other.is_none() && (keeps || plan.is_some()));
-    if let Some(pointwise) = system.pointwise().filter(|_| plan.is_none() && known.is_none()) {
-        let decoder = if keeps { Decoder::with_stored_coordinates } else { Decoder::with_recomputed_coordinates }(
-            pointwise,
-            &cage,
-            &rest.points,
-            columns,
-        );
-        let decoder = decoder.with_dependent_normals(values.dependent_normals);
-        let Some(fitted) = fitted else { return Ok(BoundModel { rest, decoder, outside: 0, bound: 0 }) };
-        let Survey { outside, mut beside } = Survey::of(pointwise, &cage, &rest.points);
-        // Other coordinates have no poles.
-        beside.retain(|_| header.coordinates == MeanValue.name());
-        let bound = Bound::new(pointwise, &cage, &fitted, &rest.points, &beside)
-            .map_err(|cause| DecodeError::Model { path: model_path.to_owned(), cause })?;
-        let count = bound.places.len();
-        return Ok(BoundModel { rest, decoder: decoder.with_bound(bound), outside, bound: count });
-    }
-    let elements = if known.is_some() { 0 } else { system.working_bytes(&cage, plan.as_ref()) };
-    let needed = coordinates_bytes(rest.points.len(), columns, 2).saturating_add(elements);
-    if needed > free_bytes() {
-        return Err(DecodeError::Memory { path: model_path.to_owned(), gigabytes: 1e-9 * needed as f64 });
-    }
-    let coordinates = known.map_or_else(|| system.coordinates(&cage, &rest.points, plan.as_ref()), Ok);
-    let found = coordinates.map_err(|cause| DecodeError::Coordinates { path: model_path.to_owned(), cause })?;
-    let decoder =
-        Decoder::new(found.phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals);
-    Ok(BoundModel { rest, decoder, outside: found.outside.len(), bound: 0 })
-}
-
-/// Frames of a container, decoded as they are asked for.
-pub struct Positions {
-    container: Container,
-    model: BoundModel,
-    path: PathBuf,
-}
-
-impl Positions {
-    /// Of a container. Coordinates are kept, unless there are more of them than a quarter of the free memory holds: those are computed for each reading.
-    ///
-    /// # Errors
-    /// As [`decode`].
-    pub fn open(path: &Path) -> Result<Self, DecodeError> {
-        let mut container = open(path)?;
-        container.limit_coordinates(free_bytes());
-        let memory = Memory::half_of_free();
-        // Any number of frames may be read at a time, down to one.
-        let most = container.frames();
-        let model = bind(&mut container, path, None, None, |points, columns| memory.keeps(points, columns, most))?;
-        Ok(Self { container, model, path: path.to_owned() })
-    }
-
-    /// Positions of these frames, from which the container's origin is subtracted.
-    ///
-    /// # Errors
-    /// Damage, or a frame that is not there.
-    pub fn read(&mut self, frames: &[usize]) -> Result<Vec<Vec<f32>>, DecodeError> {
-        let fail = |cause| DecodeError::container(&self.path, cause);
-        let (mut cages, mut positions) = (vec![Vec::new(); frames.len()], vec![Vec::new(); frames.len()]);
-        for (&frame, cage) in frames.iter().zip(&mut cages) {
-            self.container.read_frame(frame, cage).map_err(fail)?;
-        }
-        let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-        for (cages, positions) in views.chunks(BATCH).zip(positions.chunks_mut(BATCH)) {
-            self.model.decoder.decode(cages, positions);
-        }
-        self.container.add_residual(frames, &mut positions).map_err(fail)?;
-        Ok(positions)
-    }
-
-    /// How far positions may move where the origin is added to them in single precision.
-    ///
-    /// # Errors
-    /// Damage.
-    pub fn may_lose(&mut self) -> Result<f64, DecodeError> {
-        may_lose(&mut self.container).map_err(|cause| DecodeError::container(&self.path, cause))
-    }
-
-    /// What a cage of vertices × 3 makes of the model, without the residual; the container's origin is subtracted from both.
-    ///
-    /// # Panics
-    /// Where the cage has not one row for each unknown.
-    pub fn of_cage(&self, cage: &[f32]) -> Vec<f32> {
-        let mut positions = [Vec::new()];
-        self.model.decoder.decode(&[cage], &mut positions);
-        let [positions] = positions;
-        positions
-    }
 }
 
 /// Frame rate and frame numbers of the output; `timing` overrides the container's, whose frames are counted from 0 where their numbers are damaged and

@@ -3,6 +3,7 @@
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
 use cager_cages::{Design, DesignOptions, Parts, Style};
+use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_proto::report::{DesignReport, StageReport};
 
 /// Frames of a capture that a design looks at, at most: some to design by, others to choose by, and stretches of time to judge by.
@@ -11,6 +12,18 @@ pub const FRAMES: usize = 160;
 /// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
 pub fn default_vertices(points: usize) -> usize {
     350.min(points / 2).max(4)
+}
+
+/// The usual options of a design for these coordinates: mean value coordinates do without a tidy cage; the others want all points inside.
+pub fn usual_options(system: &dyn CoordinateSystem) -> DesignOptions {
+    let style = if system.name() == MeanValue.name() { Style::Free } else { Style::Editable };
+    DesignOptions { style, ..DesignOptions::default() }
+}
+
+/// Most vertices of a cage for these coordinates that so many points can determine.
+pub fn most_vertices(system: &dyn CoordinateSystem, points: usize) -> usize {
+    // Its normals are unknowns too, two for each vertex.
+    if system.name() == Green::Free.name() { points.div_ceil(3) } else { points }
 }
 
 /// Evenly spaced frames of a capture, or of a range of it, to design a cage from.

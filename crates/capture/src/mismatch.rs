@@ -12,7 +12,7 @@ pub use hand::{Mirroring, SAME_AXES};
 use cager_geometry::mesh::{Model, Point, bounds};
 use cager_geometry::units::Up;
 use cager_geometry::vector::distance;
-use hand::Regions;
+use hand::{Regions, signed_permutations};
 use std::fmt;
 
 /// Number of evenly spaced frames to compare.
@@ -212,33 +212,22 @@ struct AxisScores {
 
 impl AxisScores {
     fn new(correlation: &[Point; 3]) -> Self {
-        const ORDERS: [([usize; 3], f64); 6] = [
-            ([0, 1, 2], 1.0),
-            ([0, 2, 1], -1.0),
-            ([1, 0, 2], -1.0),
-            ([1, 2, 0], 1.0),
-            ([2, 0, 1], 1.0),
-            ([2, 1, 0], -1.0),
-        ];
         let none = f64::NEG_INFINITY;
         let mut best = Self { without: none, with: none, mirrored: none, up: None };
-        for (order, parity) in ORDERS {
-            for signs in 0..8 {
-                let sign: Point = std::array::from_fn(|k| if signs >> k & 1 == 0 { 1.0 } else { -1.0 });
-                let fit: f64 = (0..3).map(|k| sign[k] * correlation[k][order[k]]).sum();
-                let proper = parity * sign[0] * sign[1] * sign[2] > 0.0;
-                if order[1] != 2 && order[2] != 1 {
-                    best.without = best.without.max(fit);
-                } else if !proper {
-                    best.mirrored = best.mirrored.max(fit);
-                } else if fit > best.with {
-                    best.with = fit;
-                    best.up = match (order[1] == 2 && sign[1] > 0.0, order[2] == 1 && sign[2] > 0.0) {
-                        (true, false) => Some(Up::Z),
-                        (false, true) => Some(Up::Y),
-                        _ => None,
-                    };
-                }
+        for (order, is_reflection) in signed_permutations() {
+            let fit = order.fit(correlation);
+            let is_up = |from: usize, to: usize| order.axis[from] == to && !order.negative[from];
+            if order.axis[1] != 2 && order.axis[2] != 1 {
+                best.without = best.without.max(fit);
+            } else if is_reflection {
+                best.mirrored = best.mirrored.max(fit);
+            } else if fit > best.with {
+                best.with = fit;
+                best.up = match (is_up(1, 2), is_up(2, 1)) {
+                    (true, false) => Some(Up::Z),
+                    (false, true) => Some(Up::Y),
+                    _ => None,
+                };
             }
         }
         best

@@ -7,7 +7,7 @@ use crate::preparation::{cage_of, check_extent, check_told, read_part};
 use crate::problem::{self, ApiError};
 use crate::store::{Idempotency, NamedFile};
 use crate::sync::lock;
-use cager_capture::decode::{self, DecodeError, Positions};
+use cager_capture::decode::{self, Animation, DecodeError};
 use cager_capture::origin::{move_to, own_origin};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem as _, MeanValue};
@@ -318,7 +318,7 @@ impl Wanted<'_> {
             None => None,
         };
         drop(container);
-        let mut positions = Positions::open(path).map_err(refuse)?;
+        let mut positions = Animation::open(path).map_err(refuse)?;
         let mut poses = Vec::with_capacity(frames.len());
         for &frame in frames {
             let found = positions.read(&[frame as usize]).map_err(refuse)?.concat();

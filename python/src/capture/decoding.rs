@@ -4,7 +4,7 @@ use super::Capture;
 use crate::apart::interruptible;
 use crate::fault::{Fault, computing, of};
 use crate::geometry::array;
-use cager_capture::decode::{self, DecodeError, Positions};
+use cager_capture::decode::{self, Animation, DecodeError};
 use cager_capture::origin::{move_from, move_to};
 use cager_geometry::mesh::Point;
 use numpy::ndarray::{ArrayViewMut3, Axis};
@@ -18,13 +18,13 @@ const BATCH_BYTES: usize = 64 << 20;
 
 impl Capture {
     /// Works with the decoder, which is prepared when it is needed first.
-    fn decoding<T>(&self, work: impl FnOnce(&mut Positions) -> Result<T, Fault>) -> Result<T, Fault> {
+    fn decoding<T>(&self, work: impl FnOnce(&mut Animation) -> Result<T, Fault>) -> Result<T, Fault> {
         let mut positions = self.positions.lock().unwrap_or_else(PoisonError::into_inner);
         work(match &mut *positions {
             Some(there) => there,
             none => none.insert(self.again(|path| {
                 let path = path.to_owned();
-                interruptible(move || Ok(Positions::open(&path)?))
+                interruptible(move || Ok(Animation::open(&path)?))
             })?),
         })
     }

@@ -1,46 +1,25 @@
 //! Decodes containers that play one after the other to one sequence.
 
-use super::{Chosen, DecodeError, Decoding, Layer, units as meaning};
-use crate::memory::Memory;
+use super::{Chosen, DecodeError, Decoding, units as meaning};
 use crate::timing::Timing;
-use cager_formats::{FrameOptions, FrameRange, MorphOptions, Target, create_frames};
+use cager_formats::{FrameOptions, FrameRange, Target, create_frames};
 use cager_geometry::mesh::Model;
-use cager_geometry::units::Units;
 use std::path::PathBuf;
-
-/// What to decode of several containers that play one after the other.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Joining {
-    /// Frame rate, where it is given.
-    pub fps: Option<f64>,
-    /// Added to the numbers of all frames.
-    pub shift: f64,
-    /// Whether to read and validate only.
-    pub dry_run: bool,
-    /// Memory limit; by default half of the free memory.
-    pub memory: Option<Memory>,
-    /// How much of the files is decoded.
-    pub layer: Layer,
-    /// How a `.glb` holds the frames.
-    pub morphs: MorphOptions,
-    /// Unit and upward axis that positions are brought to.
-    pub units: Units,
-}
 
 /// Decodes ranges of frames of containers, at least one, into one `output`, whose files have the mesh of their container each. Formats of one mesh are refused
 /// before anything is decoded, unless all have the same. `progress` is told the number of frames done, which is returned with
-/// what the user should know of the output.
+/// what the user should know of the output. `shift` is added to the numbers of all frames; model, cages, range and first frame of `what` are not for several files.
 ///
 /// # Errors
 /// See [`DecodeError`].
 pub fn decode_joined(
     inputs: &[(PathBuf, FrameRange)],
     output: impl Into<Target>,
-    what: Joining,
+    (what, shift): (&Decoding<'_>, f64),
     progress: &mut dyn FnMut(usize),
 ) -> Result<(usize, Vec<String>), DecodeError> {
-    let Joining { fps, shift, dry_run, memory, layer, morphs, units } = what;
-    let timing = Timing { fps, start: None };
+    let Decoding { dry_run, memory, layer, morphs, units, .. } = *what;
+    let timing = Timing { start: None, ..what.timing };
     let mut all = Vec::with_capacity(inputs.len());
     for (path, range) in inputs {
         let what = Decoding { range: Some(*range), timing, dry_run, memory, layer, units, ..Decoding::default() };

@@ -35,9 +35,9 @@ pub const SAME_AXES: &str = "export both with the same axes, right-handed or lef
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mirroring {
     /// The axis of the rest pose that each axis of the frame is.
-    axis: [usize; 3],
+    pub(super) axis: [usize; 3],
     /// Whether it is negative.
-    negative: [bool; 3],
+    pub(super) negative: [bool; 3],
 }
 
 /// The regions of a rest pose: the whole, its halves, theirs, and so on.
@@ -207,33 +207,36 @@ fn products(a: &[Point], b: &[Point]) -> [Point; 3] {
 impl Hand {
     /// The exchange of axes that the frame looks like, where it looks like one.
     pub(super) fn mirroring(&self) -> Option<Mirroring> {
-        const ORDERS: [([usize; 3], bool); 6] = [
-            ([0, 1, 2], false),
-            ([0, 2, 1], true),
-            ([1, 0, 2], true),
-            ([1, 2, 0], false),
-            ([2, 0, 1], false),
-            ([2, 1, 0], true),
-        ];
-        let mut best: Option<(f64, Mirroring)> = None;
-        for (axis, is_odd) in ORDERS {
-            for signs in 0..8_usize {
-                let negative = [0, 1, 2].map(|k| signs >> k & 1 == 1);
-                if is_odd == (signs.count_ones() % 2 == 1) {
-                    continue;
-                }
-                let fit =
-                    (0..3).map(|k| self.map[k][axis[k]] * if negative[k] { -1.0 } else { 1.0 }).sum::<f64>() / 3.0;
-                if best.as_ref().is_none_or(|(other, _)| fit > *other) {
-                    best = Some((fit, Mirroring { axis, negative }));
-                }
-            }
-        }
-        best.filter(|(fit, _)| *fit > LIKE).map(|(_, mirroring)| mirroring)
+        let reflections = signed_permutations().filter(|(_, is_reflection)| *is_reflection);
+        let fits = reflections.map(|(mirroring, _)| (mirroring.fit(&self.map) / 3.0, mirroring));
+        fits.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(fit, _)| *fit > LIKE).map(|(_, mirroring)| mirroring)
     }
 }
 
+/// The ways to exchange and negate axes, and whether each is a reflection.
+pub(super) fn signed_permutations() -> impl Iterator<Item = (Mirroring, bool)> {
+    const ORDERS: [([usize; 3], bool); 6] = [
+        ([0, 1, 2], false),
+        ([0, 2, 1], true),
+        ([1, 0, 2], true),
+        ([1, 2, 0], false),
+        ([2, 0, 1], false),
+        ([2, 1, 0], true),
+    ];
+    ORDERS.into_iter().flat_map(|(axis, is_odd)| {
+        (0..8_u32).map(move |signs| {
+            let negative = [0, 1, 2].map(|k| signs >> k & 1 == 1);
+            (Mirroring { axis, negative }, is_odd != (signs.count_ones() % 2 == 1))
+        })
+    })
+}
+
 impl Mirroring {
+    /// How well a map has these axes: the sum of its entries there, with these signs.
+    pub(super) fn fit(&self, map: &[Point; 3]) -> f64 {
+        (0..3).map(|k| map[k][self.axis[k]] * if self.negative[k] { -1.0 } else { 1.0 }).sum()
+    }
+
     /// What makes up for it.
     pub fn advice(&self) -> String {
         const NAMES: [char; 3] = ['x', 'y', 'z'];

@@ -1,8 +1,7 @@
 //! Recovered animations on their way into a container.
 
 use cager_capture::coding::{Goal, InversionChoices};
-use cager_capture::encode::{self, EncodeError, EncodeProgress, Encoded, Job};
-use cager_capture::memory::Memory;
+use cager_capture::encode::{Encode, EncodeError, EncodeProgress, Encoded};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
@@ -48,22 +47,7 @@ impl Encoding<'_> {
             is_coded: goal.is_some(),
         };
         let options = choices.options(system.values(cage).unknowns());
-        let memory = Memory::half_of_free();
-        let job = Job {
-            rest,
-            cage,
-            frames,
-            output,
-            system,
-            options,
-            matrix: None,
-            choose: None,
-            memory,
-            goal,
-            origin,
-            units,
-            exact_rest,
-        };
-        encode::encode(job, progress)
+        let encode = Encode::new(rest, cage).coordinates(system).solver(options).goal(goal).origin(origin);
+        encode.units(units).exact_rest(exact_rest).progress(progress).run(frames, output)
     }
 }

@@ -3,6 +3,7 @@
 mod cage_maker;
 mod checks;
 mod geometry;
+mod reach;
 mod shared_cache;
 mod solvers;
 mod valid_options;
@@ -12,12 +13,12 @@ pub(crate) use cage_maker::{
 };
 pub(crate) use checks::{cannot_be_coded, check, check_model};
 pub(crate) use geometry::{Geometry, cage_of, read, read_cage, read_part, read_part_with_units};
+pub(crate) use reach::Reach;
 pub(crate) use solvers::{KeptSolvers, SolverRequest, SolverResponse, Solvers, kept_solvers};
 pub(crate) use valid_options::{ValidOptions, check_told, content_key, goal};
 
 use crate::problem::ApiError;
 use cager_capture::preparation_warnings::preparation_warnings;
-use cager_capture::reach::Reach;
 use cager_capture::speed::StepClock;
 use cager_core::cage::Cage;
 use cager_core::inversion::{PrepareContext, PrepareError, Solver, SolverOptions};

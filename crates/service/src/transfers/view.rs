@@ -4,7 +4,7 @@ use super::{Transfer, TransferJob};
 use crate::jobs::{Frames, Phase, Piece};
 use crate::service::Service;
 use crate::store::Kind;
-use cager_capture::decode::Positions;
+use cager_capture::decode::Animation;
 use cager_proto::messages::JobState;
 use cager_proto::transfer_messages::{Transfer as View, TransferProgress};
 use std::fs::File;
@@ -65,7 +65,7 @@ enum Positioned {
     /// As they are moved.
     Live(Arc<File>),
     /// What a decoder gets back.
-    Decoded(Box<Positions>),
+    Decoded(Box<Animation>),
 }
 
 /// Positions of a transfer for one reader, who gets all from one place: as they are moved where it runs, else decoded.
@@ -88,7 +88,7 @@ impl TransferFrames {
                 let path =
                     service.store.job_file(Kind::Transfer, job.id(), "capture.cager").map_err(io::Error::other)?;
                 service.store.bring(&path)?;
-                *from = Some(Positioned::Decoded(Box::new(Positions::open(&path).map_err(io::Error::other)?)));
+                *from = Some(Positioned::Decoded(Box::new(Animation::open(&path).map_err(io::Error::other)?)));
             }
             let Some(Positioned::Decoded(positions)) = from else { return Ok(Vec::new()) };
             Ok(positions.read(&frames).map_err(io::Error::other)?.concat())

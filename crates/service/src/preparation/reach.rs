@@ -10,26 +10,26 @@ const MAX_DIAGONALS: f64 = 1e5;
 
 /// Where the points of a capture's frames may lie.
 #[derive(Clone, Copy, Debug)]
-pub struct Reach {
+pub(crate) struct Reach {
     centre: Point,
     diagonal: f64,
 }
 
 impl Reach {
     /// Around the middle of these points; `diagonal` is that of the rest pose.
-    pub fn around(points: &[Point], diagonal: f64) -> Self {
+    pub(crate) fn around(points: &[Point], diagonal: f64) -> Self {
         let (low, high) = bounds(points);
         Self { centre: std::array::from_fn(|k| (low[k] + high[k]) / 2.0), diagonal }
     }
 
     /// Why a frame is refused, if it lies too far away. `frame` is its number, `what` names its rows (`point` or `handle`), and `positions` has three
     /// coordinates for each row.
-    pub fn refusal(&self, frame: u64, is_first: bool, what: &str, positions: &[f64]) -> Option<String> {
+    pub(crate) fn refusal(&self, frame: u64, is_first: bool, what: &str, positions: &[f64]) -> Option<String> {
         self.refusal_of(frame, is_first, what, positions.as_chunks().0.iter().copied())
     }
 
     /// As [`Self::refusal`], of little-endian `f32`.
-    pub fn refusal_of_bytes(&self, frame: u64, is_first: bool, what: &str, bytes: &[u8]) -> Option<String> {
+    pub(crate) fn refusal_of_bytes(&self, frame: u64, is_first: bool, what: &str, bytes: &[u8]) -> Option<String> {
         let points = bytes.as_chunks::<4>().0.as_chunks::<3>().0;
         let points = points.iter().map(|point| point.map(|number| f64::from(f32::from_le_bytes(number))));
         self.refusal_of(frame, is_first, what, points)

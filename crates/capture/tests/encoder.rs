@@ -1,0 +1,72 @@
+//! Frames that are pushed one by one.
+
+use cager_capture::encode::Encode;
+use cager_capture::{Animation, Cage, EncodeError, Encoder, Goal, Inverter, LengthError};
+use cager_demo::{Capture, Options};
+use cager_formats::{ScratchDir, Target};
+
+fn demo() -> (cager_capture::Model, Cage, Vec<Vec<[f64; 3]>>) {
+    let demo = Capture::new(&Options { points: 400, frames: 37, cage_vertices: 42 });
+    let mut flat = Vec::new();
+    let frames = (0..37)
+        .map(|frame| {
+            demo.frame(frame, &mut flat);
+            flat.as_chunks().0.to_vec()
+        })
+        .collect();
+    (demo.rest, Cage::new(demo.cage).expect("a cage"), frames)
+}
+
+#[test]
+fn pushed_frames_give_the_bytes_that_a_reader_of_them_gives() {
+    let (rest, cage, frames) = demo();
+    let folder = ScratchDir::create(std::env::temp_dir()).expect("a folder");
+    let array = folder.path().join("frames.npy");
+    let faces = Default::default();
+    let mut writer = cager_formats::create_frames(&array, 400, 37, &faces, &Default::default()).expect("an array");
+    let single = |frame: &Vec<[f64; 3]>| frame.as_flattened().iter().map(|&x| x as f32).collect::<Vec<f32>>();
+    frames.iter().for_each(|frame| writer.write_frame(&single(frame)).expect("a frame"));
+    writer.finish().expect("an array");
+    for goal in [None, Some(Goal::MaxError(1e-3)), Some(Goal::Size(60_000))] {
+        let encode = || Encode::new(&rest, &cage).goal(goal);
+        let mut reader = cager_formats::open_frames(&array, 400).expect("frames");
+        let read = folder.path().join("read.cager");
+        let encoded = encode().run(reader.as_mut(), &Target::from(&read)).expect("an encoding");
+        let of_reader = encoded.commit().expect("a file");
+        let pushed = folder.path().join("pushed.cager");
+        let mut encoder = encode().expect_frames(37).start(&pushed).expect("an encoder");
+        for frame in &frames {
+            let frame: Vec<[f64; 3]> = frame.iter().map(|p| p.map(|x| f64::from(x as f32))).collect();
+            encoder.push(&frame).expect("a frame");
+        }
+        let report = encoder.finish().expect("a file");
+        assert_eq!((report.frames, report.error.linf_max), (of_reader.frames, of_reader.error.linf_max), "{goal:?}");
+        let mut decoded = [&read, &pushed].map(|path| Animation::open(path).expect("a container"));
+        for frame in [0, 17, 36] {
+            let [a, b] = decoded.each_mut().map(|animation| animation.frame(frame).expect("a frame"));
+            assert_eq!(a, b, "{goal:?} {frame}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused_and_leaves_no_file() {
+    let (rest, cage, frames) = demo();
+    let folder = ScratchDir::create(std::env::temp_dir()).expect("a folder");
+    let output = folder.path().join("out.cager");
+    let mut encoder = Encoder::new(&rest, &cage, &output).expect("an encoder");
+    encoder.push(&frames[0]).expect("a frame");
+    let short = encoder.push(&frames[1][1..]);
+    assert!(matches!(short, Err(EncodeError::PointCount { frame: 1, found: 399, expected: 400 })), "{short:?}");
+    let mut broken = frames[1].clone();
+    broken[7][2] = f64::NAN;
+    let refused = encoder.push(&broken);
+    assert!(matches!(refused, Err(EncodeError::NotFinite { frame: 1, point: 7 })), "{refused:?}");
+    drop(encoder);
+    assert!(!output.exists());
+    let unknown = Encode::new(&rest, &cage).goal(Goal::Size(60_000)).start(&output);
+    assert!(matches!(unknown.err(), Some(EncodeError::UnknownLength)));
+    let inverter = Inverter::new(&rest.points, &cage).expect("an inverter");
+    assert_eq!(inverter.cage(&rest.points[..3]), Err(LengthError { found: 3, expected: 400 }));
+    assert_eq!(inverter.positions(&[]), Err(LengthError { found: 0, expected: 42 }));
+}
