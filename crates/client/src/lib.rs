@@ -62,3 +62,8 @@ pub use results::Coordinates;
 pub use source::{FnFrames, FrameSource, MemoryFrames};
 pub use transfers::{NewTransfer, TransferSource};
 pub use upload::{Rows, UploadOptions, Uploaded};
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

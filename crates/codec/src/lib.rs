@@ -44,3 +44,8 @@ pub const MAX_POSITIONS: usize = 1 << 26;
 pub const MAX_FRAMES: usize = 1024;
 /// Most rows of a cage.
 pub const MAX_ROWS: usize = 4096;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

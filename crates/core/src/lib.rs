@@ -16,3 +16,8 @@ pub mod sted;
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
 /// [`coordinates::DEFINITION`] alone.
 pub const SOLVER_VERSION: u32 = 9;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -40,3 +40,8 @@ pub use mesh::{
     read_model_with_note, read_prim_with_note, read_prim_with_units, write_model,
 };
 pub use signature::Signature;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -7,3 +7,8 @@ pub mod spatial;
 pub mod topology;
 pub mod units;
 pub mod vector;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

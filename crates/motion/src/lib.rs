@@ -5,3 +5,8 @@ pub mod pose_cage;
 pub mod pose_faces;
 pub mod recover;
 pub mod transfer;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

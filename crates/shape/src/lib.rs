@@ -15,3 +15,8 @@ pub mod transfer;
 pub use deformation::{Gradients, Poisson};
 pub use error::{MeshError, ShapeError, TransferError};
 pub use similarity::Similarity;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

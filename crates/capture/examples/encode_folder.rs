@@ -1,4 +1,4 @@
-//! Encodes a folder of frames: `cargo run --example encode -- rest.obj cage.obj frames walk.cager`.
+//! Encodes a folder of frames: `cargo run --example encode_folder -- rest.obj cage.obj frames walk.cager`.
 
 use cager_capture::{Capture, encode};
 use std::error::Error;

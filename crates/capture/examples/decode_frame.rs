@@ -1,4 +1,4 @@
-//! Decodes a frame to a mesh: `cargo run --example decode -- walk.cager 12 frame.obj`.
+//! Decodes a frame to a mesh: `cargo run --example decode_frame -- walk.cager 12 frame.obj`.
 
 use cager_capture::{Animation, write_model};
 use std::error::Error;

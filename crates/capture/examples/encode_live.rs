@@ -1,4 +1,4 @@
-//! Encodes frames that arrive in memory: `cargo run --example live -- rest.obj cage.obj live.cager`.
+//! Encodes frames that arrive in memory: `cargo run --example encode_live -- rest.obj cage.obj live.cager`.
 
 use cager_capture::{Cage, Encode, Inverter, TriMesh, read_model};
 use std::error::Error;
