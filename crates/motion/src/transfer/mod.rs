@@ -15,6 +15,6 @@ pub use job::{MethodChoice, Public, TransferJob};
 pub use motion_file::{MotionFile, decoded};
 pub use pairs::read_pairs;
 pub use placing::about_origin;
-pub use report::{QualityReport, Seconds, TransferReport};
+pub use report::{Seconds, TransferReport};
 pub use run::MOVED;
 pub use run::{Transferred, transfer};

@@ -29,7 +29,7 @@ pub struct TransferReport {
     /// Whether the detail of the target at rest was brought back to every frame.
     pub detail: bool,
     /// What the motion does to the target.
-    pub quality: QualityReport,
+    pub quality: MotionSummary,
     /// How long it took.
     pub seconds: Seconds,
     /// For each point of the target, the number of a point of the source that was laid there. Of the fitted cage alone.
@@ -45,25 +45,4 @@ pub struct Seconds {
     pub frames: f64,
     /// What the quality was measured in.
     pub measure: f64,
-}
-
-/// What a motion does to the model that took it, over all frames.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct QualityReport {
-    /// Share of the area that faces against the rotation of its surroundings, on average. None without faces.
-    pub folded: Option<f64>,
-    /// Share of the area that is twice as long, or half as long, in some direction, on average. None without faces.
-    pub stretched: Option<f64>,
-    /// The least and the largest volume, over that at rest. None where the mesh is not closed.
-    pub volume: Option<[f64; 2]>,
-    /// Mean second difference over time, over that of the source, each as a share of the model's size. None for fewer than three frames, and where the source
-    /// moves evenly.
-    pub jitter: Option<f64>,
-}
-
-impl From<MotionSummary> for QualityReport {
-    fn from(found: MotionSummary) -> Self {
-        let MotionSummary { folded, stretched, volume, jitter } = found;
-        Self { folded, stretched, volume, jitter }
-    }
 }

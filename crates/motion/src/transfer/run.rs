@@ -3,11 +3,11 @@
 use super::error::TransferFailed;
 use super::job::TransferJob;
 use super::method::Mover;
-use super::report::{QualityReport, TransferReport};
+use super::report::TransferReport;
 use crate::recover::RecoveredFrames;
 use cager_formats::FrameReader;
 use cager_geometry::mesh::{Point, TriMesh};
-use cager_shape::quality::MotionQuality;
+use cager_shape::quality::{MotionQuality, MotionSummary};
 use cager_shape::transfer::placement::{Placement, lowest};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -66,7 +66,7 @@ pub fn transfer(mut job: TransferJob<'_>, progress: &dyn Fn(usize)) -> Result<Tr
 }
 
 /// What is to be said of a model that hardly keeps its shape.
-fn torn(quality: &QualityReport) -> Option<String> {
+fn torn(quality: &MotionSummary) -> Option<String> {
     /// Of the volume at rest, and of the area.
     const VOLUMES: RangeInclusive<f64> = 0.2..=5.0;
     const STRETCHED: f64 = 0.5;
@@ -191,7 +191,7 @@ fn measured(
     mut quality: MotionQuality,
     frames: &mut RecoveredFrames,
     mut source: RecoveredFrames,
-) -> Result<QualityReport, cager_formats::Error> {
+) -> Result<MotionSummary, cager_formats::Error> {
     frames.rewind()?;
     source.rewind()?;
     let (mut shape, mut pose) = (Vec::new(), Vec::new());
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn a_model_that_loses_its_shape_is_told_of() {
-        let of = |volume, stretched| torn(&QualityReport { volume, stretched, ..QualityReport::default() });
+        let of = |volume, stretched| torn(&MotionSummary { volume, stretched, ..MotionSummary::default() });
         assert_eq!(of(Some([0.8, 1.3]), Some(0.1)), None);
         assert_eq!(of(None, None), None);
         assert!(of(Some([-9.0, 1.0]), None).is_some_and(|said| said.contains("volume is -9.0 to 1.0 times")));

@@ -1,4 +1,4 @@
-//! What a pose does to a mesh: folded and stretched triangles, volume; and how a motion trembles.
+//! What a pose does to a mesh: folded and stretched triangles, volume.
 
 use crate::registration::welded;
 use cager_geometry::mesh::{Point, TriMesh};
@@ -6,7 +6,6 @@ use glam::{DMat3, DVec3};
 
 use crate::deformation::gradients::{Gradients, area_vector};
 use crate::deformation::poisson::vectors;
-use crate::similarity::Similarity;
 
 /// Measures poses of one mesh.
 pub struct Quality {
@@ -91,13 +90,6 @@ fn volume(points: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
         a.dot(b.cross(c))
     };
     triangles.iter().map(of).sum::<f64>() / 6.0
-}
-
-/// Mean distance of points after the best rotation and translation: how far a pose is from another one.
-pub fn mean_error(pose: &[Point], truth: &[Point]) -> f64 {
-    let best = Similarity::of_points(pose, truth, false);
-    let far = |(p, q): (&Point, &Point)| best.apply((*p).into()).distance((*q).into());
-    pose.iter().zip(truth).map(far).sum::<f64>() / pose.len() as f64
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Measures of what a motion does to a mesh: how evenly its triangles follow, and how smoothly in time.
 
-pub(crate) mod frame;
+mod frame;
 mod motion;
 
-pub use frame::{Quality, mean_error};
+pub use frame::Quality;
 pub use motion::{MotionQuality, MotionSummary};

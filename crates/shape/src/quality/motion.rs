@@ -2,9 +2,10 @@
 
 use cager_geometry::mesh::{Point, TriMesh};
 use glam::DVec3;
+use serde::Serialize;
 
+use super::frame::Quality;
 use crate::canonical::size;
-use crate::quality::frame::Quality;
 
 /// Gathers how good the frames of a moved target are: push them in order, then ask for the summary.
 pub struct MotionQuality {
@@ -14,12 +15,12 @@ pub struct MotionQuality {
     folded: f64,
     stretched: f64,
     volume: Option<[f64; 2]>,
-    target: Trembling,
-    source: Trembling,
+    target: Jitter,
+    source: Jitter,
 }
 
-/// How good a motion is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a motion does to the model that took it, over all frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MotionSummary {
     /// Share of the area that is folded, in the mean over the frames; none for a cloud of points.
     pub folded: Option<f64>,
@@ -27,8 +28,8 @@ pub struct MotionSummary {
     pub stretched: Option<f64>,
     /// The least and the greatest volume over that at rest; none for a mesh that is not closed.
     pub volume: Option<[f64; 2]>,
-    /// Mean second difference of the target's points over that of the source's, each as a share of its size: how much the motion trembles. None for fewer than
-    /// three frames, or where the source moves evenly.
+    /// Mean second difference of the target's points over that of the source's, each as a share of its size. None for fewer than three frames, or
+    /// where the source moves evenly.
     pub jitter: Option<f64>,
 }
 
@@ -36,7 +37,7 @@ impl MotionQuality {
     /// Of a target, with or without faces, and the rest pose of the source whose motion it takes.
     pub fn new(target: &TriMesh, source: &[Point]) -> Self {
         let quality = (!target.triangles.is_empty()).then(|| Quality::new(target));
-        let [target, source] = [&target.vertices[..], source].map(Trembling::new);
+        let [target, source] = [&target.vertices[..], source].map(Jitter::new);
         Self { quality, frames: 0, folded: 0.0, stretched: 0.0, volume: None, target, source }
     }
 
@@ -68,14 +69,14 @@ impl MotionQuality {
 }
 
 /// Second differences of points over time.
-struct Trembling {
+struct Jitter {
     size: f64,
     before: [Vec<Point>; 2],
     sum: f64,
     count: usize,
 }
 
-impl Trembling {
+impl Jitter {
     fn new(rest: &[Point]) -> Self {
         Self { size: size(rest), before: [Vec::new(), Vec::new()], sum: 0.0, count: 0 }
     }

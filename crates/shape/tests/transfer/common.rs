@@ -5,7 +5,8 @@ use cager_cages::{EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
-use cager_shape::quality::mean_error;
+use cager_geometry::vector::distance;
+use cager_shape::Similarity;
 use faer::Mat;
 use std::path::{Path, PathBuf};
 
@@ -70,6 +71,13 @@ impl Caged {
     pub fn source(&self) -> cager_shape::transfer::Source<'_> {
         cager_shape::transfer::Source { rest: &self.rest, cage: &self.cage, phi: self.phi.as_ref() }
     }
+}
+
+/// Mean distance of points after the best rotation and translation: how far a pose is from another one.
+fn mean_error(pose: &[Point], truth: &[Point]) -> f64 {
+    let best = Similarity::of_points(pose, truth, false);
+    let far = |(p, q): (&Point, &Point)| distance(best.apply((*p).into()).to_array(), *q);
+    pose.iter().zip(truth).map(far).sum::<f64>() / pose.len() as f64
 }
 
 /// Mean errors of some frames after rigid alignment, over those of the target not moved at all, in percent; and in percent of the diagonal.
