@@ -33,28 +33,12 @@ impl CagedShapes {
         Ok(self.model(&self.space.shape(weights)?, weights))
     }
 
-    /// The shape as [`ShapeSpace::rough_shape`] has it on the cage: fast enough to follow a pointer also where the cage has hundreds of vertices.
-    ///
-    /// # Errors
-    /// As [`ShapeSpace::shape`].
-    pub fn rough_shape(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
-        Ok(self.model(&self.space.rough_shape(weights)?, weights))
-    }
-
     /// The cage of a shape.
     ///
     /// # Errors
     /// As [`ShapeSpace::shape`].
     pub fn cage(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
         self.space.shape(weights)
-    }
-
-    /// The cage of a rough shape.
-    ///
-    /// # Errors
-    /// As [`ShapeSpace::shape`].
-    pub fn rough_cage(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
-        self.space.rough_shape(weights)
     }
 
     fn model(&self, cage: &[Point], weights: &[f64]) -> Vec<Point> {

@@ -7,7 +7,7 @@ use super::features::{Features, Refinement};
 use super::poses::{Seams, check_poses};
 use super::rotations::{Ways, polar};
 use crate::deformation::gradients::Gradients;
-use crate::deformation::poisson::{Poisson, offsets, plain, vectors};
+use crate::deformation::poisson::{Poisson, offsets, vectors};
 use crate::error::ShapeError;
 
 /// The shapes that weights of some poses name.
@@ -89,15 +89,10 @@ impl ShapeSpace {
             let moved: Vec<DVec3> = refined.iter().zip(&start).map(|(to, from)| *to - *from).collect();
             shape.iter_mut().zip(self.poisson.rows().spread(&moved)).for_each(|(p, by)| *p += by);
         }
-        Ok(self.finished(shape, weights))
-    }
-
-    /// [`Self::shape`] without the last step: faster, and less exact where poses are far apart.
-    ///
-    /// # Errors
-    /// As [`Self::shape`].
-    pub fn rough_shape(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
-        Ok(self.finished(self.unrefined(weights)?, weights))
+        self.seams.part(&mut shape, weights);
+        let wanted: DVec3 = weights.iter().zip(&self.poses).map(|(&w, pose)| w * pose.mean).sum();
+        let by = wanted - mean(&shape);
+        Ok(shape.iter().map(|p| (*p + by).to_array()).collect())
     }
 
     fn unrefined(&self, weights: &[f64]) -> Result<Vec<DVec3>, ShapeError> {
@@ -126,15 +121,6 @@ impl ShapeSpace {
             return Err(ShapeError::Sum { sum });
         }
         Ok(())
-    }
-
-    /// With the vertices of seams, and the mean where the poses have it.
-    fn finished(&self, mut points: Vec<DVec3>, weights: &[f64]) -> Vec<Point> {
-        self.seams.part(&mut points, weights);
-        let wanted: DVec3 = weights.iter().zip(&self.poses).map(|(&w, pose)| w * pose.mean).sum();
-        let by = wanted - mean(&points);
-        points.iter_mut().for_each(|p| *p += by);
-        plain(&points)
     }
 }
 

@@ -161,7 +161,7 @@ fn weights_and_poses_that_do_not_fit_are_named() {
     let space = ShapeSpace::new(&mesh.triangles, &poses).unwrap();
     assert_eq!(space.shape(&[0.5, 0.6]), Err(ShapeError::Sum { sum: 1.1 }));
     assert_eq!(space.shape(&[f64::NAN, 1.0]), Err(ShapeError::Weight { pose: 0 }));
-    assert_eq!(space.rough_shape(&[1.0, f64::INFINITY]), Err(ShapeError::Weight { pose: 1 }));
+    assert_eq!(space.shape(&[1.0, f64::INFINITY]), Err(ShapeError::Weight { pose: 1 }));
     let one = space.shape(&[1.0]).unwrap_err();
     assert_eq!(one.to_string(), "there is 1 weight for 2 poses; give one for each");
     let three = space.shape(&[0.2, 0.3, 0.5]).unwrap_err();
