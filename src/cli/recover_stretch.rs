@@ -18,7 +18,7 @@ use cager_motion::recover::{
 use cager_proto::report::json_file;
 use cager_shape::people::manifold::Manifold;
 use cager_shape::people::rig::Rig;
-use cager_shape::people::{FitOptions, Method};
+use cager_shape::people::{COORDINATES, FitOptions, Method};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -68,7 +68,7 @@ impl Stretching<'_> {
         let scratch = ScratchDir::create(folder_of(self.output))?;
         let options = person_options(self.args.method);
         let known = self.person.map(|(rig, manifold)| Person { rig, manifold, options });
-        let system = if known.is_some() { options.system.system() } else { &MeanValue };
+        let system = if known.is_some() { COORDINATES } else { &MeanValue };
         let recovered = self.followed((template, cage), known, scratch.path())?;
         self.encoded(system, recovered, beside)
     }

@@ -8,6 +8,7 @@ pub mod interpolate;
 pub mod people;
 pub mod quality;
 pub mod registration;
+mod rotation;
 mod similarity;
 pub mod tracking;
 pub mod transfer;

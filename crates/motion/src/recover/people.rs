@@ -10,7 +10,7 @@ use cager_geometry::vector::{distance, norm};
 use cager_shape::people::joints::{CagedJoints, MarkedJoints};
 use cager_shape::people::manifold::Manifold;
 use cager_shape::people::rig::Rig;
-use cager_shape::people::{FitOptions, PersonFit, PersonModel, PersonTracker};
+use cager_shape::people::{COORDINATES, FitOptions, PersonFit, PersonModel, PersonTracker};
 
 /// What is known of a person.
 pub struct Person<'a> {
@@ -82,9 +82,9 @@ impl Person<'_> {
         finisher: &dyn Fn(usize) -> Result<Finisher<'f>, RecoverError>,
         watch: &Watch<'_>,
     ) -> Result<Finished, RecoverError> {
-        let model = surfaces.on_pool(|| PersonModel::new(rest, self.rig, self.options.system, self.options.samples))?;
+        let model = surfaces.on_pool(|| PersonModel::new(rest, self.rig, COORDINATES, self.options.samples))?;
         let fit = PersonFit { model: &model, manifold: self.manifold, options: self.options };
-        let caged = CagedJoints::new(MarkedJoints::of_rig(self.rig), model.cage(), self.options.system.system())?;
+        let caged = CagedJoints::new(MarkedJoints::of_rig(self.rig), model.cage(), COORDINATES)?;
         let (mut tracker, mut numbers, mut frames) = (PersonTracker::new(&fit), Vec::new(), 0);
         surfaces.each(0.., |frame, seen| {
             frames += 1;

@@ -19,6 +19,7 @@ use cager_motion::recover::{
     FirstLook, Person, RecoverError, RecoverJob, RecoverProgress, cage_around, manifold_of, placed_units, recover,
     rig_of,
 };
+use cager_shape::people::COORDINATES;
 use std::sync::Arc;
 
 impl Run for Recovery {
@@ -113,9 +114,8 @@ impl Service {
         };
         job.set_phase(Phase::Running);
         let workshop = self.store.workshop()?;
-        let person_options = person;
-        let person = known.as_ref().map(|(manifold, rig)| Person { rig, manifold, options: person_options });
-        let system = if person.is_some() { person_options.system.system() } else { &MeanValue };
+        let person = known.as_ref().map(|(manifold, rig)| Person { rig, manifold, options: person });
+        let system = if person.is_some() { COORDINATES } else { &MeanValue };
         let recovering = RecoverJob {
             template: model,
             cage,

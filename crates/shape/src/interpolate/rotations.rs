@@ -8,6 +8,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use crate::deformation::gradients::Gradients;
 use crate::deformation::ties::Tie;
+use crate::rotation::rotation_vector;
 
 /// Rotation and symmetric stretch of each gradient, `D = R S`.
 pub(super) fn polar(gradients: &[DMat3]) -> (Vec<DMat3>, Vec<DMat3>) {
@@ -58,7 +59,7 @@ impl<'a> Ways<'a> {
             }
             let to = if t == from { before[t] } else { turns[from] };
             if self.gradients.has_area(t) {
-                turns[t] = nearest(turn(turned[t]), to);
+                turns[t] = nearest(rotation_vector(turned[t]), to);
             } else {
                 // What has no rotation of its own hands on that of its neighbour.
                 (turns[t], turned[t]) = (to, turned[from]);
@@ -96,12 +97,4 @@ fn nearest(turn: DVec3, to: DVec3) -> DVec3 {
     }
     let axis = turn / angle;
     turn + axis * whole(to.dot(axis) - angle)
-}
-
-/// Axis times angle, the angle between 0 and π.
-fn turn(q: DQuat) -> DVec3 {
-    let q = if q.w < 0.0 { -q } else { q };
-    let sine = q.xyz().length();
-    let factor = if sine > 0.0 { 2.0 * sine.atan2(q.w) / sine } else { 2.0 };
-    factor * q.xyz()
 }

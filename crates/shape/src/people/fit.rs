@@ -7,8 +7,9 @@ use super::model::{CAGE_UNKNOWNS, PersonModel};
 use super::observed::Observed;
 use super::options::{FitOptions, Method};
 use super::stages::{Free, LatentStage, Linearized, QuadStage, Stage, VertexStage};
+use crate::Similarity;
 use crate::people::manifold::Manifold;
-use crate::people::rig::{Placement, QUAD_UNKNOWNS, QUADS, deform};
+use crate::people::rig::{QUAD_UNKNOWNS, QUADS};
 use crate::registration::{Observation, OrientedPoints};
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
@@ -19,9 +20,9 @@ use rayon::prelude::*;
 /// A stage ends where its step moves no vertex by more than this fraction of the height.
 const STILL: f64 = 2e-4;
 /// A limb whose mean distance is above this fraction of the height, or so many times that of the frame before, is tried elsewhere.
-const ASTRAY: [f64; 2] = [0.015, 1.3];
+const RELOCATED_ABOVE: [f64; 2] = [0.015, 1.3];
 /// More rounds for quads of limbs that were put elsewhere.
-const MENDING: usize = 4;
+const EXTRA_ROUNDS: usize = 4;
 /// Matches whose derivatives one task computes.
 const TASK: usize = 64;
 
@@ -29,7 +30,7 @@ const TASK: usize = 64;
 #[derive(Clone, Debug)]
 pub struct FrameFit {
     /// Where the pelvis is.
-    pub placement: Placement,
+    pub placement: Similarity,
     /// Latent numbers.
     pub latent: Vec<f64>,
     /// The pose of the quads.
@@ -40,8 +41,6 @@ pub struct FrameFit {
     pub score: f64,
     /// Of each quad, the mean distance of the template around it to what was observed, as the score.
     pub parts: [f64; QUADS],
-    /// Vertices of the cage of the manifold alone, and of the quads: what the stages before the last came to.
-    pub stages: [Vec<Point>; 2],
 }
 
 /// A template, its rig and a manifold, ready to be fitted.
@@ -74,11 +73,11 @@ impl<'a> PersonFit<'a> {
             stage.offset = self.offset(&stage, &fit.pose);
             let found = self.finish(&observed, stage, self.options.rounds);
             let (before, now) = (limb_scores(&fit.parts), limb_scores(&found.parts));
-            let astray = |&limb: &usize| now[limb] > ASTRAY[0].min(ASTRAY[1] * before[limb]);
-            let limbs: Vec<usize> = (0..now.len()).filter(astray).collect();
+            let misplaced = |&limb: &usize| now[limb] > RELOCATED_ABOVE[0].min(RELOCATED_ABOVE[1] * before[limb]);
+            let limbs: Vec<usize> = (0..now.len()).filter(misplaced).collect();
             return self.refit_with_other_limbs(&observed, found, &limbs);
         }
-        self.anew(&observed)
+        self.fit_from_search(&observed)
     }
 
     /// A fit with limbs put elsewhere, where it then lies better.
@@ -91,7 +90,7 @@ impl<'a> PersonFit<'a> {
         let mut stage = self.latent_stage(fit.placement, fit.latent.clone());
         stage.offset = pose.iter().zip(stage.pose()).map(|(y, on)| y - on).collect();
         let [_, quads, vertices] = self.options.rounds;
-        let again = self.finish(observed, stage, [0, quads + MENDING, vertices]);
+        let again = self.finish(observed, stage, [0, quads + EXTRA_ROUNDS, vertices]);
         if again.score < fit.score { again } else { fit }
     }
 
@@ -116,32 +115,21 @@ impl<'a> PersonFit<'a> {
         }
         let target = stage.pose();
         let (placement, latent) = (stage.placement, stage.latent);
-        let on_manifold = deform(rig, &target, &placement).vertices;
-        let start = target.clone();
-        let mut quads = QuadStage::new(rig, height, options, placement, [start, target]);
+        let mut quads = QuadStage::new(rig, height, options, placement, target);
         self.run(&mut quads, observed, self.rounds(rounds[1]));
-        let of_quads = quads.linearized().vertices;
-        let vertices = if options.method == Method::Robust && rounds[2] > 0 {
-            let mut vertices = VertexStage::new(height, options, of_quads.clone());
-            self.run(&mut vertices, observed, self.rounds(rounds[2]));
-            vertices.linearized().vertices
-        } else {
-            of_quads.clone()
-        };
-        let score = self.matching(observed, 1).score(&vertices);
-        FrameFit {
-            placement: quads.placement,
-            latent,
-            pose: quads.pose,
-            vertices,
-            score: score.mean,
-            parts: score.parts,
-            stages: [on_manifold, of_quads],
+        let mut vertices = quads.linearized().vertices;
+        if options.method == Method::Robust && rounds[2] > 0 {
+            let mut stage = VertexStage::new(height, options, vertices);
+            self.run(&mut stage, observed, self.rounds(rounds[2]));
+            vertices = stage.linearized().vertices;
         }
+        let score = self.matching(observed, 1).score(&vertices);
+        let QuadStage { placement, pose, .. } = quads;
+        FrameFit { placement, latent, pose, vertices, score: score.mean, parts: score.parts }
     }
 
     /// The stage of placement and latent numbers.
-    pub(super) fn latent_stage(&self, placement: Placement, latent: Vec<f64>) -> LatentStage<'a> {
+    pub(super) fn latent_stage(&self, placement: Similarity, latent: Vec<f64>) -> LatentStage<'a> {
         LatentStage {
             rig: self.model.rig(),
             manifold: self.manifold,

@@ -1,6 +1,6 @@
 //! Paths of joints: each joint by its coordinates in the rest cage, taken along with the cage (Duveau et al. 2012, §6.2), and their files.
 
-use crate::people::rotation::between;
+use crate::rotation::between;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, DependentNormals};
 use cager_formats::biovision::{Channel, Joint, Motion, Skeleton, bvh_bytes};

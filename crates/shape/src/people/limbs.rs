@@ -1,14 +1,15 @@
-//! Arms and legs that went astray: those of every example in place of a limb, and the one that explains best what was observed.
+//! Arms and legs that were fitted in the wrong place: each is tried as in every example, and the best is taken.
 //!
 //! Gauss–Newton does not bring an arm back that lies on the trunk instead, since what it should lie on is out of reach there.
 
 use super::matching::{MIN_COSINE, NORMAL_LENGTH, SCORE_CAP};
 use super::model::PersonModel;
 use super::observed::Observed;
+use crate::Similarity;
 use crate::people::manifold::Manifold;
-use crate::people::rig::{Placement, QUADS, deform};
-use crate::people::rotation::{exp, log};
+use crate::people::rig::{QUADS, deform};
 use crate::registration::{Observation, OrientedPoints};
+use crate::rotation::{exp, log};
 use cager_geometry::mesh::Point;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -32,7 +33,7 @@ pub(super) fn limb_scores(parts: &[f64; QUADS]) -> [f64; 4] {
 pub(super) fn pose_with_other_limbs(
     (model, manifold): (&PersonModel, &Manifold),
     observed: &Observed<'_>,
-    (placement, pose): (&Placement, &[f64]),
+    (placement, pose): (&Similarity, &[f64]),
     limbs: &[usize],
 ) -> Option<Vec<f64>> {
     let count = manifold.examples().min(EXAMPLES);
@@ -79,7 +80,7 @@ fn with_limb(pose: &[f64], other: &[f64], limb: usize) -> Vec<f64> {
 struct LimbCost<'a> {
     model: &'a PersonModel,
     observed: &'a Observed<'a>,
-    placement: &'a Placement,
+    placement: &'a Similarity,
     /// Samples of the limb.
     samples: Vec<usize>,
     /// Chosen points, and how far each is from the rest of the body.
@@ -90,7 +91,7 @@ impl<'a> LimbCost<'a> {
     fn new(
         model: &'a PersonModel,
         observed: &'a Observed<'a>,
-        placement: &'a Placement,
+        placement: &'a Similarity,
         pose: &[f64],
         limb: usize,
     ) -> Self {

@@ -95,17 +95,21 @@ impl Matching<'_> {
         let moved = |s: usize, at: &[Point]| {
             at.get(s).is_none_or(|&p| DVec3::from(p).distance_squared(sampled.points[s].into()) > still2)
         };
-        let anew: Vec<bool> = (0..count).map(|s| moved(s, at)).collect();
+        let has_moved: Vec<bool> = (0..count).map(|s| moved(s, at)).collect();
         forth.resize(count, 0);
         at.resize(count, [0.0; 3]);
-        forth.par_iter_mut().zip(at.par_iter_mut()).with_min_len(TASK).enumerate().filter(|&(s, _)| anew[s]).for_each(
-            |(s, (pair, at))| {
+        forth
+            .par_iter_mut()
+            .zip(at.par_iter_mut())
+            .with_min_len(TASK)
+            .enumerate()
+            .filter(|&(s, _)| has_moved[s])
+            .for_each(|(s, (pair, at))| {
                 *pair = self.observed.tree.nearest(sampled.points[s], sampled.normals[s]).0;
                 *at = sampled.points[s];
-            },
-        );
-        let some = anew.iter().filter(|&&anew| anew).count();
-        if self.options.method == Method::Robust && (back.is_empty() || some * 20 > count) {
+            });
+        let count_moved = has_moved.iter().filter(|&&moved| moved).count();
+        if self.options.method == Method::Robust && (back.is_empty() || count_moved * 20 > count) {
             let tree = OrientedPoints::new(&sampled.points, &sampled.normals, NORMAL_LENGTH * self.model.diagonal());
             let Observation { points, normals } = self.observed.observation;
             let chosen: Vec<usize> = self.observed.chosen.iter().copied().step_by(self.thin).collect();

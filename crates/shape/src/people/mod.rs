@@ -7,7 +7,6 @@
 //! What is fitted are distances of points of the template to the planes of the observed points that they are matched with, both ways, in the unit
 //! `0.005 · height`, less the farther apart and not at all where the surfaces face apart.
 
-mod anew;
 mod equations;
 mod fit;
 pub mod joints;
@@ -19,15 +18,14 @@ mod observed;
 mod options;
 pub mod poses;
 pub mod rig;
-mod rotation;
 mod search;
+mod search_fit;
 mod stages;
 #[cfg(test)]
 pub(crate) mod tests;
 mod track;
 
-pub use crate::registration::Observation;
 pub use fit::{FrameFit, PersonFit};
 pub use model::{ModelError, PersonModel};
-pub use options::{FitOptions, Method, SystemKind};
-pub use track::{PersonTracker, TrackedFrame, WayBack, track};
+pub use options::{COORDINATES, FitOptions, Method};
+pub use track::{BackwardPass, PersonTracker, TrackedFrame};

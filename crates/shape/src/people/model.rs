@@ -1,10 +1,9 @@
 //! A template in the cage of its rig: coordinates of all vertices and of samples of the surface, and derivatives by the cage.
 
-use super::options::SystemKind;
 use crate::people::rig::{CAGE_VERTICES, QUADS, Rig, owner};
 use crate::registration::{SurfacePoint, sample_surface};
 use cager_core::cage::{Cage, CageError};
-use cager_core::coordinates::{CoordinatesError, DependentNormals, Derivative};
+use cager_core::coordinates::{CoordinateSystem, CoordinatesError, DependentNormals, Derivative};
 use cager_geometry::linalg::{tall_product, zeros};
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use cager_geometry::vector::{cross, dot, norm};
@@ -67,9 +66,13 @@ impl PersonModel {
     ///
     /// # Errors
     /// See [`ModelError`].
-    pub fn new(template: &TriMesh, rig: &Rig, system: SystemKind, samples: usize) -> Result<Self, ModelError> {
+    pub fn new(
+        template: &TriMesh,
+        rig: &Rig,
+        system: &dyn CoordinateSystem,
+        samples: usize,
+    ) -> Result<Self, ModelError> {
         let cage = Cage::new(rig.cage())?;
-        let system = system.system();
         let coordinates = system.coordinates(&cage, &template.vertices, None)?;
         let points = template.vertices.len();
         if coordinates.outside.len() as f64 > OUTSIDE * points as f64 {

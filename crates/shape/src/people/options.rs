@@ -1,6 +1,6 @@
 //! How a person is fitted.
 
-use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
+use cager_core::coordinates::{CoordinateSystem, Green};
 
 /// The recipe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,33 +14,14 @@ pub enum Method {
     Paper,
 }
 
-/// The coordinates that take the template along with the cage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SystemKind {
-    /// Mean value coordinates: vertices alone.
-    MeanValue,
-    /// Green coordinates with normals that follow from the vertices, as in the paper.
-    #[default]
-    Green,
-}
-
-impl SystemKind {
-    /// The coordinate system.
-    pub fn system(self) -> &'static dyn CoordinateSystem {
-        match self {
-            Self::MeanValue => &MeanValue,
-            Self::Green => &Green::Consistent,
-        }
-    }
-}
+/// The coordinates that take people along with their cages, as in the paper: Green's, with normals that follow from the vertices.
+pub const COORDINATES: &dyn CoordinateSystem = &Green::Consistent;
 
 /// Weights and numbers of a fit. Lengths are fractions of the template's height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
     /// The recipe.
     pub method: Method,
-    /// The coordinates.
-    pub system: SystemKind,
     /// Points of the template that are matched.
     pub samples: usize,
     /// Observed points that are matched with the template.
@@ -69,7 +50,6 @@ impl Default for FitOptions {
     fn default() -> Self {
         Self {
             method: Method::Robust,
-            system: SystemKind::Green,
             samples: 2500,
             observed: 1500,
             deviation: 0.005,

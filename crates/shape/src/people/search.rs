@@ -2,8 +2,9 @@
 
 use super::model::PersonModel;
 use super::observed::Observed;
+use crate::Similarity;
 use crate::people::manifold::Manifold;
-use crate::people::rig::{Placement, deform};
+use crate::people::rig::deform;
 use crate::registration::{Observation, OrientedPoints};
 use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};
@@ -23,7 +24,7 @@ pub(super) fn search(
     manifold: &Manifold,
     count: usize,
     observed: &Observed<'_>,
-) -> Vec<(Placement, Vec<f64>)> {
+) -> Vec<(Similarity, Vec<f64>)> {
     let tried = manifold.examples().min(EXAMPLES);
     let examples: Vec<usize> = (0..tried).map(|k| k * manifold.examples() / tried).collect();
     let up = DVec3::from(model.rig().up);
@@ -32,11 +33,11 @@ pub(super) fn search(
     let seen: Vec<usize> = observed.chosen.iter().copied().step_by(THIN).collect();
     let cap = 0.1 * model.height();
     let center = middle(&some);
-    let mut starts: Vec<(f64, Placement, usize, usize)> = examples
+    let mut starts: Vec<(f64, Similarity, usize, usize)> = examples
         .par_iter()
         .flat_map_iter(|&example| {
             let vertices =
-                deform(model.rig(), &manifold.pose(manifold.latent(example)), &Placement::default()).vertices;
+                deform(model.rig(), &manifold.pose(manifold.latent(example)), &Similarity::IDENTITY).vertices;
             let sampled = model.sampled(&vertices, THIN);
             let vectors = |all: &[Point]| -> Vec<DVec3> { all.iter().map(|&p| p.into()).collect() };
             let (at, facing) = (vectors(&sampled.points), vectors(&sampled.normals));
@@ -49,9 +50,10 @@ pub(super) fn search(
                 .map(|heading| {
                     let rotation = DMat3::from_axis_angle(up, TAU * heading as f64 / HEADINGS as f64);
                     let turned: Vec<DVec3> = at.iter().map(|&p| rotation * p).collect();
-                    let placement = Placement { rotation, translation: center - middle(&turned) };
+                    let translation = center - middle(&turned);
+                    let placement = Similarity { rotation, translation, ..Similarity::IDENTITY };
                     let forth = at.iter().zip(&facing).map(|(&p, &n)| {
-                        let p = placement.at(p);
+                        let p = placement.apply(p);
                         let found = observed.tree.nearest(p.to_array(), (rotation * n).to_array()).0;
                         p.distance(points[found].into()).min(cap)
                     });

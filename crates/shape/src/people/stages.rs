@@ -3,8 +3,9 @@
 use super::equations::NormalEquations;
 use super::model::CAGE_UNKNOWNS;
 use super::options::FitOptions;
+use crate::Similarity;
 use crate::people::manifold::Manifold;
-use crate::people::rig::{BONES, CAGE_VERTICES, Deformed, Placement, QUAD_UNKNOWNS, Rig, deform, triangles};
+use crate::people::rig::{BONES, CAGE_VERTICES, Deformed, QUAD_UNKNOWNS, Rig, deform, stepped, triangles};
 use cager_geometry::linalg::{multiply, zeros};
 use cager_geometry::mesh::Point;
 use faer::Mat;
@@ -84,7 +85,7 @@ pub(super) enum Free {
 pub(super) struct LatentStage<'a> {
     pub(super) rig: &'a Rig,
     pub(super) manifold: &'a Manifold,
-    pub(super) placement: Placement,
+    pub(super) placement: Similarity,
     pub(super) latent: Vec<f64>,
     /// What poses are off the manifold by: it is shifted to pass through the last fit.
     pub(super) offset: Vec<f64>,
@@ -138,7 +139,7 @@ impl Stage for LatentStage<'_> {
             Free::Latent => step,
         };
         if self.free != Free::Latent {
-            self.placement = self.placement.stepped(&step[..6]);
+            self.placement = stepped(&self.placement, step);
         }
         self.latent.iter_mut().zip(latent).for_each(|(x, d)| *x += d);
     }
@@ -147,9 +148,9 @@ impl Stage for LatentStage<'_> {
 /// Stage (b): placement and quads, held by `‖W(y − ŷ)‖²` and the lengths of bones; free where the weights are zero.
 pub(super) struct QuadStage<'a> {
     pub(super) rig: &'a Rig,
-    pub(super) placement: Placement,
+    pub(super) placement: Similarity,
     pub(super) pose: Vec<f64>,
-    /// What the quads are held to.
+    /// The pose near which the quads stay: the first.
     pub(super) target: Vec<f64>,
     /// Weights of position and rotation.
     pub(super) weights: [f64; 2],
@@ -157,18 +158,11 @@ pub(super) struct QuadStage<'a> {
 }
 
 impl<'a> QuadStage<'a> {
-    pub(super) fn new(
-        rig: &'a Rig,
-        height: f64,
-        options: &FitOptions,
-        placement: Placement,
-        start: [Vec<f64>; 2],
-    ) -> Self {
-        let [pose, target] = start;
+    pub(super) fn new(rig: &'a Rig, height: f64, options: &FitOptions, placement: Similarity, pose: Vec<f64>) -> Self {
         // The paper's own local adjustment holds quads by nothing.
         let held = f64::from(u8::from(options.method == super::Method::Robust));
         let weights = [options.quads / (0.03 * height), options.quads * 3.0].map(|w| w * held);
-        Self { rig, placement, pose, target, weights, bones: held * options.bones / (0.004 * height) }
+        Self { rig, placement, target: pose.clone(), pose, weights, bones: held * options.bones / (0.004 * height) }
     }
 }
 
@@ -200,7 +194,7 @@ impl Stage for QuadStage<'_> {
     }
 
     fn step(&mut self, step: &[f64]) {
-        self.placement = self.placement.stepped(&step[..6]);
+        self.placement = stepped(&self.placement, step);
         self.pose.iter_mut().zip(&step[6..]).for_each(|(y, d)| *y += d);
     }
 }

@@ -2,12 +2,17 @@
 
 use super::matching::Match;
 use super::stages::{Free, LatentStage, QuadStage, Stage, VertexStage};
-use super::{FitOptions, PersonFit, PersonModel, SystemKind};
+use super::{FitOptions, PersonFit, PersonModel};
+use crate::Similarity;
+use crate::people::COORDINATES;
 use crate::people::manifold::{Examples, Kind, Manifold};
-use crate::people::rig::{Placement, Quad, Rig};
+use crate::people::rig::{Quad, Rig};
+use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::vector::dot;
 use glam::{DMat3, DVec3};
+
+const SYSTEMS: [&dyn CoordinateSystem; 2] = [COORDINATES, &MeanValue];
 
 /// A rig of boxes, left along x, up along y.
 pub(crate) fn mannequin() -> Rig {
@@ -87,16 +92,16 @@ fn derivatives_of_every_stage_equal_central_differences() {
     let rig = mannequin();
     let body = body(&rig);
     let examples = Examples::new(&rig, &poses(&rig, 24)).unwrap();
-    let placement = Placement {
+    let placement = Similarity {
         rotation: DMat3::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 1.1),
         translation: DVec3::new(3.0, -2.0, 5.0),
+        ..Similarity::IDENTITY
     };
-    for system in [SystemKind::Green, SystemKind::MeanValue] {
+    for system in SYSTEMS {
         let model = PersonModel::new(&body, &rig, system, 300).unwrap();
         for kind in [Kind::Pca, Kind::Gplvm] {
             let manifold = Manifold::learn(&examples, kind, 4).unwrap();
-            let fit =
-                PersonFit { model: &model, manifold: &manifold, options: FitOptions { system, ..Default::default() } };
+            let fit = PersonFit { model: &model, manifold: &manifold, options: FitOptions::default() };
             let latent: Vec<f64> = manifold.latent(5).iter().map(|x| x + 0.07).collect();
             let pose = manifold.pose(&latent);
             for free in [Free::Both, Free::Placement, Free::Latent] {
@@ -111,7 +116,7 @@ fn derivatives_of_every_stage_equal_central_differences() {
                 };
                 compare(&fit, stage, "latent");
             }
-            let quads = || QuadStage::new(&rig, model.height(), &fit.options, placement, [pose.clone(), pose.clone()]);
+            let quads = || QuadStage::new(&rig, model.height(), &fit.options, placement, pose.clone());
             compare(&fit, quads, "quads");
             let vertices = quads().linearized().vertices;
             compare(&fit, || VertexStage::new(model.height(), &fit.options, vertices.clone()), "vertices");
@@ -129,7 +134,7 @@ fn derivatives_of_manifolds_and_their_priors_equal_central_differences() {
         let x: Vec<f64> = manifold.latent(9).iter().map(|x| x + 0.11).collect();
         let pose = manifold.pose(&x);
         assert!(pose.iter().zip(learned.pose(&x)).all(|(a, b)| (a - b).abs() < 1e-9), "from its file");
-        let (jacobian, prior, variance) = (manifold.jacobian(&x), manifold.prior(&x), manifold.variance(&x));
+        let (jacobian, prior) = (manifold.jacobian(&x), manifold.prior(&x));
         let step = 1e-5;
         for k in 0..x.len() {
             let moved = |by: f64| {
@@ -145,7 +150,6 @@ fn derivatives_of_manifolds_and_their_priors_equal_central_differences() {
             for (j, found) in jacobian[k].iter().enumerate() {
                 near(*found, manifold.pose(&up)[j], manifold.pose(&down)[j]);
             }
-            near(variance.1[k], manifold.variance(&up).0, manifold.variance(&down).0);
             let (above, below) = (manifold.prior(&up).residuals, manifold.prior(&down).residuals);
             for (r, row) in prior.jacobian.iter().enumerate() {
                 near(row[k], above[r], below[r]);
@@ -171,14 +175,13 @@ fn a_walk_is_followed_closely_where_correspondences_are_known() {
     let manifold = Manifold::learn(&examples, Kind::Pca, 4).unwrap();
     let mut means = [0.0; 2];
     let frames = [0, 12, 24, 36, 48, 60, 72];
-    for (which, system) in [SystemKind::Green, SystemKind::MeanValue].into_iter().enumerate() {
+    for (which, system) in SYSTEMS.into_iter().enumerate() {
         let model = PersonModel::new(&walk.rest, &rig, system, 1500).unwrap();
-        let options = FitOptions { system, quads: 1e-4, bones: 1e-4, vertices: 1e-5, ..Default::default() };
+        let options = FitOptions { quads: 1e-4, bones: 1e-4, vertices: 1e-5, ..Default::default() };
         let fit = PersonFit { model: &model, manifold: &manifold, options };
         for frame in frames {
             let truth: Vec<Point> = samples.iter().map(|s| s.at(&walk.frames[frame], &walk.rest.triangles)).collect();
-            let rest = rig.rest_pose();
-            let mut quads = QuadStage::new(&rig, model.height(), &options, Placement::default(), [rest.clone(), rest]);
+            let mut quads = QuadStage::new(&rig, model.height(), &options, Similarity::IDENTITY, rig.rest_pose());
             known(&fit, &mut quads, &truth, 25);
             let mut vertices = VertexStage::new(model.height(), &options, quads.linearized().vertices);
             if which == 1 {

@@ -1,4 +1,4 @@
-//! A sequence: each frame from the one before, those that are lost anew, and back again.
+//! A sequence: each frame from the one before or, where that is lost, from a search; then once more from the last frame to the first.
 
 use super::fit::{FrameFit, PersonFit};
 use super::limbs::limb_scores;
@@ -15,7 +15,7 @@ pub struct TrackedFrame {
     pub searched: bool,
 }
 
-/// A frame whose score is this many times the usual one of the frames before is searched for anew.
+/// A frame whose score is this many times the usual one of the frames before is searched for.
 const SUSPECT: f64 = 1.15;
 /// A frame is lost above this many times the usual score.
 const LOST: f64 = 1.5;
@@ -26,7 +26,7 @@ const MAX_SCORE: f64 = 0.03;
 /// Frames that the usual score is of.
 const WINDOW: usize = 31;
 
-/// On the way back, frames whose score is below this many times that of the next one are left as they are.
+/// In the second pass, frames whose score is below this many times that of the next one are left as they are.
 const AGREED: f64 = 0.9;
 
 /// Fits a sequence forwards, frame by frame as they come.
@@ -53,9 +53,9 @@ impl<'f, 'a> PersonTracker<'f, 'a> {
         let usual = usual_of(frames.iter().rev().take(WINDOW).filter(|frame| !frame.lost).map(|frame| frame.fit.score));
         let mut frame = TrackedFrame { fit: fit.fit(observation, last), lost: false, searched: last.is_none() };
         if !frame.searched && usual.is_some_and(|usual| frame.fit.score > SUSPECT * usual) {
-            let anew = fit.fit(observation, None);
-            if anew.score < frame.fit.score {
-                frame = TrackedFrame { fit: anew, lost: false, searched: true };
+            let found = fit.fit(observation, None);
+            if found.score < frame.fit.score {
+                frame = TrackedFrame { fit: found, lost: false, searched: true };
             }
         }
         frame.lost = frame.fit.score > MAX_SCORE || usual.is_some_and(|usual| frame.fit.score > LOST * usual);
@@ -63,22 +63,22 @@ impl<'f, 'a> PersonTracker<'f, 'a> {
         &frames[frames.len() - 1]
     }
 
-    /// The way back, from the last frame.
-    pub fn back(self) -> WayBack<'f, 'a> {
+    /// The second pass, from the last frame to the first.
+    pub fn back(self) -> BackwardPass<'f, 'a> {
         let usual = usual_of(self.frames.iter().map(|frame| frame.fit.score));
-        WayBack { fit: self.fit, frames: self.frames, usual }
+        BackwardPass { fit: self.fit, frames: self.frames, usual }
     }
 }
 
 /// Fits a sequence backwards after [`PersonTracker`], keeping the better fit of each frame.
-pub struct WayBack<'f, 'a> {
+pub struct BackwardPass<'f, 'a> {
     fit: &'f PersonFit<'a>,
     frames: Vec<TrackedFrame>,
-    /// The usual score on the way forwards.
+    /// The usual score of the first pass.
     usual: Option<f64>,
 }
 
-impl WayBack<'_, '_> {
+impl BackwardPass<'_, '_> {
     /// Fits a frame from the one after it, unless it lies well already; to be called from the last frame to the first.
     pub fn refit(&mut self, number: usize, observation: impl FnOnce() -> Observation) {
         let (before, from) = self.frames.split_at_mut(number + 1);
@@ -90,7 +90,7 @@ impl WayBack<'_, '_> {
         frame.take_better(again, self.usual);
     }
 
-    /// All frames. Which are lost is judged anew, by what is usual in all of them.
+    /// All frames; which of them are lost follows from the usual score of all.
     pub fn into_frames(mut self) -> Vec<TrackedFrame> {
         judge(&mut self.frames);
         self.frames
@@ -122,24 +122,6 @@ fn worst_limb(fit: &FrameFit) -> f64 {
     limb_scores(&fit.parts).into_iter().fold(0.0, f64::max)
 }
 
-/// Fits a sequence forwards and, where `back` says so, backwards from its end. `done` is told each frame of the first pass.
-pub fn track(
-    fit: &PersonFit<'_>,
-    observations: &[Observation],
-    back: bool,
-    mut done: impl FnMut(usize, &TrackedFrame),
-) -> Vec<TrackedFrame> {
-    let mut tracker = PersonTracker::new(fit);
-    for (number, observation) in observations.iter().enumerate() {
-        done(number, tracker.follow(observation));
-    }
-    let mut way_back = tracker.back();
-    for number in (0..if back { observations.len() } else { 0 }).rev() {
-        way_back.refit(number, || observations[number].clone());
-    }
-    way_back.into_frames()
-}
-
 /// The lower quartile: frames that are off raise it least.
 fn usual_of(scores: impl Iterator<Item = f64>) -> Option<f64> {
     let mut scores: Vec<f64> = scores.collect();
@@ -150,20 +132,14 @@ fn usual_of(scores: impl Iterator<Item = f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::people::rig::{Placement, QUADS};
+    use crate::Similarity;
+    use crate::people::rig::QUADS;
 
     fn frame(score: f64, arm: f64) -> TrackedFrame {
         let mut parts = [0.007; QUADS];
         parts[5..9].fill(arm);
-        let fit = FrameFit {
-            placement: Placement::default(),
-            latent: Vec::new(),
-            pose: Vec::new(),
-            vertices: Vec::new(),
-            score,
-            parts,
-            stages: [Vec::new(), Vec::new()],
-        };
+        let (latent, pose, vertices) = (Vec::new(), Vec::new(), Vec::new());
+        let fit = FrameFit { placement: Similarity::IDENTITY, latent, pose, vertices, score, parts };
         TrackedFrame { fit, lost: false, searched: false }
     }
 

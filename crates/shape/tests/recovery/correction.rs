@@ -1,13 +1,14 @@
 //! Joints of a rig corrected after a first pass, against vertex-exact truth; figures in percent of the height.
 
 use crate::common::{Capture, capture, there};
-use crate::observe::{errors, poses, seen};
+use crate::observe::{self, errors, poses, seen};
 use crate::true_joints::{LIMBS, TrueJoints};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{add, distance, sub};
 use cager_shape::people::manifold::{Examples, Kind, Manifold};
 use cager_shape::people::rig::{Corrected, PlacementOptions, Rig, correct, enclose, place};
-use cager_shape::people::{FitOptions, Observation, PersonFit, PersonModel, track};
+use cager_shape::people::{COORDINATES, FitOptions, PersonFit, PersonModel};
+use cager_shape::registration::Observation;
 
 /// Quads at the joints [`LIMBS`], left and right in turn.
 const QUADS: [usize; 12] = [9, 10, 11, 17, 18, 19, 5, 6, 7, 13, 14, 15];
@@ -18,8 +19,8 @@ fn followed(what: &str, rig: &Rig, truth: &Capture, frames: &[usize], seen: &[Ob
     let examples = Examples::new(rig, &poses(rig, "131_01", 0..994, 8)).unwrap();
     let manifold = Manifold::learn(&examples, Kind::Pca, 20).unwrap();
     let options = FitOptions::default();
-    let model = PersonModel::new(&truth.rest, rig, options.system, options.samples).unwrap();
-    let tracked = track(&PersonFit { model: &model, manifold: &manifold, options }, seen, false, |_, _| {});
+    let model = PersonModel::new(&truth.rest, rig, COORDINATES, options.samples).unwrap();
+    let tracked = observe::followed(&PersonFit { model: &model, manifold: &manifold, options }, seen);
     let found: Vec<Vec<Point>> = tracked.iter().map(|frame| model.deformed(&frame.fit.vertices)).collect();
     let all = || found.iter().zip(frames).map(|(found, &f)| errors(found, &truth.frames[f], truth.height)[0]);
     let mean = all().sum::<f64>() / frames.len() as f64;

@@ -5,9 +5,10 @@
 use cager_formats::biovision::read_bvh;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{combination, cross, distance, norm, sub};
-use cager_shape::people::Observation;
 use cager_shape::people::poses::{Naming, SkeletonPoses};
 use cager_shape::people::rig::Rig;
+use cager_shape::people::{PersonFit, PersonTracker, TrackedFrame};
+use cager_shape::registration::Observation;
 use std::ops::Range;
 
 use crate::common::{Capture, data};
@@ -52,6 +53,15 @@ pub fn poses(rig: &Rig, clip: &str, frames: Range<usize>, step: usize) -> Vec<Ve
     let clip = read_bvh(data().join("bvh").join(clip).with_extension("bvh")).unwrap();
     let poses = SkeletonPoses::new(&clip.skeleton, &Naming::of(&clip.skeleton).unwrap(), rig).unwrap();
     frames.step_by(step).map(|f| poses.pose(&clip.skeleton.pose(clip.motion.frame(f)))).collect()
+}
+
+/// A person followed through observations, forwards alone.
+pub fn followed(fit: &PersonFit<'_>, observations: &[Observation]) -> Vec<TrackedFrame> {
+    let mut tracker = PersonTracker::new(fit);
+    for observation in observations {
+        tracker.follow(observation);
+    }
+    tracker.back().into_frames()
 }
 
 /// Mean distance of vertices, and the largest, in percent of the height.

@@ -13,19 +13,8 @@ use cager_geometry::linalg::{cholesky, product, solve_cholesky, zeros};
 use faer::Mat;
 use serde::{Deserialize, Serialize};
 
-/// How a model is learned.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GplvmOptions {
-    /// Steps of L-BFGS at the most.
-    pub steps: usize,
-}
-
-impl Default for GplvmOptions {
-    fn default() -> Self {
-        Self { steps: 250 }
-    }
-}
-
+/// Steps of L-BFGS at the most.
+const STEPS: usize = 250;
 /// What is added to the variance of the noise, so that the covariance stays definite.
 const JITTER: f64 = 1e-6;
 
@@ -103,14 +92,14 @@ impl Gplvm {
     ///
     /// # Errors
     /// Where there are not more poses than these.
-    pub fn learn(examples: &Examples, dims: usize, options: &GplvmOptions) -> Result<Self, ManifoldError> {
+    pub fn learn(examples: &Examples, dims: usize) -> Result<Self, ManifoldError> {
         let start = Pca::learn(examples, dims)?.latent;
         let n = examples.len();
         let scale = (examples.centered.squared_norm_l2() / (n * QUAD_UNKNOWNS) as f64).sqrt();
         let y = Mat::from_fn(n, QUAD_UNKNOWNS, |i, j| examples.centered[(i, j)] / scale);
         let problem = Problem::new(&y, dims);
         let mut unknowns = problem.start(&start).ok_or(ManifoldError::NotFinite)?;
-        minimize(&mut unknowns, options.steps, |v, gradient| problem.cost(v, gradient));
+        minimize(&mut unknowns, STEPS, |v, gradient| problem.cost(v, gradient));
         let theta: Vec<f64> = unknowns[n * dims..].iter().map(|t| t.exp()).collect();
         let x = problem.latent(&unknowns);
         Self::try_from(Stored {
@@ -148,7 +137,7 @@ impl Gplvm {
         derivatives.iter().map(|dk| (0..QUAD_UNKNOWNS).map(|j| self.output(dk, j)).collect()).collect()
     }
 
-    /// Variance of a normalised number of the pose, and its derivatives.
+    /// Variance of a normalised number of the pose, and its derivatives by the latent numbers (Eq. 9 and 10).
     pub fn variance(&self, x: &[f64]) -> (f64, Vec<f64>) {
         let k = self.kernel(x);
         let n = k.len();

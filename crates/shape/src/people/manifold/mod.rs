@@ -11,6 +11,6 @@ mod pca;
 
 pub use error::ManifoldError;
 pub use examples::{Examples, PoseWeights};
-pub use gplvm::{Gplvm, GplvmOptions};
+pub use gplvm::Gplvm;
 pub use model::{Kind, Manifold, Prior};
 pub use pca::Pca;

@@ -1,7 +1,7 @@
 //! A learned manifold of either kind: poses, derivatives, prior and files.
 
 use super::error::ManifoldError;
-use super::{Examples, Gplvm, GplvmOptions, Pca};
+use super::{Examples, Gplvm, Pca};
 use serde::{Deserialize, Serialize};
 
 /// How poses are learned.
@@ -42,7 +42,7 @@ impl Manifold {
     pub fn learn(examples: &Examples, kind: Kind, dims: usize) -> Result<Self, ManifoldError> {
         Ok(match kind {
             Kind::Pca => Self::Pca(Pca::learn(examples, dims)?),
-            Kind::Gplvm => Self::Gplvm(Gplvm::learn(examples, dims, &GplvmOptions::default())?),
+            Kind::Gplvm => Self::Gplvm(Gplvm::learn(examples, dims)?),
         })
     }
 
@@ -113,14 +113,6 @@ impl Manifold {
         match self {
             Self::Pca(pca) => pca.basis.clone(),
             Self::Gplvm(gplvm) => gplvm.jacobian(x),
-        }
-    }
-
-    /// Variance of a weighted number of the pose, and its derivatives by the latent numbers (Eq. 9 and 10); constant for principal components.
-    pub fn variance(&self, x: &[f64]) -> (f64, Vec<f64>) {
-        match self {
-            Self::Pca(pca) => (pca.variance, vec![0.0; x.len()]),
-            Self::Gplvm(gplvm) => gplvm.variance(x),
         }
     }
 

@@ -6,7 +6,7 @@
 use super::error::PoseError;
 use super::names::Naming;
 use crate::people::rig::{QUADS, Rig};
-use crate::people::rotation::{between, halfway, log};
+use crate::rotation::{between, halfway, log};
 use cager_formats::biovision::{JointPose, Skeleton};
 use glam::{DMat3, DVec3};
 

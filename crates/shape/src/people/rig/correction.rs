@@ -4,7 +4,7 @@ use super::Rig;
 use super::enclosure::{enclose, extent};
 use super::placement::PlacedRig;
 use super::topology::{BONES, CHEST, HEAD, LEFT_ARM, LEFT_LEG, NECK, PELVIS, QUADS, TO_RIGHT, WAIST};
-use cager_geometry::linalg::nearest_rotation;
+use crate::Similarity;
 use cager_geometry::mesh::{Point, TriMesh};
 use glam::{DMat3, DVec3};
 
@@ -37,13 +37,6 @@ struct Meeting {
     bones: [[usize; 2]; 2],
     /// The limb bends right at the quad, so that its corners go along.
     moves_corners: bool,
-}
-
-/// A rigid motion from the rest pose.
-#[derive(Clone, Copy)]
-struct Motion {
-    turn: DMat3,
-    shift: DVec3,
 }
 
 /// Corrects the joints of a rig by frames of its template, one point for each of it, and puts their quads there; joints that do not turn stay. `margin` is that of
@@ -123,16 +116,20 @@ fn points_of(bone: [usize; 2], joints: &[DVec3], template: &TriMesh) -> Vec<usiz
 }
 
 /// The rigid motion of a bone in each frame, by those of its points that move rigidly; none of too few.
-fn motions(points: &[usize], template: &TriMesh, frames: &[&Vec<Point>]) -> Option<Vec<Motion>> {
+fn motions(points: &[usize], template: &TriMesh, frames: &[&Vec<Point>]) -> Option<Vec<Similarity>> {
     if points.len() < MIN_POINTS || frames.is_empty() {
         return None;
     }
-    let fit =
-        |kept: &[usize]| -> Vec<Motion> { frames.iter().map(|frame| rigid(kept, &template.vertices, frame)).collect() };
+    let fit = |kept: &[usize]| -> Vec<Similarity> {
+        let pairs = |frame: &[Point]| -> Vec<_> {
+            kept.iter().map(|&v| (template.vertices[v].into(), frame[v].into(), 1.0)).collect()
+        };
+        frames.iter().map(|frame| Similarity::between(&pairs(frame), false)).collect()
+    };
     let found = fit(points);
     let off = |v: usize| -> f64 {
         let p = DVec3::from(template.vertices[v]);
-        let moved = found.iter().zip(frames).map(|(m, frame)| (m.turn * p + m.shift).distance_squared(frame[v].into()));
+        let moved = found.iter().zip(frames).map(|(m, frame)| m.apply(p).distance_squared(frame[v].into()));
         moved.sum()
     };
     let mut errors: Vec<(f64, usize)> = points.iter().map(|&v| (off(v), v)).collect();
@@ -142,27 +139,15 @@ fn motions(points: &[usize], template: &TriMesh, frames: &[&Vec<Point>]) -> Opti
     Some(fit(&kept))
 }
 
-/// The rigid motion that takes points nearest to where they are in a frame (Arun et al. 1987).
-fn rigid(points: &[usize], rest: &[Point], frame: &[Point]) -> Motion {
-    let mean = |all: &[Point]| points.iter().map(|&v| DVec3::from(all[v])).sum::<DVec3>() / points.len() as f64;
-    let (from, to) = (mean(rest), mean(frame));
-    let moment = points.iter().fold(DMat3::ZERO, |sum, &v| {
-        let (a, b) = (DVec3::from(rest[v]) - from, DVec3::from(frame[v]) - to);
-        sum + DMat3::from_cols(b * a.x, b * a.y, b * a.z)
-    });
-    let turn = nearest_rotation(moment);
-    Motion { turn, shift: to - turn * from }
-}
-
 /// The point of the rest pose that both motions take to about the same place in all frames; where they hardly turn against each other, or about one axis only, near
 /// its first place.
-fn center(above: &[Motion], below: &[Motion], first: DVec3) -> DVec3 {
+fn center(above: &[Similarity], below: &[Similarity], first: DVec3) -> DVec3 {
     let mut a = DMat3::from_diagonal(DVec3::splat(above.len() as f64 * TRUSTED_TURN * TRUSTED_TURN));
     let mut b = DVec3::ZERO;
     for (above, below) in above.iter().zip(below) {
-        let turn = above.turn - below.turn;
+        let turn = above.rotation - below.rotation;
         a += turn.transpose() * turn;
-        b += turn.transpose() * (below.shift - above.shift - turn * first);
+        b += turn.transpose() * (below.translation - above.translation - turn * first);
     }
     first + a.inverse() * b
 }
@@ -170,8 +155,8 @@ fn center(above: &[Motion], below: &[Motion], first: DVec3) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::people::rotation::exp;
     use crate::people::tests::mannequin;
+    use crate::rotation::exp;
 
     /// Forty points around each bone, and the bones.
     fn sticks(joints: &[DVec3]) -> (TriMesh, Vec<[usize; 2]>) {
@@ -193,15 +178,14 @@ mod tests {
         let joints: Vec<DVec3> = rig.quads.iter().map(|quad| quad.joint.into()).collect();
         let (template, bones) = sticks(&joints);
         let about = |quad: usize, turn: DVec3| {
-            let turn = exp(turn);
-            Motion { turn, shift: joints[quad] - turn * joints[quad] }
+            let rotation = exp(turn);
+            Similarity { rotation, scale: 1.0, translation: joints[quad] - rotation * joints[quad] }
         };
-        let then = |a: Motion, b: Motion| Motion { turn: a.turn * b.turn, shift: a.turn * b.shift + a.shift };
         let frame = |f: i32| -> Vec<Point> {
             let t = 0.4 * f64::from(f);
             let upper_arm = about(5, 0.5 * DVec3::new(t.sin(), t.cos(), (2.0 * t).sin()));
             // An elbow turns about one axis.
-            let forearm = then(upper_arm, about(6, DVec3::Z * (0.8 + 0.7 * t.sin())));
+            let forearm = upper_arm.after(&about(6, DVec3::Z * (0.8 + 0.7 * t.sin())));
             let leg = about(9, 0.4 * DVec3::new(t.cos(), 0.2 * t.sin(), t.sin()));
             let moved = |(p, bone): (&Point, &[usize; 2])| {
                 let motion = match bone {
@@ -210,7 +194,7 @@ mod tests {
                     [9..12, _] => leg,
                     _ => return *p,
                 };
-                (motion.turn * DVec3::from(*p) + motion.shift).to_array()
+                motion.apply((*p).into()).to_array()
             };
             template.vertices.iter().zip(&bones).map(moved).collect()
         };

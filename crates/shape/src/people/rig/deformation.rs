@@ -5,41 +5,20 @@
 
 use super::Rig;
 use super::topology::{CAGE_VERTICES, QUADS, owner};
-use crate::people::rotation::{exp, right_jacobian, skew};
+use crate::Similarity;
+use crate::rotation::{exp, right_jacobian, skew};
 use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};
 
 /// Numbers of a pose.
 pub const QUAD_UNKNOWNS: usize = 6 * QUADS;
 
-/// Where the pelvis frame is: `x ↦ rotation · x + translation`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
-    /// Its rotation.
-    pub rotation: DMat3,
-    /// Its translation.
-    pub translation: DVec3,
-}
-
-impl Default for Placement {
-    fn default() -> Self {
-        Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO }
-    }
-}
-
-impl Placement {
-    /// A point of the pelvis frame.
-    pub fn at(&self, p: DVec3) -> DVec3 {
-        self.rotation * p + self.translation
-    }
-
-    /// The placement after a small turn, by its rotation vector, about the origin of the pelvis frame and a small translation: the step of
-    /// [`Deformed::pull`]'s first six derivatives.
-    #[must_use]
-    pub fn stepped(&self, step: &[f64]) -> Self {
-        let turn = exp(DVec3::from_slice(&step[..3]));
-        Self { rotation: turn * self.rotation, translation: self.translation + DVec3::from_slice(&step[3..6]) }
-    }
+/// A placement of the pelvis after a small turn, by its rotation vector, about the origin of the pelvis frame and a small translation: the step of
+/// [`Deformed::pull`]'s first six derivatives.
+#[must_use]
+pub(crate) fn stepped(placement: &Similarity, step: &[f64]) -> Similarity {
+    let rotation = exp(DVec3::from_slice(&step[..3])) * placement.rotation;
+    Similarity { rotation, translation: placement.translation + DVec3::from_slice(&step[3..6]), ..*placement }
 }
 
 /// The cage of a posed rig, with what its derivatives need.
@@ -54,11 +33,11 @@ pub struct Deformed {
     by_rotation: Vec<DMat3>,
 }
 
-/// The cage of a rig in this pose and place.
+/// The cage of a rig in this pose, where the pelvis frame is placed without a factor.
 ///
 /// # Panics
 /// Where the pose does not have [`QUAD_UNKNOWNS`] numbers.
-pub fn deform(rig: &Rig, pose: &[f64], placement: &Placement) -> Deformed {
+pub fn deform(rig: &Rig, pose: &[f64], placement: &Similarity) -> Deformed {
     assert_eq!(pose.len(), QUAD_UNKNOWNS, "six numbers for each quad");
     let g = placement.rotation;
     let quads: Vec<(DVec3, DMat3, DMat3)> = pose

@@ -11,7 +11,8 @@ mod sections;
 mod topology;
 
 pub use correction::{Corrected, correct};
-pub use deformation::{Deformed, Placement, QUAD_UNKNOWNS, deform};
+pub(crate) use deformation::stepped;
+pub use deformation::{Deformed, QUAD_UNKNOWNS, deform};
 pub use enclosure::{Enclosure, enclose};
 pub use error::RigError;
 pub use placement::{PlacedRig, PlacementOptions, place};

@@ -1,11 +1,11 @@
-//! A person that no frame before tells of: many starts, of which ever fewer are followed ever further.
+//! A person without a frame before: many starts, of which ever fewer are refined ever further.
 
 use super::fit::{FrameFit, PersonFit, Rounds};
 use super::observed::Observed;
 use super::options::Method;
 use super::search::search;
 use super::stages::{LatentStage, QuadStage, Stage};
-use crate::people::rig::Placement;
+use crate::Similarity;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -23,8 +23,8 @@ struct Start<'a> {
 }
 
 impl<'a> PersonFit<'a> {
-    /// The fit of an observation from everything that the manifold knows.
-    pub(super) fn anew(&self, observed: &Observed<'_>) -> FrameFit {
+    /// The fit of an observation, beginning at examples of the manifold.
+    pub(super) fn fit_from_search(&self, observed: &Observed<'_>) -> FrameFit {
         let starts = search(self.model, self.manifold, KEPT[0], observed);
         if self.options.method == Method::Paper {
             let (placement, latent) = starts.into_iter().next().unwrap_or_else(|| self.middle());
@@ -57,8 +57,8 @@ impl<'a> PersonFit<'a> {
         })
     }
 
-    fn middle(&self) -> (Placement, Vec<f64>) {
-        (Placement::default(), vec![0.0; self.manifold.dims()])
+    fn middle(&self) -> (Similarity, Vec<f64>) {
+        (Similarity::IDENTITY, vec![0.0; self.manifold.dims()])
     }
 
     /// The best starts, of which only some face the same way, since the best of all may face the wrong way.
@@ -80,9 +80,7 @@ impl<'a> PersonFit<'a> {
         let (rig, height) = (self.model.rig(), self.model.height());
         for count in [12, 6] {
             self.run(&mut start.stage, observed, Rounds { count, thin: 3, reach: [10.0, 5.0] });
-            let target = start.stage.pose();
-            let held = [target.clone(), target];
-            let mut quads = QuadStage::new(rig, height, &self.options, start.stage.placement, held);
+            let mut quads = QuadStage::new(rig, height, &self.options, start.stage.placement, start.stage.pose());
             self.run(&mut quads, observed, Rounds { count: 6, thin: 3, reach: [8.0, 4.0] });
             start.stage.offset = vec![0.0; start.stage.offset.len()];
             start.stage.offset = self.offset(&start.stage, &quads.pose);

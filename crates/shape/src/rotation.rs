@@ -11,7 +11,11 @@ pub(crate) fn exp(w: DVec3) -> DMat3 {
 
 /// The vector of a rotation, no longer than π.
 pub(crate) fn log(rotation: DMat3) -> DVec3 {
-    let q = DQuat::from_mat3(&rotation);
+    rotation_vector(DQuat::from_mat3(&rotation))
+}
+
+/// [`log`] of a unit quaternion.
+pub(crate) fn rotation_vector(q: DQuat) -> DVec3 {
     let q = if q.w < 0.0 { -q } else { q };
     let axis = q.xyz();
     let sine = axis.length();
