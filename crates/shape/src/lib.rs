@@ -3,6 +3,7 @@
 
 mod canonical;
 pub mod deformation;
+mod edge_distances;
 mod error;
 pub mod interpolate;
 pub mod people;

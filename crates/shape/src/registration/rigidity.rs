@@ -2,7 +2,6 @@
 //! nodes of the model and of the cage's vertices.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 use cager_geometry::linalg::{gram, nearest_rotation};
 use cager_geometry::mesh::Polygons;
@@ -10,6 +9,8 @@ use cager_geometry::topology::{Adjacency, UnionFind};
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3, Vec3A};
 use rayon::prelude::*;
+
+use crate::edge_distances::{NO_SOURCE, nearest_sources};
 
 use super::dense_rows::DenseRows;
 use super::sparse_rows::{SparseRows, matrix, points};
@@ -159,44 +160,15 @@ fn hessian(coordinates: MatRef<'_, f64>, by_node: &[Vec<Edge>]) -> Mat<f64> {
 /// the mesh that hold nodes and touch no other are tied to the nearest node of the rest, by up to three edges each. Edges by the numbers of the nodes in `nodes`.
 pub(crate) fn node_edges(vertices: &[DVec3], triangles: &[[u32; 3]], nodes: &[u32]) -> Vec<[u32; 2]> {
     let adjacency = Adjacency::new(&Polygons::of_triangles(triangles), vertices.len());
-    let cells = cells(vertices, &adjacency, nodes);
+    let (cells, _) = nearest_sources(vertices, &adjacency, nodes);
     let mut edges = Vec::new();
     for a in 0..vertices.len() {
         let touching = adjacency.of(a).iter().map(|&b| [cells[a], cells[b as usize]]);
-        edges.extend(touching.filter(|[a, b]| a < b && *b != NONE));
+        edges.extend(touching.filter(|[a, b]| a < b && *b != NO_SOURCE));
     }
     edges.sort_unstable();
     edges.dedup();
     tie_parts(&nodes.iter().map(|&n| vertices[n as usize]).collect::<Vec<_>>(), edges)
-}
-
-/// No cell: the vertex cannot be reached.
-const NONE: u32 = u32::MAX;
-
-/// The nearest node of each vertex along edges, by Dijkstra's algorithm from all nodes at once.
-fn cells(vertices: &[DVec3], adjacency: &Adjacency, nodes: &[u32]) -> Vec<u32> {
-    let mut cell = vec![NONE; vertices.len()];
-    let mut distance = vec![f64::INFINITY; vertices.len()];
-    // Bits of positive numbers are in the order of the numbers.
-    let mut next: BinaryHeap<Reverse<(u64, u32)>> = BinaryHeap::new();
-    for (k, &node) in nodes.iter().enumerate() {
-        (cell[node as usize], distance[node as usize]) = (k as u32, 0.0);
-        next.push(Reverse((0, node)));
-    }
-    while let Some(Reverse((bits, a))) = next.pop() {
-        let way = f64::from_bits(bits);
-        if way > distance[a as usize] {
-            continue;
-        }
-        for &b in adjacency.of(a as usize) {
-            let longer = way + vertices[a as usize].distance(vertices[b as usize]);
-            if longer < distance[b as usize] {
-                (distance[b as usize], cell[b as usize]) = (longer, cell[a as usize]);
-                next.push(Reverse((longer.to_bits(), b)));
-            }
-        }
-    }
-    cell
 }
 
 /// Adds edges until all nodes are connected: to the largest part comes the one that is nearest to it, again and again (Prim's algorithm).

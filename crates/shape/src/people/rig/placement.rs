@@ -44,7 +44,8 @@ pub fn place(template: &TriMesh, options: &PlacementOptions) -> Result<PlacedRig
         return Err(RigError::NoSurface { points, faces });
     }
     let to_world = axes(template, options)?;
-    let own: Vec<DVec3> = template.vertices.iter().map(|&p| to_world.transpose() * DVec3::from(p)).collect();
+    let own: Vec<Point> =
+        template.vertices.iter().map(|&p| (to_world.transpose() * DVec3::from(p)).to_array()).collect();
     let body = Body::new(&own, &template.triangles);
     let rig = first_rig(&Landmarks::find(&body)?);
     let rig = taken_by(&rig, to_world);

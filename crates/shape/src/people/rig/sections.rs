@@ -1,9 +1,12 @@
 //! Cross-sections of a surface, and distances along it.
 
-use cager_geometry::topology::UnionFind;
+use crate::deformation::rows::Rows;
+use crate::edge_distances::nearest_sources;
+use crate::registration::welded;
+use cager_geometry::mesh::{Point, Polygons};
+use cager_geometry::topology::{Adjacency, UnionFind};
 use glam::DVec3;
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::HashMap;
 
 /// A surface of a person, left along x, up along y, forward along z; vertices in one place are one.
 pub(super) struct Body {
@@ -44,19 +47,10 @@ impl Extent {
 
 impl Body {
     /// Joins vertices that share their position exactly.
-    pub(super) fn new(points: &[DVec3], triangles: &[[u32; 3]]) -> Self {
-        let mut names: HashMap<[u64; 3], u32> = HashMap::new();
-        let mut kept: Vec<DVec3> = Vec::new();
-        let of: Vec<u32> = points
-            .iter()
-            .map(|p| {
-                *names.entry(p.to_array().map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
-                    kept.push(*p);
-                    kept.len() as u32 - 1
-                })
-            })
-            .collect();
-        Self { points: kept, triangles: triangles.iter().map(|t| t.map(|v| of[v as usize])).collect() }
+    pub(super) fn new(points: &[Point], triangles: &[[u32; 3]]) -> Self {
+        let rows = Rows::new(&welded(points));
+        let points = rows.gathered(&points.iter().map(|&p| p.into()).collect::<Vec<_>>());
+        Self { points, triangles: triangles.iter().map(|&t| rows.of(t)).collect() }
     }
 
     /// The connected parts of the section by the plane through `through`, each as the points where the plane crosses edges.
@@ -100,31 +94,9 @@ impl Body {
         loops
     }
 
-    /// Distances along edges from one vertex; infinite in other parts (Dijkstra 1959).
+    /// Distances along edges from one vertex; infinite in other parts.
     pub(super) fn distances(&self, from: usize) -> Vec<f64> {
-        let mut around: Vec<Vec<u32>> = vec![Vec::new(); self.points.len()];
-        for t in &self.triangles {
-            for k in 0..3 {
-                around[t[k] as usize].extend([t[(k + 1) % 3], t[(k + 2) % 3]]);
-            }
-        }
-        let mut distance = vec![f64::INFINITY; self.points.len()];
-        distance[from] = 0.0;
-        // Non-negative numbers are in the order of their bits.
-        let mut queue = BinaryHeap::from([Reverse((0_u64, from as u32))]);
-        while let Some(Reverse((bits, v))) = queue.pop() {
-            let d = f64::from_bits(bits);
-            if d > distance[v as usize] {
-                continue;
-            }
-            for &w in &around[v as usize] {
-                let next = d + self.points[v as usize].distance(self.points[w as usize]);
-                if next < distance[w as usize] {
-                    distance[w as usize] = next;
-                    queue.push(Reverse((next.to_bits(), w)));
-                }
-            }
-        }
-        distance
+        let adjacency = Adjacency::new(&Polygons::of_triangles(&self.triangles), self.points.len());
+        nearest_sources(&self.points, &adjacency, &[from as u32]).1
     }
 }

@@ -1,6 +1,5 @@
 //! How the quads of a rig are joined to a cage: tubes between neighbouring quads, caps at the ends, and what joins limbs to the trunk.
 
-use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// Quads of a rig.
@@ -79,19 +78,15 @@ pub fn owner(vertex: usize) -> usize {
 /// Triangles of the cage, closed and facing outwards.
 pub fn triangles() -> &'static [[u32; 3]; CAGE_FACES] {
     static TRIANGLES: OnceLock<[[u32; 3]; CAGE_FACES]> = OnceLock::new();
-    TRIANGLES.get_or_init(|| {
-        let mut faces = unoriented();
-        orient(&mut faces);
-        faces.try_into().unwrap_or_else(|faces: Vec<_>| unreachable!("{} faces", faces.len()))
-    })
+    TRIANGLES.get_or_init(|| faces().try_into().unwrap_or_else(|faces: Vec<_>| unreachable!("{} faces", faces.len())))
 }
 
 fn ring(quad: usize) -> [u32; 4] {
     [0, 1, 2, 3].map(|k| (4 * quad + k) as u32)
 }
 
-/// All triangles, the first of them facing outwards.
-fn unoriented() -> Vec<[u32; 3]> {
+/// All triangles, facing outwards.
+fn faces() -> Vec<[u32; 3]> {
     let [front, back] = [4 * QUADS as u32, 4 * QUADS as u32 + 1];
     let [head, neck, chest, pelvis] = [HEAD, NECK, CHEST, PELVIS].map(ring);
     // Corners run from front left to front right, so that this order faces up.
@@ -100,13 +95,18 @@ fn unoriented() -> Vec<[u32; 3]> {
     tube(&mut faces, ring(WAIST), chest, &[]);
     tube(&mut faces, chest, neck, &[1, 3]);
     tube(&mut faces, neck, head, &[]);
-    faces.extend([[pelvis[1], pelvis[0], front], [pelvis[3], pelvis[2], back]]);
+    faces.extend([[pelvis[1], front, pelvis[0]], [pelvis[3], back, pelvis[2]]]);
     for (side, first) in [(0, 0), (1, TO_RIGHT)] {
+        let begun = faces.len();
         let [near_front, near_back] = if side == 0 { [0, 3] } else { [1, 2] };
         let shoulder = [chest[near_front], chest[near_back], neck[near_back], neck[near_front]];
         limb(&mut faces, shoulder, LEFT_ARM + first);
         let groin = [pelvis[near_front], front, back, pelvis[near_back]];
         limb(&mut faces, groin, LEFT_LEG + first);
+        if side == 0 {
+            // Rings run the other way about the limbs of this side.
+            faces[begun..].iter_mut().for_each(|face| face.swap(1, 2));
+        }
     }
     faces
 }
@@ -118,41 +118,14 @@ fn limb(faces: &mut Vec<[u32; 3]>, start: [u32; 4], first: usize) {
         tube(faces, from, ring(quad), &[]);
         from = ring(quad);
     }
-    faces.extend([[from[0], from[1], from[2]], [from[0], from[2], from[3]]]);
+    faces.extend([[from[0], from[2], from[1]], [from[0], from[3], from[2]]]);
 }
 
 /// The sides between two rings, but for some.
 fn tube(faces: &mut Vec<[u32; 3]>, a: [u32; 4], b: [u32; 4], without: &[usize]) {
     for i in (0..4).filter(|i| !without.contains(i)) {
         let j = (i + 1) % 4;
-        faces.extend([[a[i], a[j], b[j]], [a[i], b[j], b[i]]]);
-    }
-}
-
-/// Turns faces to run with the first one.
-fn orient(faces: &mut [[u32; 3]]) {
-    let sides = |face: [u32; 3]| [[face[0], face[1]], [face[1], face[2]], [face[2], face[0]]];
-    let mut at: HashMap<[u32; 2], Vec<usize>> = HashMap::new();
-    for (f, &face) in faces.iter().enumerate() {
-        for [a, b] in sides(face) {
-            at.entry([a.min(b), a.max(b)]).or_default().push(f);
-        }
-    }
-    let mut seen = vec![false; faces.len()];
-    seen[0] = true;
-    let mut next = vec![0];
-    while let Some(f) = next.pop() {
-        for [a, b] in sides(faces[f]) {
-            for &g in &at[&[a.min(b), a.max(b)]] {
-                if !seen[g] {
-                    if sides(faces[g]).contains(&[a, b]) {
-                        faces[g].swap(1, 2);
-                    }
-                    seen[g] = true;
-                    next.push(g);
-                }
-            }
-        }
+        faces.extend([[a[i], b[j], a[j]], [a[i], b[i], b[j]]]);
     }
 }
 
