@@ -1,25 +1,18 @@
 //! A frame that turns with a shape, so that what is computed in it does not depend on how the shape was turned.
 
-use cager_geometry::linalg::symmetric_eigen;
 use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};
 
+use crate::points::Moments;
 use crate::similarity::Similarity;
 
 /// Moves the centre of some points to the origin and turns their principal axes onto the axes, each in the direction in which the points reach farther
 /// (their third moment is positive).
 pub(crate) fn canonical_frame(points: &[Point]) -> Similarity {
-    let points: Vec<DVec3> = points.iter().map(|&p| p.into()).collect();
-    let center = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-    let mut covariance = [[0.0; 3]; 3];
-    for point in &points {
-        let d = (*point - center).to_array();
-        (0..3).for_each(|i| (0..3).for_each(|j| covariance[i][j] += d[i] * d[j]));
-    }
-    let (_, axes) = symmetric_eigen(covariance);
+    let Moments { center, axes, .. } = Moments::new(points);
     let [first, second] = [0, 1].map(|k| {
-        let axis = DVec3::from(axes[k]);
-        let skew: f64 = points.iter().map(|p| (*p - center).dot(axis).powi(3)).sum();
+        let axis = axes[k];
+        let skew: f64 = points.iter().map(|&p| (DVec3::from(p) - center).dot(axis).powi(3)).sum();
         if skew < 0.0 { -axis } else { axis }
     });
     let rotation = DMat3::from_cols(first, second, first.cross(second)).transpose();
@@ -28,10 +21,7 @@ pub(crate) fn canonical_frame(points: &[Point]) -> Similarity {
 
 /// A length that says how large points are, however they are turned: the diagonal of a solid box with their second moments, `√(12 tr Σ)`.
 pub(crate) fn size(points: &[Point]) -> f64 {
-    let count = points.len().max(1) as f64;
-    let center = points.iter().map(|&p| DVec3::from(p)).sum::<DVec3>() / count;
-    let spread = points.iter().map(|&p| DVec3::from(p).distance_squared(center)).sum::<f64>() / count;
-    (12.0 * spread).sqrt()
+    (12.0 * Moments::new(points).variances.iter().sum::<f64>()).max(0.0).sqrt()
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod edge_distances;
 mod error;
 pub mod interpolate;
 pub mod people;
+mod points;
 pub mod quality;
 pub mod registration;
 mod rotation;

@@ -1,5 +1,6 @@
 //! Rotations, factors and translations in one.
 
+use crate::points::outer;
 use cager_geometry::linalg::nearest_rotation;
 use cager_geometry::vector::Point;
 use glam::{DMat3, DVec3};
@@ -63,7 +64,7 @@ impl Similarity {
         let (mut covariance, mut size) = (DMat3::ZERO, 0.0);
         for &(p, q, weight) in pairs {
             let (p, q) = (p - from, weight * (q - to));
-            covariance += DMat3::from_cols(q * p.x, q * p.y, q * p.z);
+            covariance += outer(q, p);
             size += weight * p.length_squared();
         }
         let rotation = nearest_rotation(covariance);

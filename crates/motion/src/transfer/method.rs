@@ -86,7 +86,7 @@ impl Mover {
             ..TransferReport::default()
         };
         let mut warnings = Vec::new();
-        if self.aligned.doubtful() {
+        if self.aligned.is_ambiguous() {
             warnings.push(format!(
                 "another way to lay the source onto the target fits almost as well ({:.2} times the distance); look at the result, and give {} where it is wrong",
                 self.aligned.runner_up,

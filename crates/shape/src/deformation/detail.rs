@@ -11,9 +11,9 @@ use rayon::prelude::*;
 
 use crate::deformation::gradients::flatness;
 use crate::deformation::graph::edge_growth;
-use crate::deformation::poisson::vectors;
 use crate::deformation::rows::Rows;
 use crate::error::MeshError;
+use crate::points::vectors;
 
 /// Brings the detail of a rest pose to poses of it: `min ‖L x − R δ‖² + ω² ‖x − x₁‖²`, `δ = L x₀`.
 pub struct Detail {

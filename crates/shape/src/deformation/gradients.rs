@@ -1,5 +1,6 @@
 //! Deformation gradients of the triangles of a mesh (Sumner and Popović 2004).
 
+use crate::points::area_vector;
 use crate::registration::welded;
 use cager_geometry::linalg::nearest_rotation;
 use cager_geometry::mesh::TriMesh;
@@ -80,11 +81,6 @@ impl Gradients {
 fn frame([a, b, c]: [DVec3; 3]) -> DMat3 {
     let normal = area_vector([a, b, c]);
     DMat3::from_cols(b - a, c - a, normal / normal.length().max(f64::MIN_POSITIVE).sqrt())
-}
-
-/// Twice the area times the unit normal.
-pub(crate) fn area_vector([a, b, c]: [DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a)
 }
 
 /// The height of a triangle over its longest edge; none where it has no area.

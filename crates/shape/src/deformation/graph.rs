@@ -10,6 +10,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::canonical::canonical_frame;
+use crate::points::{matrix, outer, row_points};
 
 /// Edges between points of a model in a cage. Energies are squared relative strains, in the mean over the edges.
 pub(crate) struct CageGraph {
@@ -56,7 +57,7 @@ impl CageGraph {
 
     /// Where the nodes are in a cage, m × 3.
     pub(crate) fn positions(&self, cage: MatRef<'_, f64>) -> Vec<DVec3> {
-        points_of(tall_product(self.coordinates.as_ref(), cage).as_ref())
+        row_points(tall_product(self.coordinates.as_ref(), cage).as_ref())
     }
 
     /// What pulls a cage, whose nodes are at `positions`, towards edges that are turned and stretched by the means of `by` at both ends: minus half the
@@ -117,7 +118,7 @@ impl CageSpace {
         (0..m).for_each(|k| sum[(k, k)] += hold);
         let factor = cholesky(sum)?;
         let points = points.iter().map(|&p| p.into()).collect();
-        Some(Self { graph, phi: phi.to_owned(), rest: matrix_of(rest), points, factor })
+        Some(Self { graph, phi: phi.to_owned(), rest: matrix(rest), points, factor })
     }
 
     /// The pose whose edges are turned and stretched as these gradients at the nodes ask, the mean as at rest.
@@ -130,26 +131,12 @@ impl CageSpace {
         let start = linear(&self.rest);
         let mut change = self.graph.pull(&self.graph.positions(start.as_ref()), gradients);
         solve_cholesky(self.factor.as_ref(), &mut change);
-        let moved = points_of(tall_product(self.phi.as_ref(), change.as_ref()).as_ref());
+        let moved = row_points(tall_product(self.phi.as_ref(), change.as_ref()).as_ref());
         let shape: Vec<DVec3> = moved.iter().zip(&self.points).map(|(d, p)| mean * *p + *d).collect();
         let count = shape.len() as f64;
         let by = (self.points.iter().sum::<DVec3>() - shape.iter().sum::<DVec3>()) / count;
         shape.iter().map(|p| *p + by).collect()
     }
-}
-
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
-}
-
-/// The rows of an n × 3 matrix as points.
-pub(crate) fn points_of(matrix: MatRef<'_, f64>) -> Vec<DVec3> {
-    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)])).collect()
-}
-
-/// Points as a matrix, n × 3.
-pub(crate) fn matrix_of(points: &[Point]) -> Mat<f64> {
-    Mat::from_fn(points.len(), 3, |i, k| points[i][k])
 }
 
 /// The factor by which the edges of a mesh are longer in a pose, in the root mean square.

@@ -2,15 +2,16 @@
 
 use crate::registration::welded;
 use cager_geometry::linalg::{SparseCholesky, SparsePattern};
-use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::mesh::TriMesh;
 use cager_geometry::topology::UnionFind;
 use faer::Mat;
 use glam::{DMat3, DVec3};
 
-use crate::deformation::gradients::{area_vector, flatness};
+use crate::deformation::gradients::flatness;
 use crate::deformation::rows::Rows;
 use crate::deformation::ties::{Tie, ties};
 use crate::error::MeshError;
+use crate::points::{area_vector, vectors};
 
 /// Finds the positions of vertices whose triangles are turned and stretched as asked, in least squares by area (the Poisson equation of deformation
 /// transfer, Botsch et al. 2006). Vertices at the same place stay together; parts of the mesh that no edge connects are carried by the nearest points of
@@ -146,14 +147,4 @@ impl Poisson {
 /// From the row that carries to the one that is carried.
 pub(crate) fn offsets(ties: &[Tie], at: &[DVec3]) -> Vec<DVec3> {
     ties.iter().map(|&Tie { rows: [a, b], .. }| at[a as usize] - at[b as usize]).collect()
-}
-
-/// As plain points.
-pub(crate) fn plain(points: &[DVec3]) -> Vec<Point> {
-    points.iter().map(DVec3::to_array).collect()
-}
-
-/// As vectors.
-pub(crate) fn vectors(points: &[Point]) -> Vec<DVec3> {
-    points.iter().map(|&p| p.into()).collect()
 }

@@ -7,8 +7,9 @@ use super::features::{Features, Refinement};
 use super::poses::{Seams, check_poses};
 use super::rotations::{Ways, polar};
 use crate::deformation::gradients::Gradients;
-use crate::deformation::poisson::{Poisson, offsets, vectors};
+use crate::deformation::poisson::{Poisson, offsets};
 use crate::error::ShapeError;
+use crate::points::vectors;
 
 /// The shapes that weights of some poses name.
 pub struct ShapeSpace {

@@ -9,9 +9,8 @@ use faer::{Mat, Scale};
 use glam::{DMat3, DVec3};
 
 use super::poses::check_poses;
-use crate::deformation::graph::{matrix_of, points_of};
-use crate::deformation::poisson::{plain, vectors};
 use crate::error::ShapeError;
+use crate::points::{matrix, plain, row_points, vectors};
 use crate::similarity::Similarity;
 
 /// Poses of a model in a cage.
@@ -47,22 +46,22 @@ impl PoseCages {
         let shape = mirrored(gram(laplacian.as_ref(), BLOCK_ROWS));
         let sum = Scale(scale) * mirrored(gram(phi.as_ref(), BLOCK_ROWS)) + Scale(STIFFNESS) * shape;
         let factor = if n < m { None } else { cholesky(sum) }.ok_or(none)?;
-        let rest = plain(&points_of(tall_product(phi.as_ref(), matrix_of(cage.vertices()).as_ref()).as_ref()));
+        let rest = plain(&row_points(tall_product(phi.as_ref(), matrix(cage.vertices()).as_ref()).as_ref()));
         let (mut cages, mut missed) = (Vec::new(), Vec::new());
         for pose in poses {
             let start = Similarity::of_points(&rest, pose, true).apply_all(cage.vertices());
-            let (start_matrix, start) = (matrix_of(&start), vectors(&start));
-            let left = matrix_of(pose) - tall_product(phi.as_ref(), start_matrix.as_ref());
+            let (start_matrix, start) = (matrix(&start), vectors(&start));
+            let left = matrix(pose) - tall_product(phi.as_ref(), start_matrix.as_ref());
             let by_points = Scale(scale) * transposed_product(phi.as_ref(), left.as_ref(), BLOCK_ROWS);
             let mut found = start.clone();
             for _ in 0..ITERATIONS {
                 let turned = rings.turned(&start, &found);
                 let mut change = &by_points + Scale(STIFFNESS) * (laplacian.transpose() * turned);
                 solve_cholesky(factor.as_ref(), &mut change);
-                found = points_of((&start_matrix + change).as_ref());
+                found = row_points((&start_matrix + change).as_ref());
             }
             let found = plain(&found);
-            let reached = points_of(tall_product(phi.as_ref(), matrix_of(&found).as_ref()).as_ref());
+            let reached = row_points(tall_product(phi.as_ref(), matrix(&found).as_ref()).as_ref());
             missed.push(pose.iter().zip(reached).map(|(p, q)| DVec3::from(*p) - q).collect());
             cages.push(found);
         }
@@ -71,7 +70,7 @@ impl PoseCages {
 
     /// The model in a cage between or beyond poses, with what their own cages miss of these.
     pub(super) fn model(&self, cage: &[Point], weights: &[(usize, f64)]) -> Vec<Point> {
-        let mut model = points_of(tall_product(self.phi.as_ref(), matrix_of(cage).as_ref()).as_ref());
+        let mut model = row_points(tall_product(self.phi.as_ref(), matrix(cage).as_ref()).as_ref());
         for &(pose, weight) in weights {
             model.iter_mut().zip(&self.missed[pose]).for_each(|(p, missed)| *p += weight * *missed);
         }
@@ -113,6 +112,6 @@ impl Rings {
             }
             (nearest_rotation(sum) * delta - delta).to_array()
         };
-        matrix_of(&self.0.iter().enumerate().map(change).collect::<Vec<Point>>())
+        matrix(&self.0.iter().enumerate().map(change).collect::<Vec<Point>>())
     }
 }

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 /// A stage ends where its step moves no vertex by more than this fraction of the height.
 const STILL: f64 = 2e-4;
 /// A limb whose mean distance is above this fraction of the height, or so many times that of the frame before, is tried elsewhere.
-const RELOCATED_ABOVE: [f64; 2] = [0.015, 1.3];
+const RESEED_ABOVE: [f64; 2] = [0.015, 1.3];
 /// More rounds for quads of limbs that were put elsewhere.
 const EXTRA_ROUNDS: usize = 4;
 /// Matches whose derivatives one task computes.
@@ -73,11 +73,11 @@ impl<'a> PersonFit<'a> {
             stage.offset = self.offset(&stage, &fit.pose);
             let found = self.finish(&observed, stage, self.options.rounds);
             let (before, now) = (limb_scores(&fit.parts), limb_scores(&found.parts));
-            let misplaced = |&limb: &usize| now[limb] > RELOCATED_ABOVE[0].min(RELOCATED_ABOVE[1] * before[limb]);
+            let misplaced = |&limb: &usize| now[limb] > RESEED_ABOVE[0].min(RESEED_ABOVE[1] * before[limb]);
             let limbs: Vec<usize> = (0..now.len()).filter(misplaced).collect();
             return self.refit_with_other_limbs(&observed, found, &limbs);
         }
-        self.fit_from_search(&observed)
+        self.first_fit(&observed)
     }
 
     /// A fit with limbs put elsewhere, where it then lies better.

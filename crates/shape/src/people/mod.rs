@@ -8,6 +8,7 @@
 //! `0.005 · height`, less the farther apart and not at all where the surfaces face apart.
 
 mod equations;
+mod first_fit;
 mod fit;
 pub mod joints;
 mod limbs;
@@ -19,7 +20,6 @@ mod options;
 pub mod poses;
 pub mod rig;
 mod search;
-mod search_fit;
 mod stages;
 #[cfg(test)]
 pub(crate) mod tests;

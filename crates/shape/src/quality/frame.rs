@@ -4,8 +4,8 @@ use crate::registration::welded;
 use cager_geometry::mesh::{Point, TriMesh};
 use glam::{DMat3, DVec3};
 
-use crate::deformation::gradients::{Gradients, area_vector};
-use crate::deformation::poisson::vectors;
+use crate::deformation::gradients::Gradients;
+use crate::points::{area_vector, renamed, vectors};
 
 /// Measures poses of one mesh.
 pub struct Quality {
@@ -75,7 +75,7 @@ fn stretches(gradient: DMat3, normal: DVec3) -> [f64; 2] {
 /// Whether each side of a triangle runs against one of another; vertices at the same place are one.
 fn is_closed(mesh: &TriMesh) -> bool {
     let place = welded(&mesh.vertices);
-    let faces: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|v| place[v as usize])).collect();
+    let faces = renamed(&mesh.triangles, &place);
     let mut sides: Vec<[u32; 2]> =
         faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).filter(|[a, b]| a != b).collect();
     let mut against: Vec<[u32; 2]> = sides.iter().map(|&[a, b]| [b, a]).collect();

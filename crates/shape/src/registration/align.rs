@@ -1,13 +1,13 @@
 //! One surface turned, moved and, where asked, scaled onto another that is about the same: where a template begins.
 
-use cager_geometry::linalg::{nearest_rotation, symmetric_eigen};
+use cager_geometry::linalg::nearest_rotation;
 use cager_geometry::vector::Point;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::matching::OrientedPoints;
 use super::observation::Observation;
-use super::sparse_rows::vectors;
+use crate::points::{Moments, outer, plain, vectors};
 
 /// What an alignment may change.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,7 +60,7 @@ const LAST_ITERATIONS: usize = 40;
 /// Iterations after which those have to wait that score above so many times the best. Once the others are done, those of them end as well that score below so
 /// many times the best then: they may still come close to it.
 const JUDGED_ITERATIONS: usize = 8;
-const DOUBTFUL: f64 = 1.3;
+const MAX_WAITING_RATIO: f64 = 1.3;
 const HOPELESS: f64 = 2.0;
 /// Starts that are gone on with.
 const MAX_CONTINUED: usize = 4;
@@ -107,7 +107,7 @@ pub fn alignments(moved: &Observation, fixed: &Observation, options: &AlignOptio
     // As it stands, the surface of a symmetrical body fits as well as others and may come after them by chance.
     let (unturned, unturned_score) = (tried[0].rotation, tried[0].score);
     tried.sort_by(|a, b| a.score.total_cmp(&b.score));
-    let is_near = unturned_score <= DOUBTFUL * tried[0].score;
+    let is_near = unturned_score <= MAX_WAITING_RATIO * tried[0].score;
     let mut kept: Vec<Placed> = Vec::new();
     for placed in tried {
         let is_unturned = is_near && placed.score == unturned_score && placed.rotation == unturned;
@@ -121,7 +121,7 @@ pub fn alignments(moved: &Observation, fixed: &Observation, options: &AlignOptio
     let begun: Vec<Placed> = starts.map(|start| go_on(start, JUDGED_ITERATIONS)).collect();
     let best = |all: &[Placed]| all.iter().map(|placed| placed.score).fold(f64::INFINITY, f64::min);
     let end = |placed: Placed| go_on(placed, LAST_ITERATIONS - JUDGED_ITERATIONS);
-    let most = DOUBTFUL * best(&begun);
+    let most = MAX_WAITING_RATIO * best(&begun);
     let (waiting, hopeful): (Vec<Placed>, Vec<Placed>) = begun.into_iter().partition(|placed| placed.score > most);
     let mut done: Vec<Placed> = hopeful.into_par_iter().map(end).collect();
     let most = HOPELESS * best(&done);
@@ -186,15 +186,8 @@ impl Cloud {
         let every = observation.points.len().div_ceil(most).max(1);
         let points: Vec<DVec3> = vectors(&observation.points).into_iter().step_by(every).collect();
         let normals = vectors(&observation.normals).into_iter().step_by(every).collect();
-        let center = points.iter().sum::<DVec3>() / points.len() as f64;
-        let mut covariance = [[0.0; 3]; 3];
-        for point in &points {
-            let d = (*point - center).to_array();
-            (0..3).for_each(|i| (0..3).for_each(|j| covariance[i][j] += d[i] * d[j] / points.len() as f64));
-        }
-        let (values, vectors) = symmetric_eigen(covariance);
-        let [first, second, _] = vectors.map(DVec3::from);
-        let spread = values.iter().sum::<f64>().max(0.0).sqrt();
+        let Moments { center, variances, axes: [first, second, _] } = Moments::new(&points);
+        let spread = variances.iter().sum::<f64>().max(0.0).sqrt();
         Self { points, normals, center, spread, axes: DMat3::from_cols(first, second, first.cross(second)) }
     }
 }
@@ -219,7 +212,7 @@ impl Placed {
         let (mut covariance, mut size) = (DMat3::ZERO, 0.0);
         for &(p, q, weight) in pairs {
             let (p, q) = (p - from, weight * (q - to));
-            covariance += DMat3::from_cols(q * p.x, q * p.y, q * p.z);
+            covariance += outer(q, p);
             size += weight * p.length_squared();
         }
         self.rotation = up.map_or_else(|| nearest_rotation(covariance), |up| turn_about(up, covariance));
@@ -304,7 +297,6 @@ impl Pair {
 }
 
 fn tree(points: &[DVec3], normals: &[DVec3], spread: f64) -> OrientedPoints {
-    let plain = |points: &[DVec3]| points.iter().map(DVec3::to_array).collect::<Vec<_>>();
     OrientedPoints::new(&plain(points), &plain(normals), NORMAL_LENGTH * spread)
 }
 

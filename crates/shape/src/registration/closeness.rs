@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::matching::OrientedPoints;
 use super::observation::Observation;
-use super::sampling::{area_normal, sample_surface};
-use super::sparse_rows::vectors;
+use super::sampling::sample_surface;
+use crate::points::{area_vector, vectors};
 
 /// A surface to which points with normals are measured.
 pub struct MeasuredSurface {
@@ -34,7 +34,7 @@ impl MeasuredSurface {
 
     /// Triangles, facing outwards. Distances are shares of `size`.
     pub fn of_mesh(vertices: &[Point], triangles: &[[u32; 3]], size: f64) -> Self {
-        let normal = |t: &[u32; 3]| area_normal(t.map(|v| vertices[v as usize])).normalize_or_zero();
+        let normal = |t: &[u32; 3]| area_vector(t.map(|v| vertices[v as usize])).normalize_or_zero();
         let normals = triangles.iter().map(normal).collect();
         Self { shape: Shape::Triangles { surface: Surface::new(vectors(vertices), triangles.to_vec()), normals }, size }
     }
@@ -52,7 +52,7 @@ impl MeasuredSurface {
     /// point, where what faces away is farther off (by up to 4 %). Distances beyond 5 % count as 5 %. NaN where one of them is not finite.
     pub fn distance(&self, own: &Observation, vertices: &[Point], triangles: &[[u32; 3]], seed: u64) -> f64 {
         let samples = sample_surface(vertices, triangles, MEASURED, seed);
-        let normal = |face: u32| area_normal(triangles[face as usize].map(|v| vertices[v as usize]));
+        let normal = |face: u32| area_vector(triangles[face as usize].map(|v| vertices[v as usize]));
         let there: Vec<f64> = samples
             .par_iter()
             .with_min_len(64)

@@ -8,9 +8,10 @@ use rayon::prelude::*;
 
 use super::anchors::Anchors;
 use super::matching::{KnownMatches, OrientedPoints, match_weight};
-use super::sparse_rows::{matrix, points, single, vectors};
+use super::sparse_rows::single;
 use super::target::Target;
-use super::template::{Template, plain};
+use super::template::Template;
+use crate::points::{matrix, outer, plain, row_points};
 
 /// How a fit goes from stiff and far-seeing to loose and exact: `[first, last]` of each iteration's values, in between in proportion.
 #[derive(Clone, Copy, Debug)]
@@ -120,8 +121,8 @@ impl Template {
         anchors: Option<&Anchors>,
         known: &mut KnownMatches,
     ) -> (Vec<Point>, bool) {
-        let reference = matrix(&vectors(reference));
-        let mut cage = matrix(&vectors(start));
+        let reference = matrix(reference);
+        let mut cage = matrix(start);
         let m = cage.nrows();
         let hold = options.hold / (self.diagonal * self.diagonal * m as f64);
         let mut in_reach = true;
@@ -156,7 +157,7 @@ impl Template {
                 break;
             }
         }
-        (plain(&points(cage.as_ref())), in_reach)
+        (plain(&row_points(cage.as_ref())), in_reach)
     }
 
     /// Matches of every sample with the surface, and of a part of the surface with the samples.
@@ -174,7 +175,7 @@ impl Template {
         let share = unit / positions.len() as f64;
         let term = |normal: DVec3, weight: f64, offset: DVec3| {
             let weighted = weight * normal;
-            let hessian = DMat3::from_cols(weighted * normal.x, weighted * normal.y, weighted * normal.z);
+            let hessian = outer(weighted, normal);
             (hessian, -offset.dot(normal) * weighted)
         };
         let (mut hessians, mut pulls): (Vec<DMat3>, Vec<DVec3>) = positions

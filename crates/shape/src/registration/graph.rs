@@ -6,7 +6,7 @@ use super::nearest::NearestPoints;
 use super::orientation::welded;
 use super::rigidity::node_edges;
 use super::sampling::spread;
-use super::sparse_rows::vectors;
+use crate::points::vectors;
 
 /// Points of a model that are spread over it, and the edges between those whose surroundings touch.
 #[derive(Clone, Debug)]

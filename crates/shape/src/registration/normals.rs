@@ -3,11 +3,11 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use cager_geometry::linalg::symmetric_eigen;
-use cager_geometry::vector::{Point, dot, mean, sub};
+use cager_geometry::vector::{Point, dot};
 use rayon::prelude::*;
 
 use super::nearest::NearestPoints;
+use crate::points::Moments;
 
 /// Points that a plane is laid through.
 const PLANE_POINTS: u32 = 12;
@@ -36,14 +36,8 @@ pub(crate) fn estimated_normals(points: &[Point], kept: &[u32]) -> Option<Vec<Po
 
 /// The normal of the plane through some points; zero where they lie on a line or in one place.
 pub(crate) fn plane_normal(points: &[Point]) -> Point {
-    let center = mean(points);
-    let mut covariance = [[0.0; 3]; 3];
-    for &p in points {
-        let d = sub(p, center);
-        (0..3).for_each(|i| (0..3).for_each(|j| covariance[i][j] += d[i] * d[j]));
-    }
-    let (values, vectors) = symmetric_eigen(covariance);
-    if values[1] > 1e-12 * values[0] { vectors[2] } else { [0.0; 3] }
+    let Moments { variances, axes, .. } = Moments::new(points);
+    if variances[1] > 1e-12 * variances[0] { axes[2].to_array() } else { [0.0; 3] }
 }
 
 /// Turns normals to one side.

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use super::normals::{estimated_normals, plane_normal};
 use super::orientation::{Oriented, oriented};
-use super::sampling::{area_normal, sample_surface};
+use super::sampling::sample_surface;
+use crate::points::area_vector;
 
 /// Points of a surface, each with its outward unit normal. Nothing corresponds from one observation to the next.
 #[derive(Clone, Debug, Default)]
@@ -102,7 +103,7 @@ impl Observation {
         if drawn.is_empty() {
             return Err(ObservationError::NoArea);
         }
-        let normal = |triangle: &[u32; 3]| area_normal(triangle.map(|v| vertices[v as usize]));
+        let normal = |triangle: &[u32; 3]| area_vector(triangle.map(|v| vertices[v as usize]));
         let observation = Self {
             points: drawn.iter().map(|sample| sample.at(vertices, &triangles)).collect(),
             normals: drawn.iter().map(|s| normal(&triangles[s.face as usize]).normalize_or_zero().to_array()).collect(),

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use crate::points::renamed;
 use cager_geometry::vector::{Point, cross, dot, mean, sub};
 use rayon::prelude::*;
 
@@ -18,8 +19,7 @@ pub(crate) struct Oriented {
 /// same place are one: scans double them along seams of their textures.
 pub(crate) fn oriented(vertices: &[Point], triangles: &[[u32; 3]]) -> Oriented {
     let welded = welded(vertices);
-    let joined: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| welded[v as usize])).collect();
-    let links = links(&joined);
+    let links = links(&renamed(triangles, &welded));
     let mut triangles = triangles.to_vec();
     let against = links.iter().any(|link| link.against);
     let turned_faces = if against { turn_parts(vertices, &mut triangles, &links) } else { 0 };

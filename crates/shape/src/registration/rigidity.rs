@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use crate::edge_distances::{NO_SOURCE, nearest_sources};
 
 use super::dense_rows::DenseRows;
-use super::sparse_rows::{SparseRows, matrix, points};
+use super::sparse_rows::SparseRows;
+use crate::points::{matrix, outer, row_points};
 
 /// Nodes and the edges between them.
 pub(crate) struct Rigidity {
@@ -107,7 +108,7 @@ impl Rigidity {
 
     /// Where the nodes are in a cage, m × 3.
     pub(crate) fn positions(&self, cage: MatRef<'_, f64>) -> Vec<DVec3> {
-        self.dense.times(&points(cage))
+        self.dense.times(&row_points(cage))
     }
 
     /// What pulls the cage's vertices towards local rigidity, m × 3: minus half the gradient.
@@ -115,7 +116,7 @@ impl Rigidity {
         let rotations = self.of_each_node(|i| {
             let covariance = self.edges(i).iter().fold(DMat3::ZERO, |sum, edge| {
                 let moved = edge.weight * (positions[edge.to as usize] - positions[i]);
-                sum + DMat3::from_cols(moved * edge.rest.x, moved * edge.rest.y, moved * edge.rest.z)
+                sum + outer(moved, edge.rest)
             });
             nearest_rotation(covariance)
         });

@@ -1,9 +1,9 @@
 //! Points of a surface: at random, even by area; and the farthest from each other.
 
 use cager_geometry::vector::{Point, combination};
-use glam::DVec3;
 
 use super::matching::join;
+use crate::points::area_vector;
 
 /// A point of a triangle mesh, by its triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,12 +28,6 @@ pub fn surface_vertices(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<Point
     vertices.iter().zip(used).filter(|(_, used)| *used).map(|(&p, _)| p).collect()
 }
 
-/// Twice the area of a triangle times its unit normal.
-pub(crate) fn area_normal([a, b, c]: [Point; 3]) -> DVec3 {
-    let a = DVec3::from(a);
-    (DVec3::from(b) - a).cross(DVec3::from(c) - a)
-}
-
 /// `count` points of a surface at random, one in each of as many parts of equal area, in the order of the triangles. None where the surface has
 /// no area.
 pub fn sample_surface(vertices: &[Point], triangles: &[[u32; 3]], count: usize, seed: u64) -> Vec<SurfacePoint> {
@@ -41,7 +35,7 @@ pub fn sample_surface(vertices: &[Point], triangles: &[[u32; 3]], count: usize, 
     let mut sums = Vec::with_capacity(triangles.len());
     let mut area = 0.0;
     for triangle in triangles {
-        area += area_normal(triangle.map(|v| vertices[v as usize])).length();
+        area += area_vector(triangle.map(|v| vertices[v as usize])).length();
         sums.push(area);
     }
     if area.is_nan() || area <= 0.0 || area.is_infinite() {

@@ -5,9 +5,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::matching::{KnownMatches, OrientedPoints};
-use super::sparse_rows::{matrix, vectors};
 use super::target::{NORMAL_LENGTH, Target};
-use super::template::{Template, plain};
+use super::template::Template;
+use crate::points::{matrix, plain};
 
 /// Distances count no more than this in a score, as a share of the diagonal.
 const MAX_SCORED: f64 = 0.05;
@@ -26,7 +26,7 @@ impl Template {
     pub fn score_from(&self, target: &Target, cage: &[Point], every: usize, known: &mut KnownMatches) -> f64 {
         let every = every.max(1);
         known.keep_if_of(self.samples.len(), target.points.len());
-        let (positions, normals) = self.samples_in(matrix(&vectors(cage)).as_ref());
+        let (positions, normals) = self.samples_in(matrix(cage).as_ref());
         let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);
         let scored = |offset: DVec3, own: DVec3, other: DVec3, d2: f64| {
             let far = d2.sqrt() / self.diagonal;

@@ -1,6 +1,5 @@
 //! Coordinates whose small entries are left out, for the many products of a solver that needs no more.
 
-use cager_geometry::vector::Point;
 use faer::MatRef;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
@@ -82,21 +81,6 @@ impl Compressed {
         }
         (0..lists).into_par_iter().with_min_len(128).map(row).collect()
     }
-}
-
-/// Points as a matrix, n × 3.
-pub(crate) fn matrix(points: &[DVec3]) -> faer::Mat<f64> {
-    faer::Mat::from_fn(points.len(), 3, |i, k| points[i][k])
-}
-
-/// The rows of an n × 3 matrix as points.
-pub(crate) fn points(matrix: MatRef<'_, f64>) -> Vec<DVec3> {
-    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)])).collect()
-}
-
-/// As vectors.
-pub(crate) fn vectors(points: &[Point]) -> Vec<DVec3> {
-    points.iter().map(|&p| DVec3::from(p)).collect()
 }
 
 /// The rows of an n × 3 matrix in single precision.

@@ -8,9 +8,9 @@ use super::closeness::MeasuredSurface;
 use super::fit::FitOptions;
 use super::matching::KnownMatches;
 use super::observation::Observation;
-use super::sparse_rows::{matrix, vectors};
 use super::target::Target;
 use super::template::Template;
+use crate::points::matrix;
 
 /// How a template is laid onto another shape.
 #[derive(Clone, Copy, Debug)]
@@ -134,7 +134,7 @@ impl Template {
                 // Later stages see less far.
                 break;
             }
-            self.rest_in(matrix(&vectors(&moved)).as_ref());
+            self.rest_in(matrix(&moved).as_ref());
         }
         self.rigidity.restore(&at_rest);
         moved
@@ -190,7 +190,7 @@ mod tests {
         let seen = Observation::of_mesh(&target.vertices, &target.triangles, &draw).unwrap().0;
         let surface = MeasuredSurface::of_mesh(&target.vertices, &target.triangles, template.diagonal());
         let score = |cage: &[Point]| {
-            let laid = tall_product(phi.as_ref(), matrix(&vectors(cage)).as_ref());
+            let laid = tall_product(phi.as_ref(), matrix(cage).as_ref());
             let laid: Vec<Point> = (0..laid.nrows()).map(|i| [0, 1, 2].map(|k| laid[(i, k)])).collect();
             surface.distance(&seen, &laid, &rest.triangles, 0)
         };
@@ -219,7 +219,7 @@ mod tests {
         let place = target.vertices[40];
         let anchors = Anchors::new(rows_of(phi.as_ref(), &[0]), &[place], 10.0);
         let first = |cage: &[Point]| {
-            let at = tall_product(phi.as_ref().subrows(0, 1), matrix(&vectors(cage)).as_ref());
+            let at = tall_product(phi.as_ref().subrows(0, 1), matrix(cage).as_ref());
             cager_geometry::vector::distance([at[(0, 0)], at[(0, 1)], at[(0, 2)]], place)
         };
         let pulled = lay(Some(&anchors), &StageOptions::default());

@@ -4,8 +4,7 @@ use glam::DVec3;
 
 use super::matching::OrientedPoints;
 use super::observation::Observation;
-use super::sparse_rows::vectors;
-use super::template::plain;
+use crate::points::{plain, vectors};
 
 /// A surface made ready to be matched.
 pub struct Target {

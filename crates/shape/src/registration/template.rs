@@ -3,15 +3,15 @@
 use cager_core::cage::Cage;
 use cager_geometry::linalg::{gram, rows_of};
 use cager_geometry::mesh::{TriMesh, diagonal};
-use cager_geometry::vector::Point;
 use faer::{Mat, MatRef};
 use glam::DVec3;
 
 use super::dense_rows::DenseRows;
 use super::orientation::welded;
 use super::rigidity::{Rigidity, node_edges};
-use super::sampling::{SurfacePoint, area_normal, sample_surface, spread, surface_vertices};
-use super::sparse_rows::{SparseRows, points, vectors};
+use super::sampling::{SurfacePoint, sample_surface, spread, surface_vertices};
+use super::sparse_rows::SparseRows;
+use crate::points::{plain, renamed, row_points, vectors, vertex_normals};
 
 /// How closely a template is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -124,8 +124,7 @@ impl Template {
         let mut scaled = gram(coordinates.as_ref(), BLOCK_ROWS);
         scaled *= faer::Scale(1.0 / (samples.len() as f64 * diagonal * diagonal));
         let first = welded(&rest.vertices);
-        let joined: Vec<[u32; 3]> = rest.triangles.iter().map(|t| t.map(|v| first[v as usize])).collect();
-        let joined = TriMesh { vertices: rest.vertices.clone(), triangles: joined };
+        let joined = TriMesh { vertices: rest.vertices.clone(), triangles: renamed(&rest.triangles, &first) };
         let rigidity = rigidity(&joined, cage, phi, diagonal, options);
         Ok(Self {
             diagonal,
@@ -140,7 +139,7 @@ impl Template {
 
     /// Samples in a cage: positions and unit normals.
     pub(crate) fn samples_in(&self, cage: MatRef<'_, f64>) -> (Vec<DVec3>, Vec<DVec3>) {
-        let corners = self.corner_coordinates.times(&points(cage));
+        let corners = self.corner_coordinates.times(&row_points(cage));
         self.samples.iter().map(|sample| pose(sample, &corners)).unzip()
     }
 
@@ -167,12 +166,7 @@ fn rigidity(rest: &TriMesh, cage: &Cage, phi: MatRef<'_, f64>, diagonal: f64, op
 
 /// Vertices spread over a mesh, by position and normal.
 fn nodes(rest: &TriMesh, count: usize, normal_length: f64, seed: u64) -> Vec<u32> {
-    let mut normals = vec![DVec3::ZERO; rest.vertices.len()];
-    for triangle in &rest.triangles {
-        let normal = area_normal(triangle.map(|v| rest.vertices[v as usize]));
-        triangle.iter().for_each(|&v| normals[v as usize] += normal);
-    }
-    let normals: Vec<Point> = normals.iter().map(|n| n.normalize_or_zero().to_array()).collect();
+    let normals = plain(&vertex_normals(&rest.vertices, &rest.triangles));
     spread(&rest.vertices, &normals, count, normal_length, seed)
 }
 
@@ -181,9 +175,4 @@ pub(crate) fn pose(sample: &Sample, corners: &[DVec3]) -> (DVec3, DVec3) {
     let [a, b, c] = sample.corners.map(|row| corners[row as usize]);
     let [u, v, w] = sample.weights;
     (u * a + v * b + w * c, (b - a).cross(c - a).normalize_or_zero())
-}
-
-/// As plain points.
-pub(crate) fn plain(points: &[DVec3]) -> Vec<Point> {
-    points.iter().map(DVec3::to_array).collect()
 }

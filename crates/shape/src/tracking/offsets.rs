@@ -1,5 +1,6 @@
 //! How far every vertex of a template leaves its cage to meet a surface.
 
+use crate::points::{outer, plain, renamed, vectors, vertex_normals};
 use crate::registration::{OrientedPoints, Target, welded};
 use cager_geometry::mesh::{Polygons, TriMesh};
 use cager_geometry::topology::Adjacency;
@@ -49,7 +50,7 @@ impl OffsetSolver {
     /// For a template at rest, with this diagonal.
     pub fn new(rest: &TriMesh, diagonal: f64) -> Self {
         let first = welded(&rest.vertices);
-        let triangles: Vec<[u32; 3]> = rest.triangles.iter().map(|t| t.map(|v| first[v as usize])).collect();
+        let triangles = renamed(&rest.triangles, &first);
         let adjacency = Adjacency::new(&Polygons::of_triangles(&triangles), rest.vertices.len());
         Self { adjacency, first, triangles, diagonal }
     }
@@ -57,7 +58,7 @@ impl OffsetSolver {
     /// The template's vertices moved from `positions`, where their cage has them, towards a surface: point to plane, both ways, smooth. Runs on the
     /// current rayon pool; the result does not depend on it.
     pub fn offset(&self, positions: &[Point], surface: &Target) -> Vec<Point> {
-        let base: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p)).collect();
+        let base: Vec<DVec3> = vectors(positions);
         let mut offsets = vec![DVec3::ZERO; base.len()];
         let mut known = None;
         for iteration in 0..ITERATIONS {
@@ -74,25 +75,15 @@ impl OffsetSolver {
         base.iter().zip(&self.first).map(|(&p, &first)| (p + offsets[first as usize]).to_array()).collect()
     }
 
-    fn normals(&self, vertices: &[DVec3]) -> Vec<DVec3> {
-        let mut normals = vec![DVec3::ZERO; vertices.len()];
-        for triangle in &self.triangles {
-            let [a, b, c] = triangle.map(|v| vertices[v as usize]);
-            let normal = (b - a).cross(c - a);
-            triangle.iter().for_each(|&v| normals[v as usize] += normal);
-        }
-        normals.iter().map(|n| n.normalize_or_zero()).collect()
-    }
-
     /// Matches of every vertex with the surface, and of every point of the surface with a vertex.
     fn pulls(&self, vertices: &[DVec3], surface: &Target, reach: f64, known: Option<&Matches>) -> Pulls {
-        let normals = self.normals(vertices);
+        let normals = vertex_normals(vertices, &self.triangles);
         let term = |own: DVec3, other: DVec3, offset: DVec3, share: f64| {
             let cosine = own.dot(other);
             let far = offset.length_squared() / (reach * reach);
             let weight = if cosine > MIN_COSINE { share * cosine / (1.0 + far).powi(2) } else { 0.0 };
             let weighted = weight * other;
-            let hessian = DMat3::from_cols(weighted * other.x, weighted * other.y, weighted * other.z);
+            let hessian = outer(weighted, other);
             (hessian, -offset.dot(other) * weighted)
         };
         let there: Vec<u32> = vertices
@@ -110,7 +101,6 @@ impl OffsetSolver {
             term(normals[i], surface.normals()[j], vertices[i] - surface.points()[j], 1.0)
         };
         let (mut hessians, mut pulls): (Vec<DMat3>, Vec<DVec3>) = there.iter().enumerate().map(of_vertex).unzip();
-        let plain = |points: &[DVec3]| points.iter().map(DVec3::to_array).collect::<Vec<Point>>();
         let tree = OrientedPoints::new(&plain(vertices), &plain(&normals), surface.normal_length());
         let share = vertices.len() as f64 / surface.points().len() as f64;
         let back: Vec<u32> = surface

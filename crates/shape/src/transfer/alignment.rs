@@ -33,11 +33,11 @@ pub struct Aligned {
 
 impl Aligned {
     /// An alignment that another one comes within 15 % of: either may be right.
-    pub const DOUBTFUL: f64 = 1.15;
+    pub const AMBIGUOUS_BELOW: f64 = 1.15;
 
     /// Whether another alignment fits almost as well.
-    pub fn doubtful(&self) -> bool {
-        self.runner_up < Self::DOUBTFUL
+    pub fn is_ambiguous(&self) -> bool {
+        self.runner_up < Self::AMBIGUOUS_BELOW
     }
 }
 
@@ -95,7 +95,7 @@ pub(crate) fn align_with(
     }
     let mut near: Vec<(f64, Aligned)> = found
         .iter()
-        .filter(|alignment| alignment.score <= Aligned::DOUBTFUL * best)
+        .filter(|alignment| alignment.score <= Aligned::AMBIGUOUS_BELOW * best)
         .map(|alignment| (alignment.score, aligned(alignment)))
         .collect();
     near.sort_by(|a, b| preferred(a).total_cmp(&preferred(b)));

@@ -1,11 +1,10 @@
 //! Which triangle of one surface lies where a triangle or point of another does.
 
-use crate::registration::{OrientedPoints, welded};
+use crate::points::area_vector;
+use crate::registration::OrientedPoints;
 use cager_geometry::vector::Point;
 use glam::DVec3;
 use rayon::prelude::*;
-
-use crate::deformation::gradients::area_vector;
 
 /// Triangles that can be asked for by position and normal.
 pub(crate) struct Correspondence {
@@ -42,15 +41,4 @@ fn middle(vertices: &[Point], triangle: &[u32; 3]) -> (Point, Point) {
     let corners = triangle.map(|v| DVec3::from(vertices[v as usize]));
     let center = (corners[0] + corners[1] + corners[2]) / 3.0;
     (center.to_array(), area_vector(corners).normalize_or_zero().to_array())
-}
-
-/// Unit normals of vertices, by area; zero for vertices without triangles. Vertices at the same place have the same one.
-pub(crate) fn vertex_normals(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<Point> {
-    let place = welded(vertices);
-    let mut normals = vec![DVec3::ZERO; vertices.len()];
-    for triangle in triangles {
-        let normal = area_vector(triangle.map(|v| vertices[v as usize].into()));
-        triangle.iter().for_each(|&v| normals[place[v as usize] as usize] += normal);
-    }
-    place.iter().map(|&first| normals[first as usize].normalize_or_zero().to_array()).collect()
 }

@@ -8,14 +8,14 @@ use faer::MatRef;
 use glam::{DMat3, DVec3};
 
 use super::fitted_options::{FittedOptions, Pose};
-use super::registered_source::{Goal, Laid};
+use super::registered_source::{Goal, RegisteredSource};
 use super::source::{Source, moved_frame};
 use crate::deformation::gradients::Gradients;
 use crate::deformation::graph::CageSpace;
-use crate::deformation::poisson::{Poisson, vectors};
+use crate::deformation::poisson::Poisson;
 use crate::error::{MeshError, TransferError};
+use crate::points::{vectors, welded_normals};
 use crate::transfer::alignment::Aligned;
-use crate::transfer::correspondence::vertex_normals;
 
 /// How well source and target go together.
 #[derive(Clone, Debug)]
@@ -91,10 +91,10 @@ impl FittedTransfer {
         let seen = Observation::of_mesh(&target.vertices, &target.triangles, &options.observation())?.0;
         let triangles = outward(&target.vertices, &target.triangles);
         let goal = Goal { points: &target.vertices, triangles: &triangles, seen: &seen };
-        let laid = Laid::new(source, &goal, options)?;
+        let laid = RegisteredSource::new(source, &goal, options)?;
         let found = laid.correspondence();
         let matches = found.of_triangles(&target.vertices, &triangles);
-        let under = found.of_points(&target.vertices, &vertex_normals(&target.vertices, &triangles));
+        let under = found.of_points(&target.vertices, &welded_normals(&target.vertices, &triangles));
         Ok(Self::assembled(laid, Body::Mesh(body), matches, under, &target.vertices, options))
     }
 
@@ -117,26 +117,26 @@ impl FittedTransfer {
             let normals = points.iter().map(|&p| seen.normals[near.nearest(p).0]).collect();
             (seen, normals)
         } else {
-            (Observation::of_mesh(points, &triangles, &draw)?.0, vertex_normals(points, &triangles))
+            (Observation::of_mesh(points, &triangles, &draw)?.0, welded_normals(points, &triangles))
         };
         let rest = target.cage.vertices();
         let body = CageSpace::new(points, &normals, &triangles, target.phi, rest)
             .ok_or(TransferError::Target(MeshError::Degenerate))?;
-        let laid = Laid::new(source, &Goal { points, triangles: &triangles, seen: &seen }, options)?;
+        let laid = RegisteredSource::new(source, &Goal { points, triangles: &triangles, seen: &seen }, options)?;
         let under = laid.correspondence().of_points(points, &normals);
         let matches = body.graph.nodes.iter().map(|&node| under[node as usize]).collect();
         Ok(Self::assembled(laid, Body::Caged(Box::new(body)), matches, under, points, options))
     }
 
     fn assembled(
-        laid: Laid,
+        laid: RegisteredSource,
         body: Body,
         matches: Vec<u32>,
         under: Vec<u32>,
         target: &[Point],
         options: &FittedOptions<'_>,
     ) -> Self {
-        let Laid { aligned, rest, laid, registration, .. } = laid;
+        let RegisteredSource { aligned, rest, laid, registration, .. } = laid;
         let gradients = Gradients::new(&rest);
         let like = registration.score < LIKE_SHAPES;
         let smoothing = match body {

@@ -1,11 +1,10 @@
 //! Which targets follow by a cage.
 
+use crate::points::area_vector;
 use crate::registration::welded;
 use cager_geometry::mesh::TriMesh;
 use cager_geometry::topology::UnionFind;
 use glam::DVec3;
-
-use crate::deformation::gradients::area_vector;
 
 /// More parts than these, none of which has most of the area, are a soup.
 const MANY_PARTS: usize = 10;

@@ -4,6 +4,7 @@ use cager_geometry::mesh::Point;
 use glam::DVec3;
 
 use crate::error::TransferError;
+use crate::points::Moments;
 
 /// A vertex of the source and the vertex of the target that lies at the same place of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,12 +65,6 @@ impl Pairs {
 
 /// Whether points lie on no line.
 fn spread(points: &[DVec3]) -> bool {
-    let center = points.iter().sum::<DVec3>() / points.len() as f64;
-    let mut covariance = [[0.0; 3]; 3];
-    for point in points {
-        let d = (*point - center).to_array();
-        (0..3).for_each(|i| (0..3).for_each(|j| covariance[i][j] += d[i] * d[j]));
-    }
-    let (values, _) = cager_geometry::linalg::symmetric_eigen(covariance);
-    values[1] > LINE * LINE * values[0]
+    let variances = Moments::new(points).variances;
+    variances[1] > LINE * LINE * variances[0]
 }

@@ -12,9 +12,8 @@ use faer::{Mat, MatRef};
 use glam::DVec3;
 
 use super::source::moved_frame;
-use crate::deformation::graph::{matrix_of, points_of};
-use crate::deformation::poisson::vectors;
 use crate::error::TransferError;
+use crate::points::{matrix, row_points, vectors};
 use crate::similarity::Similarity;
 
 /// Moves frames of a source onto a target through a cage around both.
@@ -130,7 +129,7 @@ impl PublicTransfer {
 
     /// The target in a cage whose values changed by these, then moved as a whole.
     pub(super) fn target_in(&self, change: MatRef<'_, f64>, whole: &Similarity) -> Vec<Point> {
-        let moved = points_of(tall_product(self.target.as_ref(), change).as_ref());
+        let moved = row_points(tall_product(self.target.as_ref(), change).as_ref());
         moved.iter().zip(&self.target_rest).map(|(d, p)| whole.apply(*p + *d).to_array()).collect()
     }
 
@@ -147,7 +146,7 @@ impl PublicTransfer {
     fn with_normals(&self, normals: &Normals, wanted: &Mat<f64>) -> Mat<f64> {
         let columns = self.values.len();
         let m = columns - normals.dependent.faces().len();
-        let rest = matrix_of(&self.values);
+        let rest = matrix(&self.values);
         let projected = transposed_product(self.source.as_ref(), wanted.as_ref(), BLOCK_ROWS);
         let mut vertices: Vec<Point> = self.values[..m].to_vec();
         let size = vertices.iter().map(|p| norm(*p)).fold(0.0, f64::max);

@@ -9,13 +9,13 @@ use cager_geometry::linalg::{rows_of, tall_product};
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use cager_geometry::spatial::Surface;
 use cager_geometry::vector::distance;
-use faer::Mat;
 use glam::DVec3;
 
 use super::fitted_options::FittedOptions;
 use super::source::Source;
 use crate::canonical::canonical_frame;
 use crate::error::TransferError;
+use crate::points::{matrix, plain, row_points};
 use crate::similarity::Similarity;
 use crate::transfer::alignment::{Aligned, align_with, preferred};
 use crate::transfer::correspondence::Correspondence;
@@ -44,7 +44,7 @@ pub(crate) struct Goal<'a> {
 }
 
 /// The source laid onto the target.
-pub(crate) struct Laid {
+pub(crate) struct RegisteredSource {
     pub(crate) aligned: Aligned,
     /// The source at rest in the target's space, its triangles facing outwards.
     pub(crate) rest: TriMesh,
@@ -55,7 +55,7 @@ pub(crate) struct Laid {
     size: f64,
 }
 
-impl Laid {
+impl RegisteredSource {
     pub(crate) fn new(
         source: &Source<'_>,
         goal: &Goal<'_>,
@@ -190,8 +190,6 @@ impl<'a> Fitting<'a> {
 
     /// The source's vertices in a cage.
     fn laid(&self, cage: &[Point]) -> Vec<Point> {
-        let cage = Mat::from_fn(cage.len(), 3, |i, k| cage[i][k]);
-        let laid = tall_product(self.source.phi, cage.as_ref());
-        (0..laid.nrows()).map(|i| [0, 1, 2].map(|k| laid[(i, k)])).collect()
+        plain(&row_points(tall_product(self.source.phi, matrix(cage).as_ref()).as_ref()))
     }
 }

@@ -10,10 +10,10 @@ use glam::DVec3;
 
 use super::public::PublicTransfer;
 use crate::canonical::size;
-use crate::deformation::graph::{CageGraph, edge_growth, matrix_of};
+use crate::deformation::graph::{CageGraph, edge_growth};
 use crate::error::{MeshError, TransferError};
+use crate::points::{matrix, welded_normals};
 use crate::similarity::Similarity;
-use crate::transfer::correspondence::vertex_normals;
 
 /// Moves frames of a source onto a target through a cage around both, the target as rigid as possible.
 pub struct RigidTransfer {
@@ -46,7 +46,7 @@ impl RigidTransfer {
         rigidity: f64,
     ) -> Result<Self, TransferError> {
         let public = PublicTransfer::new(&source.vertices, &target.vertices, aligned, cage, system)?;
-        let normals = vertex_normals(&target.vertices, &target.triangles);
+        let normals = welded_normals(&target.vertices, &target.triangles);
         let graph = CageGraph::new(&target.vertices, &normals, &target.triangles, public.target.as_ref());
         let m = public.values.len();
         let size = aligned.scale * size(&surface_vertices(&source.vertices, &source.triangles));
@@ -65,7 +65,7 @@ impl RigidTransfer {
     /// As [`PublicTransfer::pose`].
     pub fn pose(&self, frame: usize, points: &[Point]) -> Result<Vec<Point>, TransferError> {
         let (whole, pose) = self.public.moved(frame, points)?;
-        let rest = matrix_of(&self.public.values);
+        let rest = matrix(&self.public.values);
         let mut change = self.public.change(&pose);
         // Edges grow with the source's, so that a source that is scaled scales the target.
         let growth = edge_growth(&self.public.source_rest, &pose, &self.triangles);

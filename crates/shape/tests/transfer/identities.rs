@@ -165,7 +165,7 @@ fn copies_turned_at_random_are_aligned_exactly_or_known_to_be_doubtful() {
         let error = found.similarity.rotation * copy.rotation.transpose();
         let degrees = DQuat::from_mat3(&error).to_scaled_axis().length().to_degrees();
         let degrees = degrees.min(360.0 - degrees);
-        assert!(degrees < 0.01 || found.doubtful(), "{k}: {degrees} {}", found.runner_up);
+        assert!(degrees < 0.01 || found.is_ambiguous(), "{k}: {degrees} {}", found.runner_up);
         if degrees < 0.01 {
             exact += 1;
             assert!((found.similarity.scale / copy.scale - 1.0).abs() < 1e-4, "{k}: {}", found.similarity.scale);

@@ -2,9 +2,10 @@
 
 use super::Rig;
 use super::topology::{CAGE_VERTICES, triangles};
+use crate::points::vertex_normals;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Surface, outside};
-use cager_geometry::vector::{add, cross, dot, norm, sub};
+use cager_geometry::vector::{add, dot, norm, sub};
 use glam::DVec3;
 
 /// How much of a template lies outside a cage.
@@ -33,9 +34,11 @@ impl Rig {
 /// Pushes the corners of quads out until the template, and what is `margin` of its height outside of it, lies inside.
 pub fn enclose(mut rig: Rig, template: &TriMesh, margin: f64) -> (Rig, Enclosure) {
     let height = extent(rig.up, template);
-    let normals = vertex_normals(template);
+    let normals = vertex_normals(&template.vertices, &template.triangles);
     let mut wanted = template.vertices.clone();
-    wanted.extend(template.vertices.iter().zip(&normals).map(|(&p, &n)| add(p, n.map(|x| x * margin * height))));
+    wanted.extend(
+        template.vertices.iter().zip(&normals).map(|(&p, &n)| (DVec3::from(p) + margin * height * n).to_array()),
+    );
     let before = rig.cage().vertices;
     for _ in 0..ROUNDS {
         let cage = rig.cage();
@@ -80,17 +83,4 @@ pub(super) fn extent(up: Point, template: &TriMesh) -> f64 {
     let along = template.vertices.iter().map(|&p| dot(p, up));
     let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
     (high - low).max(f64::MIN_POSITIVE)
-}
-
-/// Unit normals of the vertices, of the faces around them by area; zero where there are none.
-fn vertex_normals(mesh: &TriMesh) -> Vec<Point> {
-    let mut normals = vec![[0.0; 3]; mesh.vertices.len()];
-    for &[a, b, c] in &mesh.triangles {
-        let [p, q, r] = [a, b, c].map(|v| mesh.vertices[v as usize]);
-        let normal = cross(sub(q, p), sub(r, p));
-        for v in [a, b, c] {
-            normals[v as usize] = add(normals[v as usize], normal);
-        }
-    }
-    normals.iter().map(|&n| n.map(|x| x / norm(n).max(f64::MIN_POSITIVE))).collect()
 }

@@ -24,7 +24,7 @@ struct Start<'a> {
 
 impl<'a> PersonFit<'a> {
     /// The fit of an observation, beginning at examples of the manifold.
-    pub(super) fn fit_from_search(&self, observed: &Observed<'_>) -> FrameFit {
+    pub(super) fn first_fit(&self, observed: &Observed<'_>) -> FrameFit {
         let starts = search(self.model, self.manifold, KEPT[0], observed);
         if self.options.method == Method::Paper {
             let (placement, latent) = starts.into_iter().next().unwrap_or_else(|| self.middle());

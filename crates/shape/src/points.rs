@@ -1,0 +1,82 @@
+//! Points as vectors and as matrices, and what they determine: normals, moments.
+
+use cager_geometry::linalg::symmetric_eigen;
+use cager_geometry::mesh::Point;
+use faer::{Mat, MatRef};
+use glam::{DMat3, DVec3};
+
+use crate::registration::welded;
+
+/// As vectors.
+pub(crate) fn vectors(points: &[Point]) -> Vec<DVec3> {
+    points.iter().map(|&p| p.into()).collect()
+}
+
+/// As plain points.
+pub(crate) fn plain(points: &[DVec3]) -> Vec<Point> {
+    points.iter().map(DVec3::to_array).collect()
+}
+
+/// Points as a matrix, n × 3.
+pub(crate) fn matrix<P: Copy + Into<Point>>(points: &[P]) -> Mat<f64> {
+    Mat::from_fn(points.len(), 3, |i, k| points[i].into()[k])
+}
+
+/// The rows of an n × 3 matrix as points.
+pub(crate) fn row_points(matrix: MatRef<'_, f64>) -> Vec<DVec3> {
+    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)])).collect()
+}
+
+/// The outer product `a bᵀ`.
+pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// Twice the area of a triangle times its unit normal.
+pub(crate) fn area_vector<P: Into<DVec3>>(corners: [P; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(Into::into);
+    (b - a).cross(c - a)
+}
+
+/// Unit normals of vertices, by area; zero for vertices without triangles.
+pub(crate) fn vertex_normals<P: Copy + Into<DVec3>>(vertices: &[P], triangles: &[[u32; 3]]) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::ZERO; vertices.len()];
+    for triangle in triangles {
+        let normal = area_vector(triangle.map(|v| vertices[v as usize]));
+        triangle.iter().for_each(|&v| normals[v as usize] += normal);
+    }
+    normals.into_iter().map(DVec3::normalize_or_zero).collect()
+}
+
+/// [`vertex_normals`], the same one for vertices at the same place.
+pub(crate) fn welded_normals(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<Point> {
+    let place = welded(vertices);
+    let normals = vertex_normals(vertices, &renamed(triangles, &place));
+    place.iter().map(|&first| normals[first as usize].to_array()).collect()
+}
+
+/// Triangles whose corners have these other numbers.
+pub(crate) fn renamed(triangles: &[[u32; 3]], names: &[u32]) -> Vec<[u32; 3]> {
+    triangles.iter().map(|triangle| triangle.map(|v| names[v as usize])).collect()
+}
+
+/// Mean and covariance of points.
+pub(crate) struct Moments {
+    pub(crate) center: DVec3,
+    /// Variances along the principal axes, the largest first.
+    pub(crate) variances: [f64; 3],
+    pub(crate) axes: [DVec3; 3],
+}
+
+impl Moments {
+    pub(crate) fn new<P: Copy + Into<DVec3>>(points: &[P]) -> Self {
+        let count = points.len().max(1) as f64;
+        let center = points.iter().map(|&p| p.into()).sum::<DVec3>() / count;
+        let covariance = points.iter().fold(DMat3::ZERO, |sum, &p| {
+            let offset = p.into() - center;
+            sum + outer(offset, offset)
+        });
+        let (variances, axes) = symmetric_eigen((covariance * (1.0 / count)).to_cols_array_2d());
+        Self { center, variances, axes: axes.map(DVec3::from) }
+    }
+}
