@@ -9,7 +9,7 @@ use cager_codec::{AdjacentGroups, CageBasis, decode_cages, encode_cages};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Coordinates, Green, Harmonic, MeanValue, Refinement};
 use cager_core::inversion::{BATCH, PrepareContext, Rows, Solver, SolverOptions, Step};
-use cager_core::maxvol::{self, maxvol};
+use cager_core::spectral::maxvol::{self, maxvol};
 use cager_demo::{Capture, Options};
 use cager_formats::{FrameOptions, create_frames, open_frames, read_model, write_model};
 use cager_geometry::linalg::svd::svd;

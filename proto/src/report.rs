@@ -4,9 +4,10 @@
 
 use crate::container::Header;
 use cager_core::coordinates::Refinement;
-use cager_core::inversion::{Convergence, Outcome, Threshold};
-use cager_core::maxvol::Volume;
+use cager_core::inversion::{Convergence, Outcome};
 use cager_core::numbers::number_or_null;
+use cager_core::spectral::Threshold;
+use cager_core::spectral::maxvol::Volume;
 use cager_geometry::units::Units;
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -1,7 +1,7 @@
 //! The names of what reports take from the core.
 
 use cager_core::coordinates::Refinement;
-use cager_core::maxvol::Volume;
+use cager_core::spectral::maxvol::Volume;
 
 #[test]
 fn volumes_and_refinements_keep_their_names() {

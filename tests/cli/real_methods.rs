@@ -3,8 +3,9 @@
 use crate::real_data::{cage_of, data, run};
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareContext, Rows, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Handles, PrepareContext, Rows, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
+use cager_core::spectral::Analysis;
 use cager_formats::{open_frames, read_model};
 use cager_geometry::mesh::Model;
 

@@ -1,7 +1,7 @@
 //! What people should know of a prepared solver.
 
 use cager_core::inversion::{Handles, Solver, SolverOptions};
-use cager_core::regularize::{Regularizer, WEAK_SINGULAR_VALUE};
+use cager_core::regularize::Regularizer;
 
 /// Warnings that follow from the preparation.
 pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<String> {
@@ -30,16 +30,10 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
         ));
     }
     let (read, points) = (solver.handles().len(), solver.decoder().points());
-    // Where every point is read, these are the handles of maximum volume, or none.
     if options.handles == Handles::All && read > unknowns && read < points {
         warnings.push(format!("of so many points a sample is analysed: {read} of {points} are read"));
     }
-    let sigma = &found.singular_values;
-    // None are known where the factor of the normal equations alone says that they are large enough.
-    let weak = match sigma.as_slice() {
-        [] => 0,
-        all => unknowns - all.len() + all.iter().filter(|&&s| s < WEAK_SINGULAR_VALUE * all[0]).count(),
-    };
+    let weak = found.weak;
     let strong = unknowns - weak;
     if weak > 0 {
         let consequence = match options.regularizer {

@@ -2,7 +2,7 @@
 
 use super::sample::{Frame, Sample};
 use cager_core::cage::Cage;
-use cager_core::inversion::{FactoredInversion, HandleSystem, ProjectedFrames};
+use cager_core::inversion::{Rows, Solver};
 use cager_geometry::mesh::{Point, diagonal};
 use cager_geometry::vector::distance;
 use serde::Serialize;
@@ -118,25 +118,10 @@ fn max(values: &[f64]) -> f64 {
     values.iter().copied().filter(|x| x.is_finite()).fold(f64::NAN, f64::max)
 }
 
-/// A batch of frames for one method.
-#[derive(Clone, Copy)]
-pub(crate) struct Batch<'a> {
-    /// The system whose rows the method reads.
-    pub(crate) handle_system: &'a HandleSystem<'a>,
-    /// The projected frames.
-    pub(crate) projected: &'a ProjectedFrames,
-    /// Whether to take the time of the inversion.
-    pub(crate) timed: bool,
-    /// The frames.
-    pub(crate) frames: &'a [Frame],
-    /// The same without noise.
-    pub(crate) clean: &'a [Frame],
-}
-
 /// The evaluation of a method over the capture.
 pub(crate) struct MethodEvaluation {
-    /// The method.
-    pub(crate) method: Arc<FactoredInversion>,
+    /// The method, prepared.
+    pub(crate) solver: Arc<Solver>,
     /// Whether it reads the frames with noise.
     pub(crate) noisy: bool,
     /// Results so far.
@@ -151,22 +136,19 @@ pub(crate) struct MethodEvaluation {
 
 impl MethodEvaluation {
     /// At the beginning.
-    pub(crate) fn new(method: Arc<FactoredInversion>, noisy: bool, sample: &Sample) -> Self {
+    pub(crate) fn new(solver: Arc<Solver>, noisy: bool, sample: &Sample) -> Self {
         let empty = || PerFrame::empty(sample.measured().len());
-        Self { method, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, before: VecDeque::new() }
+        Self { solver, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, before: VecDeque::new() }
     }
 
-    /// Inverts and measures the frames that follow.
-    pub(crate) fn take(&mut self, on: &Batch<'_>, sample: &Sample, shape: &Shape) {
-        let Batch { handle_system, projected, timed, frames, clean } = *on;
+    /// Inverts and measures the frames that follow; `clean` are the same without noise.
+    pub(crate) fn take(&mut self, frames: &[Frame], clean: &[Frame], sample: &Sample, shape: &Shape) {
         let views: Vec<&[f64]> = frames.iter().map(|frame| frame.points.as_slice()).collect();
         let previous = self.before.back().map(|(_, cage)| cage.as_slice());
         let clock = Instant::now();
-        let cages = handle_system.cages(&self.method, previous, projected, &views);
-        if timed {
-            self.frame_seconds = self.frame_seconds.min(clock.elapsed().as_secs_f64() / frames.len() as f64);
-        }
-        let decoder = handle_system.decoder();
+        let cages = cages(&self.solver, previous, &views);
+        self.frame_seconds = self.frame_seconds.min(clock.elapsed().as_secs_f64() / frames.len() as f64);
+        let decoder = self.solver.decoder();
         let measured: Vec<usize> = (0..frames.len()).filter(|&i| frames[i].measured).collect();
         let errors = |of: &[Frame]| {
             let cages: Vec<&[f32]> = measured.iter().map(|&i| cages[i].as_slice()).collect();
@@ -183,8 +165,9 @@ impl MethodEvaluation {
             }
             [self.found.edges_mean[at], self.found.edges_max[at]] = shape.edge_change(&cages[i]);
         }
+        let positions = decoder.positions();
         for (frame, cage) in frames.iter().zip(cages) {
-            self.follow(frame.number, cage, decoder.positions(), sample, shape.diagonal);
+            self.follow(frame.number, cage, positions, sample, shape.diagonal);
         }
     }
 
@@ -202,6 +185,11 @@ impl MethodEvaluation {
         }
         self.before.push_back((number, cage));
     }
+}
+
+/// Cages of frames by a method, after that of the frame before them.
+pub(crate) fn cages(solver: &Solver, previous: Option<&[f32]>, frames: &[&[f64]]) -> Vec<Vec<f32>> {
+    solver.invert(Rows::All, previous, frames).into_iter().map(|inverted| inverted.cage).collect()
 }
 
 /// Mean and largest `|C_{t+1} − 2 C_t + C_{t−1}|` of the first `count` rows.

@@ -1,7 +1,8 @@
 //! What the report of a comparison draws: the rest pose in its cage, some frames, and of every system the cages and models of the methods.
 
+use super::evaluation::cages;
 use super::figures::SystemFigures;
-use super::method_groups::data_alone;
+use super::method_groups::{data_alone, solver};
 use super::methods::Method;
 use super::sample::{Frame, Sample};
 use super::system::SystemStudy;
@@ -145,7 +146,7 @@ impl<'a> GeometryBuilder<'a> {
 
     /// Adds a system.
     pub(super) fn add(&mut self, study: &SystemStudy<'_>) -> Result<(), CompareError> {
-        let rows = &study.analysis.handles().rows;
+        let rows = study.analysis.handles().map_or(&[][..], |handles| &handles.rows);
         let (v, count) = (study.analysis.handle_vectors(), self.cage.vertices().len());
         let painted = &study.figures.vectors.painted;
         let system = SystemGeometry {
@@ -185,8 +186,7 @@ impl<'a> GeometryBuilder<'a> {
         let frames = [frame.points.as_slice()];
         let usual = study.figures.method(|m| m.is_cager() && m.curve).map(|m| m.method.options());
         let handle_system = study.analysis.handle_system_of(rows)?;
-        let method = handle_system.factored(usual.unwrap_or_else(data_alone))?;
-        let cages = handle_system.cages(&method, None, &handle_system.project(&frames), &frames);
+        let cages = cages(&solver(&handle_system, usual.unwrap_or_else(data_alone))?, None, &frames);
         Ok(cages.first().map(|cage| {
             let (offsets, [l2, linf]) = self.offsets(study, cage, &frame.points);
             DrawGeometry { name: name.clone(), l2, linf, offsets }

@@ -1,17 +1,14 @@
 //! Methods grouped by the rows that they read, so that frames are projected once per group.
 
-use super::evaluation::{Batch, MethodEvaluation, Shape};
+use super::evaluation::{MethodEvaluation, Shape, cages};
 use super::figures::{DRAW_FRAMES, draws};
 use super::methods::{Method, methods};
 use super::sample::{Frame, Sample};
-use cager_core::inversion::{Analysis, FactoredInversion, HandleSystem, Handles, PrepareError, Rows, SolverOptions};
+use cager_core::inversion::{Handles, PrepareError, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
+use cager_core::spectral::{Analysis, HandleSystem};
 use rayon::prelude::*;
 use std::sync::Arc;
-use std::time::Instant;
-
-/// Times of an inversion are the least of this many.
-const REPEATS: usize = 3;
 
 /// Which series this is; methods with their position in the order of all.
 #[derive(Clone)]
@@ -85,25 +82,24 @@ impl GroupPlan {
     pub(super) fn bytes(&self, analysis: &Analysis) -> usize {
         let m = analysis.coordinates().ncols();
         let columns = if analysis.decoder().dependent_normals().is_some() { analysis.decoder().columns() } else { 0 };
-        let operator = if columns > 0 { m * analysis.coordinates().nrows() } else { 0 };
-        8 * m * m * 4 + (8 * (m * m + operator) + 16 * columns * columns) * self.series.len()
+        let reads_all = self.series.iter().any(|series| series.options().handles == Handles::All);
+        let read = if reads_all { analysis.coordinates().nrows() } else { 2 * m };
+        8 * m * m * 4 + (8 * m * read + 16 * columns * columns) * self.series.len()
     }
 }
 
-/// Rows with their decomposition, and every method that reads them.
-pub(super) struct MethodGroup<'a> {
-    pub(super) handle_system: HandleSystem<'a>,
-    pub(super) methods: Vec<(SolverOptions, Arc<FactoredInversion>)>,
+/// Every method that reads the same rows.
+pub(super) struct MethodGroup {
+    methods: Vec<(SolverOptions, Arc<Solver>)>,
     pub(super) evaluations: Vec<(SeriesKind, MethodEvaluation)>,
-    is_tied: bool,
     is_draw: bool,
     /// The frames measured.
     sample: Sample,
 }
 
-impl<'a> MethodGroup<'a> {
+impl MethodGroup {
     /// Decomposes the rows of a plan and prepares its methods.
-    pub(super) fn prepare(analysis: &'a Analysis, plan: &GroupPlan, sample: &Sample) -> Result<Self, PrepareError> {
+    pub(super) fn prepare(analysis: &Analysis, plan: &GroupPlan, sample: &Sample) -> Result<Self, PrepareError> {
         let handle_system = match plan.series.first() {
             Some(SeriesKind::Draw(_, rows, _)) => analysis.handle_system_of(rows)?,
             Some(SeriesKind::Method(_, method) | SeriesKind::Noise(_, method)) => {
@@ -119,19 +115,19 @@ impl<'a> MethodGroup<'a> {
         }
         // The first alone, since it computes what all of them share.
         let (first, others) = options.split_at(1);
-        let factored = |of: &SolverOptions| Ok((*of, Arc::new(handle_system.factored(*of)?)));
-        let mut methods: Vec<(SolverOptions, Arc<FactoredInversion>)> =
-            first.iter().map(factored).collect::<Result<_, PrepareError>>()?;
-        methods.extend(others.par_iter().map(factored).collect::<Result<Vec<_>, PrepareError>>()?);
-        let is_tied = analysis.decoder().dependent_normals().is_some();
-        let sample = if is_tied && plan.is_draw() { sample.some(DRAW_FRAMES) } else { sample.clone() };
+        let prepared = |of: &SolverOptions| Ok((*of, Arc::new(solver(&handle_system, *of)?)));
+        let mut methods: Vec<(SolverOptions, Arc<Solver>)> =
+            first.iter().map(prepared).collect::<Result<_, PrepareError>>()?;
+        methods.extend(others.par_iter().map(prepared).collect::<Result<Vec<_>, PrepareError>>()?);
+        let iterates = analysis.decoder().dependent_normals().is_some();
+        let sample = if iterates && plan.is_draw() { sample.some(DRAW_FRAMES) } else { sample.clone() };
         let evaluation = |series: &SeriesKind| {
             let (_, method) = methods.iter().find(|(of, _)| *of == series.options())?;
             let evaluation = MethodEvaluation::new(method.clone(), matches!(series, SeriesKind::Noise(..)), &sample);
             Some((series.clone(), evaluation))
         };
         let evaluations = plan.series.iter().filter_map(evaluation).collect();
-        Ok(Self { handle_system, methods, evaluations, is_tied, is_draw: plan.is_draw(), sample })
+        Ok(Self { methods, evaluations, is_draw: plan.is_draw(), sample })
     }
 
     pub(super) fn is_draw(&self) -> bool {
@@ -140,35 +136,6 @@ impl<'a> MethodGroup<'a> {
 
     pub(super) fn reads_noise(&self) -> bool {
         self.evaluations.iter().any(|(_, evaluation)| evaluation.noisy)
-    }
-
-    /// Times the matrix product that encoding takes, which is the same for every method that reads these rows; where frames depend
-    /// on each other, with what that takes. Where every method iterates, series are timed while they are evaluated instead.
-    pub(super) fn time(&mut self, batch: &[Frame]) -> Result<(), PrepareError> {
-        if self.is_draw || self.is_tied {
-            return Ok(());
-        }
-        let frames: Vec<&[f64]> = batch.iter().map(|frame| frame.points.as_slice()).collect();
-        let mut known: Option<f64> = None;
-        for (series, evaluation) in &mut self.evaluations {
-            let ordered = evaluation.method.follows_previous();
-            evaluation.frame_seconds = match known.filter(|_| !ordered) {
-                Some(seconds) => seconds,
-                None => {
-                    let solver = self.handle_system.solver(series.options(), None)?;
-                    let seconds = (0..REPEATS).map(|_| {
-                        let clock = Instant::now();
-                        std::hint::black_box(solver.invert(Rows::All, None, &frames));
-                        clock.elapsed().as_secs_f64()
-                    });
-                    seconds.fold(f64::INFINITY, f64::min) / frames.len() as f64
-                }
-            };
-            if !ordered {
-                known = Some(evaluation.frame_seconds);
-            }
-        }
-        Ok(())
     }
 
     /// Inverts and measures those of the frames that follow which are needed; `with_noise` are all of them with noise, for methods.
@@ -185,25 +152,22 @@ impl<'a> MethodGroup<'a> {
         if batch.is_empty() {
             return;
         }
-        let project = |of: &[Frame]| {
-            let frames: Vec<&[f64]> = of.iter().map(|frame| frame.points.as_slice()).collect();
-            self.handle_system.project(&frames)
-        };
-        let clean = project(batch);
-        let noisy = self.reads_noise().then(|| project(with_noise));
-        let (handle_system, is_tied, sample) = (&self.handle_system, self.is_tied, &self.sample);
+        let sample = &self.sample;
         self.evaluations.par_iter_mut().for_each(|(_, evaluation)| {
-            let (frames, projected) = match &noisy {
-                Some(noisy) if evaluation.noisy => (with_noise, noisy),
-                _ => (batch, &clean),
-            };
-            evaluation.take(&Batch { handle_system, projected, timed: is_tied, frames, clean: batch }, sample, shape);
+            evaluation.take(if evaluation.noisy { with_noise } else { batch }, batch, sample, shape);
         });
     }
 
-    /// Cages of up to a batch of frames by the method with these options, if it is among these.
+    /// Cages of frames by the method with these options, if it is among these.
     pub(super) fn invert(&self, options: SolverOptions, frames: &[&[f64]]) -> Option<Vec<Vec<f32>>> {
-        let (_, method) = self.methods.iter().find(|(of, _)| *of == options)?;
-        Some(self.handle_system.cages(method, None, &self.handle_system.project(frames), frames))
+        let (_, solver) = self.methods.iter().find(|(of, _)| *of == options)?;
+        Some(cages(solver, None, frames))
     }
+}
+
+/// A method as the paper has it: where its cages run away from a frame, nothing brings them back, unless iterations start from them.
+pub(super) fn solver(handle_system: &HandleSystem<'_>, options: SolverOptions) -> Result<Solver, PrepareError> {
+    let solver = handle_system.solver(options, None)?;
+    let iterates = solver.decoder().dependent_normals().is_some();
+    Ok(if iterates { solver } else { solver.without_nearness() })
 }

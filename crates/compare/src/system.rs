@@ -6,7 +6,8 @@ use super::method_groups::{GroupPlan, MethodGroup, SeriesKind, plans};
 use super::noise::{RADIUS, noisy};
 use super::sample::{Frame, Sample};
 use super::{CompareError, Job, Progress};
-use cager_core::inversion::{Analysis, BATCH, SolverOptions, default_spectrum};
+use cager_core::inversion::{BATCH, SolverOptions, default_spectrum};
+use cager_core::spectral::Analysis;
 use rayon::prelude::*;
 
 /// Memory for groups of methods that are evaluated together, beside the coordinates they share.
@@ -22,7 +23,7 @@ pub(super) struct SystemStudy<'a> {
     pub(super) figures: SystemFigures,
     pub(super) analysis: &'a Analysis,
     /// The groups of methods, with their prepared systems.
-    pub(super) method_groups: Vec<MethodGroup<'a>>,
+    pub(super) method_groups: Vec<MethodGroup>,
     /// Mean and largest second temporal difference of the model itself.
     pub(super) motion: [f64; 2],
     /// Name and rows of the random draw with the median error.
@@ -53,7 +54,7 @@ pub(super) fn study<'a>(
     let unknowns = analysis.coordinates().ncols();
     let usual = default_spectrum(unknowns);
     let damping = spectra.handles[spectra.handles.len().saturating_sub(usual + 1)];
-    let start = ("pivoted LU".to_owned(), analysis.handles().start.clone());
+    let start = ("pivoted LU".to_owned(), analysis.handles().map_or_else(Vec::new, |handles| handles.start.clone()));
     let plans = plans(job.rest.points.len(), unknowns, usual, damping, sample.is_complete(), start);
 
     let mut found = Results::default();
@@ -76,7 +77,7 @@ pub(super) fn study<'a>(
         let prepared: Vec<_> = group.par_iter().map(|plan| MethodGroup::prepare(analysis, plan, sample)).collect();
         // Rows drawn at random may determine nothing.
         let useful = prepared.into_iter().zip(group).filter(|(choice, plan)| choice.is_ok() || !plan.is_draw());
-        let mut method_groups: Vec<MethodGroup<'a>> = useful.map(|(choice, _)| choice).collect::<Result<_, _>>()?;
+        let mut method_groups: Vec<MethodGroup> = useful.map(|(choice, _)| choice).collect::<Result<_, _>>()?;
         let here: usize = group.iter().map(|plan| plan.series.len()).sum();
         let motion = (through == 0).then_some(&mut motion);
         follow(job, &mut method_groups, motion, sample, shape, &mut |done| {
@@ -119,7 +120,7 @@ pub(super) fn study<'a>(
 /// Evaluates all groups of methods on the frames of the capture.
 fn follow(
     job: &Job<'_>,
-    method_groups: &mut [MethodGroup<'_>],
+    method_groups: &mut [MethodGroup],
     mut motion: Option<&mut Motion>,
     sample: &Sample,
     shape: &Shape,
@@ -128,17 +129,11 @@ fn follow(
     let mut reader = (job.open)()?;
     let size = (BATCH_BYTES / (24 * job.rest.points.len())).clamp(1, BATCH);
     let any_noise = method_groups.iter().any(MethodGroup::reads_noise);
-    let (mut next, mut batch, mut timed) = (0, Vec::new(), false);
+    let (mut next, mut batch) = (0, Vec::new());
     loop {
         sample.fill(reader.as_mut(), &mut next, size, &mut batch)?;
         if batch.is_empty() {
             return Ok(());
-        }
-        if !timed {
-            for choice in method_groups.iter_mut() {
-                choice.time(&batch)?;
-            }
-            timed = true;
         }
         if let Some(motion) = &mut motion {
             motion.take(&batch, sample, shape.diagonal);
@@ -164,14 +159,14 @@ struct Results {
 
 impl Results {
     /// Moves the results of a group of methods here; returns the group without its series.
-    fn collect<'a>(&mut self, mut choice: MethodGroup<'a>) -> MethodGroup<'a> {
+    fn collect(&mut self, mut choice: MethodGroup) -> MethodGroup {
         for (series, evaluation) in std::mem::take(&mut choice.evaluations) {
-            self.collect_series(&choice, series, evaluation);
+            self.collect_series(series, evaluation);
         }
         choice
     }
 
-    fn collect_series(&mut self, choice: &MethodGroup<'_>, series: SeriesKind, evaluation: MethodEvaluation) {
+    fn collect_series(&mut self, series: SeriesKind, evaluation: MethodEvaluation) {
         let totals = evaluation.found.totals();
         match series {
             SeriesKind::Method(order, method) => {
@@ -188,7 +183,7 @@ impl Results {
             SeriesKind::Draw(name, rows, _) => match self.draws.last_mut().filter(|draw| draw.choice == name) {
                 Some(draw) => draw.totals = totals,
                 None => {
-                    let sigma = choice.handle_system.singular_values();
+                    let sigma = &evaluation.solver.preparation().singular_values;
                     let (first, last) = (sigma.first().copied().unwrap_or(0.0), sigma.last().copied().unwrap_or(0.0));
                     // For dependent rows this is rounding; a plot needs a finite value.
                     let condition = (first / last).min(1.0 / f64::EPSILON);

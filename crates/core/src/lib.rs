@@ -4,13 +4,12 @@ mod batch;
 pub mod cage;
 pub mod coordinates;
 pub mod decode;
-pub mod handles;
 pub mod inversion;
-pub mod maxvol;
+mod morton;
 pub mod numbers;
 pub mod regularize;
-mod row_basis;
 mod simd;
+pub mod spectral;
 pub mod sted;
 
 /// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on

@@ -5,7 +5,8 @@ mod common;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_core::decode::{Decoder, FrameError};
-use cager_core::inversion::{Analysis, Handles, PrepareContext, Solver, SolverOptions};
+use cager_core::inversion::{Handles, PrepareContext, Solver, SolverOptions};
+use cager_core::spectral::Analysis;
 use cager_demo::{Capture, Options};
 use common::Cages;
 

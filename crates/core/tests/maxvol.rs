@@ -2,7 +2,7 @@
 
 mod common;
 
-use cager_core::maxvol::{TOLERANCE, maxvol};
+use cager_core::spectral::maxvol::{TOLERANCE, maxvol};
 use common::Random;
 use faer::Mat;
 

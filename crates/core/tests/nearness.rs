@@ -4,7 +4,7 @@ mod common;
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
-use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions, SolverParts};
+use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_core::regularize::Regularizer;
 use cager_demo::{Capture, Options};
 use cager_geometry::mesh::{Point, TriMesh, bounds, diagonal};
@@ -49,24 +49,7 @@ fn trembling(capture: &Capture) -> Vec<Vec<f64>> {
 
 /// Without what keeps its cages near.
 fn let_go(solver: &Solver) -> Solver {
-    let dependent = solver.dependent().map(|(normals, gram, weight)| cager_core::inversion::DependentParts {
-        normals: normals.clone(),
-        gram: gram.to_owned(),
-        weight,
-    });
-    Solver::from_parts(SolverParts {
-        handles: solver.handles().to_vec(),
-        reads_all: solver.reads_all(),
-        operator: solver.operator().to_owned(),
-        target: solver.regularization_target().clone(),
-        phi: solver.decoder().coordinates().unwrap().to_owned(),
-        positions: solver.decoder().positions(),
-        dependent,
-        nearness: None,
-        diagonal: solver.diagonal(),
-        preparation: solver.preparation().clone(),
-    })
-    .unwrap()
+    solver.clone().without_nearness()
 }
 
 /// How many diagonals a frame's cage is away from it, at the most, beyond what the rest cage is.

@@ -6,8 +6,9 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{
     CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, Green, MeanValue,
 };
-use cager_core::inversion::{Analysis, BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
+use cager_core::inversion::{BATCH, Handles, PrepareContext, PrepareError, Solver, SolverOptions};
 use cager_core::regularize::{Reference, Regularizer, TermError};
+use cager_core::spectral::Analysis;
 use cager_demo::{Capture, Options};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::Point;

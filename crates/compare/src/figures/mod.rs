@@ -114,7 +114,7 @@ pub(crate) struct MethodFigures {
     pub(crate) totals: Totals,
     /// Every measured frame.
     pub(crate) per_frame: PerFrame,
-    /// Seconds of one inversion, on one thread, in a batch; of methods that read the same rows the same product, timed once.
+    /// Seconds of one inversion, on one thread, in a batch: the least of all batches.
     pub(crate) frame_seconds: f64,
 }
 

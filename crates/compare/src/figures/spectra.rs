@@ -1,6 +1,6 @@
 //! Singular values of `Φ□`, `Φ` and `ΦᵀΦ` (the paper's Figs. 6 and 9).
 
-use cager_core::inversion::Analysis;
+use cager_core::spectral::Analysis;
 use serde::Serialize;
 
 /// Singular values, descending, and condition numbers over the numerical rank. Those of `ΦᵀΦ` are the squares of those of `Φ`.

@@ -1,8 +1,8 @@
 //! Volume and condition number of `Φ□` after every swap of maxvol (the paper's Fig. 4).
 
 use crate::noise::Random;
-use cager_core::inversion::Analysis;
-use cager_core::maxvol::{MaxVol, TOLERANCE, maxvol_from, start_rows};
+use cager_core::spectral::Analysis;
+use cager_core::spectral::maxvol::{MaxVol, TOLERANCE, maxvol_from, start_rows};
 use faer::Mat;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -19,7 +19,7 @@ const DRAWN: [usize; 7] = [2, 3, 4, 5, 6, 8, 16];
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Swaps {
     /// From the rows that LU with partial pivoting picks, as every encoding does it.
-    pub(crate) from_lu: SwapTrace,
+    pub(crate) from_lu: Option<SwapTrace>,
     /// From rows that LU picks among a few points drawn at random; null where no independent ones were found.
     pub(crate) from_random: Option<SwapTrace>,
 }
@@ -42,7 +42,7 @@ impl Swaps {
     pub(crate) fn of(analysis: &Analysis) -> Self {
         let phi = analysis.coordinates();
         let all: Vec<u32> = (0..phi.nrows() as u32).collect();
-        let from_lu = || SwapTrace::of(analysis.handles(), analysis, &all);
+        let from_lu = || analysis.handles().map(|handles| SwapTrace::of(handles, analysis, &all));
         let (from_lu, from_random) = rayon::join(from_lu, || from_random(analysis));
         Self { from_lu, from_random }
     }

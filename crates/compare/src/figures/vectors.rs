@@ -1,6 +1,6 @@
 //! Localisation of the singular vectors of `Φ□` on the cage (the paper's Figs. 11 and 15).
 
-use cager_core::inversion::Analysis;
+use cager_core::spectral::Analysis;
 use serde::Serialize;
 
 /// Vectors painted from the beginning and from the end.

@@ -5,11 +5,11 @@ use super::checks::{
 };
 use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions, Step};
 
+use super::Handles;
 use crate::cage::Cage;
 use crate::coordinates::{CageValues, CoordinateSystem, MeanValue, PointwiseCoordinates};
 use crate::decode::{Decoder, for_each_chunk};
-use crate::handles::Handles;
-use crate::handles::farthest::morton_order;
+use crate::morton::morton_order;
 use cager_geometry::mesh::{Point, diagonal};
 use faer::Mat;
 use rayon::prelude::*;
@@ -21,21 +21,36 @@ const ROWS_PER_UNKNOWN: usize = 8;
 const NEAREST: usize = 8;
 
 /// Coordinates for the analysis and for decoding.
-pub(super) struct AnalysisCoordinates {
+pub(crate) struct AnalysedCoordinates {
     /// `Φ` of the points analysed, in the system that the inversion starts from.
-    pub(super) phi: Mat<f64>,
+    pub(crate) phi: Mat<f64>,
     /// The points analysed.
-    pub(super) points: Vec<Point>,
+    pub(crate) points: Vec<Point>,
     /// Their indices in the model, ascending, where they are not all.
-    pub(super) sample: Option<Vec<u32>>,
+    pub(crate) sample: Option<Vec<u32>>,
     /// The decoder, where its coordinates are not `phi`.
-    pub(super) decoder: Option<Decoder>,
+    pub(crate) decoder: Option<Decoder>,
     /// Unknowns of the rest pose, m × 3.
-    pub(super) rest: Vec<Point>,
+    pub(crate) rest: Vec<Point>,
     /// Diagonal of the rest pose's bounding box.
-    pub(super) diagonal: f64,
+    pub(crate) diagonal: f64,
     /// As far as it follows from the coordinates.
-    pub(super) preparation: PreparationReport,
+    pub(crate) preparation: PreparationReport,
+}
+
+impl AnalysedCoordinates {
+    /// Of all points, or, for a solver that reads these handles, of a sample of a very large model, once points and options are checked.
+    pub(crate) fn checked(
+        (system, cage, points): (&dyn CoordinateSystem, &Cage, &[Point]),
+        options: SolverOptions,
+        handles: Option<Handles>,
+        context: &PrepareContext<'_>,
+    ) -> Result<Self, PrepareError> {
+        check(points, system.values(cage).unknowns(), options, context.memory)?;
+        reject_far_points(cage, points)?;
+        context.begin(Step::Coordinates)?;
+        coordinates(system, cage, points, handles, context)
+    }
 }
 
 /// A sample of points spaced evenly along a space-filling curve; `None` where all points are analysed, as for every choice of handles. It has at least as many points as the handles
@@ -55,19 +70,6 @@ fn sample(points: &[Point], unknowns: usize, handles: Option<Handles>, entries: 
     Some(sample)
 }
 
-/// As [`coordinates`], once points and options are checked.
-pub(super) fn checked_coordinates(
-    (system, cage, points): (&dyn CoordinateSystem, &Cage, &[Point]),
-    options: SolverOptions,
-    handles: Option<Handles>,
-    context: &PrepareContext<'_>,
-) -> Result<AnalysisCoordinates, PrepareError> {
-    check(points, system.values(cage).unknowns(), options, context.memory)?;
-    reject_far_points(cage, points)?;
-    context.begin(Step::Coordinates)?;
-    coordinates(system, cage, points, handles, context)
-}
-
 /// Coordinates of all points, or, for a solver that reads these handles, of a sample of a very large model.
 fn coordinates(
     system: &dyn CoordinateSystem,
@@ -75,7 +77,7 @@ fn coordinates(
     points: &[Point],
     handles: Option<Handles>,
     context: &PrepareContext<'_>,
-) -> Result<AnalysisCoordinates, PrepareError> {
+) -> Result<AnalysedCoordinates, PrepareError> {
     let copies = if handles.is_none() { 3 } else { 2 };
     let values = system.values(cage);
     let (m, columns) = (values.unknowns(), values.columns());
@@ -108,7 +110,7 @@ fn coordinates(
     let (refinement, plan) = (found.refinement, found.plan);
     let preparation = PreparationReport { refinement, plan, ..report(cage, points, &found.outside, worst.1) };
     let (points, diagonal) = (points.to_vec(), diagonal(points));
-    Ok(AnalysisCoordinates { phi, points, sample: None, decoder, rest, diagonal, preparation })
+    Ok(AnalysedCoordinates { phi, points, sample: None, decoder, rest, diagonal, preparation })
 }
 
 fn of_sample(
@@ -118,7 +120,7 @@ fn of_sample(
     points: &[Point],
     mut sample: Vec<u32>,
     keeps: bool,
-) -> Result<AnalysisCoordinates, PrepareError> {
+) -> Result<AnalysedCoordinates, PrepareError> {
     let (unknowns, columns) = (values.unknowns(), values.columns());
     let mut rest = values.rest;
     let mut nearest: Vec<Vec<(f64, u32)>> = vec![Vec::new(); columns];
@@ -158,7 +160,7 @@ fn of_sample(
     } else {
         pointwise(cage, &sampled)
     };
-    Ok(AnalysisCoordinates {
+    Ok(AnalysedCoordinates {
         phi: start.phi,
         points: sampled,
         sample: Some(sample),

@@ -136,6 +136,6 @@ pub(super) fn reproduction_error(
 }
 
 /// Unknowns relative to the first vertex, m × 3, which keeps precision; the target does not depend on translations.
-pub(super) fn about_first(unknowns: &[Point], positions: usize) -> Mat<f64> {
+pub(crate) fn about_first(unknowns: &[Point], positions: usize) -> Mat<f64> {
     Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { unknowns[0][k] } else { 0.0 })
 }

@@ -2,7 +2,7 @@
 
 use super::PrepareError;
 use crate::coordinates::{ElementPlan, Refinement};
-use crate::maxvol::Volume;
+use crate::spectral::maxvol::Volume;
 use cager_geometry::linalg::SparseMatrix;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -16,12 +16,15 @@ pub struct PreparationReport {
     pub affine_reproduction_error: f64,
     /// Condition number of `Φ`, over its rank.
     pub condition_full: f64,
-    /// Condition number of the rows read, over their rank; of `Φ□` where every point is read. NaN in an analysis for rows that are given later.
+    /// Condition number of the rows read, over their rank. NaN in an analysis for rows that are given later.
     pub condition_handles: f64,
     /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read. Of
-    /// 1,024 unknowns or more, of which few are regularised, only the first one and the last are computed; the others are NaN.
+    /// 1,024 unknowns or more, of which few are regularised, only the first one and the last are computed; the others are NaN. None where all
+    /// points are solved for by normal equations.
     pub singular_values: Vec<f64>,
-    /// How the handles of maximum volume were found.
+    /// Singular directions below [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE): the points hardly determine them.
+    pub weak: usize,
+    /// How the handles of maximum volume were found; zeros where none were looked for.
     pub maxvol: Volume,
     /// Points outside the cage, ascending.
     pub outside: Vec<u32>,
@@ -82,7 +85,7 @@ impl Default for PrepareContext<'_> {
 }
 
 impl PrepareContext<'_> {
-    pub(super) fn begin(&self, step: Step) -> Result<(), PrepareError> {
+    pub(crate) fn begin(&self, step: Step) -> Result<(), PrepareError> {
         match (self.before_step)(step) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(PrepareError::Stopped),

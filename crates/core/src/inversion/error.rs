@@ -125,6 +125,6 @@ pub enum PrepareError {
 }
 
 /// That a computation did not succeed.
-pub(super) fn failed(what: &'static str) -> PrepareError {
+pub(crate) fn failed(what: &'static str) -> PrepareError {
     PrepareError::NoSolution { what }
 }

@@ -1,25 +1,18 @@
 //! Least squares over all points, regularised over the whole spectrum, by its normal equations:
 //! `(ΦᵀΦ + w ΔᵀΔ) C = Φᵀ P + w ΔᵀΔ C₀` with `w = λ n/m`, so that λ is relative to the mean square error of the points.
 
-use super::analysed_coordinates::AnalysisCoordinates;
-use super::checks::about_first;
-use super::nearness::Nearness;
-use super::operator::padded_to_tiles;
-use super::translations::with_unit_row_sums;
-use super::{PreparationReport, PrepareContext, PrepareError, RegularizationTarget, Solver, SolverOptions, Step};
+use super::{
+    AnalysedCoordinates, Handles, Nearness, PreparationReport, PrepareContext, PrepareError, RegularizationTarget,
+    Solver, SolverOptions, Step, about_first, failed, padded_to_tiles, with_unit_row_sums,
+};
 use crate::cage::Cage;
 use crate::decode::Decoder;
-use crate::handles::Handles;
-use crate::maxvol::RANK_TOLERANCE;
-use crate::regularize::{Reference, Regularizer, add_term};
+use crate::regularize::{Reference, Regularizer, WEAK_SINGULAR_VALUE, add_term};
 use cager_geometry::linalg::{self, svd};
 use faer::{Mat, MatRef};
 
 /// Pivots of the normal equations below this fraction of their diagonal entries leave too few digits: singular directions solve such systems.
 const SMALLEST_PIVOT: f64 = 1e-10;
-
-/// Condition number of `Φ` up to which the Cholesky factor of `ΦᵀΦ` keeps its smallest singular values to four digits.
-const FACTOR_IS_SAFE: f64 = 1e6;
 
 /// Whether the options ask for all points and a term over the whole spectrum.
 pub(super) fn applies(options: SolverOptions, unknowns: usize) -> bool {
@@ -33,19 +26,19 @@ pub(super) fn applies(options: SolverOptions, unknowns: usize) -> bool {
 /// # Errors
 /// [`PrepareError::Stopped`], and where a decomposition does not converge.
 pub(super) fn solver(
-    found: AnalysisCoordinates,
+    found: AnalysedCoordinates,
     cage: &Cage,
     delta: MatRef<'_, f64>,
     options: SolverOptions,
     context: &PrepareContext<'_>,
-) -> Result<Result<Solver, AnalysisCoordinates>, PrepareError> {
+) -> Result<Result<Solver, AnalysedCoordinates>, PrepareError> {
     context.begin(Step::Operator)?;
     let phi = found.phi.as_ref();
     let (n, m) = phi.shape();
     let positions = cage.vertices().len();
     let weight = options.lambda * n as f64 / m as f64;
-    let normal = linalg::mirrored(linalg::lower_product(phi.transpose(), phi));
-    let mut system = normal.clone();
+    let gram = linalg::lower_product(phi.transpose(), phi);
+    let mut system = gram.clone();
     add_term(&mut system, delta, weight);
     // The inverse, the target of the rest cage, and what a translation of that cage would add to it.
     let reference = options.regularizer.reference();
@@ -77,17 +70,14 @@ pub(super) fn solver(
         }
     };
     let operator = || padded_to_tiles(with_unit_row_sums(linalg::tall_product(phi, inverse), positions));
-    let conditioned = || conditioning(phi, normal);
-    let (operator, spectrum) = rayon::join(operator, conditioned);
-    let Conditioning { factor, rank, condition, singular_values } =
-        spectrum.ok_or(super::error::failed("singular value decomposition of the coordinates"))?;
-    let scale = (m as f64 / n as f64).sqrt();
-    let factor = faer::Scale(scale) * factor;
+    let (operator, determined) = rayon::join(operator, || Determined::of(gram));
+    let Determined { factor, rank, condition, weak } = determined.ok_or(failed("factorisation of the coordinates"))?;
+    let factor = faer::Scale((m as f64 / n as f64).sqrt()) * factor;
     let nearness =
         options.regularizer.is_sub_spectral().then(|| Nearness::new(factor, &found.rest, cage, &found.points));
-    let AnalysisCoordinates { phi, sample, decoder, diagonal, preparation, .. } = found;
+    let AnalysedCoordinates { phi, sample, decoder, diagonal, preparation, .. } = found;
     let (condition_full, condition_handles) = (condition, condition);
-    let preparation = PreparationReport { rank, condition_full, condition_handles, singular_values, ..preparation };
+    let preparation = PreparationReport { rank, condition_full, condition_handles, weak, ..preparation };
     Ok(Ok(Solver {
         reads_all: sample.is_none(),
         handles: sample.unwrap_or_default(),
@@ -102,32 +92,31 @@ pub(super) fn solver(
 }
 
 /// What the points determine of a cage.
-struct Conditioning {
-    /// Upper triangular R with `ΦᵀΦ = RᵀR`.
+struct Determined {
+    /// F with `FᵀF = ΦᵀΦ`, one row for each of the rank.
     factor: Mat<f64>,
-    /// Numerical rank of `Φ`.
+    /// Numerical rank of `ΦᵀΦ`.
     rank: usize,
-    /// Condition number over the rank.
+    /// Condition number of `Φ` over the rank.
     condition: f64,
-    /// All singular values, descending, where it took them to find out.
-    singular_values: Vec<f64>,
+    /// Directions of which the points say next to nothing.
+    weak: usize,
 }
 
-/// From the Cholesky factor of `ΦᵀΦ`, and of an ill-conditioned `Φ` from its QR factorisation. `None` where that does not converge.
-fn conditioning(phi: MatRef<'_, f64>, normal: Mat<f64>) -> Option<Conditioning> {
-    let m = phi.ncols();
-    if let Some(factor) = linalg::cholesky(normal) {
-        let factor = factor.transpose().to_owned();
-        let inverse = linalg::upper_inverse(factor.as_ref());
-        let [first, last] = svd::ends(None, factor.as_ref(), inverse.as_ref());
-        let condition = first / last;
-        if condition <= FACTOR_IS_SAFE {
-            return Some(Conditioning { factor, rank: m, condition, singular_values: Vec::new() });
+impl Determined {
+    /// From the pivots of `ΦᵀΦ`. `None` where it is not finite.
+    fn of(gram: Mat<f64>) -> Option<Self> {
+        let m = gram.nrows();
+        let (lower, order) = linalg::pivoted_cholesky(gram)?;
+        let rank = lower.ncols();
+        let first = lower.submatrix(0, 0, rank, rank).transpose().to_owned();
+        let inverse = linalg::upper_inverse(first.as_ref());
+        let [largest, smallest] = svd::ends(first.as_ref(), inverse.as_ref());
+        let strong = (0..rank).filter(|&k| lower[(k, k)] >= WEAK_SINGULAR_VALUE * lower[(0, 0)]).count();
+        let mut factor = Mat::zeros(rank, m);
+        for (i, &column) in order.iter().enumerate() {
+            factor.col_mut(column).copy_from(lower.row(i).transpose());
         }
+        Some(Self { factor, rank, condition: largest / smallest, weak: m - strong })
     }
-    let factor = linalg::upper_factor(phi.to_owned());
-    let singular_values = svd::singular_values(factor.as_ref())?;
-    let rank = singular_values.iter().filter(|&&s| s > RANK_TOLERANCE * singular_values[0]).count();
-    let condition = singular_values[0] / *singular_values.get(rank.checked_sub(1)?)?;
-    Some(Conditioning { factor, rank, condition, singular_values })
 }

@@ -2,37 +2,36 @@
 //! Gauss–Newton steps where normals are functions of the vertices.
 
 mod analysed_coordinates;
-mod analysis;
 mod checks;
 mod consistent;
 mod context;
 mod error;
-mod factored;
-mod handle_system;
+mod handles;
 mod least_squares;
 mod nearness;
-mod operator;
 mod options;
 mod parts;
 mod prepare;
 mod solve;
-mod spectra;
 mod target;
-mod threshold;
 mod translations;
 
 pub use crate::batch::BATCH;
-pub use crate::handles::Handles;
-pub use analysis::Analysis;
 pub use checks::{check_options, coordinates_bytes, reject_far_points};
 pub use consistent::{Convergence, Outcome};
 pub use context::{PreparationReport, PrepareContext, Step};
 pub use error::PrepareError;
-pub use factored::{FactoredInversion, ProjectedFrames};
-pub use handle_system::HandleSystem;
+pub use handles::Handles;
 pub use nearness::NearnessParts;
 pub use options::{SolverOptions, default_spectrum};
 pub use parts::{DependentParts, SolverParts};
 pub use solve::{InvertedFrame, Rows, Solver};
 pub use target::RegularizationTarget;
-pub use threshold::Threshold;
+
+pub(crate) use analysed_coordinates::AnalysedCoordinates;
+pub(crate) use checks::about_first;
+pub(crate) use consistent::Consistent;
+pub(crate) use error::failed;
+pub(crate) use nearness::Nearness;
+pub(crate) use solve::padded_to_tiles;
+pub(crate) use translations::{with_unit_row_sums, with_zero_row_sums};

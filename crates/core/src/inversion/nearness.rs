@@ -46,7 +46,7 @@ pub struct NearnessParts {
 
 impl Nearness {
     /// For the points of a rest pose, from F with `FᵀF = AᵀA`; `None` where there is no cage.
-    pub(super) fn new(factor: Mat<f64>, unknowns: &[Point], cage: &Cage, points: &[Point]) -> Option<Self> {
+    pub(crate) fn new(factor: Mat<f64>, unknowns: &[Point], cage: &Cage, points: &[Point]) -> Option<Self> {
         Self::from_parts(NearnessParts {
             factor,
             rest: Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k]),

@@ -1,6 +1,6 @@
 //! Options of a solver.
 
-use crate::handles::Handles;
+use super::Handles;
 use crate::regularize::Regularizer;
 
 /// Options of a solver.
@@ -25,6 +25,19 @@ impl SolverOptions {
     pub const PAPER: Self =
         Self { handles: Handles::MaxVol, regularizer: Regularizer::Laplacian, spectrum: DEFAULT_SPECTRUM, lambda: 1.0 };
 
+    /// Without a regularisation term whose λ is zero, which is the same as a threshold of zero.
+    pub(crate) fn without_idle_term(self) -> Self {
+        if self.lambda > 0.0 {
+            return self;
+        }
+        let usual = Self { spectrum: 0, lambda: Self::default().lambda, ..self };
+        match self.regularizer {
+            Regularizer::Global => Self { regularizer: Regularizer::None, ..usual },
+            regularizer if regularizer.is_sub_spectral() => usual,
+            _ => self,
+        }
+    }
+
     /// Default options for a cage of so many unknowns.
     pub fn for_unknowns(unknowns: usize) -> Self {
         Self { spectrum: default_spectrum(unknowns), ..Self::default() }
@@ -44,18 +57,5 @@ impl Default for SolverOptions {
             spectrum: DEFAULT_SPECTRUM,
             lambda: 1.0,
         }
-    }
-}
-
-/// Drops the regularisation term where λ is zero, which makes it the same as a threshold of zero.
-pub(super) fn drop_zero_weight_regularizer(options: SolverOptions) -> SolverOptions {
-    if options.lambda > 0.0 {
-        return options;
-    }
-    let usual = SolverOptions { spectrum: 0, lambda: SolverOptions::default().lambda, ..options };
-    match options.regularizer {
-        Regularizer::Global => SolverOptions { regularizer: Regularizer::None, ..usual },
-        regularizer if regularizer.is_sub_spectral() => usual,
-        _ => options,
     }
 }

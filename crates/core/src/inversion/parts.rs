@@ -72,6 +72,12 @@ impl Solver {
         self.nearness.as_ref().map(|nearness| nearness.parts())
     }
 
+    /// The same solver, whose cages go where the data take them.
+    #[must_use]
+    pub fn without_nearness(self) -> Self {
+        Self { nearness: None, ..self }
+    }
+
     /// Reassembles a solver whose results are bit-identical to those of the original. `None` where the parts are inconsistent.
     pub fn from_parts(parts: SolverParts) -> Option<Self> {
         let SolverParts {
@@ -111,7 +117,7 @@ impl Solver {
             Some(parts) => Some(Arc::new(Nearness::from_parts(parts).filter(|nearness| nearness.unknowns() == m)?)),
             None => None,
         };
-        let operator = super::operator::padded_to_tiles(operator);
+        let operator = super::padded_to_tiles(operator);
         Some(Self { handles, reads_all, operator, target, consistent, nearness, decoder, diagonal, preparation })
     }
 }

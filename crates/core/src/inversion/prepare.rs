@@ -1,10 +1,11 @@
 //! Preparation of a solver: coordinates, handles, spectrum and operator.
 
-use super::analysed_coordinates::checked_coordinates;
+use super::AnalysedCoordinates;
 use super::checks::{check, reject_far_points};
-use super::{Analysis, PrepareContext, PrepareError, Solver, SolverOptions, Step, least_squares};
+use super::{PrepareContext, PrepareError, Solver, SolverOptions, Step, least_squares};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
+use crate::spectral::Analysis;
 use cager_geometry::mesh::Point;
 
 impl Solver {
@@ -52,7 +53,7 @@ impl Solver {
         let values = system.values(cage);
         let unknowns = values.unknowns();
         let delta = options.regularizer.delta(context.matrix, cage, unknowns)?;
-        let mut found = checked_coordinates((system, cage, points), options, Some(options.handles), context)?;
+        let mut found = AnalysedCoordinates::checked((system, cage, points), options, Some(options.handles), context)?;
         if values.dependent_normals.is_none() && least_squares::applies(options, unknowns) {
             match least_squares::solver(found, cage, delta.as_ref(), options, context)? {
                 Ok(solver) => return Ok(solver),

@@ -15,18 +15,18 @@ use std::sync::Arc;
 /// A prepared inversion: `C_t = R · H_t`, plus a constant or a linear function of the previous cage for some terms.
 #[derive(Clone, Debug)]
 pub struct Solver {
-    pub(super) handles: Vec<u32>,
-    pub(super) reads_all: bool,
+    pub(crate) handles: Vec<u32>,
+    pub(crate) reads_all: bool,
     /// `Rᵀ`, K × m, column-major: one row per point read; padded with zero columns to a whole tile.
-    pub(super) operator: Mat<f64>,
-    pub(super) target: RegularizationTarget,
+    pub(crate) operator: Mat<f64>,
+    pub(crate) target: RegularizationTarget,
     /// The consistent inversion, where normals are functions of the vertices.
-    pub(super) consistent: Option<Arc<Consistent>>,
+    pub(crate) consistent: Option<Arc<Consistent>>,
     /// Brings cages back to their frames; `None` without a term that holds them.
-    pub(super) nearness: Option<Arc<Nearness>>,
-    pub(super) decoder: Decoder,
-    pub(super) diagonal: f64,
-    pub(super) preparation: PreparationReport,
+    pub(crate) nearness: Option<Arc<Nearness>>,
+    pub(crate) decoder: Decoder,
+    pub(crate) diagonal: f64,
+    pub(crate) preparation: PreparationReport,
 }
 
 /// What is given of a frame.
@@ -55,7 +55,7 @@ impl Solver {
         &self.preparation
     }
 
-    /// Indices of the points read, K, in the order in which they are read. With [`Handles::All`](crate::handles::Handles::All) every point is
+    /// Indices of the points read, K, in the order in which they are read. With [`Handles::All`](super::Handles::All) every point is
     /// read: these are those of maximum volume, or none where no handles were chosen; for a very large model they are its sample, and no
     /// other point is read.
     pub fn handles(&self) -> &[u32] {
@@ -202,4 +202,10 @@ impl Solver {
 
 fn single(cage: &[Point]) -> Vec<f32> {
     cage.as_flattened().iter().map(|&x| x as f32).collect()
+}
+
+/// Zero columns up to a whole tile, see `product_columns`.
+pub(crate) fn padded_to_tiles(mut operator: Mat<f64>) -> Mat<f64> {
+    operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(linalg::TILE_ROWS), |_, _| 0.0);
+    operator
 }

@@ -22,7 +22,7 @@ pub enum RegularizationTarget {
 
 impl RegularizationTarget {
     /// Towards the previous frame's cage by this linear map of it, and at first towards the rest cage.
-    pub(super) fn towards_previous(to_cage: Mat<f64>, rest: &[Point], positions: usize) -> Self {
+    pub(crate) fn towards_previous(to_cage: Mat<f64>, rest: &[Point], positions: usize) -> Self {
         let first = rest.iter().flatten().map(|&x| x as f32).collect();
         Self::Previous { operator: with_zero_row_sums(to_cage, positions), first }
     }

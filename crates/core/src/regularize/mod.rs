@@ -5,10 +5,8 @@
 //! that cage.
 
 mod laplacian;
-mod spectral;
 
 pub(crate) use laplacian::cage_laplacian;
-pub(crate) use spectral::{DataMap, RegularizationOperator, SpectralMap, Spectrum, last_map, spectral_map};
 
 use crate::cage::Cage;
 use cager_geometry::linalg::SparseMatrix;

@@ -2,7 +2,6 @@
 //! unless noted.
 
 use super::products::{BLOCK_COLUMNS, PARALLEL_THRESHOLD};
-use super::svd::{Svd, svd};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_unit_lower_triangular_in_place, solve_upper_triangular_in_place,
@@ -85,11 +84,6 @@ fn in_column_blocks(a: MatMut<'_, f64>, each: usize, work: impl Fn(MatMut<'_, f6
     a.par_col_chunks_mut(BLOCK_COLUMNS).for_each(work);
 }
 
-/// Singular values and right singular vectors of a tall matrix, through its QR factorisation.
-pub fn right_singular(a: Mat<f64>) -> Option<Svd> {
-    svd(upper_factor(a).as_ref())
-}
-
 /// R of the QR factorisation of a tall matrix.
 pub fn upper_factor(mut a: Mat<f64>) -> Mat<f64> {
     use faer::linalg::qr::no_pivoting::factor;
@@ -120,6 +114,20 @@ pub fn cholesky_in_place(a: MatMut<'_, f64>, par: Par) -> Option<()> {
     Some(())
 }
 
+/// Cholesky factor with diagonal pivoting of a symmetric positive semidefinite matrix, from its lower triangle: L, m × r for the numerical rank r, with
+/// a diagonal that falls, and the row of the matrix that each row of L belongs to. `None` where the matrix is indefinite beyond rounding.
+pub fn pivoted_cholesky(mut a: Mat<f64>) -> Option<(Mat<f64>, Vec<usize>)> {
+    use cholesky::llt_pivoting::factor;
+    let m = a.nrows();
+    let [mut forward, mut backward] = [vec![0; m], vec![0; m]];
+    let scratch = factor::cholesky_in_place_scratch::<usize, f64>(m, Par::Seq, Default::default());
+    let mut memory = MemBuffer::new(scratch);
+    let stack = MemStack::new(&mut memory);
+    let found = factor::cholesky_in_place(a.as_mut(), &mut forward, &mut backward, Par::Seq, stack, Default::default());
+    let rank = found.ok()?.0.rank;
+    Some((Mat::from_fn(m, rank, |i, j| if i >= j { a[(i, j)] } else { 0.0 }), forward))
+}
+
 /// Solves `A X = B` for symmetric positive definite A. `None` where A is not definite.
 pub fn solve_definite(a: Mat<f64>, b: Mat<f64>) -> Option<Mat<f64>> {
     solve_definite_within(a, b, 0.0, 0.0)
@@ -142,13 +150,6 @@ pub fn solve_cholesky(l: MatRef<'_, f64>, x: &mut Mat<f64>) {
     in_column_blocks(x.as_mut(), 2 * l.nrows() * l.nrows(), |mut columns| {
         solve_lower_triangular_in_place(l, columns.as_mut(), Par::Seq);
         solve_upper_triangular_in_place(l.transpose(), columns, Par::Seq);
-    });
-}
-
-/// `R⁻¹ X` in place, for an upper triangular R.
-pub fn solve_upper(r: MatRef<'_, f64>, x: &mut Mat<f64>) {
-    in_column_blocks(x.as_mut(), r.nrows() * r.nrows(), |columns| {
-        solve_upper_triangular_in_place(r, columns, Par::Seq);
     });
 }
 

@@ -12,8 +12,8 @@ mod zeros;
 
 pub use eigen::eigen;
 pub use factors::{
-    Pivoted, cholesky, cholesky_in_place, inverse, pivoted, right_singular, solve_cholesky, solve_definite,
-    solve_definite_within, solve_lower, solve_upper, upper_factor, upper_inverse,
+    Pivoted, cholesky, cholesky_in_place, inverse, pivoted, pivoted_cholesky, solve_cholesky, solve_definite,
+    solve_definite_within, solve_lower, upper_factor, upper_inverse,
 };
 pub use products::{
     BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, multiply_add,

@@ -3,7 +3,8 @@
 use crate::registration::NearestPoints;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DependentNormals, SYSTEMS};
-use cager_core::inversion::{Analysis, Handles, PrepareContext, PrepareError, SolverOptions};
+use cager_core::inversion::{Handles, PrepareContext, PrepareError, SolverOptions};
+use cager_core::spectral::Analysis;
 use cager_geometry::linalg::{gram, mirrored, solve_definite, tall_product, transposed_product};
 use cager_geometry::mesh::Point;
 use cager_geometry::spatial::outside;

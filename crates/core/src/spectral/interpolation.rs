@@ -8,7 +8,7 @@
 //! takes the place of the frame in least squares over all points. B is any basis of the columns of `Φ`, S are the samples, Ω is their covariance and
 //! k that of all points with them. N itself, n × K, is never computed.
 
-use super::farthest::morton_order;
+use crate::morton::morton_order;
 use crate::simd::{LANES, Lanes, grouped, multiversion};
 use cager_geometry::linalg;
 use cager_geometry::linalg::zeros;

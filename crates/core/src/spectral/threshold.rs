@@ -1,6 +1,7 @@
 //! Automatic choice of the spectrum threshold: the largest one whose additional error on sample frames stays within a bound.
 
-use super::{BATCH, HandleSystem, PrepareError, Rows, Solver, SolverOptions};
+use super::HandleSystem;
+use crate::inversion::{BATCH, PrepareError, Rows, Solver, SolverOptions};
 use cager_geometry::linalg::SparseMatrix;
 use rayon::prelude::*;
 
@@ -71,25 +72,17 @@ impl HandleSystem<'_> {
 
 /// Mean L2 error of frames over the rest diagonal.
 fn mean_error(solver: &Solver, frames: &[Vec<f64>]) -> f64 {
-    let measured = |previous: Option<&[f32]>, batch: &[Vec<f64>]| {
-        let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
-        let inverted = solver.invert(Rows::All, previous, &frames);
-        let cages: Vec<Vec<f32>> = inverted.into_iter().map(|inverted| inverted.cage).collect();
+    let measured = |frames: &[Vec<f64>]| {
+        let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+        let cages: Vec<Vec<f32>> =
+            solver.invert(Rows::All, None, &frames).into_iter().map(|inverted| inverted.cage).collect();
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-        let l2: Vec<f64> = solver.decoder().measure(&views, &frames).iter().map(|error| error.l2).collect();
-        (l2, cages)
+        solver.decoder().measure(&views, &frames).iter().map(|error| error.l2).sum::<f64>()
     };
-    let mut all = Vec::with_capacity(frames.len());
-    if solver.follows_previous() {
-        let mut previous: Option<Vec<f32>> = None;
-        for batch in frames.chunks(BATCH) {
-            let (l2, mut cages) = measured(previous.as_deref(), batch);
-            all.extend(l2);
-            previous = cages.pop();
-        }
+    let sum: f64 = if solver.follows_previous() {
+        measured(frames)
     } else {
-        let found: Vec<Vec<f64>> = frames.par_chunks(BATCH).map(|batch| measured(None, batch).0).collect();
-        all = found.concat();
-    }
-    all.iter().sum::<f64>() / frames.len() as f64 / solver.diagonal()
+        frames.par_chunks(BATCH).map(measured).collect::<Vec<f64>>().iter().sum()
+    };
+    sum / frames.len() as f64 / solver.diagonal()
 }

@@ -4,7 +4,7 @@
 //! the greedy choice is the largest. Leverages only fall as rows are added: old ones are bounds, and few have to be computed
 //! anew for each row.
 
-use crate::row_basis::RowBasis;
+use super::row_basis::RowBasis;
 use cager_geometry::linalg;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;

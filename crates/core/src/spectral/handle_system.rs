@@ -1,19 +1,15 @@
 //! From a choice of handles to solvers: the regularised map of singular directions, and the regularisation target.
 
-use super::checks::{about_first, check_options};
-use super::consistent::Consistent;
-use super::error::failed;
-use super::nearness::Nearness;
-use super::operator::{Decomposition, Directions, padded_to_tiles};
-use super::options::drop_zero_weight_regularizer;
-use super::target::RegularizationTarget;
-use super::translations::{with_unit_row_sums, with_zero_row_sums};
-use super::{Analysis, PrepareError, Solver, SolverOptions};
+use super::analysis::Analysis;
+use super::decomposition::Decomposition;
+use super::maxvol::Volume;
+use super::terms::{SpectralMap, Term, spectral_map};
 use crate::decode::Decoder;
-use crate::handles::Handles;
-use crate::regularize::{
-    Reference, RegularizationOperator, Regularizer, SpectralMap, Spectrum, WEAK_SINGULAR_VALUE, last_map, spectral_map,
+use crate::inversion::{
+    Consistent, Handles, Nearness, PrepareError, RegularizationTarget, Solver, SolverOptions, about_first,
+    check_options, failed, padded_to_tiles, with_unit_row_sums, with_zero_row_sums,
 };
+use crate::regularize::{Reference, Regularizer, WEAK_SINGULAR_VALUE};
 use cager_geometry::linalg::{self, SparseMatrix};
 use faer::Mat;
 use std::sync::{Arc, OnceLock};
@@ -35,9 +31,7 @@ impl Analysis {
     pub fn handle_system(&self, handles: Handles) -> Result<HandleSystem<'_>, PrepareError> {
         let options = SolverOptions { handles, spectrum: 0, ..SolverOptions::PAPER };
         check_options(self.found.phi.nrows(), self.found.phi.ncols(), options, self.memory)?;
-        let decomposition =
-            Decomposition::new(self.found.phi.as_ref(), &self.found.points, &self.basis, &self.spectra, handles)?;
-        Ok(HandleSystem::new(self, decomposition))
+        Ok(HandleSystem::new(self, Decomposition::new(self, handles)?))
     }
 
     /// As [`Self::handle_system`], of the given rows, at least as many as unknowns.
@@ -83,15 +77,20 @@ impl<'a> HandleSystem<'a> {
     pub fn solver(&self, options: SolverOptions, matrix: Option<&SparseMatrix>) -> Result<Solver, PrepareError> {
         let analysis = self.analysis;
         let (map, target, consistent) = self.parts(options, matrix)?;
-        let operator = self.decomposition.operator(analysis.found.phi.as_ref(), &map.data);
+        let operator = self.decomposition.operator(analysis.found.phi.as_ref(), map.data.as_ref());
         let operator = padded_to_tiles(with_unit_row_sums(operator, analysis.decoder.positions()));
         let (handles, reads_all) = self.points_read();
         // The baselines and inversions without a term go where the data take them.
-        let held = options.regularizer.is_sub_spectral() && !is_unregularized(drop_zero_weight_regularizer(options));
+        let held = options.regularizer.is_sub_spectral() && !is_unregularized(options.without_idle_term());
         let nearness = if held { self.nearness().map(Arc::new) } else { None };
         let mut preparation = analysis.found.preparation.clone();
         preparation.condition_handles = self.decomposition.condition;
         preparation.singular_values = self.singular_values();
+        let Decomposition { directions, rank, .. } = &self.decomposition;
+        preparation.weak = directions.below(WEAK_SINGULAR_VALUE).max(analysis.found.phi.ncols() - rank);
+        if reads_all {
+            preparation.maxvol = Volume::default();
+        }
         Ok(Solver {
             handles,
             reads_all,
@@ -112,16 +111,14 @@ impl<'a> HandleSystem<'a> {
     }
 
     /// F with `FᵀF = AᵀA · m/K` for the K rows of what is inverted, so that weights beside it are relative to the mean square error.
-    pub(super) fn scaled_factor(&self) -> Mat<f64> {
-        let Decomposition { directions, rank, rows, .. } = &self.decomposition;
-        let scale = (self.analysis.found.phi.ncols() as f64 / *rows as f64).sqrt();
-        match directions {
-            Directions::All { sigma, v } => Mat::from_fn(*rank, v.nrows(), |k, j| scale * sigma[k] * v[(j, k)]),
-            Directions::Last(_) => {
-                let factor = self.analysis.spectra.normal_factor.as_ref().unwrap_or(&self.analysis.basis.square);
-                Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| scale * factor[(i, j)])
-            }
+    fn scaled_factor(&self) -> Mat<f64> {
+        let (analysis, read) = (self.analysis, &self.decomposition);
+        let phi = analysis.found.phi.as_ref();
+        let scale = (phi.ncols() as f64 / read.rows as f64).sqrt();
+        if read.rows == phi.nrows() {
+            return analysis.factor.scaled(scale);
         }
+        faer::Scale(scale) * linalg::rows_of(phi, &read.handles)
     }
 
     /// Indices of the points read, and whether all points are read instead.
@@ -136,7 +133,7 @@ impl<'a> HandleSystem<'a> {
     }
 
     /// The map of singular directions, the regularisation target, and the consistent inversion that follows, if any.
-    pub(super) fn parts(
+    fn parts(
         &self,
         options: SolverOptions,
         matrix: Option<&SparseMatrix>,
@@ -144,7 +141,7 @@ impl<'a> HandleSystem<'a> {
         let analysis = self.analysis;
         let m = analysis.found.phi.ncols();
         check_options(analysis.found.phi.nrows(), m, options, analysis.memory)?;
-        let options = drop_zero_weight_regularizer(options);
+        let options = options.without_idle_term();
         let dependent = analysis.decoder.dependent_normals().is_some();
         // Without regularisation the Gauss–Newton steps are held to their start by the small weight of `start_weight` only; the start itself is
         // regularised nevertheless, since from an ill-conditioned one they end in a worse minimum.
@@ -156,9 +153,13 @@ impl<'a> HandleSystem<'a> {
         } else {
             (options.regularizer, options.spectrum, options.lambda)
         };
-        let (delta, reference) = (regularizer.delta(matrix, &analysis.cage, m)?, regularizer.reference());
-        let map = self.map(&RegularizationOperator { delta, reference }, regularizer, s, lambda)?;
-        let target = self.target(&map, reference);
+        let delta = regularizer.delta(matrix, &analysis.cage, m)?;
+        let squared = if regularizer == Regularizer::Tikhonov { lambda * lambda } else { lambda };
+        let weight = squared * self.decomposition.rows as f64 / m as f64;
+        let term = Term { regularizer, delta, spectrum: s, weight };
+        let Decomposition { directions, rank, .. } = &self.decomposition;
+        let map = spectral_map(directions, *rank, &term).ok_or(failed("regularised solve"))?;
+        let target = self.target(&map, regularizer.reference());
         let decoder = &analysis.decoder;
         let consistent = match decoder.dependent_normals() {
             None => None,
@@ -173,44 +174,19 @@ impl<'a> HandleSystem<'a> {
         Ok((map, target, consistent))
     }
 
-    fn map(
-        &self,
-        regularization_operator: &RegularizationOperator,
-        regularizer: Regularizer,
-        s: usize,
-        lambda: f64,
-    ) -> Result<SpectralMap, PrepareError> {
-        let found = &self.decomposition;
-        let unknowns = self.analysis.found.phi.ncols();
-        let squared = if regularizer == Regularizer::Tikhonov { lambda * lambda } else { lambda };
-        let weight = squared * found.rows as f64 / unknowns as f64;
-        let map = match &found.directions {
-            Directions::All { sigma, v } => {
-                let spectrum = Spectrum { sigma: &sigma[..found.rank], v: v.as_ref(), term: regularization_operator };
-                spectral_map(&spectrum, regularizer, s, weight)
-            }
-            Directions::Last(last) => {
-                let s = if regularizer.is_sub_spectral() { s.max(last.below(WEAK_SINGULAR_VALUE)) } else { 0 };
-                last_map(last, regularization_operator, s, weight)
-            }
-        };
-        map.ok_or(failed("regularised solve"))
-    }
-
     /// The regularisation target: a constant for the rest cage, a matrix for the previous frame's cage.
     fn target(&self, map: &SpectralMap, reference: Reference) -> RegularizationTarget {
-        let Some(target) = &map.target else { return RegularizationTarget::None };
-        let to_cage = self.decomposition.directions.to_cage(target.as_ref());
+        let Some(target) = map.target.clone() else { return RegularizationTarget::None };
         let positions = self.analysis.decoder.positions();
         let rest = &self.analysis.found.rest;
         if reference == Reference::RestCage {
-            let operator = with_zero_row_sums(to_cage, positions);
+            let operator = with_zero_row_sums(target, positions);
             return RegularizationTarget::Constant(linalg::product(
                 operator.as_ref(),
                 about_first(rest, positions).as_ref(),
             ));
         }
-        RegularizationTarget::towards_previous(to_cage, rest, positions)
+        RegularizationTarget::towards_previous(target, rest, positions)
     }
 }
 

@@ -1,9 +1,5 @@
 //! Handles: the points that the inversion reads, from one per unknown to all. `docs/PAPER.md` compares their errors.
 
-pub(crate) mod farthest;
-pub(crate) mod interpolation;
-pub(crate) mod rectangular;
-
 /// Which points the inversion reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handles {

@@ -47,14 +47,12 @@ pub struct MaxVol {
     pub rows: Vec<u32>,
     /// Rows the search started from: those of pivoted LU, or what was given.
     pub start: Vec<u32>,
-    /// How the search went; `max_entry` is from a fresh factorisation, or, where a tolerance of one allows it, in single precision.
+    /// How the search went; `max_entry` is from a fresh factorisation.
     pub volume: Volume,
     /// The swaps, in order.
     pub trace: Vec<Swap>,
     /// `ln |det Φ□|` of the rows the search started from.
     pub start_log_volume: f64,
-    /// `Bᵀ B`, m × m, symmetric; `None` where the swaps were confirmed in single precision.
-    pub(crate) gram: Option<Mat<f64>>,
     /// `Φ□⁻¹`, m × m.
     pub(crate) inverse: Mat<f64>,
 }

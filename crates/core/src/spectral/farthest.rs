@@ -4,8 +4,9 @@
 //! block only if it is closer to the box than the block's largest distance to a sample so far; others are skipped, so that all samples together
 //! cost little more than a few passes.
 
+use crate::morton::morton_order;
 use crate::simd::{LANES, Lanes, grouped, multiversion};
-use cager_geometry::mesh::{Point, bounds};
+use cager_geometry::mesh::Point;
 use cager_geometry::spatial::Aabb;
 use rayon::prelude::*;
 
@@ -117,33 +118,6 @@ fn sorted_blocks(points: &[Point]) -> (Vec<Block>, Vec<u32>) {
     let mut place = vec![0; ids.len()];
     ids.iter().enumerate().for_each(|(at, &id)| place[id as usize] = at as u32);
     (ids.par_chunks(BLOCK_POINTS).map(|ids| Block::new(points, ids)).collect(), place)
-}
-
-/// Indices of all points in Morton order.
-pub(crate) fn morton_order(points: &[Point]) -> Vec<u32> {
-    const CELLS: f64 = 1024.0;
-    let (low, high) = bounds(points);
-    let widest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
-    let scale = if widest > 0.0 { CELLS / widest } else { 0.0 };
-    let cell = |x: f64| (x * scale).min(CELLS - 1.0) as u32;
-    let mut order: Vec<(u32, u32)> = points
-        .par_iter()
-        .enumerate()
-        .map(|(i, p)| {
-            let code = (0..3).fold(0, |code, k| code | interleave_zeros(cell(p[k] - low[k])) << k);
-            (code, i as u32)
-        })
-        .collect();
-    order.par_sort_unstable();
-    order.into_iter().map(|(_, i)| i).collect()
-}
-
-/// Inserts two zeros between each of the lowest ten bits.
-fn interleave_zeros(x: u32) -> u32 {
-    let x = (x | x << 16) & 0x0300_00ff;
-    let x = (x | x << 8) & 0x0300_f00f;
-    let x = (x | x << 4) & 0x030c_30c3;
-    (x | x << 2) & 0x0924_9249
 }
 
 #[cfg(test)]

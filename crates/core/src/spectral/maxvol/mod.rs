@@ -5,25 +5,20 @@
 //! fresh factorisation then confirms the result or finds further candidates.
 
 mod handles;
-mod many_columns;
 mod passes;
 mod swaps;
 
 pub use handles::{MaxVol, Swap, Volume};
-pub(crate) use passes::maxima_and_gram;
 
+use super::normal_factor::RANK_TOLERANCE;
 use cager_geometry::linalg;
-use faer::MatRef;
+use faer::{Mat, MatRef};
 use handles::{LOOSE_TOLERANCE, MANY_COLUMNS, MAX_PASSES, SINGLE_IS_SAFE};
 use passes::row_maxima;
 use swaps::{CandidateRows, candidates};
 
-/// Singular values below this fraction of the largest are taken for zero: coordinates are not accurate to more.
-pub(crate) const RANK_TOLERANCE: f64 = 1e-11;
 /// Default tolerance τ: swaps end when no entry of B exceeds 1.01.
 pub const TOLERANCE: f64 = 0.01;
-/// From this many columns on, and up to [`MANY_COLUMNS`], the first round of swaps is hardly ever the last.
-const SEVERAL_ROUNDS: usize = 512;
 
 /// The matrix has no m linearly independent rows to the working precision.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -45,12 +40,6 @@ pub fn tolerance(unknowns: usize) -> f64 {
 /// # Errors
 /// [`DependentColumns`] where the columns are numerically dependent.
 pub fn maxvol(phi: MatRef<'_, f64>, tolerance: f64) -> Result<MaxVol, DependentColumns> {
-    if phi.ncols() >= MANY_COLUMNS
-        && tolerance >= LOOSE_TOLERANCE
-        && let Some(found) = many_columns::search(phi, tolerance)
-    {
-        return Ok(found);
-    }
     Ok(search(phi, start_rows(phi)?, tolerance))
 }
 
@@ -72,36 +61,27 @@ fn search(phi: MatRef<'_, f64>, start: Vec<u32>, tolerance: f64) -> MaxVol {
     let mut trace = Vec::new();
     let (mut inverse, mut log_volume) = linalg::inverse(linalg::rows_of(phi, &rows).as_ref());
     let start_log_volume = log_volume;
-    let found = |rows, trace: Vec<Swap>, log_volume, max_entry, gram, inverse| {
-        let volume = Volume { swaps: trace.len(), log_volume, max_entry };
-        MaxVol { rows, start, volume, trace, start_log_volume, gram: Some(gram), inverse }
-    };
-    let mut row_max = row_maxima(phi, inverse.as_ref());
-    for pass in 0..MAX_PASSES {
+    let single = |inverse: &Mat<f64>| row_maxima(phi, inverse.as_ref(), |x| x as f32);
+    let mut row_max = single(&inverse);
+    let mut max_entry = f64::NAN;
+    for _ in 0..MAX_PASSES {
         let candidates = CandidateRows::computed(phi, candidates(&row_max), &rows, inverse.as_ref());
-        let done = candidates.swap(&mut rows, tolerance);
-        let swapped = !done.is_empty();
-        trace.extend(done);
+        trace.extend(candidates.swap(&mut rows, tolerance));
         (inverse, log_volume) = linalg::inverse(linalg::rows_of(phi, &rows).as_ref());
         // A pass that is about to find more rows to swap need not be exact.
-        let several = (SEVERAL_ROUNDS..MANY_COLUMNS).contains(&phi.ncols());
-        if swapped && (pass > 0 || several) {
-            row_max = row_maxima(phi, inverse.as_ref());
-            if row_max.iter().any(|&x| x > (1.0 + tolerance) as f32) {
-                continue;
-            }
+        row_max = single(&inverse);
+        if row_max.iter().any(|&x| x > (1.0 + tolerance) as f32) {
+            continue;
         }
-        let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), 1.0 + tolerance);
-        let max_entry = maxima.iter().copied().fold(0.0, f64::max);
+        let maxima = row_maxima(phi, inverse.as_ref(), |x| x);
+        max_entry = maxima.iter().copied().fold(0.0, f64::max);
         if max_entry <= 1.0 + tolerance {
-            return found(rows, trace, log_volume, max_entry, gram, inverse);
+            break;
         }
         row_max = maxima.iter().map(|&x| x as f32).collect();
     }
-    // Not converged: reports show the largest entry.
-    let (maxima, gram) = maxima_and_gram(phi, inverse.as_ref(), f64::INFINITY);
-    let max_entry = maxima.iter().copied().fold(0.0, f64::max);
-    found(rows, trace, log_volume, max_entry, gram, inverse)
+    let volume = Volume { swaps: trace.len(), log_volume, max_entry };
+    MaxVol { rows, start, volume, trace, start_log_volume, inverse }
 }
 
 /// Rows that LU with partial pivoting picks. Single precision decides the pivots as well as double does, in half the time,

@@ -61,17 +61,6 @@ impl CandidateRows {
         Self { rows: candidates, width, entries, row_max }
     }
 
-    /// Given rows of B: all of it, transposed, and the largest entry of every row.
-    pub(super) fn copied(transposed: MatRef<'_, f32>, row_max: &[f32]) -> Self {
-        let (rows, width) = (candidates(row_max), transposed.nrows());
-        let mut entries = vec![0.0f32; rows.len() * width];
-        entries.par_chunks_exact_mut(width).zip(&rows).for_each(|(to, &i)| {
-            to.iter_mut().zip(transposed.col(i as usize).iter()).for_each(|(to, &x)| *to = x);
-        });
-        let row_max = rows.iter().map(|&i| row_max[i as usize]).collect();
-        Self { rows, width, entries, row_max }
-    }
-
     /// Swaps rows until no entry exceeds 1 + τ, and returns the swaps. `picked` are the handles.
     pub(super) fn swap(mut self, picked: &mut [u32], tolerance: f64) -> Vec<Swap> {
         // Rounding of the updates must not end the swaps just above the tolerance.
