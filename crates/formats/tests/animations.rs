@@ -318,7 +318,8 @@ fn of_several_animations_the_first_or_the_chosen_one_is_read() {
     assert!(note.contains(told), "{note}");
     for gone in ["jump", "3"] {
         let error = message(take(Some(gone)));
-        let listed = format!("holds no animation {gone} that moves the mesh, but walk, run and animation 2; give one of");
+        let listed =
+            format!("holds no animation {gone} that moves the mesh, but walk, run and animation 2; give one of");
         assert!(error.contains(&listed), "{error}");
     }
 }
@@ -606,11 +607,9 @@ fn a_shot_from_1001_plays_at_once_and_keeps_its_numbers() {
             assert!(notes[0].contains("is at 0 s, where programs begin to play"), "{notes:?}");
             let root = Root::from_slice(&fs::read(&path).unwrap());
             if let Ok(root) = root {
-                assert!(
-                    root.accessors
-                        .iter()
-                        .any(|accessor| accessor.min.as_ref().is_some_and(|min| min[0].as_f64() == Some(0.0) && min[1].is_null()))
-                );
+                assert!(root.accessors.iter().any(|accessor| {
+                    accessor.min.as_ref().is_some_and(|min| min[0].as_f64() == Some(0.0) && min[1].is_null())
+                }));
             }
             let reader = open_frames(&path, 48).unwrap();
             assert_eq!((numbers(&*reader), reader.frame_rate()), (numbered.clone(), Some(fps)));
