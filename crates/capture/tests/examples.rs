@@ -25,7 +25,7 @@ fn examples_encode_a_folder_decode_a_frame_and_encode_frames_from_memory() {
     write_model(&at("rest.obj"), &demo.rest).expect("a rest pose");
     write_model(&at("cage.obj"), &demo.cage.clone().into()).expect("a cage");
     let (points, faces) = (demo.rest.points.len(), &demo.rest.faces);
-    let mut writer = create_frames(&at("frames/*.ply"), points, 8, faces, &FrameOptions::default()).expect("a folder");
+    let mut writer = create_frames(at("frames/*.ply"), points, 8, faces, &FrameOptions::default()).expect("a folder");
     let (mut wide, mut last) = (Vec::new(), Vec::new());
     for frame in 0..8 {
         demo.frame(frame, &mut wide);

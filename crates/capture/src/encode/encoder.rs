@@ -50,7 +50,7 @@ impl<Files> Encode<'_, Files> {
         let (memory, progress) = (self.memory_limit(), self.progress);
         let numbers = (0..frames.frames()).map(|frame| frames.number(frame)).collect();
         let job = self.expect_frames(frames.frames());
-        let mut encoder = Encoder::begin(job, output, (frames.frame_rate(), numbers))?;
+        let mut encoder = Encoder::begin(&job, output, (frames.frame_rate(), numbers))?;
         encoder.push_all(frames, memory, progress)?;
         encoder.complete()
     }
@@ -65,7 +65,7 @@ impl Encode<'_> {
         if matches!(self.goal, Some(Goal::Size(_))) && self.expected.is_none() {
             return Err(EncodeError::UnknownLength);
         }
-        Encoder::begin(self, &output.into(), (None, Vec::new()))
+        Encoder::begin(&self, &output.into(), (None, Vec::new()))
     }
 }
 
@@ -92,7 +92,7 @@ impl Encoder {
 
     /// Prepares for frames of this rate and these numbers, 0, 1, 2, … where there are none.
     pub(super) fn begin<F>(
-        job: Encode<'_, F>,
+        job: &Encode<'_, F>,
         output: &Target,
         (frame_rate, numbers): (Option<f64>, Vec<f64>),
     ) -> Result<Self, EncodeError> {
@@ -116,7 +116,7 @@ impl Encoder {
         let clock_prepare = Instant::now();
         let (prepared, space) = std::thread::scope(|scope| {
             let space = begins_early.then(|| scope.spawn(|| GroupSpace::new(system, cage, rest, None)));
-            let prepared = prepare(&job, rest, cage);
+            let prepared = prepare(job, rest, cage);
             (prepared, space.map(|space| space.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
         });
         let (solver, options, choice, [coordinates, maxvol, svd]) = prepared?;

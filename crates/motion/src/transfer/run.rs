@@ -198,7 +198,7 @@ fn measured(
     while frames.read_next(&mut shape)? && source.read_next(&mut pose)? {
         quality.push(shape.as_chunks().0, pose.as_chunks().0);
     }
-    Ok(quality.summary().into())
+    Ok(quality.summary())
 }
 
 #[cfg(test)]
