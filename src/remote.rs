@@ -1,4 +1,4 @@
-//! Encoding by a service: another machine computes, from frames in single precision, the container that [`cager_capture::encode`]
+//! Encoding by a service: another machine computes, from frames in single precision, the container that [`mod@cager_capture::encode`]
 //! gives of such frames.
 
 mod cage;
