@@ -188,13 +188,13 @@ pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs
 
 /// What is to be said of frames that lost digits before they came here: in single precision, as far away as their rest pose.
 fn single_far_away(files: &CaptureFiles, rest: &Model, frames: &[Vec<f64>]) -> Option<String> {
-    const LOST: f64 = 1e-5;
+    const MAX_ROUNDING_ERROR: f64 = 1e-5;
     let origin = files.origin?;
     let farthest = origin.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
     let lost = farthest * f64::from(f32::EPSILON) / 2.0 / diagonal(&rest.points);
     let is_single = |(x, o): (&f64, &f64)| f64::from((x + o) as f32) == x + o;
     let singles = frames.iter().all(|frame| frame.iter().zip(origin.iter().cycle()).all(is_single));
-    (lost > LOST && singles).then(|| {
+    (lost > MAX_ROUNDING_ERROR && singles).then(|| {
         format!(
             "{}: its frames are in single precision, which so far from the origin has lost what is smaller than {lost:.1e} of the rest pose's diagonal; export them in double precision (float64)",
             files.path.display()

@@ -7,7 +7,7 @@ use super::poses::{PoseFile, Poses};
 use super::solver_options::with_input_name;
 use super::{counted, grouped, progress, tell};
 use anyhow::{Context, Result, bail};
-use cager_capture::origin::{LOST, move_to, own_origin};
+use cager_capture::origin::{MAX_ROUNDING_ERROR, move_to, own_origin};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::reject_far_points;
@@ -92,7 +92,7 @@ pub(super) fn run(args: &ExploreArgs) -> Result<()> {
     let triangles = TriMesh::from(&poses.model).triangles;
     let faces = &poses.model.faces;
     let origin = own_origin(&poses.model.points);
-    let rounding = LOST * diagonal(&poses.model.points);
+    let rounding = MAX_ROUNDING_ERROR * diagonal(&poses.model.points);
     let options = FrameOptions { origin, rounding, units: poses.units, ..FrameOptions::default() };
     let mut writer = create_frames(output, poses.model.points.len(), count, faces, &options)?;
     let bar = progress::frames("shaping", count);

@@ -219,8 +219,8 @@ fn begin_report(header: &Header, encoding: &Encoding<'_>) -> Report {
 
 /// Cages are stored in single precision, which loses resolution far from the origin.
 fn far_away(frame: usize, diagonals: f64, stays_near: bool) -> Option<String> {
-    const LOST: f64 = 100.0;
-    (diagonals > LOST).then(|| {
+    const MAX_DIAGONALS: f64 = 100.0;
+    (diagonals > MAX_DIAGONALS).then(|| {
         let cure = if stays_near {
             "move the capture closer to the origin"
         } else {

@@ -13,7 +13,7 @@ use bind::{BoundModel, bind};
 
 use crate::edited::EditedCages;
 use crate::memory::{Memory, free_bytes};
-use crate::origin::LOST;
+use crate::origin::MAX_ROUNDING_ERROR;
 use crate::timing::Timing;
 use cager_core::inversion::BATCH;
 use cager_formats::{CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
@@ -121,7 +121,7 @@ pub(crate) fn frame_options(
 
 /// What a format may lose where it adds the origin in single precision: what a guaranteed error leaves, and what is not seen where there is none.
 fn may_lose(container: &mut Container) -> Result<f64, container::Error> {
-    Ok(diagonal(&container.rest()?.points) * left_by_bound(container)?.unwrap_or(LOST))
+    Ok(diagonal(&container.rest()?.points) * left_by_bound(container)?.unwrap_or(MAX_ROUNDING_ERROR))
 }
 
 /// What a guaranteed error leaves, as a share of the diagonal; `None` where nothing is guaranteed, or known of a file that was cut.

@@ -8,7 +8,7 @@ use cager_geometry::vector::{add, distance, middle, sub};
 pub const FAR: f64 = 100.0;
 
 /// What single precision may lose of a diagonal without being seen.
-pub const LOST: f64 = 1e-4;
+pub const MAX_ROUNDING_ERROR: f64 = 1e-4;
 
 /// An origin near the middle of a rest pose that lies far away; `None` for all others. In whole units, or the largest power of two that is not above
 /// the diagonal where that is less than one, so that subtracting it from doubles loses nothing.

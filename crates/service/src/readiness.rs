@@ -11,7 +11,7 @@ use tokio::time::timeout;
 /// How long a success is valid.
 const VALIDITY: Duration = Duration::from_secs(1);
 /// How long an answer may take, which is less than what asks waits, 5 s.
-const PATIENCE: Duration = Duration::from_secs(4);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(4);
 
 #[derive(Default)]
 pub(crate) struct Readiness {
@@ -34,7 +34,7 @@ impl Readiness {
     /// Which part of it does not, or does not answer.
     pub(crate) async fn look(&self, store: &Store) -> Result<(), ApiError> {
         let failed = |what: String| ApiError::new(problem::STORAGE_FAILED, what).retry_after(60);
-        let Ok(probed) = timeout(PATIENCE, self.probe(store)).await else {
+        let Ok(probed) = timeout(PROBE_TIMEOUT, self.probe(store)).await else {
             let part = lock(&self.part).name();
             tracing::error!(part, "not ready: it does not answer");
             return Err(failed(format!("{part} does not answer; see whether it hangs or is overloaded")));

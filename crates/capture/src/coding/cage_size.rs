@@ -1,7 +1,7 @@
 //! How many vertices a cage needs for what a coded file is to meet: some frames are coded with cages of several sizes, made around the rest pose.
 
 use super::error::CodingError;
-use super::goal::{Carried, Goal, HELD, group_frames};
+use super::goal::{BYTES_PER_POSITION, Carried, Goal, group_frames};
 use super::group::GroupCoder;
 use super::meshes::RestMeshes;
 use super::model::GroupDecoder;
@@ -69,7 +69,7 @@ impl CageSizes<'_> {
         let model = GroupDecoder::new(self.system, &meshes.checked, rest, &solver).ok()?;
         let other = (meshes.rest.bytes() + meshes.cage.bytes() + colors_bytes(&rest.colors)) as u64;
         let most = group_frames(rest.points.len(), solver.decoder().unknowns()).min(self.frames.len());
-        let most = self.memory.frames(HELD * rest.points.len(), most);
+        let most = self.memory.frames(BYTES_PER_POSITION * rest.points.len(), most);
         let carried = Carried { room: self.goal.room(other, self.total), ..Carried::default() };
         let mut coder = GroupCoder::new(self.goal, Arc::new(model), diagonal(&rest.points), most, carried);
         let frames: Vec<&[f64]> = self.frames[..most].iter().map(Vec::as_slice).collect();

@@ -130,11 +130,11 @@ pub fn slack(diagonal: f64, terms: usize, sum: f64, farthest: f64) -> f64 {
 
 /// Bytes that coding a group holds, and of these for each position of a frame: as captured, of its cage, as a residual, decoded.
 const MAX_HELD_BYTES: usize = 512 << 20;
-pub(crate) const HELD: usize = 112;
+pub(crate) const BYTES_PER_POSITION: usize = 112;
 
 /// Most frames of a group. The same on every machine, so that files are wherever a group fits into memory.
 pub fn group_frames(points: usize, rows: usize) -> usize {
-    container::group_frames(points, rows).min(MAX_HELD_BYTES / (HELD * points.max(1))).max(1)
+    container::group_frames(points, rows).min(MAX_HELD_BYTES / (BYTES_PER_POSITION * points.max(1))).max(1)
 }
 
 /// Bytes of a file after so many frames, about.

@@ -5,7 +5,9 @@ use super::options::Encode;
 use super::sink::{FrameSink, SinkError};
 use super::{ChooseSpectrum, EncodeError, EncodeProgress, Encoded};
 use crate::capture::{CaptureWriter, Encoding};
-use crate::coding::{Carried, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, HELD, RestMeshes, group_frames};
+use crate::coding::{
+    BYTES_PER_POSITION, Carried, CodingError, Goal, GroupCoder, GroupDecoder, GroupSpace, RestMeshes, group_frames,
+};
 use crate::frames::CaptureFiles;
 use crate::memory::{Memory, free_bytes};
 use crate::preparation_warnings::held_frames;
@@ -141,7 +143,7 @@ impl Encoder {
         let mut writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(fail)?;
         let points = rest.points.len();
         let group_frames = group_frames(points, solver.decoder().unknowns());
-        let group_frames = job.memory_limit().frames(HELD * points, group_frames);
+        let group_frames = job.memory_limit().frames(BYTES_PER_POSITION * points, group_frames);
         let coder = goal.zip(model).map(|(goal, model)| {
             let room = goal.room(writer.bytes(), job.expected.unwrap_or(0));
             GroupCoder::new(goal, Arc::new(model), unit, group_frames, Carried { room, ..Carried::default() })

@@ -4,7 +4,7 @@ use super::geometry::geometry;
 use super::{Geometry, ValidOptions};
 use crate::problem::{self, ApiError};
 use cager_capture::coding::{CodingError, Goal, slack};
-use cager_capture::origin::{LOST, own_origin};
+use cager_capture::origin::{MAX_ROUNDING_ERROR, own_origin};
 use cager_codec::MAX_ROWS;
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
@@ -39,7 +39,7 @@ fn check_place(points: &[Point]) -> Result<(), ApiError> {
     let farthest = points.iter().flatten().fold(0.0f64, |far, x| far.max(x.abs()));
     let lost = farthest * f64::from(f32::EPSILON) / 2.0 / diagonal(points);
     match own_origin(points) {
-        Some([x, y, z]) if lost > LOST => Err(geometry(format!(
+        Some([x, y, z]) if lost > MAX_ROUNDING_ERROR => Err(geometry(format!(
             "the rest pose lies so far from the origin that the single precision in which frames are sent loses {lost:.1e} of its diagonal; subtract {x} {y} {z} from rest pose, cage and frames, as cager encode --server does"
         ))),
         _ => Ok(()),

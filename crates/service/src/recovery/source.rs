@@ -18,7 +18,7 @@ use tokio::runtime::Handle;
 use tokio::time::sleep_until;
 
 /// How long a recovery waits for its next frame before it gives its memory back; the next frame then has it begin anew.
-const PATIENCE: Duration = Duration::from_secs(60);
+const FRAME_WAIT: Duration = Duration::from_secs(60);
 /// How long it works while others wait for their turn.
 const TURN: Duration = Duration::from_secs(5);
 
@@ -154,7 +154,7 @@ impl SurfaceSource for StoredSurfaces {
                         // Where too many wait already, it gives its memory back at once; what it works on is finished in its place.
                         let Some(room) = self.keep() else { return Arrival::Stopped };
                         drop(lock(&self.place).take());
-                        let until = tokio::time::Instant::now() + PATIENCE;
+                        let until = tokio::time::Instant::now() + FRAME_WAIT;
                         kept = Some((room, until));
                         until
                     }

@@ -24,7 +24,7 @@ use tokio_util::task::TaskTracker;
 /// How often it is looked at how things are.
 const PAUSE: Duration = Duration::from_millis(200);
 /// After the database was away, and where a process that lives has lost the lock of its shard, that one gets so long to go on.
-const PATIENCE: Duration = Duration::from_secs(3);
+const TAKEOVER_WAIT: Duration = Duration::from_secs(3);
 /// How long a shard is left alone that could not be taken, or was given up.
 const AFTER_FAILURE: Duration = Duration::from_secs(5);
 /// Nothing is given up while a shard is served by nobody, as where it moves, unless that takes longer.
@@ -84,7 +84,7 @@ impl Holding {
     async fn keep(mut self) {
         while self.shards.stop.run_until_cancelled(sleep(PAUSE)).await.is_some() {
             self.drop_lost();
-            if lock(&self.shards.trouble).is_some_and(|then| then.elapsed() < PATIENCE) {
+            if lock(&self.shards.trouble).is_some_and(|then| then.elapsed() < TAKEOVER_WAIT) {
                 continue;
             }
             self.note_free();
@@ -136,7 +136,7 @@ impl Holding {
         let now = Instant::now();
         self.failed.retain(|_, until| *until > now);
         let (seen, own) = (self.shards.seen.borrow(), lock(&self.shards.own));
-        let is_left = |shard: &u32| self.free_since.get(shard).is_some_and(|since| since.elapsed() > PATIENCE);
+        let is_left = |shard: &u32| self.free_since.get(shard).is_some_and(|since| since.elapsed() > TAKEOVER_WAIT);
         let is_open = |shard: &&u32| {
             let is_nobodys = !seen.holders.contains_key(shard) || is_left(shard);
             is_nobodys && !own.contains_key(shard) && !self.failed.contains_key(shard)
@@ -180,7 +180,7 @@ impl Shards {
         loop {
             sleep(PAUSE).await;
             if let Err(error) = self.look().await
-                && lock(&self.trouble).replace(Instant::now()).is_none_or(|then| then.elapsed() > PATIENCE)
+                && lock(&self.trouble).replace(Instant::now()).is_none_or(|then| then.elapsed() > TAKEOVER_WAIT)
             {
                 tracing::error!(%error, "it is not seen who has which shard");
             }

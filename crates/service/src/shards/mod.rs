@@ -36,7 +36,7 @@ use tokio_util::task::task_tracker::TaskTrackerToken;
 use tower::ServiceExt;
 
 /// How long a request waits for a process to have its shard.
-const PATIENCE: Duration = Duration::from_secs(10);
+const SHARD_WAIT: Duration = Duration::from_secs(10);
 /// How long it waits for news at a time.
 const PAUSE: Duration = Duration::from_millis(100);
 
@@ -120,7 +120,7 @@ impl Shards {
         };
         let mut request = Request::from_parts(parts, body);
         let mut news = self.seen.subscribe();
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + SHARD_WAIT;
         let given_up = given_up(self.ended.clone());
         // What waits counts as a request of its tenant, as what is at work does.
         let mut place = None;
@@ -184,7 +184,7 @@ impl Shards {
     }
 
     async fn shard_of(&self, tenant: &str) -> Result<u32, ApiError> {
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + SHARD_WAIT;
         loop {
             if let Some(&known) = lock(&self.tenants).get(tenant) {
                 return Ok(known);

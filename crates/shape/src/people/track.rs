@@ -18,7 +18,7 @@ pub struct TrackedFrame {
 /// A frame whose score is this many times the usual one of the frames before is searched for.
 const SUSPECT: f64 = 1.15;
 /// A frame is lost above this many times the usual score.
-const LOST: f64 = 1.5;
+const LOST_RATIO: f64 = 1.5;
 /// And where a limb is, above this many times the usual score of the worst limb: an arm that lies elsewhere hardly moves the score of the whole.
 const LIMB_LOST: f64 = 1.85;
 /// No frame is found above this score, a share of the height.
@@ -58,7 +58,7 @@ impl<'f, 'a> PersonTracker<'f, 'a> {
                 frame = TrackedFrame { fit: found, lost: false, searched: true };
             }
         }
-        frame.lost = frame.fit.score > MAX_SCORE || usual.is_some_and(|usual| frame.fit.score > LOST * usual);
+        frame.lost = frame.fit.score > MAX_SCORE || usual.is_some_and(|usual| frame.fit.score > LOST_RATIO * usual);
         frames.push(frame);
         &frames[frames.len() - 1]
     }
@@ -101,7 +101,7 @@ impl TrackedFrame {
     /// Takes another fit if it is better; the frame is found then, if it is good, so that the one before can be fitted from it.
     fn take_better(&mut self, again: FrameFit, usual: Option<f64>) {
         if again.score < self.fit.score {
-            self.lost = again.score > MAX_SCORE || usual.is_some_and(|usual| again.score > LOST * usual);
+            self.lost = again.score > MAX_SCORE || usual.is_some_and(|usual| again.score > LOST_RATIO * usual);
             self.fit = again;
         }
     }
@@ -113,7 +113,7 @@ fn judge(frames: &mut [TrackedFrame]) {
     let usual_limb = usual_of(frames.iter().map(|frame| worst_limb(&frame.fit)));
     let (Some(usual), Some(usual_limb)) = (usual, usual_limb) else { return };
     for frame in frames {
-        let most = MAX_SCORE.min(LOST * usual);
+        let most = MAX_SCORE.min(LOST_RATIO * usual);
         frame.lost = frame.fit.score > most || worst_limb(&frame.fit) > LIMB_LOST * usual_limb;
     }
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// How much longer than the database a call waits, for the way there and back.
 const WAY: Duration = Duration::from_secs(2);
 /// How often a connection is asked for again where the server gave none.
-const AGAIN: Duration = Duration::from_secs(1);
+const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 
 pub(super) struct Pool {
     place: Place,
@@ -160,7 +160,7 @@ impl Pool {
         let began = Instant::now();
         loop {
             let waits = |links: &mut Links| links.idle.is_empty() && links.used > 0 && links.closed == closed;
-            let waited = self.freed.wait_timeout_while(self.links(), AGAIN, waits);
+            let waited = self.freed.wait_timeout_while(self.links(), RETRY_INTERVAL, waits);
             let (mut links, _) = waited.unwrap_or_else(PoisonError::into_inner);
             let kept = links.idle.pop();
             let is_hopeless = links.used == 0 && links.closed == closed;
