@@ -18,13 +18,16 @@ fn joints_are_posed_by_their_channels_in_the_order_of_the_file() {
     assert_eq!(skeleton.joint("upper arm"), Some(1));
     assert_eq!(skeleton.joints[1].channels[1], Channel::Rotation(0));
     let poses = skeleton.pose(motion.frame(0));
-    assert_eq!((poses[0].position, poses[1].position), ([1.0, 2.0, 3.0], [1.0, 4.0, 3.0]));
+    assert_eq!((poses[0].translation.to_array(), poses[1].translation.to_array()), ([1.0, 2.0, 3.0], [1.0, 4.0, 3.0]));
     let poses = skeleton.pose(motion.frame(1));
     let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-12);
-    assert!(near(poses[1].position, [-2.0, 0.0, 0.0]), "{poses:?}");
+    assert!(near(poses[1].translation.to_array(), [-2.0, 0.0, 0.0]), "{poses:?}");
     // Z after X: the end of the arm points along z, which a turn about z leaves alone.
-    assert!(near(poses[1].at(skeleton.joints[1].end_sites[0]), [-2.0, 0.0, 1.5]), "{poses:?}");
-    assert_eq!(skeleton.zero_pose()[1].position, [0.0, 2.0, 0.0]);
+    assert!(
+        near(poses[1].transform_point3(skeleton.joints[1].end_sites[0].into()).to_array(), [-2.0, 0.0, 1.5]),
+        "{poses:?}"
+    );
+    assert_eq!(skeleton.zero_pose()[1].translation.to_array(), [0.0, 2.0, 0.0]);
 }
 
 #[test]

@@ -1,29 +1,24 @@
 //! Skeletons and their motion in Biovision's BVH files: read, posed, written.
 //!
-//! A file is a tree of joints, each with an offset from its parent and a list of channels, and one row of channel values for each frame. Angles are
-//! degrees; a joint's rotation is the product of those of its channels in the order of the file. Lengths are in the unit of the file.
+//! A file is a tree of joints, each with an offset from its parent and a list of channels, and one
+//! row of channel values for each frame. Angles are degrees; a joint's rotation is the product of
+//! those of its channels in the order of the file. Lengths are in the unit of the file.
 
-mod hierarchy;
-mod kinematics;
-mod motion;
+mod parser;
 mod skeleton;
-mod words;
 mod write;
 
-pub use kinematics::JointPose;
 pub use skeleton::{Channel, Clip, Joint, Motion, Skeleton};
 pub use write::{bvh_bytes, write_bvh};
 
-use crate::error::Error;
+use crate::error::{Error, Fault};
 use crate::signature::Signature;
 use std::path::Path;
-use words::Words;
 
 /// Reads a BVH file.
 ///
 /// # Errors
-/// See [`Error`]; its message names the line: a file that ends early, braces that do not match, channels that are unknown, two joints of one name,
-/// values that are not numbers or not finite, or too few or many of them.
+/// See [`Error`]; its message names the line.
 pub fn read_bvh(path: impl AsRef<Path>) -> Result<Clip, Error> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
@@ -35,10 +30,6 @@ pub fn read_bvh(path: impl AsRef<Path>) -> Result<Clip, Error> {
 /// # Errors
 /// As [`read_bvh`].
 pub fn read_bvh_bytes(name: &Path, bytes: &[u8]) -> Result<Clip, Error> {
-    let mut text = Words::new(bytes);
-    let clip = hierarchy::read(&mut text).and_then(|skeleton| {
-        let motion = motion::read(&mut text, skeleton.channels())?;
-        Ok(Clip { skeleton, motion })
-    });
-    clip.map_err(|fault| Signature::other_than("bvh", bytes).map_or(fault, crate::error::Fault::damaged).at(name))
+    let other = |fault| Signature::other_than("bvh", bytes).map_or(fault, Fault::damaged);
+    parser::read(bytes).map_err(|fault| other(fault).at(name))
 }

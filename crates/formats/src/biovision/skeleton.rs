@@ -1,6 +1,7 @@
-//! Joints and how they move.
+//! Joints, how they move, and where they are: forward kinematics.
 
 use cager_geometry::mesh::Point;
+use glam::{DAffine3, DMat3};
 
 /// What one value of a frame moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,7 +13,7 @@ pub enum Channel {
 }
 
 /// A joint of a [`Skeleton`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Joint {
     /// Its name, of which there is one in a skeleton.
     pub name: String,
@@ -42,6 +43,40 @@ impl Skeleton {
     /// Values of a frame.
     pub fn channels(&self) -> usize {
         self.joints.iter().map(|joint| joint.channels.len()).sum()
+    }
+
+    /// From each joint's frame to that of the file under these values, in the order of joints.
+    ///
+    /// # Panics
+    /// Where there are not as many values as channels.
+    pub fn pose(&self, values: &[f64]) -> Vec<DAffine3> {
+        assert_eq!(values.len(), self.channels(), "one value for each channel");
+        let mut values = values.iter();
+        let mut poses: Vec<DAffine3> = Vec::with_capacity(self.joints.len());
+        for joint in &self.joints {
+            let mut pose = DAffine3::from_translation(joint.offset.into());
+            for (channel, &value) in joint.channels.iter().zip(values.by_ref()) {
+                match *channel {
+                    Channel::Position(axis) => pose.translation[usize::from(axis)] = value,
+                    Channel::Rotation(axis) => {
+                        let about = [DMat3::from_rotation_x, DMat3::from_rotation_y, DMat3::from_rotation_z];
+                        pose.matrix3 *= about[usize::from(axis)](value.to_radians());
+                    }
+                }
+            }
+            poses.push(joint.parent.map_or(pose, |parent| poses[parent] * pose));
+        }
+        poses
+    }
+
+    /// Every joint where all angles are zero and no position replaces an offset.
+    pub fn zero_pose(&self) -> Vec<DAffine3> {
+        let channels = self.joints.iter().flat_map(|joint| joint.channels.iter().map(move |channel| (joint, channel)));
+        let value = |(joint, channel): (&Joint, &Channel)| match *channel {
+            Channel::Position(axis) => joint.offset[usize::from(axis)],
+            Channel::Rotation(_) => 0.0,
+        };
+        self.pose(&channels.map(value).collect::<Vec<_>>())
     }
 }
 

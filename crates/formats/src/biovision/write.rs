@@ -44,11 +44,11 @@ pub fn bvh_bytes(skeleton: &Skeleton, motion: &Motion) -> Vec<u8> {
         let _ = writeln!(text, "{indent}\tOFFSET {} {} {}", joint.offset[0], joint.offset[1], joint.offset[2]);
         let _ = write!(text, "{indent}\tCHANNELS {}", joint.channels.len());
         for channel in &joint.channels {
-            let (axis, kind) = match channel {
+            let (axis, kind) = match *channel {
                 Channel::Position(axis) => (axis, "position"),
                 Channel::Rotation(axis) => (axis, "rotation"),
             };
-            let _ = write!(text, " {}{kind}", ["X", "Y", "Z"][usize::from(*axis).min(2)]);
+            let _ = write!(text, " {}{kind}", ["X", "Y", "Z"][usize::from(axis).min(2)]);
         }
         text.push('\n');
         for [x, y, z] in &joint.end_sites {
@@ -57,22 +57,14 @@ pub fn bvh_bytes(skeleton: &Skeleton, motion: &Motion) -> Vec<u8> {
         stack.push((number, true));
         stack.extend(below[number].iter().rev().map(|&child| (child, false)));
     }
-    let mut first = vec![0; skeleton.joints.len()];
-    let mut next = 0;
-    for (number, joint) in skeleton.joints.iter().enumerate() {
-        first[number] = next;
-        next += joint.channels.len();
-    }
+    let counts = || skeleton.joints.iter().map(|joint| joint.channels.len());
+    let first = |number: usize| counts().take(number).sum::<usize>();
+    let ranges: Vec<_> = order.iter().map(|&k| first(k)..first(k + 1)).collect();
     let _ = writeln!(text, "MOTION\nFrames: {}\nFrame Time: {}", motion.frames(), motion.frame_time);
     for frame in 0..motion.frames() {
         let values = motion.frame(frame);
-        let mut separator = "";
-        for &number in &order {
-            for value in &values[first[number]..first[number] + skeleton.joints[number].channels.len()] {
-                let _ = write!(text, "{separator}{value}");
-                separator = " ";
-            }
-        }
+        let row: Vec<String> = ranges.iter().flat_map(|range| &values[range.clone()]).map(f64::to_string).collect();
+        text.push_str(&row.join(" "));
         text.push('\n');
     }
     text.into_bytes()

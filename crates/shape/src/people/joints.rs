@@ -183,7 +183,7 @@ mod tests {
             // Files list joints depth first.
             let poses = clip.skeleton.pose(clip.motion.frame(number));
             for (name, p) in joints.joints.names.iter().zip(frame) {
-                let found = poses[clip.skeleton.joint(name).unwrap()].position;
+                let found = poses[clip.skeleton.joint(name).unwrap()].translation;
                 assert!((0..3).all(|k| (found[k] - p[k]).abs() < 1e-9), "{name}: {found:?} {p:?}");
             }
         }

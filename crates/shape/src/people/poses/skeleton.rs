@@ -7,8 +7,8 @@ use super::error::PoseError;
 use super::names::Naming;
 use crate::people::rig::{QUADS, Rig};
 use crate::rotation::{between, halfway, log};
-use cager_formats::biovision::{JointPose, Skeleton};
-use glam::{DMat3, DVec3};
+use cager_formats::biovision::Skeleton;
+use glam::{DAffine3, DMat3, DVec3};
 
 /// Bones by their place among [`super::BONES`].
 const PELVIS: usize = 0;
@@ -42,7 +42,7 @@ impl SkeletonPoses {
     pub fn new(skeleton: &Skeleton, naming: &Naming, rig: &Rig) -> Result<Self, PoseError> {
         let joints = naming.joints(skeleton)?;
         let zero = skeleton.zero_pose();
-        let at = |joint: usize| DVec3::from(zero[joint].position);
+        let at = |joint: usize| zero[joint].translation;
         let left = at(joints[SIDE + 3].0) - at(joints[SIDE + SIDE_BONES + 3].0);
         let up = at(joints[HEAD].0) - at(joints[PELVIS].0);
         let own = axes(nearest_axis(up), nearest_axis(left)).or_else(|| axes(up, left)).ok_or(PoseError::NoAxes)?;
@@ -66,8 +66,8 @@ impl SkeletonPoses {
     }
 
     /// The pose of the rig that goes with these joints, see [`crate::people::rig::deform`].
-    pub fn pose(&self, joints: &[JointPose]) -> Vec<f64> {
-        let world = |bone: usize| matrix(&joints[self.joints[bone].0]) * self.alignments[bone];
+    pub fn pose(&self, joints: &[DAffine3]) -> Vec<f64> {
+        let world = |bone: usize| joints[self.joints[bone].0].matrix3 * self.alignments[bone];
         let pelvis = world(PELVIS).transpose();
         let turns: Vec<DMat3> =
             (0..self.joints.len()).map(|bone| self.to_rig * pelvis * world(bone) * self.to_rig.transpose()).collect();
@@ -118,9 +118,4 @@ fn nearest_axis(a: DVec3) -> DVec3 {
     let mut axis = DVec3::ZERO;
     axis[k] = a[k].signum();
     axis
-}
-
-fn matrix(pose: &JointPose) -> DMat3 {
-    let [x, y, z] = pose.rotation;
-    DMat3::from_cols_array_2d(&[x, y, z]).transpose()
 }
