@@ -1,9 +1,10 @@
-//! Matrix Market exchange format, coordinate (Boisvert, Pozo and Remington 1996): sparse matrices as text.
+//! Sparse matrices as text: Matrix Market, coordinate format (Boisvert, Pozo and Remington 1996).
 
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
 use crate::text::{Lines, integer, number, quoted, words};
 use cager_geometry::linalg::SparseMatrix;
+use std::fmt::Display;
 use std::path::Path;
 
 /// Bytes of the shortest entry: two numbers of one digit, a space and the end of the line.
@@ -27,13 +28,15 @@ pub fn read_matrix_bytes(name: &Path, bytes: &[u8]) -> Result<SparseMatrix, Erro
     read(bytes).map_err(|fault| Signature::other_than("mtx", bytes).map_or(fault, Fault::damaged).at(name))
 }
 
-/// What the first line says.
-#[derive(Clone, Copy)]
-struct Kind {
+/// What the first line and the one of the sizes say.
+struct Header {
     /// Values are written out; otherwise they are ones.
     has_values: bool,
     /// Only the lower triangle is written.
     symmetric: bool,
+    rows: u32,
+    columns: u32,
+    entries: usize,
 }
 
 /// An entry and the line it came from.
@@ -44,16 +47,17 @@ struct Entry {
     line: usize,
 }
 
+fn damaged(line: usize, what: impl Display) -> Fault {
+    Fault::damaged(format!("line {line}: {what}; export the matrix again"))
+}
+
 fn read(bytes: &[u8]) -> Result<SparseMatrix, Fault> {
     let mut lines = Lines::new(bytes);
-    let kind = kind(lines.next().unwrap_or_default())?;
-    let (rows, columns, promised) = sizes(&mut lines, kind)?;
-    let room = lines.rest().len() / SHORTEST_ENTRY + 1;
-    if promised > room {
-        return Err(Fault::damaged(format!(
-            "line {}: {promised} entries are promised, more than the file can hold; copy or export it again",
-            lines.number()
-        )));
+    let header = header(&mut lines)?;
+    let promised = header.entries;
+    if promised > lines.rest().len() / SHORTEST_ENTRY + 1 {
+        let what = format!("{promised} entries are promised, more than the file can hold");
+        return Err(damaged(lines.number(), what));
     }
     let mut entries = Vec::with_capacity(promised);
     while let Some(line) = lines.next() {
@@ -61,134 +65,100 @@ fn read(bytes: &[u8]) -> Result<SparseMatrix, Fault> {
             continue;
         }
         if entries.len() == promised {
-            let text = format!("line {}: there are more than the {promised} entries that are promised", lines.number());
-            return Err(Fault::damaged(format!("{text}; export the matrix again")));
+            let what = format!("there are more than the {promised} entries that are promised");
+            return Err(damaged(lines.number(), what));
         }
-        entries.push(entry(line, lines.number(), kind, rows, columns)?);
+        entries.push(entry(line, lines.number(), &header)?);
     }
     if entries.len() < promised {
-        return Err(Fault::damaged(format!(
-            "ends after {} of {promised} entries; copy or export the file again",
-            entries.len()
-        )));
+        let found = entries.len();
+        return Err(Fault::damaged(format!("ends after {found} of {promised} entries; copy or export the file again")));
     }
-    refuse_repetition(&mut entries)?;
-    let mirrored = |e: &Entry| (kind.symmetric && e.row != e.column).then_some((e.column, e.row, e.value));
+    entries.sort_by_key(|e| (e.row, e.column));
+    if let Some([a, b]) = entries.windows(2).find(|pair| (pair[0].row, pair[0].column) == (pair[1].row, pair[1].column))
+    {
+        let (row, column, line) = (b.row + 1, b.column + 1, a.line);
+        return Err(damaged(b.line, format!("row {row}, column {column} has an entry on line {line} already")));
+    }
+    let mirrored = |e: &Entry| (header.symmetric && e.row != e.column).then_some((e.column, e.row, e.value));
     let all = entries.iter().flat_map(|e| [Some((e.row, e.column, e.value)), mirrored(e)]).flatten().collect();
-    SparseMatrix::new(rows as usize, columns as usize, all)
+    SparseMatrix::new(header.rows as usize, header.columns as usize, all)
         .ok_or_else(|| Fault::invalid("has an entry beyond 1e100, which cannot be squared; scale the matrix down"))
 }
 
-fn kind(line: &[u8]) -> Result<Kind, Fault> {
-    let wrong = |what: &str| {
-        Fault::unsupported(format!(
+fn header(lines: &mut Lines<'_>) -> Result<Header, Fault> {
+    let unread = |what: &str| {
+        Err(Fault::unsupported(format!(
             "line 1: {what}; give a file that begins with \"%%MatrixMarket matrix coordinate real general\""
-        ))
+        )))
     };
-    let mut words = words(line).map(<[u8]>::to_ascii_lowercase);
-    let mut next = || words.next().unwrap_or_default();
-    if next() != b"%%matrixmarket" || next() != b"matrix" {
-        return Err(wrong("this is not a matrix in the Matrix Market format"));
+    let first = lines.next().unwrap_or_default().to_ascii_lowercase();
+    let mut found = words(&first);
+    let mut next = || found.next().unwrap_or_default();
+    if [next(), next()] != [&b"%%matrixmarket"[..], b"matrix"] {
+        return unread("this is not a matrix in the Matrix Market format");
     }
-    let (layout, field, symmetry) = (next(), next(), next());
+    let [layout, field, symmetry] = [next(), next(), next()];
     if layout != b"coordinate" {
-        return Err(wrong(&format!("the layout {} is not read here", quoted(&layout))));
+        return unread(&format!("the layout {} is not read here", quoted(layout)));
     }
-    let has_values = match field.as_slice() {
-        b"real" | b"integer" => true,
-        b"pattern" => false,
-        _ => return Err(wrong(&format!("entries of the kind {} are not read here", quoted(&field)))),
+    let (has_values, symmetric) = match (field, symmetry) {
+        (b"real" | b"integer" | b"pattern", b"general" | b"symmetric") => {
+            (field != b"pattern", symmetry == b"symmetric")
+        }
+        (b"real" | b"integer" | b"pattern", _) => {
+            return unread(&format!("the symmetry {} is not read here", quoted(symmetry)));
+        }
+        _ => return unread(&format!("entries of the kind {} are not read here", quoted(field))),
     };
-    let symmetric = match symmetry.as_slice() {
-        b"general" => false,
-        b"symmetric" => true,
-        _ => return Err(wrong(&format!("the symmetry {} is not read here", quoted(&symmetry)))),
-    };
-    Ok(Kind { has_values, symmetric })
-}
 
-/// Rows, columns and entries.
-fn sizes(lines: &mut Lines<'_>, kind: Kind) -> Result<(u32, u32, usize), Fault> {
     let line = lines.by_ref().find(|line| !line.is_empty() && !line.starts_with(b"%")).unwrap_or_default();
-    let place = lines.number();
-    let mut numbers = words(line);
+    let (place, mut numbers) = (lines.number(), words(line));
     let mut next = || numbers.next().and_then(integer::<u64>);
-    let (Some(rows), Some(columns), Some(entries)) = (next(), next(), next()) else {
-        return Err(Fault::damaged(format!(
-            "line {place}: the numbers of rows, columns and entries are missing; export the matrix again"
-        )));
+    let (Some(r), Some(c), Some(entries)) = (next(), next(), next()) else {
+        return Err(damaged(place, "the numbers of rows, columns and entries are missing"));
     };
     if let Some(word) = numbers.next() {
-        return Err(Fault::damaged(format!(
-            "line {place}: {} follows the numbers of rows, columns and entries; export the matrix again",
-            quoted(word)
-        )));
+        return Err(damaged(place, format!("{} follows the numbers of rows, columns and entries", quoted(word))));
     }
-    let (Ok(r), Ok(c)) = (u32::try_from(rows), u32::try_from(columns)) else {
+    let (Ok(rows), Ok(columns)) = (u32::try_from(r), u32::try_from(c)) else {
         return Err(Fault::unsupported(format!(
-            "line {place}: {rows} × {columns} is larger than any matrix read here; leave out what does not belong to the cage"
+            "line {place}: {r} × {c} is larger than any matrix read here; leave out what does not belong to the cage"
         )));
     };
-    if entries > u64::from(r) * u64::from(c) {
-        return Err(Fault::damaged(format!(
-            "line {place}: a matrix of {r} × {c} cannot have {entries} entries; export it again"
-        )));
+    if entries > r * c {
+        return Err(damaged(place, format!("a matrix of {r} × {c} cannot have {entries} entries")));
     }
-    if kind.symmetric && r != c {
-        return Err(Fault::damaged(format!(
-            "line {place}: a symmetric matrix cannot have {r} rows and {c} columns; export it again"
-        )));
+    if symmetric && r != c {
+        return Err(damaged(place, format!("a symmetric matrix cannot have {r} rows and {c} columns")));
     }
-    Ok((r, c, usize::try_from(entries).unwrap_or(usize::MAX)))
+    let entries = usize::try_from(entries).unwrap_or(usize::MAX);
+    Ok(Header { has_values, symmetric, rows, columns, entries })
 }
 
-fn entry(line: &[u8], place: usize, kind: Kind, rows: u32, columns: u32) -> Result<Entry, Fault> {
+fn entry(line: &[u8], place: usize, header: &Header) -> Result<Entry, Fault> {
     let mut words = words(line);
     let mut index = |what: &str, most: u32| {
         let word = words.next().unwrap_or_default();
-        integer::<u32>(word).filter(|i| (1..=most).contains(i)).map(|i| i - 1).ok_or_else(|| {
-            Fault::damaged(format!(
-                "line {place}: {} is not a {what} from 1 to {most}; export the matrix again",
-                quoted(word)
-            ))
-        })
+        let wrong = || damaged(place, format!("{} is not a {what} from 1 to {most}", quoted(word)));
+        integer::<u32>(word).filter(|i| (1..=most).contains(i)).map(|i| i - 1).ok_or_else(wrong)
     };
-    let (row, column) = (index("row", rows)?, index("column", columns)?);
-    if kind.symmetric && column > row {
-        return Err(Fault::damaged(format!(
-            "line {place}: a symmetric matrix has entries on and below its diagonal only; export it again"
-        )));
+    let (row, column) = (index("row", header.rows)?, index("column", header.columns)?);
+    if header.symmetric && column > row {
+        return Err(damaged(place, "a symmetric matrix has entries on and below its diagonal only"));
     }
-    let value = if kind.has_values {
+    let mut value = 1.0;
+    if header.has_values {
         let word = words.next().unwrap_or_default();
-        let value = number(word).ok_or_else(|| {
-            Fault::damaged(format!("line {place}: {} is not a number; export the matrix again", quoted(word)))
-        })?;
-        if !value.is_finite() {
+        value = number(word).ok_or_else(|| damaged(place, format!("{} is not a number", quoted(word))))?;
+        if !f64::is_finite(value) {
             return Err(Fault::invalid(format!("line {place}: the entry is NaN or infinite; repair or remove it")));
         }
-        value
-    } else {
-        1.0
-    };
+    }
     match words.next() {
         None => Ok(Entry { row, column, value, line: place }),
         Some(word) => {
             Err(Fault::damaged(format!("line {place}: {} follows the entry; give one entry a line", quoted(word))))
         }
-    }
-}
-
-fn refuse_repetition(entries: &mut [Entry]) -> Result<(), Fault> {
-    entries.sort_by_key(|e| (e.row, e.column));
-    match entries.iter().zip(entries.iter().skip(1)).find(|(a, b)| (a.row, a.column) == (b.row, b.column)) {
-        None => Ok(()),
-        Some((a, b)) => Err(Fault::damaged(format!(
-            "line {}: row {}, column {} has an entry on line {} already; leave one of them",
-            b.line,
-            b.row + 1,
-            b.column + 1,
-            a.line
-        ))),
     }
 }
