@@ -164,8 +164,10 @@ fn advice(action: Action, cause: &io::Error) -> &'static str {
 }
 
 /// An [`Error`] of a parser, which knows bytes and not the file that they came from.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub(crate) enum Fault {
+    /// The disk, of what is read where it is asked for.
+    Io(io::Error),
     Damaged(String),
     Unsupported(String),
     Invalid(String),
@@ -187,10 +189,17 @@ impl Fault {
     pub(crate) fn at(self, path: &Path) -> Error {
         let path = path.to_owned();
         match self {
+            Self::Io(cause) => Error::read(&path, cause),
             Self::Damaged(what) => Error::Damaged { path, what },
             Self::Unsupported(what) => Error::Unsupported { path, what },
             Self::Invalid(what) => Error::Invalid { path, what },
         }
+    }
+}
+
+impl From<io::Error> for Fault {
+    fn from(cause: io::Error) -> Self {
+        Self::Io(cause)
     }
 }
 

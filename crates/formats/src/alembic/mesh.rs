@@ -4,15 +4,14 @@ use std::io::{Read, Seek};
 
 use super::objects::{Archive, Kind as ObjectKind};
 use super::properties::{BOOL, F32, F64, I32, Kind, Property, U8, U32, find};
-use super::sampling::Sampling;
-use super::timing::timing;
+use super::sampling::{Sampling, timing};
 use super::unread;
 use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::frames::Scalar;
 use crate::scene::{
-    Chain, Failure, MOST_OPERATIONS, MeshTracks, MovingMesh, Operation, Timeline, Tree, Values, ancestry, check_held,
-    choose, damaged, no_points, shown, shown_path, union,
+    Chain, MOST_OPERATIONS, MeshTracks, MovingMesh, Operation, Timeline, Tree, Values, ancestry, check_held, choose,
+    damaged, no_points, shown, shown_path, union,
 };
 
 /// Bytes of the path of what an instance is of.
@@ -22,15 +21,15 @@ const USUAL_RATE: f64 = 24.0;
 /// Shares of the mean distance of two samples within which two times are one.
 const NEAR: f64 = 1e-6;
 
-/// Opens the mesh in an archive of `length` bytes that `prim` names, or the only one; tells what is not read of it where that
-/// is wanted.
+/// Opens the mesh that `prim` names, or the only one; tells what is not read of it where that is
+/// wanted.
 pub(crate) fn open<'a>(
     source: impl Read + Seek + Send + 'a,
     length: u64,
     prim: Option<&str>,
     dropped: Option<&mut Dropped>,
-) -> Result<MovingMesh<'a>, Failure> {
-    let mut archive = Archive::open(source, length)?;
+) -> Result<MovingMesh<'a>, Fault> {
+    let mut archive = Archive::open(Box::new(source), length)?;
     let object = find_mesh(&mut archive, prim)?;
     archive.container.allow(4);
     let (positions, scalar) = positions(&mut archive, object)?;
@@ -38,7 +37,7 @@ pub(crate) fn open<'a>(
     let properties = archive.schema(object, ".geom")?;
     let parts = [array(&properties, ".faceCounts")?, array(&properties, ".faceIndices")?];
     if parts.iter().any(|faces| !matches!(faces.number, I32 | U32)) {
-        return Err(damaged("its faces are not whole numbers of four bytes").into());
+        return Err(damaged("its faces are not whole numbers of four bytes"));
     }
     let mut tracks = MeshTracks { is_clockwise: true, ..MeshTracks::default() };
     let mut moving: Vec<usize> = Some(positions.sampling).filter(|_| !positions.is_constant()).into_iter().collect();
@@ -63,11 +62,11 @@ pub(crate) fn open<'a>(
     MovingMesh::new(Box::new(archive.container), tracks)
 }
 
-fn find_mesh<R: Read + Seek + Send>(archive: &mut Archive<R>, prim: Option<&str>) -> Result<usize, Failure> {
+fn find_mesh(archive: &mut Archive<'_>, prim: Option<&str>) -> Result<usize, Fault> {
     let is_candidate = |k: &usize| matches!(archive.objects[*k].kind, ObjectKind::Mesh | ObjectKind::Instance);
     let all: Vec<usize> = (0..archive.objects.len()).filter(is_candidate).collect();
     if all.is_empty() {
-        return Err(Fault::unsupported("holds no polygon mesh; export the mesh itself as Alembic").into());
+        return Err(Fault::unsupported("holds no polygon mesh; export the mesh itself as Alembic"));
     }
     let chosen = choose(archive, &all, prim)?;
     if archive.objects[chosen].kind == ObjectKind::Mesh {
@@ -85,10 +84,10 @@ fn find_mesh<R: Read + Seek + Send>(archive: &mut Archive<R>, prim: Option<&str>
     let what = format!(
         "{path} is an instance of {source}, which is not read; make instances real where it is exported, or export {source} alone"
     );
-    Err(Fault::unsupported(what).into())
+    Err(Fault::unsupported(what))
 }
 
-impl<R: Read + Seek + Send> Tree for Archive<R> {
+impl Tree for Archive<'_> {
     fn nodes(&self) -> &[crate::scene::Node] {
         &self.nodes
     }
@@ -112,31 +111,31 @@ fn array(properties: &[Property], name: &str) -> Result<Property, Fault> {
 }
 
 /// The positions of a mesh, and how they are stored.
-fn positions<R: Read + Seek>(archive: &mut Archive<R>, object: usize) -> Result<(Property, Scalar), Failure> {
+fn positions(archive: &mut Archive<'_>, object: usize) -> Result<(Property, Scalar), Fault> {
     let positions = array(&archive.schema(object, ".geom")?, "P")?;
     let scalar = match (positions.extent, positions.number) {
         (3, F32) => Scalar::F32Little,
         (3, F64) => Scalar::F64Little,
         _ => {
             let what = "has positions that are not three numbers of single or double precision; export it again";
-            return Err(Fault::unsupported(what).into());
+            return Err(Fault::unsupported(what));
         }
     };
     Ok((positions, scalar))
 }
 
 /// Adds a transform, and its times where it moves; gives whether what is above it moves it too.
-fn add_transform<R: Read + Seek + Send>(
-    archive: &mut Archive<R>,
+fn add_transform(
+    archive: &mut Archive<'_>,
     object: usize,
     chain: &mut Chain,
     moving: &mut Vec<usize>,
-) -> Result<bool, Failure> {
+) -> Result<bool, Fault> {
     let properties = archive.schema(object, ".xform")?;
     let named = |name: &str| properties.iter().find(|property| property.name == name.as_bytes());
     if let (Some(operations), Some(values)) = (named(".ops"), named(".vals")) {
         if operations.number != U8 || values.number != F64 || values.samples == 0 || operations.samples == 0 {
-            return Err(damaged("a transform has no numbers, or of an unknown type").into());
+            return Err(damaged("a transform has no numbers, or of an unknown type"));
         }
         let codes = operations.small(&mut archive.container, MOST_OPERATIONS as u64)?;
         let operations = codes.iter().map(|code| operation(code >> 4, codes.len())).collect::<Result<_, _>>()?;
@@ -149,7 +148,7 @@ fn add_transform<R: Read + Seek + Send>(
     };
     if !told.is_constant() {
         let what = "has a transform that is moved by what is above it in some frames only; bake it into the points";
-        return Err(Fault::unsupported(what).into());
+        return Err(Fault::unsupported(what));
     }
     Ok(told.small(&mut archive.container, 1)?.first() != Some(&0))
 }
@@ -169,42 +168,33 @@ fn operation(kind: u8, count: usize) -> Result<Operation, Fault> {
     })
 }
 
-/// A frame at each sample of all that moves, `moving` the tables of its times, or else at each of the positions.
-fn timeline<R: Read + Seek + Send>(
-    archive: &mut Archive<R>,
+/// A frame at each sample of all that moves, `moving` the tables of its times, or of positions.
+fn timeline(
+    archive: &mut Archive<'_>,
     positions: &Property,
     tracks: &MeshTracks,
     mut moving: Vec<usize>,
-) -> Result<Timeline, Failure> {
+) -> Result<Timeline, Fault> {
     let length = archive.container.source.length;
     let first = positions.first(&mut archive.container)?;
     let bytes = archive.container.sample(first)?.length;
     if bytes == 0 {
-        return Err(no_points().into());
+        return Err(no_points());
     }
     let is_held = |frames: usize| check_held(frames, bytes.saturating_mul(frames as u64) / 2 <= length);
-    let mut all = vec![tracks.positions.times.as_slice()];
-    all.extend(tracks.chain.moving());
-    all.retain(|times| !times.is_empty());
-    let idle;
-    if all.is_empty() {
+    let moved = tracks.chain.moving().flatten();
+    let mut samples: Vec<f64> = tracks.positions.times.iter().chain(moved).copied().collect();
+    if samples.is_empty() {
         is_held(positions.samples)?;
         moving = vec![positions.sampling];
-        idle = archive.samplings[positions.sampling].times(positions.samples)?;
-        all = vec![idle.as_slice()];
+        samples = archive.samplings[positions.sampling].times(positions.samples)?;
     }
+    check_held(samples.len(), (samples.len() as u64).saturating_mul(4) <= length)?;
+    let [low, high] = [f64::min, f64::max].map(|pick| samples.iter().copied().reduce(pick).unwrap_or_default());
+    let near = NEAR * (high - low) / samples.len() as f64;
+    let at = union(samples, near);
     moving.sort_unstable();
     moving.dedup();
-    let longest = all.iter().copied().max_by_key(|times| times.len()).unwrap_or_default();
-    let at = if all.iter().all(|times| longest.starts_with(times)) {
-        longest.to_vec()
-    } else {
-        let times = all.concat();
-        check_held(times.len(), (times.len() as u64).saturating_mul(4) <= length)?;
-        let [low, high] = [f64::min, f64::max].map(|pick| times.iter().copied().reduce(pick).unwrap_or_default());
-        let near = NEAR * (high - low) / times.len() as f64;
-        union(times, near)
-    };
     is_held(at.len())?;
     let times = match moving.as_slice() {
         // What programs give that know no times.
@@ -215,7 +205,7 @@ fn timeline<R: Read + Seek + Send>(
     Ok(Timeline { times, at })
 }
 
-/// A note of a transform that turns or travels far between two samples, where a scene shows it on its way.
+/// A note of transforms whose samples are far apart: scenes show what is between.
 fn sparse(times: &[f64], told: Option<f64>) -> Option<String> {
     let longest = times.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
     let frame = 1.0 / told.unwrap_or(USUAL_RATE).min(USUAL_RATE);

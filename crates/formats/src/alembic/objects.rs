@@ -1,13 +1,12 @@
 //! The tree of objects of an archive: what each is called, what it is, what it lies below.
 
-use std::io::{Read, Seek};
 use std::sync::Arc;
 
 use super::ogawa::{Container, DATA};
 use super::sampling::Sampling;
 use crate::error::Fault;
 use crate::frames::nominal;
-use crate::scene::{Failure, Fields, Node, damaged};
+use crate::scene::{Fields, Node, Reader, damaged};
 
 /// Objects of an archive, and how deep they nest; programs write far fewer.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -17,7 +16,6 @@ const HASHES: usize = 32;
 /// In place of an index of metadata that is told beside it.
 pub(super) const INLINE: usize = 0xff;
 
-/// What an object is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A polygon mesh, or the control mesh of a subdivision surface.
@@ -50,13 +48,12 @@ impl Kind {
 #[derive(Debug)]
 pub(super) struct Object {
     pub(super) kind: Kind,
-    /// Offset of its group.
     pub(super) group: u64,
 }
 
 /// An archive without the contents of its objects.
-pub(super) struct Archive<R> {
-    pub(super) container: Container<R>,
+pub(super) struct Archive<'a> {
+    pub(super) container: Container<'a>,
     pub(super) samplings: Vec<Sampling>,
     /// Frames per second of the program that wrote it.
     pub(super) frame_rate: Option<f64>,
@@ -65,12 +62,12 @@ pub(super) struct Archive<R> {
     pub(super) objects: Vec<Object>,
 }
 
-impl<R: Read + Seek> Archive<R> {
-    pub(super) fn open(source: R, length: u64) -> Result<Self, Failure> {
+impl<'a> Archive<'a> {
+    pub(super) fn open(source: Reader<'a>, length: u64) -> Result<Self, Fault> {
         let (mut container, root) = Container::open(source, length)?;
         let children = container.children(root)?;
         let &[_, _, top, information, times, metadata, ..] = children.as_slice() else {
-            return Err(damaged("it has no contents").into());
+            return Err(damaged("it has no contents"));
         };
         let frame_rate = frame_rate(&container.contents(information)?);
         let samplings = Sampling::table(&container.contents(times)?)?;
@@ -87,7 +84,7 @@ impl<R: Read + Seek> Archive<R> {
             nodes.push(node);
             objects.push(object);
             if objects.len() + waiting.len() > MOST_OBJECTS {
-                return Err(too_many().into());
+                return Err(too_many());
             }
         }
         // What follows reads the properties of some objects, some of them twice.
@@ -101,11 +98,11 @@ fn too_many() -> Fault {
 }
 
 /// The objects that a group has, the last one first.
-fn children_of<R: Read + Seek>(
-    container: &mut Container<R>,
+fn children_of(
+    container: &mut Container<'_>,
     (group, parent, depth): (u64, Option<usize>, usize),
     kinds: &[Kind],
-) -> Result<Vec<(Node, Object)>, Failure> {
+) -> Result<Vec<(Node, Object)>, Fault> {
     let children = container.children(group)?;
     // The first are its own properties, the last are the headers of the others.
     let [_, groups @ .., headers] = children.as_slice() else { return Ok(Vec::new()) };
@@ -114,22 +111,18 @@ fn children_of<R: Read + Seek>(
     }
     if depth > DEEPEST {
         let what = format!("nests deeper than {DEEPEST}; export the mesh alone, without what it lies below");
-        return Err(Fault::unsupported(what).into());
+        return Err(Fault::unsupported(what));
     }
     if groups.len() > MOST_OBJECTS {
-        return Err(too_many().into());
+        return Err(too_many());
     }
     let headers = container.contents(*headers)?;
     let mut fields = Fields(&headers[..headers.len().saturating_sub(HASHES)]);
     let mut objects = Vec::new();
     for &group in groups {
-        let length = fields.short(2)?;
-        let name = Arc::from(fields.take(length)?);
+        let name = Arc::from(fields.sized(2)?);
         let kind = match fields.short(0)? {
-            INLINE => {
-                let length = fields.short(2)?;
-                Kind::of(fields.take(length)?)
-            }
+            INLINE => Kind::of(fields.sized(2)?),
             index => *kinds.get(index).ok_or_else(|| damaged("an object has metadata that are not there"))?,
         };
         objects.push((Node { name, parent, depth }, Object { kind, group }));
@@ -142,8 +135,7 @@ fn children_of<R: Read + Seek>(
 fn kinds(table: &[u8]) -> Result<Vec<Kind>, Fault> {
     let (mut fields, mut kinds) = (Fields(table), vec![Kind::Other]);
     while !fields.0.is_empty() {
-        let length = fields.short(0)?;
-        kinds.push(Kind::of(fields.take(length)?));
+        kinds.push(Kind::of(fields.sized(0)?));
     }
     Ok(kinds)
 }

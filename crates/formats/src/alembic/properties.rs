@@ -1,10 +1,9 @@
 //! Properties of an object: what their headers say, and where their samples lie.
 
-use std::io::{Read, Seek};
-
 use super::objects::{Archive, INLINE};
 use super::ogawa::{Container, DATA};
-use crate::scene::{Failure, Fields, Track, Value, check_held, damaged};
+use crate::error::Fault;
+use crate::scene::{Fields, Track, Value, check_held, damaged};
 
 /// Types of numbers, as headers tell them.
 pub(super) const BOOL: u8 = 0;
@@ -14,7 +13,6 @@ pub(super) const I32: u8 = 6;
 pub(super) const F32: u8 = 10;
 pub(super) const F64: u8 = 11;
 
-/// What a property holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Other properties.
@@ -29,12 +27,11 @@ pub(super) enum Kind {
 pub(super) struct Property {
     pub(super) name: Vec<u8>,
     pub(super) kind: Kind,
-    /// The type of the numbers.
     pub(super) number: u8,
     /// Numbers of a value.
     pub(super) extent: u8,
     pub(super) samples: usize,
-    /// The first sample that differs from the one before it, and the last one; 0 and 0 where all are the same.
+    /// The first sample that differs from the one before, and the last; 0 and 0 where none does.
     first: usize,
     last: usize,
     /// Index of the times of its samples.
@@ -43,26 +40,24 @@ pub(super) struct Property {
 }
 
 impl Property {
-    /// Whether all samples are the same.
     pub(super) fn is_constant(&self) -> bool {
         self.samples < 2 || (self.first, self.last) == (0, 0)
     }
 
-    /// Where a sample lies among those that are stored: repetitions at the beginning and the end are not.
+    /// Where a sample is stored: repetitions at the beginning and the end are not.
     fn place(&self, sample: usize) -> usize {
         if sample < self.first { 0 } else { (sample.min(self.last) + 1).saturating_sub(self.first) }
     }
 
     /// The bytes of the first sample, `most` at the most.
-    pub(super) fn small<R: Read + Seek>(&self, container: &mut Container<R>, most: u64) -> Result<Vec<u8>, Failure> {
+    pub(super) fn small(&self, container: &mut Container<'_>, most: u64) -> Result<Vec<u8>, Fault> {
         let first = self.first(container)?;
         container.small(first, most, &String::from_utf8_lossy(&self.name))
     }
 
-    /// Where the first sample is.
-    pub(super) fn first<R: Read + Seek>(&self, container: &mut Container<R>) -> Result<Value, Failure> {
+    pub(super) fn first(&self, container: &mut Container<'_>) -> Result<Value, Fault> {
         let children = container.children(self.group)?;
-        Ok(children.first().map(|&data| Value(data)).ok_or_else(|| damaged("a sample is missing"))?)
+        children.first().map(|&data| Value(data)).ok_or_else(|| damaged("a sample is missing"))
     }
 }
 
@@ -71,9 +66,9 @@ pub(super) fn find<'a>(properties: &'a [Property], name: &str, kind: Kind) -> Op
     properties.iter().find(|property| property.name == name.as_bytes() && property.kind == kind)
 }
 
-impl<R: Read + Seek> Archive<R> {
+impl Archive<'_> {
     /// Where the samples of a property are, and when.
-    pub(super) fn track(&mut self, property: &Property) -> Result<Track, Failure> {
+    pub(super) fn track(&mut self, property: &Property) -> Result<Track, Fault> {
         let &Property { samples, kind, .. } = property;
         if property.is_constant() {
             return Ok(Track { default: Some(property.first(&mut self.container)?), ..Track::default() });
@@ -90,8 +85,7 @@ impl<R: Read + Seek> Archive<R> {
         Ok(Track { default: None, times, values: (0..samples).map(value).collect::<Result<_, _>>()? })
     }
 
-    /// The properties of an object.
-    pub(super) fn top_properties(&mut self, object: usize) -> Result<Vec<Property>, Failure> {
+    pub(super) fn top_properties(&mut self, object: usize) -> Result<Vec<Property>, Fault> {
         let children = self.container.children(self.objects[object].group)?;
         match children.first() {
             Some(&group) if group & DATA == 0 => self.properties(group),
@@ -99,18 +93,18 @@ impl<R: Read + Seek> Archive<R> {
         }
     }
 
-    /// The properties in an object's compound of this name, `.geom` or `.xform`; none where it has no such.
-    pub(super) fn schema(&mut self, object: usize, name: &str) -> Result<Vec<Property>, Failure> {
+    /// The properties in an object's compound `.geom` or `.xform`; none where it has no such.
+    pub(super) fn schema(&mut self, object: usize, name: &str) -> Result<Vec<Property>, Fault> {
         let all = self.top_properties(object)?;
         self.within(&all, name)
     }
 
     /// The properties in a compound among these; none where there is no such.
-    pub(super) fn within(&mut self, all: &[Property], name: &str) -> Result<Vec<Property>, Failure> {
+    pub(super) fn within(&mut self, all: &[Property], name: &str) -> Result<Vec<Property>, Fault> {
         find(all, name, Kind::Compound).map_or(Ok(Vec::new()), |compound| self.properties(compound.group))
     }
 
-    fn properties(&mut self, group: u64) -> Result<Vec<Property>, Failure> {
+    fn properties(&mut self, group: u64) -> Result<Vec<Property>, Fault> {
         let children = self.container.children(group)?;
         let Some((&headers, groups)) = children.split_last() else { return Ok(Vec::new()) };
         let headers = self.container.contents(headers)?;
@@ -118,12 +112,13 @@ impl<R: Read + Seek> Archive<R> {
         groups.iter().map(|&group| self.property(&mut fields, group)).collect()
     }
 
-    /// The next header. Its first four bytes are bits: 0–1 the kind, 2–3 the width of its numbers, 4–7 the type of the values, 8 whether times are
-    /// told, 9 whether the first and the last change are, 11 whether there is none, 12–19 the extent, 20–27 the metadata.
-    fn property(&self, fields: &mut Fields<'_>, group: u64) -> Result<Property, Failure> {
+    /// The next header. Its first bits: 0–1 the kind, 2–3 the width of its numbers, 4–7 the type of
+    /// values, 8 whether times are told, 9 whether the first and the last change are, 11 whether
+    /// there is none, 12–19 the extent, 20–27 the metadata.
+    fn property(&self, fields: &mut Fields<'_>, group: u64) -> Result<Property, Fault> {
         let bits = fields.short(2)?;
         if bits >> 2 & 3 == 3 {
-            return Err(damaged("a table has numbers of eight bytes").into());
+            return Err(damaged("a table has numbers of eight bytes"));
         }
         let (width, bit) = ((bits >> 2 & 3) as u32, |k: u32| bits >> k & 1 == 1);
         let kind = match bits & 3 {
@@ -143,14 +138,12 @@ impl<R: Read + Seek> Archive<R> {
                 sampling = fields.short(width)?;
             }
             if sampling >= self.samplings.len() {
-                return Err(damaged("a property has times that are not there").into());
+                return Err(damaged("a property has times that are not there"));
             }
         }
-        let length = fields.short(width)?;
-        let name = fields.take(length)?.to_vec();
+        let name = fields.sized(width)?.to_vec();
         if bits >> 20 & 0xff == INLINE {
-            let length = fields.short(width)?;
-            fields.take(length)?;
+            fields.sized(width)?;
         }
         let (number, extent) = ((bits >> 4 & 15) as u8, (bits >> 12 & 0xff) as u8);
         Ok(Property { name, kind, number, extent, samples, first, last, sampling, group })

@@ -1,14 +1,13 @@
 //! What a mesh of an archive has that is not read.
 
-use std::io::{Read, Seek};
-
 use super::objects::{Archive, Kind as ObjectKind};
 use super::properties::{Kind, Property, find};
 use crate::dropped::{Dropped, counted, listed};
-use crate::scene::{Failure, ancestry};
+use crate::error::Fault;
+use crate::scene::ancestry;
 
 /// Adds what a mesh has beside points and faces.
-pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped: &mut Dropped) -> Result<(), Failure> {
+pub(super) fn add(archive: &mut Archive<'_>, mesh: usize, dropped: &mut Dropped) -> Result<(), Fault> {
     let properties = archive.schema(mesh, ".geom")?;
     // With indices, as most programs write them, values are in a compound.
     let is_there = |found: &Property| found.kind == Kind::Compound || found.samples > 0;
@@ -48,7 +47,7 @@ pub(super) fn add<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize, dropped
 }
 
 /// A note of a mesh that is hidden in some frames.
-pub(super) fn visibility<R: Read + Seek>(archive: &mut Archive<R>, mesh: usize) -> Result<Option<String>, Failure> {
+pub(super) fn visibility(archive: &mut Archive<'_>, mesh: usize) -> Result<Option<String>, Fault> {
     for object in ancestry(&archive.nodes, mesh).collect::<Vec<_>>() {
         let properties = archive.top_properties(object)?;
         if find(&properties, "visible", Kind::Scalar).is_some_and(|visible| !visible.is_constant()) {

@@ -12,7 +12,7 @@ use super::{CacheFormat, FrameReader, FrameSelection, maya, mdd, npy, pc2};
 use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::glb;
-use crate::scene::{self, Failure, MovingMesh};
+use crate::scene::{self, MovingMesh};
 use crate::signature::Signature;
 use crate::usd;
 
@@ -61,7 +61,7 @@ pub(super) fn open<'a>(
 
 fn open_scene<'a>(
     path: &Path,
-    opened: Result<MovingMesh<'a>, Failure>,
+    opened: Result<MovingMesh<'a>, Fault>,
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     scene::open(path, opened.map_err(|failure| failure.at(path))?, expected_points)

@@ -6,15 +6,13 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use cager_geometry::mesh::Polygons;
-
 use super::FrameReader;
 use super::block::read_values;
 use super::numbers;
 use super::times::{Times, near_whole};
 use super::widen::Scalar;
 use crate::error::{Error, Fault};
-use crate::scene::{self, Animation, Failure, shown};
+use crate::scene::{self, Animation, MeshInfo, shown};
 
 /// Ticks of a second.
 pub(super) const TICKS: f64 = 6000.0;
@@ -46,7 +44,7 @@ pub(super) fn open<'a>(
             "it is one frame of a cache with a file for each; for all of them give the pattern '{}'",
             all.display()
         );
-        cache.times.note = Some(what);
+        cache.info.times.note = Some(what);
     }
     scene::open(path, cache, expected_points)
 }
@@ -116,9 +114,8 @@ fn fitting(ticks: &[i32], told: f64) -> f64 {
 
 struct Cache<R> {
     chunks: Chunks<R>,
-    times: Times,
+    info: MeshInfo,
     frames: Vec<Array>,
-    faces: Polygons,
     block: Vec<u8>,
     /// Whether other frames are in files of their own.
     is_one_frame: bool,
@@ -135,7 +132,7 @@ struct Array {
 type Channel = (Vec<u8>, Array);
 
 impl<R: Read + Seek> Cache<R> {
-    fn open(source: R, length: u64, prim: Option<&str>, told: Option<f64>) -> Result<Self, Failure> {
+    fn open(source: R, length: u64, prim: Option<&str>, told: Option<f64>) -> Result<Self, Fault> {
         let mut chunks = Chunks::open(source, length)?;
         let header = chunks.chunk(0, length)?;
         let start = chunks.start_time(header)?;
@@ -163,14 +160,14 @@ impl<R: Read + Seek> Cache<R> {
                 let what = format!(
                     "has {found} points in frame {frame}, and {points} in frame 0; export a mesh with all its points in every frame"
                 );
-                return Err(Fault::invalid(what).into());
+                return Err(Fault::invalid(what));
             }
             name = Some(chosen);
             frames.push(array);
             ticks.push(time);
         }
         if frames.is_empty() {
-            return Err(Fault::invalid("holds no frames; export the cache again").into());
+            return Err(Fault::invalid("holds no frames; export the cache again"));
         }
         let told = told.map(|told| fitting(&ticks, told));
         let seconds: Vec<f64> = ticks.iter().map(|&tick| f64::from(tick) / TICKS).collect();
@@ -178,7 +175,8 @@ impl<R: Read + Seek> Cache<R> {
         if let (true, Some(rate)) = (is_one_frame, told) {
             (times.frame_rate, times.first) = (told, near_whole(rate * seconds[0]));
         }
-        Ok(Self { chunks, times, frames, faces: Polygons::new(), block: Vec::new(), is_one_frame })
+        let info = MeshInfo { points: frames[0].points as usize, frames: frames.len(), times, ..MeshInfo::default() };
+        Ok(Self { chunks, info, frames, block: Vec::new(), is_one_frame })
     }
 }
 
@@ -202,26 +200,14 @@ fn choose(channels: Vec<Channel>, prim: Option<&str>) -> Result<Channel, Fault> 
 }
 
 impl<R: Read + Seek + Send> Animation for Cache<R> {
-    fn points(&self) -> usize {
-        self.frames[0].points as usize
+    fn info(&self) -> &MeshInfo {
+        &self.info
     }
 
-    fn frames(&self) -> usize {
-        self.frames.len()
-    }
-
-    fn times(&self) -> &Times {
-        &self.times
-    }
-
-    fn faces(&self) -> &Polygons {
-        &self.faces
-    }
-
-    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Fault> {
         let Array { start, scalar, .. } = self.frames[frame];
         // Every value is overwritten below.
-        out.resize(3 * self.points(), 0.0);
+        out.resize(3 * self.info.points, 0.0);
         Ok(read_values(&mut self.chunks.source, start, scalar, &mut self.block, out)?)
     }
 }
@@ -241,7 +227,7 @@ struct Chunk {
 }
 
 impl<R: Read + Seek> Chunks<R> {
-    fn open(source: R, length: u64) -> Result<Self, Failure> {
+    fn open(source: R, length: u64) -> Result<Self, Fault> {
         let mut chunks = Self { source, is_wide: false };
         let tag = chunks.bytes(0, length)?;
         chunks.is_wide = tag == *b"FOR8";
@@ -253,7 +239,7 @@ impl<R: Read + Seek> Chunks<R> {
     }
 
     /// The bytes at an offset of what ends there.
-    fn bytes<const N: usize>(&mut self, at: u64, end: u64) -> Result<[u8; N], Failure> {
+    fn bytes<const N: usize>(&mut self, at: u64, end: u64) -> Result<[u8; N], Fault> {
         if at + N as u64 > end {
             return Err(damaged("it ends within a chunk"));
         }
@@ -264,7 +250,7 @@ impl<R: Read + Seek> Chunks<R> {
     }
 
     /// The chunk at an offset of what ends there.
-    fn chunk(&mut self, at: u64, end: u64) -> Result<Chunk, Failure> {
+    fn chunk(&mut self, at: u64, end: u64) -> Result<Chunk, Fault> {
         let tag = self.bytes(at, end)?;
         let (start, size) = if self.is_wide {
             (at + 16, u64::from_be_bytes(self.bytes(at + 8, end)?))
@@ -278,7 +264,7 @@ impl<R: Read + Seek> Chunks<R> {
     }
 
     /// The time of the first frame in ticks, where the header says it.
-    fn start_time(&mut self, header: Chunk) -> Result<Option<i32>, Failure> {
+    fn start_time(&mut self, header: Chunk) -> Result<Option<i32>, Fault> {
         let mut at = header.start + 4;
         while at < header.end {
             let Chunk { tag, start, end } = self.chunk(at, header.end)?;
@@ -296,7 +282,7 @@ impl<R: Read + Seek> Chunks<R> {
     }
 
     /// The time of a block in ticks, where it says one, and its channels of vectors.
-    fn frame(&mut self, group: Chunk) -> Result<(Option<i32>, Vec<Channel>), Failure> {
+    fn frame(&mut self, group: Chunk) -> Result<(Option<i32>, Vec<Channel>), Fault> {
         if self.bytes::<4>(group.start, group.end)? != *b"MYCH" {
             return Err(damaged("a block does not begin where the one before ends"));
         }
@@ -332,6 +318,6 @@ impl<R: Read + Seek> Chunks<R> {
     }
 }
 
-fn damaged(what: &str) -> Failure {
-    Fault::damaged(format!("is not a whole cache of Maya: {what}; copy or export it again")).into()
+fn damaged(what: &str) -> Fault {
+    Fault::damaged(format!("is not a whole cache of Maya: {what}; copy or export it again"))
 }

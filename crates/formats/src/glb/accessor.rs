@@ -2,16 +2,17 @@
 
 use cager_geometry::mesh::Point;
 use gltf::json::Accessor;
-use gltf::json::accessor::sparse::Sparse;
-use gltf::json::accessor::{ComponentType, GenericComponentType, IndexComponentType, Type};
+use gltf::json::accessor::ComponentType::{self, F32, I8, I16, U8, U16, U32};
+use gltf::json::accessor::{GenericComponentType, IndexComponentType, Type};
 use gltf::json::validation::Checked;
 
 use super::buffers::{Buffers, outside};
-use super::faults::{dangling, too_large};
+use super::faults::{damaged, item, too_large};
 use crate::error::Fault;
 
 impl Buffers<'_> {
-    /// The first `N` numbers of each element of an accessor, which must be what is wanted, and no more than `most`.
+    /// The first `N` numbers of each element of an accessor, which must be what is wanted, and no
+    /// more than `most`.
     pub(super) fn values<const N: usize>(
         &self,
         index: usize,
@@ -19,181 +20,117 @@ impl Buffers<'_> {
         most: usize,
         place: &str,
     ) -> Result<Vec<[f64; N]>, Fault> {
-        self.read(index, self.kind(index, wanted, place)?, most, place, |numbers| numbers)
+        let accessor = item(&self.root.accessors, "accessor", index)?;
+        let kind = Kind::of(accessor, index, wanted, place)?;
+        let count = usize::try_from(accessor.count.0).ok().filter(|&count| count <= most);
+        let mut values: Vec<[f64; N]> = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+                let elements = self.elements((view.value(), offset), kind, accessor.count.0, place)?;
+                elements.take(count.ok_or_else(too_large)?).map(|element| kind.numbers(element)).collect()
+            }
+            None => vec![[0.0; N]; count.filter(|&count| count <= self.most_zeros()).ok_or_else(too_large)?],
+        };
+        for (at, moved) in self.sparse(accessor, kind, values.len(), place)? {
+            values[at] = moved;
+        }
+        Ok(values)
     }
 
     /// The vertex indices of an accessor, which must have no more than `most`.
     pub(super) fn indices(&self, index: usize, most: usize, place: &str) -> Result<Vec<u32>, Fault> {
-        self.read(index, self.kind(index, &INDICES, place)?, most, place, |[index]: [f64; 1]| index as u32)
+        Ok(self.values(index, &INDICES, most, place)?.into_iter().map(|[index]: [f64; 1]| index as u32).collect())
     }
 
-    /// The points that a sparse accessor names among so many, and where it moves them; none where all are stored.
+    /// The points that a sparse accessor names among so many, and where it moves them; none where
+    /// all are stored.
     pub(super) fn moved_points(
         &self,
         index: usize,
         most: usize,
         place: &str,
     ) -> Result<Option<Vec<(usize, Point)>>, Fault> {
-        let accessor = self.accessor(index)?;
-        let Some(sparse) = accessor.sparse.as_ref().filter(|_| accessor.buffer_view.is_none()) else {
+        let accessor = item(&self.root.accessors, "accessor", index)?;
+        if accessor.sparse.is_none() || accessor.buffer_view.is_some() {
             return Ok(None);
-        };
-        let kind = self.kind(index, &POSITIONS, place)?;
-        let at = self.sparse_indices(sparse, most, place)?;
-        if let Some(outside) = at.iter().find(|&&at| at >= most) {
-            return Err(Fault::damaged(format!(
-                "{place}: a sparse accessor moves point {outside} of {most}; export the mesh again"
-            )));
         }
-        let (view, offset) = (sparse.values.buffer_view.value(), sparse.values.byte_offset.0);
-        let found = self.elements(view, offset, kind.size(), sparse.count.0, place)?;
-        Ok(Some(at.into_iter().zip(found.bytes.chunks(found.stride).map(|element| kind.numbers(element))).collect()))
+        let kind = Kind::of(accessor, index, &POSITIONS, place)?;
+        self.sparse(accessor, kind, most, place).map(Some)
     }
 
-    fn accessor(&self, index: usize) -> Result<&Accessor, Fault> {
-        let accessors = &self.root.accessors;
-        accessors.get(index).ok_or_else(|| dangling(&format!("accessor {index}"), accessors.len()))
-    }
-
-    /// What the elements of an accessor are, if that is what is wanted.
-    fn kind(&self, index: usize, wanted: &Wanted, place: &str) -> Result<Kind, Fault> {
-        let accessor = self.accessor(index)?;
-        let (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) =
-            (accessor.component_type, accessor.type_)
-        else {
-            let what = format!("{place}: accessor {index} has an unknown type; export the mesh again");
-            return Err(Fault::damaged(what));
-        };
-        if !wanted.shapes.contains(&shape) || !wanted.components.contains(&component) {
-            let what = wanted.what;
-            return Err(Fault::damaged(format!(
-                "{place}: {what} are {shape:?} of {component:?}; export the mesh again"
-            )));
-        }
-        Ok(Kind { component, shape, normalized: wanted.normalized.unwrap_or(accessor.normalized) })
-    }
-
-    /// The first `N` numbers of every element, converted.
-    fn read<const N: usize, T>(
+    /// The elements that a sparse accessor replaces, of so many, and by what.
+    fn sparse<const N: usize>(
         &self,
-        index: usize,
+        accessor: &Accessor,
         kind: Kind,
         most: usize,
         place: &str,
-        convert: impl Fn([f64; N]) -> T,
-    ) -> Result<Vec<T>, Fault> {
-        let accessor = self.accessor(index)?;
-        let (size, convert) = (kind.size(), |element: &[u8]| convert(kind.numbers(element)));
-        let count = usize::try_from(accessor.count.0).ok().filter(|&count| count <= most);
-        let mut values: Vec<T> = match accessor.buffer_view {
-            Some(view) => {
-                let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
-                let found = self.elements(view.value(), offset, size, accessor.count.0, place)?;
-                let count = count.ok_or_else(too_large)?;
-                found.bytes.chunks(found.stride).take(count).map(&convert).collect()
-            }
-            // Zeros, but for what a sparse accessor has.
-            None => (0..count.filter(|&count| count <= self.most_zeros()).ok_or_else(too_large)?)
-                .map(|_| convert(&[0; MAX_ELEMENT_BYTES][..size]))
-                .collect(),
-        };
-        if let Some(sparse) = &accessor.sparse {
-            // More than there are would be read for nothing.
-            let replaced = self.sparse_indices(sparse, values.len(), place)?;
-            let (view, offset) = (sparse.values.buffer_view.value(), sparse.values.byte_offset.0);
-            let found = self.elements(view, offset, size, sparse.count.0, place)?;
-            for (at, element) in replaced.into_iter().zip(found.bytes.chunks(found.stride)) {
-                *values.get_mut(at).ok_or_else(|| outside(place))? = convert(element);
-            }
-        }
-        Ok(values)
-    }
-
-    /// Which elements a sparse accessor replaces.
-    fn sparse_indices(&self, sparse: &Sparse, most: usize, place: &str) -> Result<Vec<usize>, Fault> {
+    ) -> Result<Vec<(usize, [f64; N])>, Fault> {
+        let Some(sparse) = &accessor.sparse else { return Ok(Vec::new()) };
         let Checked::Valid(IndexComponentType(component)) = sparse.indices.component_type else {
-            return Err(Fault::damaged(format!(
-                "{place}: a sparse accessor has an unknown type; export the mesh again"
-            )));
+            return Err(damaged(place, "a sparse accessor has an unknown type"));
         };
-        let kind = Kind { component, shape: Type::Scalar, normalized: false };
-        let (view, offset) = (sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0);
-        let found = self.elements(view, offset, kind.size(), sparse.count.0, place)?;
-        let count = usize::try_from(sparse.count.0).ok().filter(|&count| count <= most).ok_or_else(too_large)?;
-        let index = |element| {
-            let [index] = kind.numbers(element);
-            index as usize
+        let count = sparse.count.0;
+        let index = Kind { component, shape: Type::Scalar, normalized: false };
+        let at = (sparse.indices.buffer_view.value(), sparse.indices.byte_offset.0);
+        let indices = self.elements(at, index, count, place)?;
+        let at = (sparse.values.buffer_view.value(), sparse.values.byte_offset.0);
+        let elements = self.elements(at, kind, count, place)?;
+        // More than there are would be read for nothing.
+        if count > most as u64 {
+            return Err(too_large());
+        }
+        let pair = |(at, element)| {
+            let [at] = index.numbers(at);
+            let at = Some(at as usize).filter(|&at| at < most).ok_or_else(|| outside(place))?;
+            Ok((at, kind.numbers(element)))
         };
-        Ok(found.bytes.chunks(found.stride).take(count).map(index).collect())
+        indices.zip(elements).map(pair).collect()
     }
 
-    /// `count` elements of `size` bytes in a view, all of them there.
-    fn elements(&self, view: usize, offset: u64, size: usize, count: u64, place: &str) -> Result<Elements<'_>, Fault> {
+    /// `count` elements at an offset of a view, all of them there.
+    fn elements(
+        &self,
+        (view, offset): (usize, u64),
+        kind: Kind,
+        count: u64,
+        place: &str,
+    ) -> Result<impl Iterator<Item = &[u8]>, Fault> {
         let (bytes, stride) = self.view(view, place)?;
+        let size = kind.size();
         let stride = stride.unwrap_or(size);
         if stride < size {
-            return Err(Fault::damaged(format!(
-                "{place}: has elements of {size} bytes at a stride of {stride}; export the mesh again"
-            )));
+            return Err(damaged(place, format!("has elements of {size} bytes at a stride of {stride}")));
         }
-        let bytes =
-            usize::try_from(offset).ok().and_then(|offset| bytes.get(offset..)).ok_or_else(|| outside(place))?;
-        let Some(last) = count.checked_sub(1) else {
-            return Ok(Elements { bytes: &[], stride });
+        let all = || {
+            let length = match count.checked_sub(1) {
+                Some(last) => last.checked_mul(stride as u64)?.checked_add(size as u64)?,
+                None => 0,
+            };
+            bytes.get(usize::try_from(offset).ok()?..)?.get(..usize::try_from(length).ok()?)
         };
-        let end = last.checked_mul(stride as u64).and_then(|start| start.checked_add(size as u64));
-        let end = end.and_then(|end| usize::try_from(end).ok());
-        let bytes = end.and_then(|end| bytes.get(..end)).ok_or_else(|| outside(place))?;
-        Ok(Elements { bytes, stride })
+        Ok(all().ok_or_else(|| outside(place))?.chunks(stride))
     }
 }
 
-use ComponentType::{F32, I8, I16, U8, U16, U32};
-
-/// What elements may be.
-pub(super) struct Wanted {
-    what: &'static str,
-    shapes: &'static [Type],
-    components: &'static [ComponentType],
-    /// Whether whole numbers are fractions, where that is not for the file to say.
-    normalized: Option<bool>,
-}
+/// What elements may be: what these are called, their types, and whether whole numbers are
+/// fractions, where that is not for the file to say.
+pub(super) struct Wanted(&'static str, &'static [Type], &'static [ComponentType], Option<bool>);
 
 impl Wanted {
-    const fn new(
-        what: &'static str,
-        shapes: &'static [Type],
-        components: &'static [ComponentType],
-        normalized: Option<bool>,
-    ) -> Self {
-        Self { what, shapes, components, normalized }
-    }
-
-    /// Values of an animation.
     pub(super) const fn animation(shapes: &'static [Type]) -> Self {
-        Self::new("values of an animation", shapes, &[I8, U8, I16, U16, F32], Some(true))
+        Self("values of an animation", shapes, &[I8, U8, I16, U16, F32], Some(true))
     }
 }
 
-pub(super) const POSITIONS: Wanted = Wanted::new("positions", &[Type::Vec3], &[I8, U8, I16, U16, F32], None);
-const INDICES: Wanted = Wanted::new("indices", &[Type::Scalar], &[U8, U16, U32], Some(false));
-pub(super) const JOINTS: Wanted = Wanted::new("joints", &[Type::Vec4], &[U8, U16, U32], Some(false));
-pub(super) const WEIGHTS: Wanted = Wanted::new("weights", &[Type::Vec4], &[I8, U8, I16, U16, U32, F32], Some(true));
-pub(super) const MATRICES: Wanted = Wanted::new("matrices", &[Type::Mat4], &[F32], None);
-/// Not all files say that they are fractions, while nothing else has a meaning; an opacity is passed over.
-pub(super) const COLORS: Wanted = Wanted::new("colours", &[Type::Vec3, Type::Vec4], &[U8, U16, F32], Some(true));
+pub(super) const POSITIONS: Wanted = Wanted("positions", &[Type::Vec3], &[I8, U8, I16, U16, F32], None);
+const INDICES: Wanted = Wanted("indices", &[Type::Scalar], &[U8, U16, U32], Some(false));
+pub(super) const JOINTS: Wanted = Wanted("joints", &[Type::Vec4], &[U8, U16, U32], Some(false));
+pub(super) const WEIGHTS: Wanted = Wanted("weights", &[Type::Vec4], &[I8, U8, I16, U16, U32, F32], Some(true));
+pub(super) const MATRICES: Wanted = Wanted("matrices", &[Type::Mat4], &[F32], None);
+/// Not all files say that they are fractions, but nothing else has a meaning.
+pub(super) const COLORS: Wanted = Wanted("colours", &[Type::Vec3, Type::Vec4], &[U8, U16, F32], Some(true));
 
-/// The largest element: sixteen numbers of four bytes.
-const MAX_ELEMENT_BYTES: usize = 64;
-
-/// Where the elements of an accessor are; the last one ends the bytes.
-struct Elements<'a> {
-    bytes: &'a [u8],
-    /// Bytes from the start of one to the start of the next, at least the size of one.
-    stride: usize,
-}
-
-/// What the elements of an accessor are.
 #[derive(Clone, Copy)]
 struct Kind {
     component: ComponentType,
@@ -203,7 +140,20 @@ struct Kind {
 }
 
 impl Kind {
-    /// Bytes of an element.
+    /// That of an accessor, if it is wanted.
+    fn of(accessor: &Accessor, index: usize, wanted: &Wanted, place: &str) -> Result<Self, Fault> {
+        let &Wanted(what, shapes, components, normalized) = wanted;
+        let (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) =
+            (accessor.component_type, accessor.type_)
+        else {
+            return Err(damaged(place, format!("accessor {index} has an unknown type")));
+        };
+        if !shapes.contains(&shape) || !components.contains(&component) {
+            return Err(damaged(place, format!("{what} are {shape:?} of {component:?}")));
+        }
+        Ok(Self { component, shape, normalized: normalized.unwrap_or(accessor.normalized) })
+    }
+
     fn size(self) -> usize {
         self.component.size() * self.shape.multiplicity()
     }
@@ -215,16 +165,14 @@ impl Kind {
     }
 
     fn number(self, bytes: &[u8]) -> f64 {
-        fn first<const N: usize>(bytes: &[u8]) -> [u8; N] {
-            bytes.first_chunk().copied().unwrap_or([0; N])
-        }
-        let (value, most) = match self.component {
-            I8 => (i8::from_le_bytes(first(bytes)).into(), 127.0),
-            U8 => (u8::from_le_bytes(first(bytes)).into(), 255.0),
-            I16 => (i16::from_le_bytes(first(bytes)).into(), 32767.0),
-            U16 => (u16::from_le_bytes(first(bytes)).into(), 65535.0),
-            U32 => return u32::from_le_bytes(first(bytes)).into(),
-            F32 => return f32::from_le_bytes(first(bytes)).into(),
+        let (value, most) = match (self.component, bytes) {
+            (I8, &[a, ..]) => (f64::from(a as i8), 127.0),
+            (U8, &[a, ..]) => (a.into(), 255.0),
+            (I16, &[a, b, ..]) => (i16::from_le_bytes([a, b]).into(), 32767.0),
+            (U16, &[a, b, ..]) => (u16::from_le_bytes([a, b]).into(), 65535.0),
+            (U32, &[a, b, c, d, ..]) => return u32::from_le_bytes([a, b, c, d]).into(),
+            (F32, &[a, b, c, d, ..]) => return f32::from_le_bytes([a, b, c, d]).into(),
+            _ => return 0.0,
         };
         if self.normalized { f64::max(value / most, -1.0) } else { value }
     }

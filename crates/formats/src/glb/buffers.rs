@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::cell::{Cell, OnceCell};
 use std::fs::File;
 use std::io::Read;
+use std::ops::Range;
 use std::path::{Component, Path};
 
 use base64::Engine as _;
@@ -12,19 +13,19 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::Root;
 use percent_encoding::percent_decode_str;
 
-use super::container::{Chunks, document, split};
-use super::faults::{dangling, too_large};
-use super::lenient;
+use super::container::split;
+use super::document::document;
+use super::faults::{damaged, item, too_large};
 use super::meshopt::Packed;
 use crate::error::Fault;
 use crate::text::quoted;
 
-/// Bytes of memory that a file may take however small it is, and those beyond for each of its bytes: nodes repeat meshes, and primitives and channels
-/// accessors, any number of times in a few bytes each. A few million points are read; where more are wanted, the file has to hold them.
+/// Bytes of memory that any file may take, and those beyond for each of its bytes: nodes repeat
+/// meshes, and primitives accessors, in a few bytes each, so that small files may hold much.
 const MEMORY_OF_ANY_FILE: usize = 1 << 29;
 const MEMORY_PER_BYTE: usize = 32;
 
-/// Numbers that are read though the file does not hold them, such as zeros of sparse accessors, and those beyond for each byte.
+/// Zeros of sparse accessors, which the file does not hold, and those beyond for each byte.
 const ZEROS_OF_ANY_FILE: usize = 1 << 16;
 const ZEROS_PER_BYTE: usize = 2;
 
@@ -36,48 +37,38 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 
 pub(super) struct Buffers<'a> {
     pub(super) root: Root,
-    binary: Cow<'a, [u8]>,
+    bytes: Cow<'a, [u8]>,
+    binary: Range<usize>,
     /// By buffer: what its `data:` URI holds, once it was asked for.
     decoded: Vec<OnceCell<Vec<u8>>>,
     /// By view: what was packed.
     unpacked: Vec<OnceCell<Vec<u8>>>,
-    /// Bytes that were unpacked.
     taken: Cell<usize>,
     /// The number of the frame at 0 s and frames per second, where the file says them.
     pub(super) frame_numbers: Option<[f64; 2]>,
-    /// Bytes of the file.
     file: usize,
 }
 
 impl<'a> Buffers<'a> {
-    /// Those of a `.glb` file, or of the text of a `.gltf` file whose other files lie in a folder, if they may be read.
+    /// Those of a `.glb` file, or of a `.gltf` file whose other files lie in a folder.
     pub(super) fn open(bytes: impl Into<Cow<'a, [u8]>>, source: &Source<'_>) -> Result<Self, Fault> {
         let bytes: Cow<'a, [u8]> = bytes.into();
-        let length = bytes.len();
-        let Chunks { json, binary } =
-            if source.is_text { Chunks { json: &bytes, binary: 0..0 } } else { split(&bytes)? };
-        let (root, frame_numbers) = (document(json)?, lenient::frame_numbers(json));
-        let binary = match bytes {
-            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[binary]),
-            Cow::Owned(mut bytes) => {
-                bytes.truncate(binary.end);
-                bytes.drain(..binary.start);
-                Cow::Owned(bytes)
-            }
-        };
+        let (json, binary) = if source.is_text { (&*bytes, 0..0) } else { split(&bytes)? };
+        let (root, frame_numbers) = document(json)?;
         let others = match source.folder {
             Some(folder) => others(&root, folder)?,
             None => Vec::new(),
         };
-        let length = length + others.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
+        let file = bytes.len() + others.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
         let buffers = Self {
             decoded: vec![OnceCell::new(); root.buffers.len()],
             unpacked: vec![OnceCell::new(); root.buffer_views.len()],
             root,
+            bytes,
             binary,
             taken: Cell::new(0),
             frame_numbers,
-            file: length,
+            file,
         };
         others.into_iter().for_each(|(k, bytes)| drop(buffers.decoded[k].set(bytes)));
         Ok(buffers)
@@ -95,8 +86,7 @@ impl<'a> Buffers<'a> {
 
     /// The bytes of a view, and its stride where it has one.
     pub(super) fn view(&self, index: usize, place: &str) -> Result<(&[u8], Option<usize>), Fault> {
-        let views = &self.root.buffer_views;
-        let view = views.get(index).ok_or_else(|| dangling(&format!("bufferView {index}"), views.len()))?;
+        let view = item(&self.root.buffer_views, "bufferView", index)?;
         let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
         let Some(packed) = Packed::of(view) else {
             let offset = view.byte_offset.map_or(0, |offset| offset.0);
@@ -104,17 +94,13 @@ impl<'a> Buffers<'a> {
         };
         let cell = &self.unpacked[index];
         if cell.get().is_none() {
-            let damaged = || {
-                Fault::damaged(format!(
-                    "{place}: the packed bufferView {index} is not understood; export the mesh again"
-                ))
-            };
-            let packed = packed.ok_or_else(damaged)?;
-            let size = packed.size().ok_or_else(damaged)?;
+            let wrong = || damaged(place, format!("the packed bufferView {index} is not understood"));
+            let packed = packed.ok_or_else(wrong)?;
+            let size = packed.size().ok_or_else(wrong)?;
             let taken =
                 self.taken.get().checked_add(size).filter(|&taken| taken <= self.most_bytes()).ok_or_else(too_large)?;
             let stream = self.part(packed.buffer, packed.offset, packed.length, place)?;
-            let unpacked = packed.unpack(stream).ok_or_else(damaged)?;
+            let unpacked = packed.unpack(stream).ok_or_else(wrong)?;
             cell.get_or_init(|| unpacked);
             self.taken.set(taken);
         }
@@ -131,14 +117,13 @@ impl<'a> Buffers<'a> {
     }
 
     fn buffer(&self, index: usize, place: &str) -> Result<&[u8], Fault> {
-        let buffers = &self.root.buffers;
-        let buffer = buffers.get(index).ok_or_else(|| dangling(&format!("buffer {index}"), buffers.len()))?;
+        let buffer = item(&self.root.buffers, "buffer", index)?;
         if let Some(bytes) = self.decoded[index].get() {
             return Ok(bytes);
         }
         let Some(uri) = &buffer.uri else {
             if index == 0 {
-                return Ok(&self.binary);
+                return Ok(&self.bytes[self.binary.clone()]);
             }
             return Err(Fault::unsupported(format!(
                 "{place}: buffer {index} has no data of its own; export the mesh without compression"
@@ -150,9 +135,8 @@ impl<'a> Buffers<'a> {
             )));
         };
         let text = data.split_once(";base64,").map(|(_, text)| text.trim_ascii());
-        let decoded = text.and_then(|text| BASE64.decode(text).ok()).ok_or_else(|| {
-            Fault::damaged(format!("{place}: the data: URI of buffer {index} is not base64; export the mesh again"))
-        })?;
+        let wrong = || damaged(place, format!("the data: URI of buffer {index} is not base64"));
+        let decoded = text.and_then(|text| BASE64.decode(text).ok()).ok_or_else(wrong)?;
         Ok(self.decoded[index].get_or_init(|| decoded))
     }
 }

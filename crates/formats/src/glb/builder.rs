@@ -1,7 +1,6 @@
 //! The points and faces of placed meshes.
 
 use std::collections::HashMap;
-use std::collections::btree_map::Entry;
 
 use cager_geometry::mesh::{Model, Point};
 use cager_geometry::vector::along;
@@ -10,18 +9,18 @@ use gltf::json::validation::Checked;
 
 use super::accessor::{COLORS, POSITIONS};
 use super::buffers::Buffers;
-use super::container;
-use super::faults::too_large;
+use super::document::{DRACO, draco};
+use super::faults::{damaged, too_large};
 use super::scene::{Placement, Scene};
-use super::skin::{Joints, Skins};
+use super::skin::Joints;
 use crate::colors::{Colors, Scale, srgb};
 use crate::error::Fault;
 use crate::faces::{Contents, check_face};
 
-/// What a point with its colour takes, and a corner with its share of a face, while others are read.
+/// Bytes of a point with its colour, and of a corner with its share of a face.
 const POINT_BYTES: usize = 36;
 const CORNER_BYTES: usize = 8;
-/// What counts for a primitive, a joint and a point that a morph target moves, which take time more than memory.
+/// What counts for a primitive, a joint and a point that a target moves: time more than memory.
 const PRIMITIVE_BYTES: usize = 256;
 const JOINT_BYTES: usize = 256;
 const MOVED_BYTES: usize = 4;
@@ -31,17 +30,31 @@ pub(super) struct Builder<'a, 'b> {
     buffers: &'a Buffers<'b>,
     scene: &'a Scene,
     contents: Contents,
-    skins: Skins,
     model: Model,
     colors: Colors,
     /// Bytes that may still be taken, beside those of points and corners.
     most: usize,
 }
 
+/// A mesh that is being placed.
+struct Placed<'a> {
+    placement: &'a Placement,
+    joints: Option<Joints>,
+    /// The first point and how many there are by accessor, as primitives that differ by their
+    /// material alone often share their points.
+    points: HashMap<usize, (usize, usize)>,
+}
+
+impl Placed<'_> {
+    fn is_mirrored(&self) -> bool {
+        self.joints.as_ref().map_or_else(|| self.placement.mirrored(), Joints::mirror)
+    }
+}
+
 impl<'a, 'b> Builder<'a, 'b> {
     pub(super) fn new(buffers: &'a Buffers<'b>, scene: &'a Scene, contents: Contents) -> Self {
-        let (model, colors, skins) = (Model::default(), Colors::default(), Skins::new());
-        Self { buffers, scene, contents, skins, model, colors, most: buffers.most_bytes() }
+        let (model, colors) = (Model::default(), Colors::default());
+        Self { buffers, scene, contents, model, colors, most: buffers.most_bytes() }
     }
 
     /// The meshes of placements in their order, as one.
@@ -54,63 +67,47 @@ impl<'a, 'b> Builder<'a, 'b> {
 
     fn place(&mut self, placement: &Placement) -> Result<(), Fault> {
         let mesh = placement.mesh_in(&self.buffers.root)?;
-        let mirrored = match placement.skin {
-            Some(skin) => self.joints(skin)?.mirror(),
-            None => placement.mirrored(),
-        };
-        // Primitives that differ by their material alone often share their points.
-        let mut placed = HashMap::new();
+        let mut placed = Placed { placement, joints: None, points: HashMap::new() };
+        if let Some(skin) = placement.skin {
+            let (joints, read) = Joints::of(skin, self.scene, self.buffers, self.most / JOINT_BYTES)?;
+            self.take(JOINT_BYTES * read)?;
+            placed.joints = Some(joints);
+        }
         for (k, primitive) in mesh.primitives.iter().enumerate() {
             // Counted even if empty: the work, not the memory alone, is bounded.
             self.take(PRIMITIVE_BYTES)?;
             let place = format!("mesh {}, primitive {k}", placement.mesh);
-            self.primitive(primitive, placement, mirrored, &place, &mut placed)?;
+            self.primitive(primitive, &mut placed, &place)?;
         }
         Ok(())
     }
 
-    fn joints(&mut self, skin: usize) -> Result<&Joints, Fault> {
-        if let Entry::Vacant(entry) = self.skins.entry(skin) {
-            let (joints, read) = Joints::of(skin, self.scene, self.buffers, self.most / JOINT_BYTES)?;
-            entry.insert(joints);
-            self.take(JOINT_BYTES * read)?;
-        }
-        Ok(&self.skins[&skin])
-    }
-
-    fn primitive(
-        &mut self,
-        primitive: &Primitive,
-        placement: &Placement,
-        mirrored: bool,
-        place: &str,
-        placed: &mut HashMap<usize, (usize, usize)>,
-    ) -> Result<(), Fault> {
+    fn primitive(&mut self, primitive: &Primitive, placed: &mut Placed<'_>, place: &str) -> Result<(), Fault> {
         let Checked::Valid(mode) = primitive.mode else {
-            return Err(Fault::damaged(format!("{place}: the mode is unknown; export the mesh again")));
+            return Err(damaged(place, "the mode is unknown"));
         };
         if matches!(mode, Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
             return Ok(());
         }
         let extensions = primitive.extensions.as_ref().map(|extensions| &extensions.others);
-        let is_draco = extensions.is_some_and(|extensions| extensions.contains_key(container::DRACO));
+        let is_draco = extensions.is_some_and(|extensions| extensions.contains_key(DRACO));
         let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).ok_or_else(|| {
             Fault::unsupported(format!("{place} has no POSITION; export the mesh without compression"))
         })?;
         // Some files have the plain data as well.
         if is_draco && self.buffers.root.accessors.get(positions.value()).is_some_and(|a| a.buffer_view.is_none()) {
-            return Err(container::draco());
+            return Err(draco());
         }
-        let (base, count) = match placed.get(&positions.value()) {
+        let (base, count) = match placed.points.get(&positions.value()) {
             Some(&known) => known,
             None => {
-                let added = self.add_points(positions.value(), primitive, placement, place)?;
+                let added = self.add_points(positions.value(), primitive, placed, place)?;
                 // Of primitives that share their points, the first one's.
                 let colors = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0)));
                 if let Some(colors) = colors.filter(|_| self.contents == Contents::PointsAndFaces) {
                     self.add_colors(colors.value(), added.1, place);
                 }
-                placed.insert(positions.value(), added);
+                placed.points.insert(positions.value(), added);
                 added
             }
         };
@@ -124,25 +121,24 @@ impl<'a, 'b> Builder<'a, 'b> {
                 (0..count as u32).collect()
             }
         };
-        self.add_triangles(&corners, mode, base, count, mirrored, place)
+        self.add_triangles(&corners, mode, (base, count), placed.is_mirrored(), place)
     }
 
     fn add_points(
         &mut self,
         index: usize,
         primitive: &Primitive,
-        placement: &Placement,
+        placed: &Placed<'_>,
         place: &str,
     ) -> Result<(usize, usize), Fault> {
         let mut points = self.buffers.values(index, &POSITIONS, self.room() / POINT_BYTES, place)?;
-        self.morph(&mut points, primitive, placement, place)?;
-        if let Some(skin) = placement.skin {
-            self.joints(skin)?;
-            self.skins[&skin].pose(&mut points, primitive, self.buffers, place)?;
+        self.morph(&mut points, primitive, placed.placement, place)?;
+        if let Some(joints) = &placed.joints {
+            joints.pose(&mut points, primitive, self.buffers, place)?;
         }
         let base = self.model.points.len();
         for (k, &point) in points.iter().enumerate() {
-            let point: Point = placement.apply(point);
+            let point: Point = placed.placement.apply(point);
             if !point.iter().all(|x| x.is_finite()) {
                 return Err(Fault::invalid(format!(
                     "{place}: vertex {k} has a coordinate that is NaN or infinite; repair or remove it"
@@ -196,8 +192,7 @@ impl<'a, 'b> Builder<'a, 'b> {
         &mut self,
         corners: &[u32],
         mode: Mode,
-        base: usize,
-        count: usize,
+        (base, count): (usize, usize),
         mirrored: bool,
         place: &str,
     ) -> Result<(), Fault> {
@@ -206,10 +201,7 @@ impl<'a, 'b> Builder<'a, 'b> {
             _ => corners.len().saturating_sub(2),
         };
         if mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
-            return Err(Fault::damaged(format!(
-                "{place}: {} corners do not make whole triangles; export the mesh again",
-                corners.len()
-            )));
+            return Err(damaged(place, format!("{} corners do not make whole triangles", corners.len())));
         }
         self.check_room(triangles.saturating_mul(3 * CORNER_BYTES))?;
         for k in 0..triangles {

@@ -2,19 +2,18 @@
 
 use glam::{DQuat, DVec3};
 use gltf::json::accessor::Type;
-use gltf::json::animation::{Channel as Stored, Interpolation, Property, Sampler};
+use gltf::json::animation::{Channel as Stored, Interpolation, Property};
 use gltf::json::validation::Checked;
 use gltf::json::{Animation, Node, Root};
 
 use super::accessor::Wanted;
 use super::buffers::Buffers;
-use super::faults::dangling;
+use super::faults::item;
 use crate::error::Fault;
 
 /// Seconds within which two times are one.
 pub(super) const NEAR: f64 = 1e-6;
 
-/// What moves one property of a node.
 pub(super) struct Channel {
     pub(super) node: usize,
     pub(super) property: Property,
@@ -23,12 +22,12 @@ pub(super) struct Channel {
     pub(super) times: Vec<f64>,
     /// Numbers of a value.
     width: usize,
-    /// A value for each time, or with [`Interpolation::CubicSpline`] its tangent before, itself and its tangent behind.
+    /// A value for each time; of cubic splines its tangent before, itself and its tangent behind.
     values: Vec<f64>,
 }
 
 impl Channel {
-    /// Reads a channel; none where it has no node or nothing to move. `room` is how many numbers may still be read.
+    /// Reads a channel; none where nothing moves. `room` is how many numbers may still be read.
     pub(super) fn read(
         animation: &Animation,
         stored: &Stored,
@@ -38,11 +37,7 @@ impl Channel {
     ) -> Result<Option<Self>, Fault> {
         let unknown =
             |what: &str| Fault::damaged(format!("{place}: its {what} is unknown; export the animation again"));
-        let count = animation.samplers.len();
-        let sampler: &Sampler = animation
-            .samplers
-            .get(stored.sampler.value())
-            .ok_or_else(|| dangling(&format!("sampler {}", stored.sampler.value()), count))?;
+        let sampler = item(&animation.samplers, "sampler", stored.sampler.value())?;
         let Checked::Valid(property) = stored.target.path else { return Err(unknown("path")) };
         let Checked::Valid(interpolation) = sampler.interpolation else { return Err(unknown("interpolation")) };
         let node = stored.target.node.value();

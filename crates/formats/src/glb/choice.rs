@@ -8,10 +8,11 @@ use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
 
 use super::scene::Scene;
-use crate::scene::{Failure, Node, Tree, choose as choose_mesh, list};
+use crate::error::Fault;
+use crate::scene::{Node, Tree, choose as choose_mesh, list};
 
 /// The placements that are read: the one that `prim` names, or all as one mesh.
-pub(super) fn choose(root: &Root, scene: &Scene, prim: Option<&str>) -> Result<Range<usize>, Failure> {
+pub(super) fn choose(root: &Root, scene: &Scene, prim: Option<&str>) -> Result<Range<usize>, Fault> {
     let all = 0..scene.placements.len();
     if prim.is_none() || all.is_empty() {
         return Ok(all);
@@ -40,14 +41,17 @@ impl<'a> Meshes<'a> {
         let called = |name: &Option<String>, kind: &str, k: usize| {
             name.as_ref().map_or_else(|| format!("{kind}_{k}"), String::clone).into_bytes().into()
         };
-        let places = scene.parents.iter().zip(&scene.depths);
-        let mut nodes: Vec<Node> = (root.nodes.iter().enumerate().zip(places))
-            .map(|((k, node), (&parent, &depth))| Node { name: called(&node.name, "node", k), parent, depth })
-            .collect();
+        let place = |k: usize| scene.places.get(k).and_then(Option::as_ref);
+        let depth = |k: usize| place(k).map_or(0, |place| place.depth);
+        let of = |(k, node): (usize, &gltf::json::Node)| {
+            let parent = place(k).and_then(|place| place.parent);
+            Node { name: called(&node.name, "node", k), parent, depth: depth(k) }
+        };
+        let mut nodes: Vec<Node> = root.nodes.iter().enumerate().map(of).collect();
         let meshes = (nodes.len()..nodes.len() + scene.placements.len()).collect();
         for placement in &scene.placements {
             let name = root.meshes.get(placement.mesh).and_then(|mesh| mesh.name.clone());
-            let depth = 1 + placement.node.map_or(0, |node| scene.depths[node]);
+            let depth = 1 + placement.node.map_or(0, depth);
             nodes.push(Node { name: called(&name, "mesh", placement.mesh), parent: placement.node, depth });
         }
         (Self { root, scene, nodes }, meshes)

@@ -3,14 +3,14 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use gltf::json::Root;
 use gltf::json::animation::Property;
 use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
 
 use super::buffers::Buffers;
 use super::channel::{Channel, NEAR};
-use super::faults::dangling;
-use super::scene::Scene;
+use super::faults::item;
+use super::scene::{Placement, Scene};
 use crate::dropped::listed;
 use crate::error::Fault;
 use crate::scene::{shown, union};
@@ -25,7 +25,7 @@ pub(super) struct Clip {
 }
 
 impl Clip {
-    /// The animation that `wanted` names, or else the first one that moves the chosen placements; none where none does.
+    /// The animation that `wanted` names, or else the first that moves the chosen placements.
     pub(super) fn of(
         buffers: &Buffers<'_>,
         scene: &Scene,
@@ -33,7 +33,7 @@ impl Clip {
         wanted: Option<&str>,
     ) -> Result<Option<Self>, Fault> {
         let root = &buffers.root;
-        let movers = Movers::of(root, scene, chosen);
+        let movers = Movers::of(root, scene, &scene.placements[chosen]);
         let moves = |k: &usize| {
             let channels = &root.animations[*k].channels;
             channels.iter().any(|channel| movers.move_by(channel.target.node.value(), &channel.target.path))
@@ -62,7 +62,7 @@ impl Clip {
                 )));
             }
             let channel = Channel::read(animation, stored, buffers, &mut room, &place)?;
-            let fixed = root.nodes.get(node).ok_or_else(|| dangling(&format!("node {node}"), root.nodes.len()))?;
+            let fixed = item(&root.nodes, "node", node)?;
             let Some(channel) = channel else { continue };
             if fixed.matrix.is_some() && channel.property != Property::MorphTargetWeights {
                 return Err(Fault::unsupported(format!(
@@ -88,7 +88,6 @@ impl Clip {
         union(self.channels.iter().flat_map(|channel| &channel.times).copied().collect(), NEAR)
     }
 
-    /// Whether anything is elsewhere between two keys.
     pub(super) fn moves_between_keys(&self) -> bool {
         self.channels.iter().any(Channel::moves_between_keys)
     }
@@ -116,7 +115,6 @@ fn find(root: &Root, moving: &[usize], wanted: &str) -> Result<usize, Fault> {
     })
 }
 
-/// An animation as messages have it.
 fn name(root: &Root, k: usize) -> String {
     root.animations[k].name.as_ref().map_or_else(|| format!("animation {k}"), |name| shown(name))
 }
@@ -127,45 +125,31 @@ fn names(root: &Root, animations: &[usize]) -> String {
     listed(names.iter().map(String::as_bytes))
 }
 
-/// The nodes that say where chosen meshes are.
+/// Nodes whose transforms, and those whose weights, say where chosen meshes are.
 struct Movers {
-    /// Those whose transforms do.
-    transforms: Vec<bool>,
-    /// Those whose weights do.
+    transforms: HashSet<usize>,
     weights: HashSet<usize>,
 }
 
 impl Movers {
-    fn of(root: &Root, scene: &Scene, chosen: Range<usize>) -> Self {
-        let mut movers = Self { transforms: vec![false; root.nodes.len()], weights: HashSet::new() };
-        let mut skins = HashSet::new();
-        for placement in &scene.placements[chosen] {
-            movers.weights.extend(placement.node);
-            match placement.skin {
-                Some(skin) if skins.insert(skin) => {
-                    let joints = root.skins.get(skin).map_or(&[][..], |skin| &skin.joints);
-                    joints.iter().for_each(|joint| movers.add(scene, joint.value()));
-                }
-                Some(_) => {}
-                None => placement.node.into_iter().for_each(|node| movers.add(scene, node)),
+    fn of(root: &Root, scene: &Scene, chosen: &[Placement]) -> Self {
+        let skins: HashSet<usize> = chosen.iter().filter_map(|placement| placement.skin).collect();
+        let joints = skins.iter().filter_map(|&skin| root.skins.get(skin)).flat_map(|skin| &skin.joints);
+        let own = chosen.iter().filter(|placement| placement.skin.is_none()).filter_map(|placement| placement.node);
+        let mut transforms = HashSet::new();
+        for node in joints.map(Index::value).chain(own) {
+            let mut next = scene.places.get(node).map(|_| node);
+            while let Some(node) = next.filter(|&node| transforms.insert(node)) {
+                next = scene.places[node].as_ref().and_then(|place| place.parent);
             }
         }
-        movers
-    }
-
-    /// A node and all above it.
-    fn add(&mut self, scene: &Scene, node: usize) {
-        let mut next = Some(node);
-        while let Some(mark) = next.and_then(|node| self.transforms.get_mut(node)).filter(|mark| !**mark) {
-            *mark = true;
-            next = next.and_then(|node| scene.parents[node]);
-        }
+        Self { transforms, weights: chosen.iter().filter_map(|placement| placement.node).collect() }
     }
 
     fn move_by(&self, node: usize, property: &Checked<Property>) -> bool {
         match property {
             Checked::Valid(Property::MorphTargetWeights) => self.weights.contains(&node),
-            Checked::Valid(_) => self.transforms.get(node) == Some(&true),
+            Checked::Valid(_) => self.transforms.contains(&node),
             // Told when it is read.
             Checked::Invalid => true,
         }

@@ -4,19 +4,19 @@ use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 
-use cager_geometry::mesh::Polygons;
 use cager_geometry::units::Units;
 
 use super::buffers::{Buffers, LARGEST, Source, too_long};
 use super::builder::Builder;
 use super::choice::{choose, listed};
 use super::clip::Clip;
-use super::container;
+use super::container::split;
+use super::document::document;
 use super::scene::Scene;
 use crate::error::{Error, Fault};
 use crate::faces::Contents;
 use crate::frames::{FrameReader, FrameSelection, Times};
-use crate::scene::{self, Animation, Failure, Timeline, check_held};
+use crate::scene::{self, Animation, MeshInfo, Timeline, check_held};
 
 /// Frames per second that programs have.
 const RATES: [f64; 10] =
@@ -24,7 +24,7 @@ const RATES: [f64; 10] =
 /// Frames past which the number of one says nothing.
 const FARTHEST: f64 = 1e9;
 
-/// Opens the frames of a file of `length` bytes: of the mesh that is selected of several, or else of all as one.
+/// Opens the frames of the mesh that is selected of several, or else of all as one.
 pub(crate) fn open_frames<'a>(
     path: &Path,
     (source, length): (impl Read + Seek, u64),
@@ -36,18 +36,18 @@ pub(crate) fn open_frames<'a>(
         let bytes = read_all(source, length)?;
         MeshFrames::open(bytes, kind, expected_points, selection)
     };
-    scene::open(path, open().map_err(|failure: Failure| failure.at(path))?, expected_points)
+    scene::open(path, open().map_err(|failure: Fault| failure.at(path))?, expected_points)
 }
 
 /// Whether a file has animations; files that cannot be read have none.
 pub(crate) fn is_animated(bytes: &[u8]) -> bool {
-    let root = container::split(bytes).and_then(|chunks| container::document(chunks.json));
-    root.is_ok_and(|root| !root.animations.is_empty())
+    let document = split(bytes).and_then(|(json, _)| document(json));
+    document.is_ok_and(|(root, _)| !root.animations.is_empty())
 }
 
-fn read_all(mut source: impl Read + Seek, length: u64) -> Result<Vec<u8>, Failure> {
+fn read_all(mut source: impl Read + Seek, length: u64) -> Result<Vec<u8>, Fault> {
     if length > LARGEST {
-        return Err(too_long().into());
+        return Err(too_long());
     }
     let mut bytes = Vec::new();
     source.seek(SeekFrom::Start(0))?;
@@ -61,9 +61,9 @@ struct MeshFrames {
     /// Of the placements in the scene.
     chosen: Range<usize>,
     clip: Option<Clip>,
-    timeline: Timeline,
-    faces: Polygons,
-    points: usize,
+    /// Seconds of each frame.
+    at: Vec<f64>,
+    info: MeshInfo,
 }
 
 impl MeshFrames {
@@ -72,14 +72,14 @@ impl MeshFrames {
         source: &Source<'_>,
         expected_points: usize,
         selection: &FrameSelection,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, Fault> {
         let buffers = Buffers::open(bytes, source)?;
         let scene = Scene::of(&buffers.root)?;
         let chosen = choose(&buffers.root, &scene, selection.prim.as_deref())?;
         let rest = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen.clone()])?;
         let points = rest.points.len();
         if points == 0 {
-            return Err(Fault::invalid("has no points; export the mesh with its vertices").into());
+            return Err(Fault::invalid("has no points; export the mesh with its vertices"));
         }
         if points != expected_points && chosen.len() > 1 {
             let what = format!(
@@ -87,59 +87,41 @@ impl MeshFrames {
                 chosen.len(),
                 listed(&buffers.root, &scene)
             );
-            return Err(Fault::invalid(what).into());
+            return Err(Fault::invalid(what));
         }
         let clip = Clip::of(&buffers, &scene, chosen.clone(), selection.animation.as_deref())?;
         let keys = clip.as_ref().map_or_else(Vec::new, Clip::key_times);
-        // A byte of the file stands for a few points of frames at the most: weights of targets, or turns of joints.
+        // A byte of the file stands for a few points at the most: weights, or turns of joints.
         let held = buffers.most_zeros().saturating_mul(POINTS_PER_ITEM);
         let is_held = |frames: usize| frames.saturating_mul(points) <= held;
         let is_smooth = clip.as_ref().is_some_and(Clip::moves_between_keys);
-        let mut timeline = timeline(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
-        if let Some(note) = clip.as_ref().and_then(|clip| clip.note.clone()) {
-            let others = &mut timeline.times.note;
-            *others = Some(others.take().map_or(note.clone(), |told| format!("{told}; {note}")));
-        }
-        Ok(Self { buffers, chosen, clip, timeline, faces: rest.faces, points })
+        let Timeline { times, at } = timeline(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
+        let notes = clip.as_ref().and_then(|clip| clip.note.clone()).into_iter().collect();
+        let info = MeshInfo { points, frames: at.len(), times, faces: rest.faces, units: Units::METRES, notes };
+        Ok(Self { buffers, chosen, clip, at, info })
     }
 }
 
 impl Animation for MeshFrames {
-    fn points(&self) -> usize {
-        self.points
+    fn info(&self) -> &MeshInfo {
+        &self.info
     }
 
-    fn frames(&self) -> usize {
-        self.timeline.at.len()
-    }
-
-    fn times(&self) -> &Times {
-        &self.timeline.times
-    }
-
-    fn faces(&self) -> &Polygons {
-        &self.faces
-    }
-
-    fn units(&self) -> Units {
-        Units::METRES
-    }
-
-    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Fault> {
         if let Some(clip) = &self.clip {
-            clip.apply(self.timeline.at[frame], &mut self.buffers.root);
+            clip.apply(self.at[frame], &mut self.buffers.root);
         }
         let scene = Scene::of(&self.buffers.root)?;
         let placements = &scene.placements[self.chosen.clone()];
         let model = Builder::new(&self.buffers, &scene, Contents::Points).build(placements)?;
         out.clear();
         out.extend_from_slice(model.points.as_flattened());
-        Ok(out.len() == 3 * self.points)
+        Ok(out.len() == 3 * self.info.points)
     }
 }
 
-/// At the times of keys, or at whole numbers of frames of a rate as far as these go. `said` is the number of the frame at 0 s and the rate of all, where the file
-/// says them: it then has a key for every frame. Otherwise far keys are told where something moves between them.
+/// At the times of keys, or at whole numbers of frames of a rate. `said` is the number of the frame
+/// at 0 s and the rate, where the file says them: it then has a key for every frame.
 fn timeline(
     keys: Vec<f64>,
     rate: Option<f64>,
@@ -189,7 +171,7 @@ const POINTS_PER_ITEM: usize = 1 << 12;
 /// The most by which single precision may move a key from its frame, in frames.
 const LARGEST_ROUNDING: f64 = 0.02;
 
-/// What to say of keys that are farther apart than frames of films are, and a little more: what is between them is not read.
+/// What to say of keys that are farther apart than frames of films: motion between is not read.
 fn far_keys(keys: &[f64]) -> Option<String> {
     const FAR: f64 = 1.05 / 24.0;
     let gap = keys.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);

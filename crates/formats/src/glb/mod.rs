@@ -1,7 +1,8 @@
-//! glTF 2.0, binary or in several files: the triangles and points of its default scene, at rest and as an animation moves them, and animations of one mesh written.
+//! glTF 2.0, binary or in several files: the triangles and points of its default scene, at rest and
+//! as an animation moves them, and animations of one mesh written.
 //!
-//! The `gltf` crate turns the JSON into a document; everything that the document refers to is looked up here with
-//! checks, because the crate's own accessors and validation panic on indices out of range.
+//! The `gltf` crate has the types of the document; what it refers to is looked up here with checks,
+//! as the crate's accessors and validation panic on indices out of range.
 
 mod accessor;
 mod buffers;
@@ -10,9 +11,9 @@ mod channel;
 mod choice;
 mod clip;
 mod container;
+mod document;
 mod faults;
 mod frames;
-mod lenient;
 mod meshopt;
 mod scene;
 mod skin;
@@ -24,19 +25,18 @@ use cager_geometry::mesh::Model;
 use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::faces::Contents;
-use crate::scene::Failure;
 use buffers::Buffers;
 pub(crate) use buffers::Source;
 use builder::Builder;
 pub(crate) use frames::{is_animated, open_frames};
 use scene::Scene;
-pub(crate) use write::{MOST_FRAMES, Morphs, Scene as MorphScene, Wanted};
+pub(crate) use write::{MOST_FRAMES, Morphs, Scene as MorphScene, Wanted, write_head};
 
 /// The meshes of the default scene at rest as one, or the one of several that `prim` names.
 pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prim: Option<&str>) -> Result<(Model, Dropped), Fault> {
     let buffers = Buffers::open(bytes, source)?;
     let scene = Scene::of(&buffers.root)?;
-    let chosen = choice::choose(&buffers.root, &scene, prim).map_err(Failure::of_bytes)?;
+    let chosen = choice::choose(&buffers.root, &scene, prim)?;
     let placements = &scene.placements[chosen];
     let model = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(placements)?;
     let dropped = unread::of(&buffers.root, placements, !model.colors.is_empty());

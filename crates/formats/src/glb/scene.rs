@@ -1,23 +1,28 @@
 //! Where the meshes of a scene stand.
 
+use std::collections::HashSet;
+
 use cager_geometry::mesh::Point;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use gltf::json::{Index, Mesh, Node, Root};
 
-use super::faults::dangling;
+use super::faults::item;
 use crate::error::Fault;
 
-/// The meshes of the default scene.
 pub(super) struct Scene {
     pub(super) placements: Vec<Placement>,
-    /// From each node's space to the world's; none for nodes outside the scene.
-    worlds: Vec<Option<DAffine3>>,
-    /// The node above each.
-    pub(super) parents: Vec<Option<usize>>,
-    /// How many nodes are in the path of each.
-    pub(super) depths: Vec<usize>,
-    /// Whether each, or one above it, is switched off.
-    hidden: Vec<bool>,
+    /// Where each node is; none for those outside the scene.
+    pub(super) places: Vec<Option<Place>>,
+}
+
+pub(super) struct Place {
+    /// From its space to the world's.
+    pub(super) world: DAffine3,
+    pub(super) parent: Option<usize>,
+    /// How many nodes are in its path.
+    pub(super) depth: usize,
+    /// Whether it, or one above it, is switched off.
+    is_hidden: bool,
 }
 
 /// A mesh at its place in the scene.
@@ -32,8 +37,7 @@ pub(super) struct Placement {
 
 impl Placement {
     pub(super) fn mesh_in<'a>(&self, root: &'a Root) -> Result<&'a Mesh, Fault> {
-        let count = root.meshes.len();
-        root.meshes.get(self.mesh).ok_or_else(|| dangling(&format!("mesh {}", self.mesh), count))
+        item(&root.meshes, "mesh", self.mesh)
     }
 
     pub(super) fn apply(&self, p: Point) -> Point {
@@ -47,16 +51,15 @@ impl Placement {
 }
 
 impl Scene {
-    /// The meshes of the default scene that are shown, or all of it where none is, in the order of their nodes, or all meshes as they are where no node has one.
+    /// The meshes of the default scene that are shown, or all of it where none is, in the order of
+    /// their nodes; all meshes as they are where no node has one.
     pub(super) fn of(root: &Root) -> Result<Self, Fault> {
-        let mut scene = Self::nodes(root)?;
-        let Self { worlds, hidden, .. } = &scene;
-        let mut placements = Vec::new();
-        let all_hidden =
-            (0..root.nodes.len()).all(|k| root.nodes[k].mesh.is_none() || worlds[k].is_none() || hidden[k]);
-        for (k, (node, world)) in root.nodes.iter().zip(worlds).enumerate() {
-            let (Some(mesh), Some(world)) = (node.mesh, world) else { continue };
-            if hidden[k] && !all_hidden {
+        let (places, mut placements) = (places(root)?, Vec::new());
+        let of_mesh = |(node, place): (&Node, &Option<Place>)| node.mesh.and(place.as_ref()).map(|p| p.is_hidden);
+        let all_hidden = root.nodes.iter().zip(&places).filter_map(of_mesh).all(|is_hidden| is_hidden);
+        for (k, (node, place)) in root.nodes.iter().zip(&places).enumerate() {
+            let (Some(mesh), Some(place)) = (node.mesh, place) else { continue };
+            if place.is_hidden && !all_hidden {
                 continue;
             }
             let others = node.extensions.as_ref().map(|extensions| &extensions.others);
@@ -67,7 +70,7 @@ impl Scene {
             }
             // The joints of a skin, not its node, say where it is.
             let skin = node.skin.map(|skin| skin.value());
-            let transform = if skin.is_some() { DAffine3::IDENTITY } else { *world };
+            let transform = if skin.is_some() { DAffine3::IDENTITY } else { place.world };
             placements.push(Placement { mesh: mesh.value(), node: Some(k), skin, transform });
         }
         if root.nodes.iter().all(|node| node.mesh.is_none()) {
@@ -79,43 +82,40 @@ impl Scene {
                 "has meshes, but none in the scene that it shows, scene {scene}; make the scene with the mesh the active one and export again"
             )));
         }
-        scene.placements = placements;
-        Ok(scene)
-    }
-
-    /// The nodes of the default scene, without meshes.
-    fn nodes(root: &Root) -> Result<Self, Fault> {
-        let count = root.nodes.len();
-        let mut tree = Self {
-            placements: Vec::new(),
-            worlds: vec![None; count],
-            parents: vec![None; count],
-            depths: vec![0; count],
-            hidden: vec![false; count],
-        };
-        let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, DAffine3::IDENTITY, None, false)).collect();
-        while let Some((index, parent, above, is_hidden)) = open.pop() {
-            let node = root.nodes.get(index).ok_or_else(|| dangling(&format!("node {index}"), count))?;
-            if tree.worlds[index].is_some() {
-                return Err(Fault::damaged(format!(
-                    "node {index} is reached twice, but nodes make a tree; export the mesh again"
-                )));
-            }
-            let (world, is_hidden) = (parent * local(node), is_hidden || hides(node));
-            (tree.worlds[index], tree.parents[index], tree.hidden[index]) = (Some(world), above, is_hidden);
-            tree.depths[index] = 1 + above.map_or(0, |above: usize| tree.depths[above]);
-            open.extend(children(node).map(|child| (child, world, Some(index), is_hidden)));
-        }
-        Ok(tree)
+        Ok(Self { placements, places })
     }
 
     /// From a node's space to the world's.
     pub(super) fn world(&self, node: usize) -> Result<&DAffine3, Fault> {
-        let world = self.worlds.get(node).ok_or_else(|| dangling(&format!("node {node}"), self.worlds.len()))?;
-        world.as_ref().ok_or_else(|| {
+        let place = item(&self.places, "node", node)?.as_ref();
+        place.map(|place| &place.world).ok_or_else(|| {
             Fault::unsupported(format!("node {node} moves a skin but is not in the scene; export the mesh again"))
         })
     }
+}
+
+/// Where the nodes of the default scene are.
+fn places(root: &Root) -> Result<Vec<Option<Place>>, Fault> {
+    let mut places: Vec<Option<Place>> = root.nodes.iter().map(|_| None).collect();
+    let mut open: Vec<_> = roots(root)?.into_iter().map(|node| (node, None)).collect();
+    while let Some((index, parent)) = open.pop() {
+        let node = item(&root.nodes, "node", index)?;
+        if places[index].is_some() {
+            return Err(Fault::damaged(format!(
+                "node {index} is reached twice, but nodes make a tree; export the mesh again"
+            )));
+        }
+        let above = parent.and_then(|parent: usize| places[parent].as_ref());
+        let place = Place {
+            world: above.map_or(DAffine3::IDENTITY, |above| above.world) * local(node),
+            parent,
+            depth: 1 + above.map_or(0, |above| above.depth),
+            is_hidden: above.is_some_and(|above| above.is_hidden) || hides(node),
+        };
+        places[index] = Some(place);
+        open.extend(children(node).map(|child| (child, Some(index))));
+    }
+    Ok(places)
 }
 
 /// Whether a node is switched off with all below it.
@@ -132,19 +132,11 @@ pub(super) fn mirrors(transform: &DAffine3) -> bool {
 
 fn roots(root: &Root) -> Result<Vec<usize>, Fault> {
     let scene = root.scene.map_or(0, |scene| scene.value());
-    match root.scenes.get(scene) {
-        Some(scene) => Ok(scene.nodes.iter().map(Index::value).collect()),
-        None if root.scene.is_some() => Err(dangling(&format!("scene {scene}"), root.scenes.len())),
-        None => {
-            let mut is_root = vec![true; root.nodes.len()];
-            for child in root.nodes.iter().flat_map(children) {
-                if let Some(is_root) = is_root.get_mut(child) {
-                    *is_root = false;
-                }
-            }
-            Ok((0..root.nodes.len()).filter(|&node| is_root[node]).collect())
-        }
+    if root.scene.is_some() || !root.scenes.is_empty() {
+        return Ok(item(&root.scenes, "scene", scene)?.nodes.iter().map(Index::value).collect());
     }
+    let below: HashSet<usize> = root.nodes.iter().flat_map(children).collect();
+    Ok((0..root.nodes.len()).filter(|node| !below.contains(node)).collect())
 }
 
 fn children(node: &Node) -> impl Iterator<Item = usize> {

@@ -1,7 +1,5 @@
 //! Skins: meshes whose vertices follow several joints, at rest.
 
-use std::collections::BTreeMap;
-
 use cager_geometry::mesh::Point;
 use glam::{DAffine3, DVec3};
 use gltf::json::mesh::{Primitive, Semantic};
@@ -9,24 +7,20 @@ use gltf::json::validation::Checked;
 
 use super::accessor::{JOINTS, MATRICES, WEIGHTS};
 use super::buffers::Buffers;
-use super::faults::{dangling, too_large};
+use super::faults::{damaged, item, too_large};
 use super::scene::{Scene, affine, mirrors};
 use crate::error::Fault;
 
-/// Sets of four joints that vertices may have: enough for any skin, and few enough that sets that repeat an accessor cost little.
+/// Sets of four joints that vertices may have; sets that repeat an accessor then cost little.
 const MAX_SETS: u32 = 8;
 
 /// From the space that the mesh was bound in to the world's, for each joint of a skin.
 pub(super) struct Joints(Vec<DAffine3>);
 
-/// The joints of each skin, once it was asked for.
-pub(super) type Skins = BTreeMap<usize, Joints>;
-
 impl Joints {
     /// Those of a skin; at most `most` matrices are read, and their number is given back too.
     pub(super) fn of(index: usize, scene: &Scene, buffers: &Buffers<'_>, most: usize) -> Result<(Self, usize), Fault> {
-        let skins = &buffers.root.skins;
-        let skin = skins.get(index).ok_or_else(|| dangling(&format!("skin {index}"), skins.len()))?;
+        let skin = item(&buffers.root.skins, "skin", index)?;
         let place = format!("skin {index}");
         let bound = match skin.inverse_bind_matrices {
             Some(accessor) => buffers.values(accessor.value(), &MATRICES, most, &place)?,
@@ -41,11 +35,8 @@ impl Joints {
                 Some(columns) => affine(columns),
                 None if bound.is_empty() => DAffine3::IDENTITY,
                 None => {
-                    return Err(Fault::damaged(format!(
-                        "{place}: has {} inverse bind matrices for {} joints; export the mesh again",
-                        bound.len(),
-                        skin.joints.len()
-                    )));
+                    let (matrices, joints) = (bound.len(), skin.joints.len());
+                    return Err(damaged(&place, format!("has {matrices} inverse bind matrices for {joints} joints")));
                 }
             };
             Ok(*scene.world(node.value())? * inverse)
@@ -83,15 +74,12 @@ impl Joints {
             let joints: Vec<[f64; 4]> = buffers.values(joints, &JOINTS, points.len(), place)?;
             let weights: Vec<[f64; 4]> = buffers.values(weights, &WEIGHTS, points.len(), place)?;
             if joints.len().min(weights.len()) < points.len() {
-                return Err(Fault::damaged(format!("{place}: not every vertex has joints; export the mesh again")));
+                return Err(damaged(place, "not every vertex has joints"));
             }
             for (k, (moved, (joints, weights))) in moved.iter_mut().zip(joints.iter().zip(&weights)).enumerate() {
                 for (&joint, &weight) in joints.iter().zip(weights).filter(|&(_, &weight)| weight != 0.0) {
                     let transform = self.0.get(joint as usize).ok_or_else(|| {
-                        Fault::damaged(format!(
-                            "{place}: vertex {k} names joint {joint}, but the skin has {}; export the mesh again",
-                            self.0.len()
-                        ))
+                        damaged(place, format!("vertex {k} names joint {joint}, but the skin has {}", self.0.len()))
                     })?;
                     moved.0 += weight * transform.transform_point3(points[k].into());
                     moved.1 += weight;

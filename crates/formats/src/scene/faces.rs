@@ -2,6 +2,7 @@
 
 use cager_geometry::mesh::Polygons;
 
+use super::bytes::damaged;
 use crate::error::Fault;
 use crate::faces::check_face;
 
@@ -14,43 +15,32 @@ pub(crate) fn most_corners(points: usize) -> u64 {
     MOST_OF_FEW.max(CORNERS_OF_POINT.saturating_mul(points as u64))
 }
 
-#[derive(Debug, Default)]
-pub(crate) struct Faces {
-    /// Those of three corners and more.
-    pub(crate) polygons: Polygons,
-    /// How many there are beside them of fewer than three corners.
-    pub(crate) left_out: usize,
-}
-
-impl Faces {
-    /// Faces in the order of their corners or, `turned`, in the opposite one; none where there are fewer corners than the faces have.
-    pub(crate) fn of(
-        counts: impl Iterator<Item = u32>,
-        mut corners: impl Iterator<Item = u32>,
-        points: usize,
-        turned: bool,
-    ) -> Result<Self, Fault> {
-        let (mut faces, mut face) = (Self::default(), Vec::new());
-        for (k, count) in counts.enumerate() {
-            face.clear();
-            face.extend(corners.by_ref().take(count as usize));
-            if face.len() != count as usize {
-                return Err(Fault::damaged(format!(
-                    "face {k} has more corners than are there, so the file is damaged; copy or export it again"
-                )));
-            }
-            if turned {
-                face.reverse();
-            }
-            check_face(&face, points, || format!("face {k}"))?;
-            if face.len() < 3 {
-                faces.left_out += 1;
-            } else {
-                faces.polygons.push(&face);
-            }
+/// Faces of three corners and more, and how many there are beside them; in the opposite order of
+/// corners where `turned`.
+pub(crate) fn faces(
+    counts: impl Iterator<Item = u32>,
+    mut corners: impl Iterator<Item = u32>,
+    points: usize,
+    turned: bool,
+) -> Result<(Polygons, usize), Fault> {
+    let (mut faces, mut left_out, mut face) = (Polygons::new(), 0, Vec::new());
+    for (k, count) in counts.enumerate() {
+        face.clear();
+        face.extend(corners.by_ref().take(count as usize));
+        if face.len() != count as usize {
+            return Err(damaged(&format!("face {k} has more corners than are there")));
         }
-        Ok(faces)
+        if turned {
+            face.reverse();
+        }
+        check_face(&face, points, || format!("face {k}"))?;
+        if face.len() < 3 {
+            left_out += 1;
+        } else {
+            faces.push(&face);
+        }
     }
+    Ok((faces, left_out))
 }
 
 /// Of a frame whose points or faces are not those of the first.

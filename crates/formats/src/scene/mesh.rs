@@ -5,13 +5,11 @@ use std::path::Path;
 use cager_geometry::mesh::{Model, Polygons};
 use cager_geometry::units::Units;
 
-use super::faces::{Faces, most_corners, topology_changes};
-use super::failure::Failure;
-use super::reader::{Animation, open};
+use super::faces::{faces, most_corners, topology_changes};
+use super::reader::{Animation, MeshInfo, open};
 use super::track::{MOST_REPEATED, Timeline, Track, Value, Values};
 use super::transform::{Chain, place};
 use crate::error::{Error, Fault};
-use crate::frames::Times;
 
 /// What a parser finds of a mesh.
 #[derive(Default)]
@@ -19,7 +17,6 @@ pub(crate) struct MeshTracks {
     pub(crate) positions: Track,
     /// How many corners faces have, and which.
     pub(crate) faces: [Track; 2],
-    /// Whether faces wind clockwise.
     pub(crate) is_clockwise: bool,
     pub(crate) chain: Chain,
     pub(crate) timeline: Timeline,
@@ -28,17 +25,16 @@ pub(crate) struct MeshTracks {
     pub(crate) notes: Vec<String>,
 }
 
-/// A mesh that moves.
 pub(crate) struct MovingMesh<'a> {
     source: Box<dyn Values + 'a>,
     tracks: MeshTracks,
     /// Whether faces are turned around as they are read.
     turned: bool,
-    /// Those of the first frame, with which all others are compared.
-    faces: Faces,
     /// Where faces are stored that are equal to these, the last ones first.
     equal: [[Option<Value>; 2]; 2],
-    points: usize,
+    info: MeshInfo,
+    /// Faces of fewer than three corners.
+    left_out: usize,
     /// The points of the next sample, where a frame lies between two.
     next: Vec<f64>,
 }
@@ -59,13 +55,13 @@ pub(crate) fn no_points() -> Fault {
 }
 
 impl<'a> MovingMesh<'a> {
-    pub(crate) fn new(mut source: Box<dyn Values + 'a>, tracks: MeshTracks) -> Result<Self, Failure> {
+    pub(crate) fn new(mut source: Box<dyn Values + 'a>, mut tracks: MeshTracks) -> Result<Self, Fault> {
         let points = match tracks.positions.at(tracks.timeline.at[0]) {
             Some((first, ..)) => source.points(first)?.count,
             None => 0,
         };
         if points == 0 {
-            return Err(no_points().into());
+            return Err(no_points());
         }
         let mut turned = tracks.is_clockwise;
         // What is not there yet is often scaled to nothing.
@@ -77,17 +73,25 @@ impl<'a> MovingMesh<'a> {
                 break;
             }
         }
-        let (faces, equal, next) = (Faces::default(), [[None; 2]; 2], Vec::new());
-        let mut mesh = Self { source, tracks, turned, faces, equal, points, next };
+        let info = MeshInfo {
+            points,
+            frames: tracks.timeline.at.len(),
+            times: std::mem::take(&mut tracks.timeline.times),
+            units: tracks.units,
+            notes: std::mem::take(&mut tracks.notes),
+            faces: Polygons::new(),
+        };
+        let (equal, next) = ([[None; 2]; 2], Vec::new());
+        let mut mesh = Self { source, tracks, turned, equal, info, left_out: 0, next };
         let places = mesh.places(0);
-        mesh.faces = mesh.read_faces(places)?;
+        (mesh.info.faces, mesh.left_out) = mesh.read_faces(places)?;
         mesh.equal = [places; 2];
         Ok(mesh)
     }
 
     /// The first frame, and how many faces were left out that have fewer than three corners.
     pub(crate) fn into_model(self, path: &Path) -> Result<(Model, usize, Units), Error> {
-        let (points, left_out, units, mut values) = (self.points, self.faces.left_out, self.units(), Vec::new());
+        let (points, left_out, units, mut values) = (self.info.points, self.left_out, self.info.units, Vec::new());
         let mut reader = open(path, self, points)?;
         reader.read_next(&mut values)?;
         let faces = reader.mesh().map(|(_, faces)| faces.clone()).unwrap_or_default();
@@ -100,22 +104,22 @@ impl<'a> MovingMesh<'a> {
         self.tracks.faces.each_ref().map(|part| part.at(time).map(|(value, ..)| value))
     }
 
-    fn read_faces(&mut self, places: [Option<Value>; 2]) -> Result<Faces, Failure> {
-        let [Some(counts), Some(corners)] = places else { return Ok(Faces::default()) };
-        let most = most_corners(self.points);
+    fn read_faces(&mut self, places: [Option<Value>; 2]) -> Result<(Polygons, usize), Fault> {
+        let [Some(counts), Some(corners)] = places else { return Ok(Default::default()) };
+        let most = most_corners(self.info.points);
         let [counts, corners] = [self.source.integers(counts, most)?, self.source.integers(corners, most)?];
         let [counts, corners] = [counts, corners].map(|numbers| numbers.into_iter().map(|number| number as u32));
-        Ok(Faces::of(counts, corners, self.points, self.turned)?)
+        faces(counts, corners, self.info.points, self.turned)
     }
 
     /// Refuses a frame whose faces are others than those of the first.
-    fn check_faces(&mut self, frame: usize) -> Result<(), Failure> {
+    fn check_faces(&mut self, frame: usize) -> Result<(), Fault> {
         let places = self.places(frame);
         if self.equal.contains(&places) {
             return Ok(());
         }
-        if self.read_faces(places)?.polygons != self.faces.polygons {
-            return Err(topology_changes("its faces are not those of frame 0").into());
+        if self.read_faces(places)?.0 != self.info.faces {
+            return Err(topology_changes("its faces are not those of frame 0"));
         }
         self.equal = [places, self.equal[0]];
         Ok(())
@@ -123,46 +127,26 @@ impl<'a> MovingMesh<'a> {
 }
 
 impl Animation for MovingMesh<'_> {
-    fn points(&self) -> usize {
-        self.points
+    fn info(&self) -> &MeshInfo {
+        &self.info
     }
 
-    fn frames(&self) -> usize {
-        self.tracks.timeline.at.len()
-    }
-
-    fn times(&self) -> &Times {
-        &self.tracks.timeline.times
-    }
-
-    fn faces(&self) -> &Polygons {
-        &self.faces.polygons
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.tracks.notes
-    }
-
-    fn units(&self) -> Units {
-        self.tracks.units
-    }
-
-    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Fault> {
         let time = self.tracks.timeline.at[frame];
         let Some((value, next, share)) = self.tracks.positions.at(time) else { return Ok(false) };
         let points = self.source.points(value)?;
-        if points.count != self.points {
-            let what = format!("it has {} points, and {} in frame 0", points.count, self.points);
-            return Err(topology_changes(&what).into());
+        if points.count != self.info.points {
+            let what = format!("it has {} points, and {} in frame 0", points.count, self.info.points);
+            return Err(topology_changes(&what));
         }
         self.check_faces(frame)?;
         let matrix = self.tracks.chain.matrix(self.source.as_mut(), time)?;
         // Every value is overwritten below.
-        out.resize(3 * self.points, 0.0);
+        out.resize(3 * self.info.points, 0.0);
         let mut finite = self.source.read(points, out)?;
         let following = if share > 0.0 { Some(self.source.points(next)?) } else { None };
         // Where the number of points changes, those before hold.
-        if let Some(following) = following.filter(|following| following.count == self.points) {
+        if let Some(following) = following.filter(|following| following.count == self.info.points) {
             self.next.resize(out.len(), 0.0);
             finite &= self.source.read(following, &mut self.next)?;
             out.iter_mut().zip(&self.next).for_each(|(value, next)| *value += share * (next - *value));

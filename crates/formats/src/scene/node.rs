@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::failure::Failure;
 use crate::error::Fault;
 
 /// Meshes that a message lists, and characters of the name of each.
@@ -32,9 +31,9 @@ pub(crate) trait Tree {
     fn describe(&mut self, mesh: usize) -> String;
 }
 
-/// Of `all` meshes, at least one, that which `prim` names by its path, by its own name or by that of a node above; the only
-/// mesh whatever `prim` is, since that is given for the rest pose and the capture alike, which may call it differently.
-pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], prim: Option<&str>) -> Result<usize, Failure> {
+/// Of `all` meshes, at least one, that which `prim` names by its path, its own name or that of a
+/// node above; the only mesh whatever `prim` is, which the rest pose and the capture share.
+pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], prim: Option<&str>) -> Result<usize, Fault> {
     if let &[only] = all {
         return Ok(only);
     }
@@ -50,7 +49,7 @@ pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], prim: Option<&str>) -
             list(scene, several)
         ),
     };
-    Err(Fault::invalid(what).into())
+    Err(Fault::invalid(what))
 }
 
 /// The meshes that a path or a name picks.

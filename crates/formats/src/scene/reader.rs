@@ -5,33 +5,26 @@ use std::path::{Path, PathBuf};
 use cager_geometry::mesh::Polygons;
 use cager_geometry::units::Units;
 
-use super::failure::Failure;
-use crate::error::Error;
+use crate::error::{Error, Fault};
 use crate::frames::{FrameReader, Times};
 
-/// A mesh that moves.
-pub(crate) trait Animation: Send {
-    /// How many points it has in its first frame.
-    fn points(&self) -> usize;
-
-    fn frames(&self) -> usize;
-
-    fn times(&self) -> &Times;
-
-    /// The faces of all frames.
-    fn faces(&self) -> &Polygons;
-
-    fn units(&self) -> Units {
-        Units::UNKNOWN
-    }
-
+/// What all frames of a mesh have in common.
+#[derive(Default)]
+pub(crate) struct MeshInfo {
+    pub(crate) points: usize,
+    pub(crate) frames: usize,
+    pub(crate) times: Times,
+    pub(crate) faces: Polygons,
+    pub(crate) units: Units,
     /// What the user should know of how it is read, beside its times.
-    fn notes(&self) -> &[String] {
-        &[]
-    }
+    pub(crate) notes: Vec<String>,
+}
+
+pub(crate) trait Animation: Send {
+    fn info(&self) -> &MeshInfo;
 
     /// Reads a frame; gives whether all is finite.
-    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure>;
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Fault>;
 }
 
 /// The frames of a mesh of so many points.
@@ -41,8 +34,8 @@ pub(crate) fn open<'a>(
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let path = path.to_owned();
-    if mesh.points() != expected_points {
-        let found = mesh.points() as u64;
+    if mesh.info().points != expected_points {
+        let found = mesh.info().points as u64;
         return Err(Error::PointCount { path, frame: None, expected: expected_points, found });
     }
     Ok(Box::new(Reader { path, mesh, next: 0 }))
@@ -56,36 +49,37 @@ struct Reader<A> {
 
 impl<A: Animation> FrameReader for Reader<A> {
     fn points(&self) -> usize {
-        self.mesh.points()
+        self.mesh.info().points
     }
 
     fn frames(&self) -> usize {
-        self.mesh.frames()
+        self.mesh.info().frames
     }
 
     fn frame_rate(&self) -> Option<f64> {
-        self.mesh.times().frame_rate
+        self.mesh.info().times.frame_rate
     }
 
     fn number(&self, frame: usize) -> f64 {
-        self.mesh.times().number(frame)
+        self.mesh.info().times.number(frame)
     }
 
     fn numbers_are_times(&self) -> bool {
-        self.mesh.times().numbers.is_some()
+        self.mesh.info().times.numbers.is_some()
     }
 
     fn notes(&self) -> Vec<String> {
-        let all = self.mesh.times().note.iter().chain(self.mesh.notes());
+        let MeshInfo { times, notes, .. } = self.mesh.info();
+        let all = times.note.iter().chain(notes);
         all.map(|note| format!("{}: {note}", self.path.display())).collect()
     }
 
     fn units(&self) -> Units {
-        self.mesh.units()
+        self.mesh.info().units
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {
-        Some((&self.path, self.mesh.faces()))
+        Some((&self.path, &self.mesh.info().faces))
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

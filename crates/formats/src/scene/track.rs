@@ -3,10 +3,8 @@
 use crate::error::Fault;
 use crate::frames::{Scalar, Times};
 
-use super::failure::Failure;
-
-/// Frames that a scene may have however few of them it holds: repetitions take no room, nor do the points of what a
-/// transform moves. Of more it holds every other one.
+/// Frames that any scene may have, as repetitions and points that a transform moves take no
+/// room. Of more it holds every other one.
 pub(crate) const MOST_REPEATED: usize = 1 << 14;
 /// Shares of the way from one sample to the next by which a time may miss one.
 const NEAR: f64 = 1e-6;
@@ -25,7 +23,6 @@ pub(crate) fn check_held(frames: usize, is_held: bool) -> Result<(), Fault> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Value(pub(crate) u64);
 
-/// The values of an attribute.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Track {
     /// The value where there are no times.
@@ -45,8 +42,8 @@ impl Track {
         self.default.or_else(|| self.values.first().copied())
     }
 
-    /// The value at a time, the next one, and how far the time is on its way there, from 0 to 1; the default where there are
-    /// no times. Before the first and after the last they hold.
+    /// The value at a time, the next one, and the share of the way there; the default where there
+    /// are no times. Before the first and after the last they hold.
     pub(crate) fn at(&self, time: f64) -> Option<(Value, Value, f64)> {
         let Some(last) = self.times.len().checked_sub(1) else { return self.default.map(|value| (value, value, 0.0)) };
         let (low, share) = position(&self.times, time);
@@ -54,7 +51,7 @@ impl Track {
     }
 }
 
-/// The last of some times, at least one, that is not after another, and how far that is on its way to the next.
+/// The last of at least one time that is not after another, and the share of the way to the next.
 pub(crate) fn position(times: &[f64], time: f64) -> (usize, f64) {
     let low = times.partition_point(|&t| t <= time).saturating_sub(1);
     let (before, after) = (times[low], times[(low + 1).min(times.len() - 1)]);
@@ -69,7 +66,6 @@ pub(crate) fn union(mut times: Vec<f64>, near: f64) -> Vec<f64> {
     times
 }
 
-/// When frames are.
 #[derive(Default)]
 pub(crate) struct Timeline {
     pub(crate) times: Times,
@@ -85,17 +81,15 @@ pub(crate) struct Points {
     pub(crate) scalar: Scalar,
 }
 
-/// What reads values.
 pub(crate) trait Values: Send {
-    /// The numbers of one value: of a number, a vector, a quaternion (its real part last) or matrices.
-    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure>;
+    /// The numbers of a value: a number, a vector, a quaternion (real part last) or matrices.
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Fault>;
 
     /// An array of at most so many whole numbers.
-    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure>;
+    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault>;
 
-    /// Where an array of points is.
-    fn points(&mut self, value: Value) -> Result<Points, Failure>;
+    fn points(&mut self, value: Value) -> Result<Points, Fault>;
 
     /// Reads points, `x y z x y z …`, all of which are overwritten; gives whether all are finite.
-    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure>;
+    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Fault>;
 }

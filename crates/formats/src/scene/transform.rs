@@ -1,16 +1,14 @@
-//! Transforms above a mesh, still or animated: stacks of operations, each of which has some numbers.
+//! Transforms above a mesh, still or animated: stacks of operations, each of some numbers.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::failure::Failure;
 use super::track::{Track, Values};
 use crate::error::Fault;
 
-/// Operations of one transform, and of all above a mesh, which are done for every frame; programs write a handful.
+/// Operations of one transform, and of all above a mesh; programs write a handful.
 pub(crate) const MOST_OPERATIONS: usize = 256;
 const MOST_ABOVE: usize = 1 << 12;
 
-/// One step of a transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Operation {
     /// Along so many axes from this one on.
@@ -24,12 +22,11 @@ pub(crate) enum Operation {
     Orient,
     /// Sixteen numbers, which are each interpolated.
     Matrix,
-    /// The same, interpolated as the place, the sizes and the rotation that they are, unless they shear or mirror.
+    /// The same, interpolated as place, sizes and rotation, unless they shear or mirror.
     Rigid,
 }
 
 impl Operation {
-    /// How many numbers it has.
     pub(crate) fn count(self) -> usize {
         match self {
             Self::Translate(_, count) | Self::Scale(_, count) => count,
@@ -129,7 +126,7 @@ impl Chain {
         values: Track,
         operations: Vec<Operation>,
         is_inverted: bool,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Fault> {
         let mut link = Link { values, operations, is_inverted, fixed: None };
         // A single sample holds at all times, whatever the default.
         let matrix = link.at(source, link.values.times.first().copied().unwrap_or_default())?;
@@ -141,7 +138,7 @@ impl Chain {
         }
         if self.0.iter().map(|link| link.operations.len()).sum::<usize>() > MOST_ABOVE {
             let what = "the transforms above a mesh have more operations than any program writes, so the file is damaged; copy or export it again";
-            return Err(Fault::damaged(what).into());
+            return Err(Fault::damaged(what));
         }
         Ok(())
     }
@@ -152,7 +149,7 @@ impl Chain {
     }
 
     /// The product of all transforms at a time; none for the identity.
-    pub(crate) fn matrix(&self, source: &mut (impl Values + ?Sized), time: f64) -> Result<Option<DAffine3>, Failure> {
+    pub(crate) fn matrix(&self, source: &mut (impl Values + ?Sized), time: f64) -> Result<Option<DAffine3>, Fault> {
         let mut product = DAffine3::IDENTITY;
         for link in &self.0 {
             let matrix = match link.fixed {
@@ -163,14 +160,14 @@ impl Chain {
         }
         if !product.is_finite() {
             let what = "has a transform that is NaN or infinite, or undone where it cannot be; repair it or bake it into the points";
-            return Err(Fault::invalid(what).into());
+            return Err(Fault::invalid(what));
         }
         Ok(Some(product).filter(|matrix| *matrix != DAffine3::IDENTITY))
     }
 }
 
 impl Link {
-    fn at(&self, source: &mut (impl Values + ?Sized), time: f64) -> Result<DAffine3, Failure> {
+    fn at(&self, source: &mut (impl Values + ?Sized), time: f64) -> Result<DAffine3, Fault> {
         let Some((value, next, share)) = self.values.at(time) else { return Ok(DAffine3::IDENTITY) };
         let from = source.numbers(value)?;
         let to = if share > 0.0 { source.numbers(next)? } else { from.clone() };
@@ -180,7 +177,7 @@ impl Link {
             start = range.end;
             let (Some(from), Some(to)) = (from.get(range.clone()), to.get(range)) else {
                 let what = "a transform has too few numbers, so the file is damaged; copy or export it again";
-                return Err(Fault::damaged(what).into());
+                return Err(Fault::damaged(what));
             };
             product *= operation.between(from, to, share);
         }
@@ -188,7 +185,7 @@ impl Link {
     }
 }
 
-/// Moves points, `x y z x y z …`, by a matrix, where there is one; gives whether all is finite, as they `were`.
+/// Moves points by a matrix, where there is one; gives whether all is finite, as they `were`.
 pub(crate) fn place(matrix: Option<DAffine3>, points: &mut [f64], were: bool) -> bool {
     let Some(matrix) = matrix else { return were };
     for point in points.as_chunks_mut::<3>().0 {

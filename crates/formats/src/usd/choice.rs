@@ -2,19 +2,16 @@
 
 use super::layer::{Kind, Layer, Prim, composed};
 use crate::error::Fault;
-use crate::scene::{Failure, Node, Tree, ancestry, choose as choose_mesh, named, shown_path};
+use crate::scene::{Node, Tree, ancestry, choose as choose_mesh, named, shown_path};
 
 /// The mesh that `prim` names, or the only one, and what the user should know of others.
-pub(super) fn choose<'a>(
-    layer: &mut Box<dyn Layer + 'a>,
-    prim: Option<&str>,
-) -> Result<(usize, Option<String>), Failure> {
-    let is_there = |&k: &usize| ancestry(layer.nodes(), k).all(|k| layer.prims()[k].is_there);
-    let there: Vec<usize> = (0..layer.prims().len()).filter(is_there).collect();
-    let is_a = |k: usize, kind: Kind| layer.prims()[k].kind == kind;
+pub(super) fn choose(layer: &mut Layer<'_>, prim: Option<&str>) -> Result<(usize, Option<String>), Fault> {
+    let is_there = |&k: &usize| ancestry(&layer.nodes, k).all(|k| layer.prims[k].is_there);
+    let there: Vec<usize> = (0..layer.prims.len()).filter(is_there).collect();
+    let is_a = |k: usize, kind: Kind| layer.prims[k].kind == kind;
     let instancer = there.iter().copied().find(|&k| is_a(k, Kind::PointInstancer));
     // Those below an instancer are shown where its points are, and not where they are themselves.
-    let is_placed = |&k: &usize| !ancestry(layer.nodes(), k).any(|above| is_a(above, Kind::PointInstancer));
+    let is_placed = |&k: &usize| !ancestry(&layer.nodes, k).any(|above| is_a(above, Kind::PointInstancer));
     let mut meshes: Vec<usize> = there.iter().copied().filter(|&k| is_a(k, Kind::Mesh)).collect();
     let is_none = meshes.is_empty();
     meshes.retain(is_placed);
@@ -23,37 +20,36 @@ pub(super) fn choose<'a>(
     }
     let first_composed = |prims: &[Prim], among: &[usize]| among.iter().find_map(|&k| Some((k, prims[k].composed?)));
     if meshes.is_empty() {
-        return Err(match (first_composed(layer.prims(), &there), instancer) {
-            (Some((prim, of)), _) => composed(&shown_path(layer.nodes(), prim), of),
+        return Err(match (first_composed(&layer.prims, &there), instancer) {
+            (Some((prim, of)), _) => composed(&shown_path(&layer.nodes, prim), of),
             (None, Some(instancer)) if !is_none => Fault::unsupported(format!(
                 "has its meshes as prototypes of {}, a PointInstancer, whose instances are not read; make them real where it is exported, or export the mesh alone",
-                shown_path(layer.nodes(), instancer)
+                shown_path(&layer.nodes, instancer)
             )),
             _ => Fault::unsupported("holds no polygon mesh; export the mesh itself as USD"),
-        }
-        .into());
+        });
     }
     let chosen = choose_mesh(layer, &meshes, prim)?;
     // What else is composed may be the mesh that is meant, unless this one was named.
-    let is_named = prim.is_some_and(|prim| !named(layer.nodes(), &[chosen], prim).is_empty());
-    let above: Vec<usize> = ancestry(layer.nodes(), chosen).collect();
+    let is_named = prim.is_some_and(|prim| !named(&layer.nodes, &[chosen], prim).is_empty());
+    let above: Vec<usize> = ancestry(&layer.nodes, chosen).collect();
     let looked_at = if is_named { above } else { there };
-    if let Some((prim, of)) = first_composed(layer.prims(), &looked_at) {
-        return Err(composed(&shown_path(layer.nodes(), prim), of).into());
+    if let Some((prim, of)) = first_composed(&layer.prims, &looked_at) {
+        return Err(composed(&shown_path(&layer.nodes, prim), of));
     }
     let note = instancer.map(|instancer| {
-        format!("the instances of {}, a PointInstancer, are not read", shown_path(layer.nodes(), instancer))
+        format!("the instances of {}, a PointInstancer, are not read", shown_path(&layer.nodes, instancer))
     });
     Ok((chosen, note))
 }
 
-/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides or stand in for what is rendered, and what is switched
-/// off is invisible.
-fn shown<'a>(layer: &mut Box<dyn Layer + 'a>, meshes: Vec<usize>) -> Result<Vec<usize>, Failure> {
+/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides
+/// or proxies, and what is switched off is invisible.
+fn shown(layer: &mut Layer<'_>, meshes: Vec<usize>) -> Result<Vec<usize>, Fault> {
     let mut rendered = Vec::new();
     for &mesh in &meshes {
         let (mut purpose, mut is_hidden) = (None, false);
-        for prim in ancestry(layer.nodes(), mesh).collect::<Vec<_>>() {
+        for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
             // The innermost purpose counts.
             purpose = match purpose {
                 None => constant(layer, prim, "purpose")?,
@@ -69,20 +65,20 @@ fn shown<'a>(layer: &mut Box<dyn Layer + 'a>, meshes: Vec<usize>) -> Result<Vec<
 }
 
 /// The token that an attribute of a prim is at all times.
-fn constant<'a>(layer: &mut Box<dyn Layer + 'a>, prim: usize, name: &str) -> Result<Option<String>, Failure> {
+fn constant(layer: &mut Layer<'_>, prim: usize, name: &str) -> Result<Option<String>, Fault> {
     let said = layer.attribute(prim, name)?;
     let value = said.still().filter(|_| said.times.len() < 2);
-    Ok(value.map_or(Ok(Vec::new()), |value| layer.tokens(value, 1))?.pop())
+    Ok(value.map_or(Ok(Vec::new()), |value| layer.source.tokens(value, 1))?.pop())
 }
 
-impl Tree for Box<dyn Layer + '_> {
+impl Tree for Layer<'_> {
     fn nodes(&self) -> &[Node] {
-        self.as_ref().nodes()
+        &self.nodes
     }
 
     fn describe(&mut self, mesh: usize) -> String {
         let points = self.attribute(mesh, "points").and_then(|points| match points.still() {
-            Some(points) => self.points(points).map(|points| points.count),
+            Some(points) => self.source.points(points).map(|points| points.count),
             None => Ok(0),
         });
         points.map_or_else(|_| "unreadable".to_owned(), |points| format!("{points} points"))

@@ -1,12 +1,12 @@
-//! What a layer of USD holds, whatever it is stored as: a tree of prims, whose attributes have values by default and at time codes.
+//! What a layer of USD holds: a tree of prims, whose attributes have values, at time codes or not.
 
 use crate::error::Fault;
-use crate::scene::{Failure, Node, Track, Value, Values};
+use crate::scene::{Node, Track, Value, Values};
 
 /// How deep prims nest; programs write far less.
 pub(super) const DEEPEST: u32 = 256;
 
-/// Fields that say what a prim is composed of, as they are called in one of the two kinds of layers.
+/// Fields that say what a prim is composed of, in text or in binary layers.
 pub(super) const COMPOSED: [(&str, &str); 9] = [
     ("references", "references"),
     ("payload", "payloads"),
@@ -41,11 +41,8 @@ impl Kind {
     }
 }
 
-/// A prim of the tree.
 #[derive(Clone, Debug)]
 pub(super) struct Prim {
-    /// Which of the layer's own this is.
-    pub(super) spec: u32,
     pub(super) kind: Kind,
     /// Whether it, without regard to what it lies below, is there: defined and active.
     pub(super) is_there: bool,
@@ -64,23 +61,36 @@ pub(super) struct Stage {
     pub(super) end: Option<f64>,
 }
 
-/// A layer.
-pub(super) trait Layer: Values {
-    fn stage(&self) -> &Stage;
-
+pub(super) struct Layer<'a> {
+    pub(super) stage: Stage,
     /// Where the prims are in their tree, and what they are.
-    fn nodes(&self) -> &[Node];
+    pub(super) nodes: Vec<Node>,
+    pub(super) prims: Vec<Prim>,
+    pub(super) source: Box<dyn Attributes + 'a>,
+}
 
-    fn prims(&self) -> &[Prim];
-
+impl Layer<'_> {
     /// The values of an attribute of a prim; none where it has none of this name.
-    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Failure>;
+    pub(super) fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault> {
+        self.source.attribute(prim, name)
+    }
+
+    /// The tokens that an attribute of a prim is at all times, or first.
+    pub(super) fn tokens(&mut self, prim: usize, name: &str, most: usize) -> Result<Option<Vec<String>>, Fault> {
+        let value = self.attribute(prim, name)?.still();
+        value.map(|value| self.source.tokens(value, most)).transpose()
+    }
+}
+
+pub(super) trait Attributes: Values {
+    /// The values of an attribute of a prim; none where it has none of this name.
+    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault>;
 
     /// The names and types of what a mesh has beside its faces, and of the materials of any prim.
     fn properties(&self, prim: usize) -> Vec<(String, String)>;
 
     /// A list of at most so many names, or one.
-    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure>;
+    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault>;
 }
 
 /// The fault of what is composed of other prims or files.

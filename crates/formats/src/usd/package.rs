@@ -1,25 +1,23 @@
-//! Packages, `.usdz`: zip archives whose files are stored as they are, and whose first is the layer.
+//! Packages, `.usdz`: zip archives of files as they are, of which the first is the layer.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
 use zip::{CompressionMethod, ZipArchive};
 
 use crate::error::Fault;
-use crate::scene::{Failure, damaged};
+use crate::scene::{Reader, damaged};
 
-/// What a package begins with.
 pub(super) const MAGIC: &[u8; 4] = b"PK\x03\x04";
 
-/// A file in a package.
-pub(super) struct Inside<R> {
-    source: R,
+struct Inside<'a> {
+    source: Reader<'a>,
     start: u64,
     length: u64,
     at: u64,
 }
 
-/// The first file of a package of `length` bytes.
-pub(super) fn first<R: Read + Seek>(source: R, length: u64) -> Result<Inside<R>, Failure> {
+/// The first file of a package of `length` bytes, and its own length.
+pub(super) fn first(source: Reader<'_>, length: u64) -> Result<(Reader<'_>, u64), Fault> {
     let wrong = |_| damaged("its list of files cannot be read");
     let mut archive = ZipArchive::new(source).map_err(wrong)?;
     let (mut start, mut size) = (0, 0);
@@ -27,25 +25,19 @@ pub(super) fn first<R: Read + Seek>(source: R, length: u64) -> Result<Inside<R>,
         let file = archive.by_index_raw(index).map_err(wrong)?;
         if file.compression() != CompressionMethod::Stored || file.encrypted() {
             let what = "is a package whose files are compressed or encrypted; pack it again with usdzip";
-            return Err(Fault::unsupported(what).into());
+            return Err(Fault::unsupported(what));
         }
         (start, size) = (file.data_start().unwrap_or(u64::MAX), file.size());
     }
     if start.checked_add(size).is_none_or(|end| end > length) {
-        return Err(damaged("an offset leads out of the package").into());
+        return Err(damaged("an offset leads out of the package"));
     }
     let mut inside = Inside { source: archive.into_inner(), start, length: size, at: 0 };
     inside.rewind()?;
-    Ok(inside)
+    Ok((Box::new(inside), size))
 }
 
-impl<R> Inside<R> {
-    pub(super) fn length(&self) -> u64 {
-        self.length
-    }
-}
-
-impl<R: Read> Read for Inside<R> {
+impl Read for Inside<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let left = usize::try_from(self.length.saturating_sub(self.at)).unwrap_or(usize::MAX);
         let most = out.len().min(left);
@@ -55,7 +47,7 @@ impl<R: Read> Read for Inside<R> {
     }
 }
 
-impl<R: Seek> Seek for Inside<R> {
+impl Seek for Inside<'_> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         let at = match to {
             SeekFrom::Start(at) => Some(at),

@@ -2,9 +2,9 @@
 
 use super::layer::Layer;
 use crate::error::Fault;
-use crate::scene::{Chain, Failure, MOST_OPERATIONS, Operation, ancestry, shown};
+use crate::scene::{Chain, MOST_OPERATIONS, Operation, ancestry, shown};
 
-/// What the order of operations has in front of what is undone, and in place of all that is above a prim.
+/// In the order of operations: before what is undone, and in place of all that is above a prim.
 const INVERTED: &str = "!invert!";
 const RESET: &str = "!resetXformStack!";
 
@@ -33,23 +33,22 @@ fn operation(name: &str) -> Option<Operation> {
     })
 }
 
-/// The transforms above a mesh and of the mesh itself, up to one that does not inherit what is above it.
-pub(super) fn above<'a>(layer: &mut (dyn Layer + 'a), mesh: usize) -> Result<Chain, Failure> {
+/// The transforms of a mesh and above it, up to one that does not inherit what is above it.
+pub(super) fn above(layer: &mut Layer<'_>, mesh: usize) -> Result<Chain, Fault> {
     let mut chain = Chain::default();
-    for prim in ancestry(layer.nodes(), mesh).collect::<Vec<_>>() {
-        let Some(order) = layer.attribute(prim, "xformOpOrder")?.still() else { continue };
-        let names = layer.tokens(order, MOST_OPERATIONS)?;
+    for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
+        let Some(names) = layer.tokens(prim, "xformOpOrder", MOST_OPERATIONS)? else { continue };
         let reset = names.iter().rposition(|name| name == RESET);
         for name in names[reset.map_or(0, |place| place + 1)..].iter().rev() {
             let plain = name.strip_prefix(INVERTED).unwrap_or(name);
             let told = plain.strip_prefix("xformOp:").and_then(|told| operation(told.split(':').next()?));
             let Some(operation) = told else {
                 let what = format!("has a transform of an unknown kind, {}; bake it into the points", shown(name));
-                return Err(Fault::unsupported(what).into());
+                return Err(Fault::unsupported(what));
             };
             let values = layer.attribute(prim, plain)?;
             if !values.is_empty() {
-                chain.push(layer, values, vec![operation], plain.len() < name.len())?;
+                chain.push(layer.source.as_mut(), values, vec![operation], plain.len() < name.len())?;
             }
         }
         if reset.is_some() {

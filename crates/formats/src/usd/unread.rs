@@ -2,7 +2,8 @@
 
 use super::layer::{Kind, Layer};
 use crate::dropped::{Dropped, counted, listed};
-use crate::scene::{Failure, ancestry};
+use crate::error::Fault;
+use crate::scene::ancestry;
 
 /// Attributes beside points and faces, and what they are.
 const KINDS: [(&str, &str); 9] = [
@@ -18,41 +19,14 @@ const KINDS: [(&str, &str); 9] = [
 ];
 
 /// Adds what a mesh has beside points and faces.
-pub(super) fn add<'a>(layer: &mut (dyn Layer + 'a), mesh: usize, dropped: &mut Dropped) -> Result<(), Failure> {
-    let mut properties = layer.properties(mesh);
+pub(super) fn add(layer: &mut Layer<'_>, mesh: usize, dropped: &mut Dropped) -> Result<(), Fault> {
+    let mut properties = layer.source.properties(mesh);
     properties.sort_unstable();
     properties.dedup();
-    let of_type = |wanted: &dyn Fn(&str, &str) -> bool| -> Vec<&str> {
-        let names = properties.iter().filter(|(name, told)| wanted(name, told) && !name.ends_with(":indices"));
-        names.map(|(name, _)| name.as_str()).collect()
-    };
-    let is_primvar = |name: &str| name.starts_with("primvars:");
-    let is_skin = |name: &str| name.starts_with("primvars:skel:") || name.starts_with("skel:");
-    let is_normals = |name: &str, told: &str| name == "normals" || is_primvar(name) && told.starts_with("normal3");
-    let is_coordinates = |name: &str, told: &str| {
-        is_primvar(name) && (told.starts_with("texCoord") || told.starts_with("float2") || told.starts_with("double2"))
-    };
-    let is_color =
-        |name: &str, told: &str| is_primvar(name) && (told.starts_with("color") || name.ends_with(":displayOpacity"));
-    let is_other = |name: &str, told: &str| {
-        is_primvar(name)
-            && !(is_skin(name) || is_normals(name, told) || is_coordinates(name, told) || is_color(name, told))
-    };
     let told = |what: &str, names: &[&str]| format!("{what} ({})", listed(names.iter().map(|name| name.as_bytes())));
-    let coordinates = of_type(&is_coordinates);
-    if !coordinates.is_empty() {
-        dropped.add_on_faces(told("texture coordinates", &coordinates));
-    }
-    let normals = of_type(&is_normals);
-    if !normals.is_empty() {
-        dropped.add_on_faces(told("normals", &normals));
-    }
-    let others = [
-        ("colours", of_type(&is_color)),
-        ("a skin", of_type(&|name: &str, _: &str| is_skin(name))),
-        ("primvars", of_type(&is_other)),
-    ];
-    for (what, names) in others {
+    for what in ["texture coordinates", "normals", "colours", "a skin", "primvars"] {
+        let of_kind = properties.iter().filter(|(name, type_name)| kind(name, type_name) == Some(what));
+        let names: Vec<&str> = of_kind.map(|(name, _)| name.as_str()).collect();
         if !names.is_empty() {
             dropped.add_on_faces(told(what, &names));
         }
@@ -62,16 +36,16 @@ pub(super) fn add<'a>(layer: &mut (dyn Layer + 'a), mesh: usize, dropped: &mut D
             dropped.add(what);
         }
     }
-    if let Some(scheme) = layer.attribute(mesh, "subdivisionScheme")?.still() {
-        let scheme = layer.tokens(scheme, 1)?.concat();
+    if let Some(scheme) = layer.tokens(mesh, "subdivisionScheme", 1)? {
+        let scheme = scheme.concat();
         if scheme != "none" {
             dropped.add(told("the subdivision scheme", &[&scheme]));
         }
     }
-    let is_subset = |k: &usize| layer.prims()[*k].kind == Kind::Subset && layer.nodes()[*k].parent == Some(mesh);
-    let subsets: Vec<usize> = (0..layer.prims().len()).filter(is_subset).collect();
-    let bound = |k: usize| layer.properties(k).iter().any(|(name, _)| name.starts_with("material:binding"));
-    if subsets.iter().copied().chain(ancestry(layer.nodes(), mesh)).any(bound) {
+    let is_subset = |k: &usize| layer.prims[*k].kind == Kind::Subset && layer.nodes[*k].parent == Some(mesh);
+    let subsets: Vec<usize> = (0..layer.prims.len()).filter(is_subset).collect();
+    let bound = |k: usize| layer.source.properties(k).iter().any(|(name, _)| name.starts_with("material:binding"));
+    if subsets.iter().copied().chain(ancestry(&layer.nodes, mesh)).any(bound) {
         dropped.add_on_faces("materials (material:binding)");
     }
     if !subsets.is_empty() {
@@ -80,13 +54,27 @@ pub(super) fn add<'a>(layer: &mut (dyn Layer + 'a), mesh: usize, dropped: &mut D
     Ok(())
 }
 
+/// What corners or points have in an attribute.
+fn kind(name: &str, type_name: &str) -> Option<&'static str> {
+    let plain = name.strip_prefix("primvars:");
+    let is_of = |types: &[&str]| plain.is_some() && types.iter().any(|start| type_name.starts_with(start));
+    match plain {
+        _ if name.ends_with(":indices") => None,
+        _ if name == "normals" || is_of(&["normal3"]) => Some("normals"),
+        _ if is_of(&["texCoord", "float2", "double2"]) => Some("texture coordinates"),
+        Some(plain) if is_of(&["color"]) || plain == "displayOpacity" => Some("colours"),
+        _ if plain.unwrap_or(name).starts_with("skel:") => Some("a skin"),
+        plain => plain.map(|_| "primvars"),
+    }
+}
+
 /// A note of a mesh that is hidden in some frames.
-pub(super) fn visibility<'a>(layer: &mut (dyn Layer + 'a), mesh: usize) -> Result<Option<String>, Failure> {
-    for prim in ancestry(layer.nodes(), mesh).collect::<Vec<_>>() {
+pub(super) fn visibility(layer: &mut Layer<'_>, mesh: usize) -> Result<Option<String>, Fault> {
+    for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
         let said = layer.attribute(prim, "visibility")?;
         let mut tokens = Vec::new();
         for value in said.values {
-            tokens.extend(layer.tokens(value, 1)?);
+            tokens.extend(layer.source.tokens(value, 1)?);
         }
         if tokens.windows(2).any(|pair| pair[0] != pair[1]) {
             return Ok(Some("its visibility is animated, which is not kept".to_owned()));

@@ -1,4 +1,5 @@
-//! Which texel a point of a frame has: a row for each frame, and where points are more than a row has, the rest in a block of rows below.
+//! Which texel a point of a frame has: a row for each frame, and where points are more than a row
+//! has, the rest in a block of rows below.
 
 use crate::error::Fault;
 
@@ -39,7 +40,7 @@ impl Layout {
         })
     }
 
-    /// The middle of the texel of a point in the first frame, as fractions of the image from its upper left corner.
+    /// The middle of a point's texel in the first frame, as fractions from the upper left corner.
     pub(super) fn place(&self, point: usize) -> [f32; 2] {
         let (column, row) = (point % self.width, point / self.width * self.frames);
         let middle = |texel: usize, all: usize| ((texel as f64 + 0.5) / all as f64) as f32;

@@ -1,13 +1,15 @@
-//! The mesh that images move: binary glTF with the place of each point in the images as its texture coordinates.
+//! The mesh that images move: binary glTF with each point's texel as its texture coordinates.
 
 use std::io::{self, Write};
 
 use super::Scene;
 use super::layout::Layout;
+use crate::glb::write_head;
 use crate::normals::vertex_normals;
+use crate::scene::bounds;
 
-/// Writes positions, normals, texture coordinates and corners. Shaders take the second set of coordinates; the first one is the same, as glTF has no
-/// second one without.
+/// Writes positions, normals, texture coordinates and corners. Shaders take the second set of
+/// coordinates; the first one is the same, as glTF has no second one without.
 pub(super) fn write(out: &mut impl Write, positions: &[f32], layout: &Layout, scene: &Scene) -> io::Result<()> {
     let points = layout.points;
     let mut normals = Vec::new();
@@ -15,11 +17,7 @@ pub(super) fn write(out: &mut impl Write, positions: &[f32], layout: &Layout, sc
     let places: Vec<f32> = (0..points).flat_map(|point| layout.place(point)).collect();
     let numbers = positions.iter().chain(normals.as_flattened()).chain(&places).flat_map(|x| x.to_le_bytes());
     let data: Vec<u8> = numbers.chain(scene.triangles.as_flattened().iter().flat_map(|x| x.to_le_bytes())).collect();
-    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for point in positions.as_chunks::<3>().0 {
-        low = std::array::from_fn(|k| low[k].min(point[k]));
-        high = std::array::from_fn(|k| high[k].max(point[k]));
-    }
+    let [low, high] = bounds(positions);
     let corners = 3 * scene.triangles.len();
     let (name, origin) = (&scene.name, scene.origin);
     let view = |start: usize, length: usize, target: u32| {
@@ -40,21 +38,12 @@ pub(super) fn write(out: &mut impl Write, positions: &[f32], layout: &Layout, sc
         accessors.push(format!(r#"{{"bufferView":3,"componentType":5125,"count":{corners},"type":"SCALAR"}}"#));
         faces = r#""indices":3"#;
     }
-    let mut json = format!(
+    let json = format!(
         r#"{{"asset":{{"version":"2.0","generator":"cager"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"name":"{name}","mesh":0,"translation":{origin:?}}}],"meshes":[{{"name":"{name}","primitives":[{{"attributes":{{"POSITION":0,"NORMAL":1,"TEXCOORD_0":2,"TEXCOORD_1":2}},{faces}}}]}}],"accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}}"#,
         accessors.join(","),
         views.join(","),
         data.len()
-    )
-    .into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let word = |x: usize| u32::try_from(x).map(u32::to_le_bytes).map_err(|_| io::ErrorKind::FileTooLarge);
-    out.write_all(b"glTF\x02\0\0\0")?;
-    out.write_all(&word(28 + json.len() + data.len())?)?;
-    out.write_all(&word(json.len())?)?;
-    out.write_all(b"JSON")?;
-    out.write_all(&json)?;
-    out.write_all(&word(data.len())?)?;
-    out.write_all(b"BIN\0")?;
+    );
+    write_head(out, json, data.len())?;
     out.write_all(&data)
 }

@@ -1,7 +1,7 @@
-//! Vertex animation textures as OpenVAT has them: a mesh, an image of what each frame moves its points by, one of normals, and the bounds of both as
-//! JSON. Game engines read them where they have no room for caches.
+//! Vertex animation textures as OpenVAT has them: a mesh, an image of what each frame moves its
+//! points by, one of normals, and the bounds of both as JSON, for game engines without caches.
 //!
-//! The axes in the images are those of Blender, whose up is z: red is x, green −z and blue y of the mesh.
+//! The axes in the images are those of Blender, whose up is z: red is x, green −z and blue y.
 
 mod layout;
 mod mesh;
@@ -24,13 +24,11 @@ pub(crate) struct Scene {
     /// The name of the mesh, with which those of all files begin.
     pub(crate) name: String,
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Frames per second.
     pub(crate) fps: f64,
     /// What is added to all positions.
     pub(crate) origin: Point,
 }
 
-/// Frames ready to be written.
 pub(crate) struct Textures<'a> {
     scene: &'a Scene,
     /// Coordinates of all points, frame after frame.
@@ -41,7 +39,6 @@ pub(crate) struct Textures<'a> {
     high: [f64; 3],
 }
 
-/// Refuses what images cannot hold.
 pub(crate) fn check(points: usize, frames: usize) -> Result<(), Fault> {
     Layout::of(points, frames).map(|_| ())
 }

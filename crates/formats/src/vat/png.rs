@@ -1,4 +1,4 @@
-//! Images of 16 bits a channel, red, green and blue, as PNG: what filters and packs rows, and nothing else of the format.
+//! Images of 16 bits a channel as PNG: filtered and packed rows, and nothing else of the format.
 
 use std::io::{self, BufWriter, Write};
 

@@ -26,13 +26,11 @@ const TRANSLATE: u8 = 0x10;
 /// Index of the times of the frames; the first times of an archive are those of what has none.
 const FRAMES: u32 = 1;
 
-/// When frames are.
 #[derive(Clone, Debug)]
 pub(crate) struct Schedule {
-    /// Frames per second.
     pub(crate) fps: f64,
-    /// Numbers of all frames, ascending: a number over the frame rate is its frame's time in seconds. Of frames that are evenly
-    /// spaced the first alone.
+    /// Numbers of frames, ascending, whose times are these over the frame rate; of evenly spaced
+    /// ones the first alone.
     pub(crate) numbers: Vec<f64>,
     /// The distance of two that are.
     pub(crate) step: Option<f64>,
@@ -53,7 +51,7 @@ pub(crate) struct MeshWriter<W> {
 }
 
 impl<W: Write + Seek> MeshWriter<W> {
-    /// Begins an archive; what lies far away gets `origin` as the translation above it, which keeps its positions exact.
+    /// Begins an archive; `origin` is the translation above what lies far away, to keep it exact.
     pub(crate) fn new(
         out: W,
         name: &str,
@@ -85,18 +83,16 @@ impl<W: Write + Seek> MeshWriter<W> {
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let frames = self.bounds.len() as u32;
         let (sink, mut metadata) = (&mut self.sink, Metadata::default());
-        let moving = |kind, number, extent| Values { kind, number, extent, samples: frames, sampling: FRAMES };
-        let still = |kind, number, extent| Values { kind, number, extent, samples: 1, sampling: 0 };
+        let moving = |kind, number, extent| Values { kind, number, extent, sampling: FRAMES };
+        let still = |kind, number, extent| Values { kind, number, extent, sampling: 0 };
 
         let mut geometry = Compound::default();
-        let group = sink.group(&self.bounds)?;
-        geometry.add(&mut metadata, (".selfBnds", "interpretation=box"), group, &moving(Kind::Scalar, F64, 6));
-        let group = sink.group(&self.positions)?;
-        let positions = moving(Kind::Array, F32, 3);
-        geometry.add(&mut metadata, ("P", "geoScope=vtx;interpretation=point"), group, &positions);
+        let bounds = (".selfBnds", "interpretation=box");
+        geometry.add(sink, &mut metadata, bounds, &self.bounds, &moving(Kind::Scalar, F64, 6))?;
+        let positions = ("P", "geoScope=vtx;interpretation=point");
+        geometry.add(sink, &mut metadata, positions, &self.positions, &moving(Kind::Array, F32, 3))?;
         for (name, sample) in [".faceIndices", ".faceCounts"].into_iter().zip(self.faces) {
-            let group = sink.group(&[sample, DATA])?;
-            geometry.add(&mut metadata, (name, ""), group, &still(Kind::Array, I32, 1));
+            geometry.add(sink, &mut metadata, (name, ""), &[sample, DATA], &still(Kind::Array, I32, 1))?;
         }
         let geometry = geometry.write(sink)?;
         let mut properties = Compound::default();
@@ -108,15 +104,12 @@ impl<W: Write + Seek> MeshWriter<W> {
         let mut transform = Compound::default();
         if let Some(origin) = self.origin {
             let sample = sink.sample(&[TRANSLATE])?;
-            let group = sink.group(&[sample])?;
-            transform.add(&mut metadata, (".ops", ""), group, &still(Kind::Scalar, U8, 1));
+            transform.add(sink, &mut metadata, (".ops", ""), &[sample], &still(Kind::Scalar, U8, 1))?;
             let sample = sink.sample(origin.map(f64::to_le_bytes).as_flattened())?;
-            let group = sink.group(&[sample])?;
-            transform.add(&mut metadata, (".vals", ""), group, &still(Kind::Scalar, F64, 3));
+            transform.add(sink, &mut metadata, (".vals", ""), &[sample], &still(Kind::Scalar, F64, 3))?;
         }
         let sample = sink.sample(&[1])?;
-        let group = sink.group(&[sample])?;
-        transform.add(&mut metadata, (".inherits", ""), group, &still(Kind::Scalar, BOOL, 1));
+        transform.add(sink, &mut metadata, (".inherits", ""), &[sample], &still(Kind::Scalar, BOOL, 1))?;
         let transform = transform.write(sink)?;
         let mut properties = Compound::default();
         properties.add_compound(&mut metadata, (".xform", TRANSFORM), &transform);
@@ -140,7 +133,7 @@ impl<W: Write + Seek> MeshWriter<W> {
 }
 
 impl Schedule {
-    /// The times of what has none, and those of the frames: how many samples they are for, seconds after which they repeat, and those stored.
+    /// The times of what has none, and those of frames: samples, the cycle, and those stored.
     fn table(&self, frames: u32) -> Vec<u8> {
         let cycle = self.step.map_or(ACYCLIC, |step| step / self.fps);
         let stored = self.numbers.iter().map(|number| number / self.fps).collect();

@@ -21,7 +21,6 @@ pub(super) fn digest(parts: &[&[u8]]) -> Digest {
     digest
 }
 
-/// An archive that is being written.
 pub(super) struct Sink<W> {
     out: W,
     at: u64,
@@ -53,7 +52,6 @@ impl<W: Write + Seek> Sink<W> {
         if bytes.is_empty() { Ok(DATA) } else { self.data(&[&digest(&[bytes]), bytes]) }
     }
 
-    /// Writes a group; gives its offset.
     pub(super) fn group(&mut self, children: &[u64]) -> io::Result<u64> {
         if children.is_empty() {
             return Ok(0);

@@ -29,13 +29,11 @@ impl Metadata {
     }
 }
 
-/// The values of a property.
 pub(super) struct Values {
     pub(super) kind: Kind,
     /// The type of the numbers, and how many a value has.
     pub(super) number: u8,
     pub(super) extent: u8,
-    pub(super) samples: u32,
     /// Index of the times of the samples.
     pub(super) sampling: u32,
 }
@@ -49,31 +47,33 @@ pub(super) struct Compound {
 }
 
 impl Compound {
-    /// Appends a property with values.
-    pub(super) fn add(
+    /// Appends a property with values; arrays have their sizes between.
+    pub(super) fn add<W: Write + Seek>(
         &mut self,
+        sink: &mut Sink<W>,
         metadata: &mut Metadata,
         (name, told): (&str, &'static str),
-        group: u64,
+        stored: &[u64],
         values: &Values,
-    ) {
-        let width = if values.samples > 0xffff { 2 } else { u32::from(values.samples > 0xff) };
+    ) -> io::Result<()> {
+        let samples = (stored.len() / if values.kind == Kind::Array { 2 } else { 1 }) as u32;
+        let width = if samples > 0xffff { 2 } else { u32::from(samples > 0xff) };
         let bits = values.kind as u32 | width << 2 | u32::from(values.number) << 4 | u32::from(values.extent) << 12;
         let bit = |k: u32, set: bool| u32::from(set) << k;
         // Scalars are of one size throughout, and so are arrays of one topology.
-        let states = bit(8, values.sampling != 0) | bit(10, true) | bit(11, values.samples < 2);
+        let states = bit(8, values.sampling != 0) | bit(10, true) | bit(11, samples < 2);
         let start = self.headers.len();
         self.headers.extend((bits | states | u32::from(metadata.index(told)) << 20).to_le_bytes());
         let mut put = |number: u32| self.headers.extend_from_slice(&number.to_le_bytes()[..1 << width]);
-        put(values.samples);
+        put(samples);
         if values.sampling != 0 {
             put(values.sampling);
         }
         put(name.len() as u32);
-        self.finish(name, group, start);
+        self.finish(name, sink.group(stored)?, start);
+        Ok(())
     }
 
-    /// Appends a compound.
     pub(super) fn add_compound(
         &mut self,
         metadata: &mut Metadata,
@@ -108,7 +108,6 @@ pub(super) struct Written {
     digest: Digest,
 }
 
-/// The name and metadata of an object.
 pub(super) type Title<'a> = (&'a str, &'static str);
 
 /// Writes an object with its properties and at most one child.

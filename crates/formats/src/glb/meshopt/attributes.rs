@@ -4,7 +4,6 @@ use super::bytes::signed;
 
 /// Elements of a group, whose numbers have one width.
 const GROUP: usize = 16;
-/// Elements of a block.
 const BLOCK: usize = 256;
 
 /// Bits that the numbers of a group take, by two bits of the header of its column.
@@ -133,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_stream_of_the_first_version_is_read_whole_or_not_at_all() {
-        // Three elements of four bytes: 1 2 3 4, 2 2 3 4, 3 2 3 4. One group a column, of two bits in the first.
+        // Three elements of four bytes: 1 2 3 4, 2 2 3 4, 3 2 3 4; two bits in the first column.
         let mut stream = vec![0xa0, 0x01, 0b0010_1000, 0, 0, 0, 0, 0, 0];
         stream.extend([0; 28]);
         stream.extend([1, 2, 3, 4]);

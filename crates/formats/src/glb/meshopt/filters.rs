@@ -1,6 +1,5 @@
 //! What is done to elements after they are read.
 
-/// Changes one element in place.
 pub(super) type Filter = fn(&mut [u8]);
 
 /// Numbers of 24 bits with an exponent become floats.
@@ -13,7 +12,8 @@ pub(super) fn exponential(element: &mut [u8]) {
     }
 }
 
-/// Three components of a unit quaternion and a scale, whose lowest two bits say which component is left out, the largest, become all four.
+/// All four parts of a unit quaternion, from three and a scale, whose lowest two bits say which
+/// part is left out, the largest.
 pub(super) fn quaternion(element: &mut [u8]) {
     for bytes in element.as_chunks_mut::<8>().0 {
         let [x, y, z, scale] = [0, 2, 4, 6].map(|k| i16::from_le_bytes([bytes[k], bytes[k + 1]]));

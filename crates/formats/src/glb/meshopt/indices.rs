@@ -61,7 +61,6 @@ struct State<'a> {
     data: &'a [u8],
     /// The lowest index that was not used yet.
     next: u32,
-    /// The index that was written out last.
     last: u32,
     edges: Recent<[u32; 2]>,
     vertices: Recent<u32>,
@@ -148,7 +147,7 @@ mod tests {
 
     #[test]
     fn triangles_follow_edges_and_vertices() {
-        // A new triangle, one on its last edge (0 2) with a new vertex, and one written out: 5, 4 and the vertex before the last.
+        // A new triangle, one on its last edge (0 2) with a new vertex, and one written out.
         let found = triangles(&stream(0xe1, &[&[0xf0, 0x00, 0xff], &[0xf2, 10, 1]], 16), 3);
         assert_eq!(found, Some(vec![0, 1, 2, 0, 2, 3, 5, 4, 2]));
     }

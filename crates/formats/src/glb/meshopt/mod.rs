@@ -1,7 +1,7 @@
-//! Views packed as `KHR_meshopt_compression` has it, of which `EXT_meshopt_compression` is the first version.
+//! Views packed as `KHR_meshopt_compression` has it, or as its first version, `EXT_…`, does.
 //!
-//! Names follow the specification's appendices A (streams) and B (filters). Every reader gives `None` for a stream that ends early,
-//! goes on too long, or refers to what was not there before.
+//! Names follow its appendices A (streams) and B (filters). Every reader gives `None` for a stream
+//! that ends early, goes on too long, or refers to what was not there before.
 
 mod attributes;
 mod bytes;
@@ -27,7 +27,7 @@ enum Mode {
 }
 
 impl Packed {
-    /// As the view's extension says; the outer `None` where there is none, the inner where it is not understood.
+    /// The outer `None` where a view is not packed, the inner where it is not understood.
     pub(super) fn of(view: &View) -> Option<Option<Self>> {
         let others = &view.extensions.as_ref()?.others;
         let extension = others.get("KHR_meshopt_compression").or_else(|| others.get("EXT_meshopt_compression"))?;
@@ -62,7 +62,6 @@ impl Packed {
         Some(packed())
     }
 
-    /// Bytes of the view, unpacked.
     pub(super) fn size(&self) -> Option<usize> {
         self.count.checked_mul(self.stride)
     }

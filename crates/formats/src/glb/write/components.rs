@@ -1,5 +1,5 @@
-//! Principal components of frames, by eigenvectors of their Gram matrix (the method of snapshots: Sirovich, "Turbulence and the
-//! dynamics of coherent structures", 1987).
+//! Principal components of frames, by eigenvectors of their Gram matrix (the method of snapshots:
+//! Sirovich, "Turbulence and the dynamics of coherent structures", 1987).
 
 use std::ops::Range;
 
@@ -8,7 +8,6 @@ use cager_geometry::mesh::diagonal;
 use faer::Mat;
 
 use super::deviation::{Deviation, Errors};
-use super::frames::Frames;
 use super::stored::Stored;
 use crate::error::Fault;
 
@@ -18,7 +17,6 @@ const USUAL: usize = 64;
 /// Frames of which eigenvectors are computed.
 pub(crate) const MOST_FRAMES: usize = 4096;
 
-/// How many targets are wanted.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Wanted {
     /// At the most.
@@ -38,7 +36,6 @@ impl Wanted {
     }
 }
 
-/// Targets, and their weights in each frame.
 pub(super) struct Components {
     pub(super) stored: Stored,
     /// Frame after frame, from 0 to 1: programs hold the sliders of morph targets within that.
@@ -47,7 +44,7 @@ pub(super) struct Components {
 }
 
 impl Components {
-    /// Those of frames. All of what is stored lies beside its place by `rounding`, which counts as an error.
+    /// Those of frames. What is stored lies beside its place by `rounding`, which is an error too.
     pub(super) fn of(
         frames: &Frames<'_>,
         floats: bool,
@@ -74,21 +71,19 @@ impl Components {
             if holds(found) {
                 return Ok(stored);
             }
-            if targets == most && wanted.is_guarantee {
-                return Err(Fault::unsupported(format!(
-                    "cannot hold the guaranteed error of the capture: {} morph targets are {:.2e} of the diagonal from the frames; allow that with --targets {}, keep fewer frames (--range), or write .usdc or .abc",
-                    found.targets,
-                    found.share(found.largest),
-                    found.targets
-                )));
-            }
             if targets == most {
-                return Err(Fault::unsupported(format!(
-                    "cannot hold --max-error {}: {} morph targets are {:.2e} of the diagonal from the frames; allow more, keep fewer frames, take --float where that is near, or write .usdc or .abc",
-                    wanted.max_error.unwrap_or_default(),
-                    found.targets,
-                    found.share(found.largest)
-                )));
+                let share = found.share(found.largest);
+                let found = format!("{} morph targets are {share:.2e} of the diagonal from the frames", found.targets);
+                return Err(Fault::unsupported(if wanted.is_guarantee {
+                    format!(
+                        "cannot hold the guaranteed error of the capture: {found}; allow that with --targets {targets}, keep fewer frames (--range), or write .usdc or .abc"
+                    )
+                } else {
+                    let error = wanted.max_error.unwrap_or_default();
+                    format!(
+                        "cannot hold --max-error {error}: {found}; allow more, keep fewer frames, take --float where that is near, or write .usdc or .abc"
+                    )
+                }));
             }
             // What is rounded takes more of them.
             targets = (targets + 1 + targets / 4).min(most);
@@ -96,7 +91,7 @@ impl Components {
     }
 }
 
-/// Frames are about `shapes · weightsᵀ`, as near as so many columns come; weights are orthonormal and tell the shapes.
+/// Orthonormal weights: frames are about `shapes · weightsᵀ`, as near as so many columns come.
 struct Directions(Mat<f64>);
 
 impl Directions {
@@ -111,7 +106,7 @@ impl Directions {
         Ok(Self(vectors.subcols(0, count).to_owned()))
     }
 
-    /// The first targets as they are stored. The base is where all their weights are smallest, so that none is negative.
+    /// The first targets as stored, the base where their weights are smallest: none is negative.
     fn stored(
         &self,
         frames: &Frames<'_>,
@@ -174,5 +169,42 @@ impl Directions {
         let mut out = Mat::zeros(rows.len(), count);
         multiply(out.as_mut(), frames.rows(rows, base).as_ref(), self.0.subcols(0, count));
         out
+    }
+}
+
+const BLOCK: usize = 1 << 21;
+
+/// Coordinates of all points, frame after frame.
+pub(super) struct Frames<'a> {
+    values: &'a [f32],
+    /// Of each frame.
+    pub(super) length: usize,
+    pub(super) count: usize,
+}
+
+impl<'a> Frames<'a> {
+    pub(super) fn new(values: &'a [f32], points: usize) -> Self {
+        Self { values, length: 3 * points, count: values.len() / (3 * points) }
+    }
+
+    pub(super) fn mean(&self) -> Vec<f64> {
+        let mut mean = vec![0.0; self.length];
+        for frame in self.values.chunks_exact(self.length) {
+            mean.iter_mut().zip(frame).for_each(|(mean, &x)| *mean += f64::from(x));
+        }
+        mean.iter_mut().for_each(|mean| *mean /= self.count as f64);
+        mean
+    }
+
+    /// Differences of coordinates from a shape: a row each, a column for each frame.
+    pub(super) fn rows(&self, rows: Range<usize>, shape: &[f64]) -> Mat<f64> {
+        let at = |frame: usize, row: usize| f64::from(self.values[frame * self.length + row]) - shape[row];
+        Mat::from_fn(rows.len(), self.count, |i, frame| at(frame, rows.start + i))
+    }
+
+    /// Ranges of whole points whose rows fill a block.
+    pub(super) fn row_blocks(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let (length, rows) = (self.length, 3 * (BLOCK / self.count / 3).clamp(1, BLOCK_ROWS));
+        (0..length).step_by(rows).map(move |first| first..(first + rows).min(length))
     }
 }

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Deviation {
     pub(crate) targets: usize,
-    /// The largest distance of a point.
     pub(crate) largest: f64,
     /// The root of the mean squared distance over all points and frames.
     pub(crate) rms: f64,
@@ -35,7 +34,7 @@ impl Errors {
         Self { first_level, frames: vec![vec![[0.0; 2]; last_level + 1 - first_level]; frames] }
     }
 
-    /// Adds some points of all frames: what they differ from the base, what targets move them by, and the weights of these.
+    /// Adds points of all frames: differences from the base, what targets move by, and weights.
     pub(super) fn add(&mut self, differences: &Mat<f64>, shapes: &Mat<f64>, weights: MatRef<'_, f64>) {
         let first_level = self.first_level;
         self.frames.par_iter_mut().enumerate().for_each(|(frame, levels)| {

@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
-use super::super::lenient::{FIRST_FRAME, FRAME_RATE};
-use super::Scene;
-use super::stored::{Stored, Values};
+use super::super::document::{FIRST_FRAME, FRAME_RATE};
+use super::stored::Stored;
+use super::{Morphs, Scene};
 use crate::error::Fault;
 
 /// Types of numbers, and what views are for, as glTF counts them.
@@ -25,33 +25,29 @@ pub(super) fn place(stored: &Stored, scene: &Scene) -> [f64; 3] {
     std::array::from_fn(|k| f64::from(stored.centre[k]) + scene.origin[k])
 }
 
-pub(super) struct Document<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) stored: &'a Stored,
-    /// Those of all targets, frame after frame.
-    pub(super) weights: &'a [f32],
-    /// Those of the base and of all targets; empty where none are wanted.
-    pub(super) normals: &'a [[f32; 3]],
+/// Writes what is in front of so many bytes of numbers in a binary file.
+pub(crate) fn write_head(out: &mut impl Write, json: String, length: usize) -> io::Result<()> {
+    let mut json = json.into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let word = |x: usize| u32::try_from(x).map(u32::to_le_bytes).map_err(|_| io::ErrorKind::FileTooLarge);
+    out.write_all(b"glTF\x02\0\0\0")?;
+    out.write_all(&word(28 + json.len() + length)?)?;
+    out.write_all(&word(json.len())?)?;
+    out.write_all(b"JSON")?;
+    out.write_all(&json)?;
+    out.write_all(&word(length)?)?;
+    out.write_all(b"BIN\0")
 }
 
-impl Document<'_> {
-    pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        let mut json = self.json(None).into_bytes();
-        json.resize(json.len().next_multiple_of(4), b' ');
-        let length = self.lengths().iter().sum::<usize>();
-        let word = |x: usize| u32::try_from(x).map(u32::to_le_bytes).map_err(|_| io::ErrorKind::FileTooLarge);
-        out.write_all(b"glTF\x02\0\0\0")?;
-        out.write_all(&word(28 + json.len() + length)?)?;
-        out.write_all(&word(json.len())?)?;
-        out.write_all(b"JSON")?;
-        out.write_all(&json)?;
-        out.write_all(&word(length)?)?;
-        out.write_all(b"BIN\0")?;
+impl Morphs<'_> {
+    /// Writes one binary file.
+    pub(crate) fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        write_head(out, self.json(None), self.lengths().iter().sum())?;
         self.write_numbers(out)
     }
 
     /// As text, with all numbers in a file of this name.
-    pub(super) fn write_apart(&self, text: &mut impl Write, data: &mut impl Write, name: &str) -> io::Result<()> {
+    pub(crate) fn write_apart(&self, text: &mut impl Write, data: &mut impl Write, name: &str) -> io::Result<()> {
         text.write_all(self.json(Some(name)).as_bytes())?;
         self.write_numbers(data)
     }
@@ -59,7 +55,7 @@ impl Document<'_> {
     fn write_numbers(&self, out: &mut impl Write) -> io::Result<()> {
         self.write_positions(out)?;
         self.write_corners(out)?;
-        let animation = self.scene.times.iter().chain(self.weights);
+        let animation = self.scene.times.iter().chain(&self.components.weights);
         animation.chain(self.normals.as_flattened()).try_for_each(|x| out.write_all(&x.to_le_bytes()))
     }
 
@@ -75,34 +71,30 @@ impl Document<'_> {
         Ok(())
     }
 
-    fn is_float(&self) -> bool {
-        matches!(self.stored.values, Values::Floats(_))
-    }
-
     /// Bytes of a position: whole numbers are filled up to whole words.
     fn stride(&self) -> usize {
-        if self.is_float() { 12 } else { 8 }
+        if self.components.stored.is_float { 12 } else { 8 }
     }
 
     fn corner_size(&self) -> usize {
-        if self.stored.points() <= FEW { 2 } else { 4 }
+        if self.components.stored.points() <= FEW { 2 } else { 4 }
     }
 
-    /// Bytes of the four views.
     fn lengths(&self) -> [usize; 4] {
-        let positions = self.stored.parts() * self.stored.points() * self.stride();
+        let positions = self.components.stored.parts() * self.components.stored.points() * self.stride();
         let corners = (3 * self.scene.triangles.len() * self.corner_size()).next_multiple_of(4);
         let normals = 12 * self.normals.len();
-        [positions, corners, 4 * (self.scene.times.len() + self.weights.len()), normals]
+        [positions, corners, 4 * (self.scene.times.len() + self.components.weights.len()), normals]
     }
 
     fn write_positions(&self, out: &mut impl Write) -> io::Result<()> {
-        match &self.stored.values {
-            Values::Floats(values) => values.iter().try_for_each(|x| out.write_all(&x.to_le_bytes())),
-            Values::Shorts(values) => values.as_chunks().0.iter().try_for_each(|[x, y, z]: &[i16; 3]| {
-                [*x, *y, *z, 0].iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))
-            }),
+        let values = &self.components.stored.values;
+        if self.components.stored.is_float {
+            return values.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
         }
+        values.as_chunks().0.iter().try_for_each(|&[x, y, z]: &[f32; 3]| {
+            out.write_all([x, y, z, 0.0].map(|x| (x as i16).to_le_bytes()).as_flattened())
+        })
     }
 
     fn write_corners(&self, out: &mut impl Write) -> io::Result<()> {
@@ -119,13 +111,14 @@ impl Document<'_> {
 
     fn json(&self, data: Option<&str>) -> String {
         let Scene { name, triangles, times, numbering: [first, rate], .. } = self.scene;
-        let (points, targets, stride) = (self.stored.points(), self.stored.parts() - 1, self.stride());
+        let (points, targets, stride) =
+            (self.components.stored.points(), self.components.stored.parts() - 1, self.stride());
         let mut layout = Layout::default();
         let [positions, corners, animation, normals] = self.lengths();
         let view = layout.view(positions, json!({ "byteStride": stride, "target": VERTICES }));
-        let kind = if self.is_float() { FLOAT } else { SHORT };
+        let kind = if self.components.stored.is_float { FLOAT } else { SHORT };
         for part in 0..=targets {
-            let [low, high] = self.stored.bounds(part);
+            let [low, high] = self.components.stored.bounds(part);
             let rest = json!({ "type": "VEC3", "min": low, "max": high });
             layout.accessor(view, part * points * stride, kind, points, rest);
         }
@@ -146,8 +139,8 @@ impl Document<'_> {
             let rest = json!({ "type": "SCALAR", "min": [start], "max": [end] });
             let input = layout.accessor(view, 0, FLOAT, times.len(), rest);
             let rest = json!({ "type": "SCALAR" });
-            let output = layout.accessor(view, 4 * times.len(), FLOAT, self.weights.len(), rest);
-            mesh["weights"] = json!(self.weights[..targets]);
+            let output = layout.accessor(view, 4 * times.len(), FLOAT, self.components.weights.len(), rest);
+            mesh["weights"] = json!(self.components.weights[..targets]);
             document["animations"] = json!([{
                 "name": name,
                 "extras": { FIRST_FRAME: first, FRAME_RATE: rate },
@@ -168,11 +161,12 @@ impl Document<'_> {
             primitive["targets"] = attributes.into();
         }
         mesh["primitives"] = json!([primitive]);
-        if !self.is_float() {
+        if !self.components.stored.is_float {
             document["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
             document["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
         }
-        let (place, scale) = (place(self.stored, self.scene).map(|x| x as f32), [self.stored.step; 3]);
+        let (place, scale) =
+            (place(&self.components.stored, self.scene).map(|x| x as f32), [self.components.stored.step; 3]);
         document["nodes"] = json!([{ "name": name, "mesh": 0, "translation": place, "scale": scale }]);
         document["meshes"] = json!([mesh]);
         document["accessors"] = layout.accessors.into();
@@ -185,7 +179,6 @@ impl Document<'_> {
     }
 }
 
-/// Where the numbers are in the file.
 #[derive(Default)]
 struct Layout {
     views: Vec<Value>,

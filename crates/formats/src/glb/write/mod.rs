@@ -1,22 +1,18 @@
-//! Frames as morph targets, the principal components of all of them, with their weights as an animation.
+//! Frames as morph targets, their principal components, with the weights as an animation.
 
 mod components;
 mod deviation;
 mod document;
-mod frames;
 mod normals;
 mod stored;
-
-use std::io::{self, Write};
 
 use cager_geometry::mesh::Point;
 
 use crate::error::Fault;
-use components::Components;
+use components::{Components, Frames};
 pub(crate) use components::{MOST_FRAMES, Wanted};
 pub(crate) use deviation::Deviation;
-use document::Document;
-use frames::Frames;
+pub(crate) use document::write_head;
 use normals::normals;
 
 /// What is written beside the frames.
@@ -32,7 +28,6 @@ pub(crate) struct Scene {
     pub(crate) origin: Point,
     /// Whether positions are floats instead of whole numbers of 16 bits.
     pub(crate) floats: bool,
-    /// Whether normals are written as well.
     pub(crate) normals: bool,
 }
 
@@ -61,31 +56,12 @@ impl<'a> Morphs<'a> {
             Vec::new()
         };
         let morphs = Self { scene, components, normals };
-        morphs.document().check()?;
+        morphs.check()?;
         Ok(morphs)
-    }
-
-    fn document(&self) -> Document<'_> {
-        Document {
-            scene: self.scene,
-            stored: &self.components.stored,
-            weights: &self.components.weights,
-            normals: &self.normals,
-        }
     }
 
     /// Targets, and how far what is written is from the frames.
     pub(crate) fn deviation(&self) -> &Deviation {
         &self.components.deviation
-    }
-
-    /// Writes one binary file.
-    pub(crate) fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        self.document().write(out)
-    }
-
-    /// Writes a file of text, which has its numbers in another one of this name.
-    pub(crate) fn write_apart(&self, text: &mut impl Write, data: &mut impl Write, name: &str) -> io::Result<()> {
-        self.document().write_apart(text, data, name)
     }
 }

@@ -1,13 +1,14 @@
-//! Normals of the base and what targets add to them: normals of all frames, as near as the weights of positions come to them.
+//! Normals of the base and of targets: those of all frames, as near as their weights come to them.
 
 use rayon::prelude::*;
 
 use crate::normals::{unit, vertex_normals};
 
-/// Normals of the base and each target, one after another, of frames of so many points and the weights of their targets, frame after frame.
+/// Normals of the base and each target, of frames of so many points and the weights of targets.
 ///
-/// Weights of principal components are about orthogonal over the frames but for their means, so a least-squares fit is one product for each target. As programs make
-/// the sum of a length of 1, what is fitted is normals divided by the length of their mean.
+/// Weights of principal components are about orthogonal but for their means, so a least-squares fit
+/// is one product for each target. Programs make the sum of a length of 1, so what is fitted is
+/// normals divided by the length of their mean.
 pub(super) fn normals(
     frames: &[f32],
     points: usize,

@@ -1,11 +1,13 @@
 //! Positions as they are stored: floats, or whole numbers of 16 bits that the node scales.
 
-/// The largest whole number that is stored.
 const LARGEST: f64 = 32767.0;
 
-/// The base and what targets add to it. A position is `centre + step × (base + Σ weight × target)`.
+/// The base and what targets add to it: positions are `centre + step × (base + Σ weight × target)`.
 pub(super) struct Stored {
-    pub(super) values: Values,
+    /// The base and the targets, one after another.
+    pub(super) values: Vec<f32>,
+    /// Whether these are not whole numbers of 16 bits.
+    pub(super) is_float: bool,
     pub(super) centre: [f32; 3],
     /// The distance of two whole numbers; 1 for floats.
     pub(super) step: f32,
@@ -13,86 +15,57 @@ pub(super) struct Stored {
     length: usize,
 }
 
-/// The base and the targets, one after another.
-pub(super) enum Values {
-    Floats(Vec<f32>),
-    Shorts(Vec<i16>),
-}
-
 impl Stored {
     /// A base, with room for so many targets, which move by `reach` at the most.
-    pub(super) fn base(base: &[f64], reach: f64, targets: usize, floats: bool) -> Self {
-        let length = base.len();
-        if floats {
-            let mut values: Vec<f32> = base.iter().map(|&x| x as f32).collect();
-            values.resize((targets + 1) * length, 0.0);
-            return Self { values: Values::Floats(values), centre: [0.0; 3], step: 1.0, length };
+    pub(super) fn base(base: &[f64], reach: f64, targets: usize, is_float: bool) -> Self {
+        let (length, mut centre, mut step) = (base.len(), [0.0; 3], 1.0);
+        if !is_float {
+            let [low, high] = bounds(base.iter().copied());
+            centre = std::array::from_fn(|k| (0.5 * (low[k] + high[k])) as f32);
+            let half = (0..length).map(|k| (base[k] - f64::from(centre[k % 3])).abs()).fold(0.0, f64::max);
+            // Motions larger than the model need larger steps, as weights are 1 at the most.
+            step = rounded_up(half.max(reach) / LARGEST);
         }
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for (k, &x) in base.iter().enumerate() {
-            (low[k % 3], high[k % 3]) = (low[k % 3].min(x), high[k % 3].max(x));
+        let mut stored = Self { values: vec![0.0; (targets + 1) * length], is_float, centre, step, length };
+        for (k, x) in base.iter().enumerate() {
+            stored.values[k] = stored.rounded((x - f64::from(centre[k % 3])) / f64::from(step));
         }
-        let centre: [f32; 3] = std::array::from_fn(|k| (0.5 * (low[k] + high[k])) as f32);
-        let half = (0..length).map(|k| (base[k] - f64::from(centre[k % 3])).abs()).fold(0.0, f64::max);
-        // Motions larger than the model need larger steps, as weights are 1 at the most.
-        let step = rounded_up(half.max(reach) / LARGEST);
-        let whole = |(k, x): (usize, &f64)| ((x - f64::from(centre[k % 3])) / f64::from(step)).round() as i16;
-        let mut values: Vec<i16> = base.iter().enumerate().map(whole).collect();
-        values.resize((targets + 1) * length, 0);
-        Self { values: Values::Shorts(values), centre, step, length }
+        stored
+    }
+
+    fn rounded(&self, x: f64) -> f32 {
+        if self.is_float { x as f32 } else { (x.round() as i16).into() }
     }
 
     /// Coordinates of the base as they are read.
     pub(super) fn base_values(&self) -> Vec<f64> {
         let step = f64::from(self.step);
-        (0..self.length).map(|k| f64::from(self.centre[k % 3]) + step * self.number(k)).collect()
+        (0..self.length).map(|k| f64::from(self.centre[k % 3]) + step * f64::from(self.values[k])).collect()
     }
 
-    /// What a target is multiplied with to use all bits, and what its weights are then, by the largest number of it and of its weights.
+    /// By the largest number of a target and of its weights: what it is multiplied with to use all
+    /// bits, and what its weights are then.
     pub(super) fn scales(&self, largest: f64, heaviest: f64) -> [f64; 2] {
         if largest <= 0.0 || heaviest <= 0.0 {
             return [0.0, 0.0];
         }
-        match self.values {
-            Values::Floats(_) => [heaviest, 1.0 / heaviest],
-            Values::Shorts(_) => [LARGEST / largest, largest / LARGEST / f64::from(self.step)],
+        if self.is_float {
+            return [heaviest, 1.0 / heaviest];
         }
+        [LARGEST / largest, largest / LARGEST / f64::from(self.step)]
     }
 
     /// Stores numbers of a target from `first` on, and gives what they move by as they are read.
     pub(super) fn put(&mut self, target: usize, first: usize, numbers: &mut [f64]) {
-        let step = f64::from(self.step);
         let start = (target + 1) * self.length + first;
-        match &mut self.values {
-            Values::Floats(values) => {
-                for (value, x) in values[start..].iter_mut().zip(numbers) {
-                    *value = *x as f32;
-                    *x = f64::from(*value);
-                }
-            }
-            Values::Shorts(values) => {
-                for (value, x) in values[start..].iter_mut().zip(numbers) {
-                    *value = x.round() as i16;
-                    *x = step * f64::from(*value);
-                }
-            }
+        for (k, x) in (start..).zip(numbers) {
+            self.values[k] = self.rounded(*x);
+            *x = f64::from(self.step) * f64::from(self.values[k]);
         }
     }
 
-    fn number(&self, k: usize) -> f64 {
-        match &self.values {
-            Values::Floats(values) => values[k].into(),
-            Values::Shorts(values) => values[k].into(),
-        }
-    }
-
-    /// The base and the targets.
     pub(super) fn parts(&self) -> usize {
-        let all = match &self.values {
-            Values::Floats(values) => values.len(),
-            Values::Shorts(values) => values.len(),
-        };
-        all / self.length
+        self.values.len() / self.length
     }
 
     pub(super) fn points(&self) -> usize {
@@ -101,13 +74,16 @@ impl Stored {
 
     /// The smallest and the largest numbers of the base (0) or a target.
     pub(super) fn bounds(&self, part: usize) -> [[f64; 3]; 2] {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for k in 0..self.length {
-            let x = self.number(part * self.length + k);
-            (low[k % 3], high[k % 3]) = (low[k % 3].min(x), high[k % 3].max(x));
-        }
-        [low, high]
+        bounds(self.values[part * self.length..][..self.length].iter().copied().map(f64::from))
     }
+}
+
+fn bounds(numbers: impl Iterator<Item = f64>) -> [[f64; 3]; 2] {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for (k, x) in numbers.enumerate() {
+        (low[k % 3], high[k % 3]) = (low[k % 3].min(x), high[k % 3].max(x));
+    }
+    [low, high]
 }
 
 /// The next single-precision number that is not smaller; 1 where there is nothing to divide.

@@ -1,13 +1,10 @@
 //! Values of a binary layer: what they are, and where.
 
-use std::io::{Read, Seek};
-
 use super::kind;
 use crate::error::Fault;
 use crate::frames::{Scalar, half_precision};
-use crate::scene::{Failure, Source, damaged};
+use crate::scene::{Source, damaged};
 
-/// What a layer begins with.
 pub(crate) const MAGIC: &[u8; 8] = b"PXR-USDC";
 
 /// A value as fields have it: its type, and the value itself or where it is.
@@ -31,27 +28,24 @@ impl Rep {
         self.0 >> 61 & 1 != 0
     }
 
-    /// Where the value is.
     pub(super) fn offset(self) -> u64 {
         self.0 & ((1 << 48) - 1)
     }
 
-    /// The value itself.
     pub(super) fn inlined(self) -> [u8; 4] {
         (self.0 as u32).to_le_bytes()
     }
 }
 
-/// The file of a layer.
-pub(super) struct File<R> {
-    pub(super) source: Source<R>,
+pub(super) struct File<'a> {
+    pub(super) source: Source<'a>,
     /// The minor version of the format, of which the major one is 0.
     pub(super) version: u8,
 }
 
-impl<R: Read + Seek> File<R> {
+impl File<'_> {
     /// Where the elements of an array begin, and how many they are.
-    pub(super) fn elements(&mut self, rep: Rep) -> Result<(u64, u64), Failure> {
+    pub(super) fn elements(&mut self, rep: Rep) -> Result<(u64, u64), Fault> {
         let start = rep.offset();
         match (start, self.version) {
             (0, _) => Ok((0, 0)),
@@ -63,11 +57,11 @@ impl<R: Read + Seek> File<R> {
     }
 
     /// The numbers of one value.
-    pub(super) fn numbers(&mut self, rep: Rep) -> Result<Vec<f64>, Failure> {
+    pub(super) fn numbers(&mut self, rep: Rep) -> Result<Vec<f64>, Fault> {
         let small = rep.inlined();
         let bytes = small.map(|byte| f64::from(byte as i8));
         let (scalar, count) = match (rep.kind(), rep.is_inlined()) {
-            _ if rep.is_array() => return Err(damaged("it has an array where one value belongs").into()),
+            _ if rep.is_array() => return Err(damaged("it has an array where one value belongs")),
             (kind::INT, true) => return Ok(vec![i32::from_le_bytes(small).into()]),
             (kind::HALF, true) => return Ok(vec![half_precision(u16::from_le_bytes([small[0], small[1]]))]),
             (kind::FLOAT | kind::DOUBLE, true) => return Ok(vec![f32::from_le_bytes(small).into()]),
@@ -84,9 +78,9 @@ impl<R: Read + Seek> File<R> {
             (kind::VEC3H, false) => (Scalar::F16Little, 3),
             (kind::QUATH, false) => (Scalar::F16Little, 4),
             (kind::BLOCKED, _) => {
-                return Err(Fault::unsupported("has a value that is blocked at a time; export it again").into());
+                return Err(Fault::unsupported("has a value that is blocked at a time; export it again"));
             }
-            (kind, _) => return Err(damaged(&format!("it has a value of type {kind} where numbers belong")).into()),
+            (kind, _) => return Err(damaged(&format!("it has a value of type {kind} where numbers belong"))),
         };
         self.source.check(rep.offset(), count, scalar.size() as u64)?;
         let mut numbers = vec![0.0; count as usize];

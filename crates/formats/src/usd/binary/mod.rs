@@ -3,23 +3,21 @@
 mod file;
 pub(super) mod kind;
 mod pack;
-mod paths;
 mod sections;
 
 use std::collections::HashMap;
-use std::io::{Read, Seek};
 use std::sync::Arc;
 
-use super::layer::{COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, composed, spline};
+use super::layer::{Attributes, COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, composed, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
-use crate::scene::{Failure, Node, Points, Source, Track, Value, Values, damaged};
+use crate::scene::{Node, Points, Reader, Source, Track, Value, Values, damaged};
 pub(super) use file::MAGIC;
 use file::{File, Rep};
 use pack::integers;
+pub(super) use sections::{CHILD_ONLY, LAST, SIBLING};
 use sections::{Sections, Spec};
 
-/// Kinds of specs.
 pub(super) const ATTRIBUTE: u32 = 1;
 pub(super) const PRIM: u32 = 6;
 pub(super) const ROOT: u32 = 7;
@@ -28,19 +26,18 @@ pub(super) const RELATIONSHIP: u32 = 8;
 /// Versions 0.4.0 to 0.13.0 of the format are read: before them tables were not packed.
 const VERSIONS: std::ops::RangeInclusive<u8> = 4..=13;
 
-pub(super) struct Binary<R> {
-    file: File<R>,
+pub(super) struct Binary<'a> {
+    file: File<'a>,
     sections: Sections,
-    stage: Stage,
-    nodes: Vec<Node>,
-    prims: Vec<Prim>,
-    /// Attributes and relationships: the paths that they lie below, ascending, and the index of each among the specs.
+    /// Of each prim.
+    paths: Vec<u32>,
+    /// Attributes and relationships: the paths above them, ascending, and their specs.
     attributes: Vec<(u32, u32)>,
 }
 
-impl<R: Read + Seek> Binary<R> {
+impl<'a> Binary<'a> {
     /// Opens a layer of `length` bytes, which begins as one does.
-    pub(super) fn open(source: R, length: u64) -> Result<Self, Failure> {
+    pub(super) fn open(source: Reader<'a>, length: u64) -> Result<Layer<'a>, Fault> {
         // The sections once; then times and lists, many of which may be the same.
         let allowance = length.saturating_mul(64).saturating_add(1 << 16);
         let mut file = File { source: Source::new(source, length, allowance), version: 0 };
@@ -51,35 +48,32 @@ impl<R: Read + Seek> Binary<R> {
                 VERSIONS.start(),
                 VERSIONS.end()
             );
-            return Err(Fault::unsupported(what).into());
+            return Err(Fault::unsupported(what));
         }
         file.version = minor;
         let contents = file.source.number(16)?;
         let sections = Sections::read(&mut file, contents)?;
-        let (stage, nodes, prims, attributes) = (Stage::default(), Vec::new(), Vec::new(), Vec::new());
-        let mut layer = Self { file, sections, stage, nodes, prims, attributes };
-        let specs = &layer.sections.specs;
-        for (index, spec) in specs.iter().enumerate().filter(|(_, spec)| [ATTRIBUTE, RELATIONSHIP].contains(&spec.kind))
-        {
-            layer.attributes.push((layer.sections.paths[spec.path as usize].parent, index as u32));
-        }
-        layer.attributes.sort_unstable();
-        layer.list_prims()?;
-        layer.read_stage()?;
-        Ok(layer)
+        let specs = sections.specs.iter().enumerate();
+        let properties = specs.filter(|(_, spec)| [ATTRIBUTE, RELATIONSHIP].contains(&spec.kind));
+        let above = |spec: &Spec| sections.paths[spec.path as usize].parent;
+        let mut attributes: Vec<_> = properties.map(|(index, spec)| (above(spec), index as u32)).collect();
+        attributes.sort_unstable();
+        let mut layer = Self { file, sections, paths: Vec::new(), attributes };
+        let (nodes, prims) = layer.list_prims()?;
+        Ok(Layer { stage: layer.read_stage()?, nodes, prims, source: Box::new(layer) })
     }
 
-    fn list_prims(&mut self) -> Result<(), Failure> {
-        let sections = &self.sections;
+    fn list_prims(&mut self) -> Result<(Vec<Node>, Vec<Prim>), Fault> {
+        let (sections, mut nodes, mut prims) = (&self.sections, Vec::new(), Vec::new());
         let mut places = vec![usize::MAX; sections.paths.len()];
         // Many prims may share one.
         let mut names: HashMap<u32, Arc<[u8]>> = HashMap::new();
-        for (index, &spec) in sections.specs.iter().enumerate().filter(|(_, spec)| spec.kind == PRIM) {
+        for &spec in sections.specs.iter().filter(|spec| spec.kind == PRIM) {
             let path = sections.paths[spec.path as usize];
-            places[spec.path as usize] = self.prims.len();
+            places[spec.path as usize] = prims.len();
             let name = names.entry(path.name).or_insert_with(|| Arc::from(sections.token(path.name)));
-            self.nodes.push(Node { name: Arc::clone(name), parent: None, depth: path.depth as usize });
-            let mut prim = Prim { spec: index as u32, kind: Kind::Other, is_there: false, composed: None };
+            nodes.push(Node { name: Arc::clone(name), parent: None, depth: path.depth as usize });
+            let mut prim = Prim { kind: Kind::Other, is_there: false, composed: None };
             let mut is_active = true;
             for field in sections.fields(spec) {
                 let (name, value) = field?;
@@ -94,30 +88,32 @@ impl<R: Read + Seek> Binary<R> {
                 }
             }
             prim.is_there &= is_active && path.depth <= DEEPEST;
-            self.prims.push(prim);
+            self.paths.push(spec.path);
+            prims.push(prim);
         }
-        for (prim, node) in self.prims.iter_mut().zip(&mut self.nodes) {
-            let path = sections.paths[sections.specs[prim.spec as usize].path as usize];
-            let parent = places[path.parent as usize];
+        for ((prim, node), &path) in prims.iter_mut().zip(&mut nodes).zip(&self.paths) {
+            let parent = places[sections.paths[path as usize].parent as usize];
             // What lies below a variant is there in that variant alone.
             prim.is_there &= node.depth == 1 || parent != usize::MAX;
             node.parent = Some(parent).filter(|&parent| node.depth > 1 && parent != usize::MAX);
         }
-        Ok(())
+        Ok((nodes, prims))
     }
 
-    fn read_stage(&mut self) -> Result<(), Failure> {
-        let Some(&root) = self.sections.specs.iter().find(|spec| spec.kind == ROOT) else { return Ok(()) };
+    fn read_stage(&mut self) -> Result<Stage, Fault> {
+        let Some(&root) = self.sections.specs.iter().find(|spec| spec.kind == ROOT) else {
+            return Ok(Stage::default());
+        };
         if let Some(list) = self.sections.field(root, "subLayers")?
             && self.file.source.number(list.offset())? > 0
         {
-            return Err(composed("the layer", "sublayers").into());
+            return Err(composed("the layer", "sublayers"));
         }
-        let mut number = |name: &str| -> Result<Option<f64>, Failure> {
+        let mut number = |name: &str| -> Result<Option<f64>, Fault> {
             let Some(value) = self.sections.field(root, name)? else { return Ok(None) };
             Ok(self.file.numbers(value)?.first().copied())
         };
-        self.stage = Stage {
+        let mut stage = Stage {
             up_is_z: None,
             metres_per_unit: number("metersPerUnit")?,
             time_codes_per_second: number("timeCodesPerSecond")?,
@@ -126,33 +122,33 @@ impl<R: Read + Seek> Binary<R> {
             end: number("endTimeCode")?,
         };
         let up = self.sections.field(root, "upAxis")?;
-        self.stage.up_is_z = up.map(|up| self.sections.token(u32::from_le_bytes(up.inlined())) == b"Z");
-        Ok(())
+        stage.up_is_z = up.map(|up| self.sections.token(u32::from_le_bytes(up.inlined())) == b"Z");
+        Ok(stage)
     }
 
     /// A table whose place is told at `at`, counted from there: behind the place, its value.
-    fn told(&mut self, at: u64) -> Result<u64, Failure> {
+    fn told(&mut self, at: u64) -> Result<u64, Fault> {
         let place = at.checked_add(self.file.source.number(at)?);
-        Ok(place.ok_or_else(|| damaged("an offset leads out of the file"))?)
+        place.ok_or_else(|| damaged("an offset leads out of the file"))
     }
 
-    fn samples(&mut self, value: Rep, attribute: &mut Track) -> Result<(), Failure> {
+    fn samples(&mut self, value: Rep, attribute: &mut Track) -> Result<(), Fault> {
         let at = self.told(value.offset())?;
         let times = Rep(self.file.source.number(at)?);
         if value.kind() != kind::TIME_SAMPLES || times.kind() != kind::DOUBLES {
-            return Err(damaged("its time samples are of another type").into());
+            return Err(damaged("its time samples are of another type"));
         }
         let count = self.file.source.number(times.offset())?;
         let values = self.told(at + 8)?;
         if self.file.source.number(values)? != count {
-            return Err(damaged("it has other times than values").into());
+            return Err(damaged("it has other times than values"));
         }
         let bytes = self.file.source.bytes(times.offset() + 8, count, 8)?;
         attribute.times = bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
         let bytes = self.file.source.bytes(values + 8, count, 8)?;
         attribute.values = bytes.as_chunks().0.iter().map(|bytes| Value(u64::from_le_bytes(*bytes))).collect();
         if !attribute.times.is_sorted() || attribute.times.iter().any(|time| !time.is_finite()) {
-            return Err(damaged("it has times that do not ascend").into());
+            return Err(damaged("it has times that do not ascend"));
         }
         Ok(())
     }
@@ -163,7 +159,7 @@ impl<R: Read + Seek> Binary<R> {
 
     /// The names of attributes and relationships of a prim, and what they are.
     fn below(&self, prim: usize) -> impl Iterator<Item = (&[u8], Spec)> {
-        let path = self.sections.specs[self.prims[prim].spec as usize].path;
+        let path = self.paths[prim];
         let first = self.attributes.partition_point(|&(above, _)| above < path);
         let below = self.attributes[first..].iter().take_while(move |&&(above, _)| above == path);
         let specs = below.map(|&(_, spec)| self.sections.specs[spec as usize]);
@@ -171,26 +167,14 @@ impl<R: Read + Seek> Binary<R> {
     }
 }
 
-impl<R: Read + Seek + Send> Layer for Binary<R> {
-    fn stage(&self) -> &Stage {
-        &self.stage
-    }
-
-    fn prims(&self) -> &[Prim] {
-        &self.prims
-    }
-
-    fn nodes(&self) -> &[Node] {
-        &self.nodes
-    }
-
-    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Failure> {
+impl Attributes for Binary<'_> {
+    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault> {
         let mut attribute = Track::default();
         let Some(spec) = self.find(prim, name) else { return Ok(attribute) };
         let field = |name| self.sections.field(spec, name);
         let (default, samples, curve) = (field("default")?, field("timeSamples")?, field("spline")?);
         if curve.is_some() {
-            return Err(spline(name).into());
+            return Err(spline(name));
         }
         attribute.default = default.filter(|value| value.kind() != kind::BLOCKED).map(|value| Value(value.0));
         if let Some(samples) = samples {
@@ -208,7 +192,7 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
         self.below(prim).map(|(name, spec)| (text(name), type_name(spec))).collect()
     }
 
-    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure> {
+    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
         let rep = Rep(value.0);
         let text = |index: u32| String::from_utf8_lossy(self.sections.token(index)).into_owned();
         if rep.kind() == kind::TOKEN && rep.is_inlined() && !rep.is_array() {
@@ -217,10 +201,10 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
         let (start, count) = match rep.kind() {
             kind::TOKENS => (rep.offset() + 8, self.file.source.number(rep.offset())?),
             kind::TOKEN if rep.is_array() => self.file.elements(rep)?,
-            _ => return Err(damaged("it has another value where a list of names belongs").into()),
+            _ => return Err(damaged("it has another value where a list of names belongs")),
         };
         if count > most as u64 {
-            return Err(damaged(&format!("it has a list of {count} names where {most} are the most")).into());
+            return Err(damaged(&format!("it has a list of {count} names where {most} are the most")));
         }
         let bytes = self.file.source.bytes(start, count, 4)?;
         let mut names = Vec::new();
@@ -233,19 +217,19 @@ impl<R: Read + Seek + Send> Layer for Binary<R> {
     }
 }
 
-impl<R: Read + Seek + Send> Values for Binary<R> {
-    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
+impl Values for Binary<'_> {
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Fault> {
         self.file.numbers(Rep(value.0))
     }
 
-    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {
+    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault> {
         let rep = Rep(value.0);
         if rep.kind() != kind::INT || !rep.is_array() {
-            return Err(damaged("it has another value where a list of whole numbers belongs").into());
+            return Err(damaged("it has another value where a list of whole numbers belongs"));
         }
         let (start, count) = self.file.elements(rep)?;
         if count > most {
-            return Err(damaged(&format!("it has {count} numbers of faces where {most} are the most")).into());
+            return Err(damaged(&format!("it has {count} numbers of faces where {most} are the most")));
         }
         if !rep.is_packed() || count == 0 {
             let bytes = self.file.source.bytes(start, count, 4)?;
@@ -253,10 +237,10 @@ impl<R: Read + Seek + Send> Values for Binary<R> {
         }
         let length = self.file.source.number(start)?;
         let packed = self.file.source.bytes(start + 8, length, 1)?;
-        Ok(integers(&packed, self.file.source.allowance.take(count, 4)?)?)
+        integers(&packed, self.file.source.allowance.take(count, 4)?)
     }
 
-    fn points(&mut self, value: Value) -> Result<Points, Failure> {
+    fn points(&mut self, value: Value) -> Result<Points, Fault> {
         let rep = Rep(value.0);
         let scalar = match (rep.kind(), rep.is_array()) {
             (kind::VEC3D, true) => Scalar::F64Little,
@@ -264,11 +248,11 @@ impl<R: Read + Seek + Send> Values for Binary<R> {
             (kind::VEC3H, true) => Scalar::F16Little,
             (kind::BLOCKED, _) => {
                 let what = "has a time at which its points are blocked; export it with its points at all times";
-                return Err(Fault::unsupported(what).into());
+                return Err(Fault::unsupported(what));
             }
             _ => {
                 let what = "has points that are not three numbers each; export it again";
-                return Err(Fault::unsupported(what).into());
+                return Err(Fault::unsupported(what));
             }
         };
         let (start, count) = self.file.elements(rep)?;
@@ -277,7 +261,7 @@ impl<R: Read + Seek + Send> Values for Binary<R> {
         Ok(Points { start, count, scalar })
     }
 
-    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure> {
+    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Fault> {
         self.file.source.values(points.start, points.scalar, out)
     }
 }

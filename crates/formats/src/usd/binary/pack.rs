@@ -5,7 +5,6 @@ use lz4_flex::block::decompress_into;
 use crate::error::Fault;
 use crate::scene::{Allowance, Fields, damaged};
 
-/// Bytes behind how many they are.
 fn sized<'a>(fields: &mut Fields<'a>) -> Result<&'a [u8], Fault> {
     let length = fields.number()?;
     fields.take(usize::try_from(length).unwrap_or(usize::MAX))

@@ -1,12 +1,10 @@
-//! The sections of a binary layer, which say what it holds and where; values are left where they are.
-
-use std::io::{Read, Seek};
+//! The sections of a binary layer: what it holds and where; values stay where they are.
 
 use super::file::{File, Rep};
 use super::pack::{unpacked, unpacked_integers};
-use super::paths::{Path, paths};
 use crate::error::Fault;
-use crate::scene::{Allowance, Failure, Fields, damaged};
+use crate::scene::{Allowance, Fields, damaged};
+use crate::usd::layer::{DEEPEST, too_deep};
 
 /// Bytes that all sections may unpack to, for each byte of the file and for the smallest of files.
 const UNPACKED: u64 = 64;
@@ -26,7 +24,6 @@ pub(super) struct Spec {
     pub(super) kind: u32,
 }
 
-/// What the sections hold.
 pub(super) struct Sections {
     text: Vec<u8>,
     /// Where the tokens begin in the text, and where the last ends.
@@ -40,13 +37,13 @@ pub(super) struct Sections {
 }
 
 impl Sections {
-    pub(super) fn read<R: Read + Seek>(file: &mut File<R>, contents: u64) -> Result<Self, Failure> {
+    pub(super) fn read(file: &mut File<'_>, contents: u64) -> Result<Self, Fault> {
         let count = file.source.number(contents)?;
         if count > MOST_SECTIONS {
-            return Err(damaged("it has more sections than any program writes").into());
+            return Err(damaged("it has more sections than any program writes"));
         }
         let table = file.source.bytes(contents.saturating_add(8), count, 32)?;
-        let mut read = |name: &str| -> Result<Vec<u8>, Failure> {
+        let mut read = |name: &str| -> Result<Vec<u8>, Fault> {
             for entry in table.as_chunks::<32>().0 {
                 let mut fields = Fields(entry);
                 if fields.take(16)?.split(|&b| b == 0).next() == Some(name.as_bytes()) {
@@ -54,7 +51,7 @@ impl Sections {
                     return file.source.bytes(start, length, 1);
                 }
             }
-            Err(damaged(&format!("it has no section {name}")).into())
+            Err(damaged(&format!("it has no section {name}")))
         };
         let [tokens, fields, sets, tree, specs] =
             [read("TOKENS")?, read("FIELDS")?, read("FIELDSETS")?, read("PATHS")?, read("SPECS")?];
@@ -65,12 +62,12 @@ impl Sections {
         let text = unpacked(&mut section, length, &mut allowance)?;
         allowance.take(count, 4)?;
         if text.len() >= u32::MAX as usize {
-            return Err(damaged("it has more names than any program writes").into());
+            return Err(damaged("it has more names than any program writes"));
         }
         let ends = text.iter().enumerate().filter(|&(_, &byte)| byte == 0).map(|(end, _)| end as u32 + 1);
         let starts: Vec<u32> = std::iter::once(0).chain(ends).collect();
         if starts.len() as u64 <= count {
-            return Err(damaged("it has fewer names than it says").into());
+            return Err(damaged("it has fewer names than it says"));
         }
 
         let mut section = Fields(&fields);
@@ -105,7 +102,7 @@ impl Sections {
         specs.sort_by_key(|spec| spec.path);
         specs.dedup_by_key(|spec| spec.path);
         if specs.last().is_some_and(|spec| spec.path as usize >= paths.len()) {
-            return Err(damaged("it describes what has no path").into());
+            return Err(damaged("it describes what has no path"));
         }
         Ok(Self { text, starts, fields, sets, paths, specs })
     }
@@ -131,7 +128,6 @@ impl Sections {
         })
     }
 
-    /// A field of a spec.
     pub(super) fn field(&self, spec: Spec, name: &str) -> Result<Option<Rep>, Fault> {
         for field in self.fields(spec) {
             let (found, value) = field?;
@@ -141,4 +137,55 @@ impl Sections {
         }
         Ok(None)
     }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Path {
+    /// Index of the path above it; of the top its own.
+    pub(super) parent: u32,
+    pub(super) name: u32,
+    pub(super) depth: u32,
+}
+
+/// In place of the distance to the next sibling: it follows at once; there is none, but a child
+/// follows; or neither.
+pub(crate) const SIBLING: i32 = 0;
+pub(crate) const CHILD_ONLY: i32 = -1;
+pub(crate) const LAST: i32 = -2;
+
+/// Paths by their indices, of which there are `count`; `names` of properties are negative.
+pub(super) fn paths(count: usize, [indices, names, jumps]: [&[i32]; 3]) -> Result<Vec<Path>, Fault> {
+    let wrong = || damaged("its paths are not a tree");
+    let mut paths = vec![Path::default(); count];
+    let mut known = vec![false; count];
+    // Places that are yet to be entered, and the paths above them.
+    let mut waiting = if indices.is_empty() { Vec::new() } else { vec![(0, None)] };
+    while let Some((mut place, above)) = waiting.pop() {
+        loop {
+            let index = indices.get(place).and_then(|&index| u32::try_from(index).ok()).ok_or_else(wrong)?;
+            // Once each, so that none lies below itself.
+            let is_new = known.get_mut(index as usize).filter(|known| !**known).ok_or_else(wrong)?;
+            *is_new = true;
+            let (parent, depth) = above.map_or((index, 0), |(parent, depth)| (parent, depth + 1));
+            // A property lies below the last of so many prims.
+            if depth > DEEPEST + 1 {
+                return Err(too_deep());
+            }
+            paths[index as usize] = Path { parent, depth, name: names[place].unsigned_abs() };
+            match jumps[place] {
+                LAST => break,
+                SIBLING => place += 1,
+                jump => {
+                    if jump > 0 {
+                        waiting.push((place + jump as usize, above));
+                    } else if jump != CHILD_ONLY {
+                        return Err(wrong());
+                    }
+                    waiting.push((place + 1, Some((index, depth))));
+                    break;
+                }
+            }
+        }
+    }
+    Ok(paths)
 }

@@ -1,57 +1,55 @@
-//! Layers of text: read once from the beginning to the end for where values are, which are parsed when they are asked for.
+//! Layers of text: read once for where values are, which are parsed when they are asked for.
 
 mod parser;
 mod scanner;
 
-use std::io::{Read, Seek};
-
-use super::layer::{Layer, Prim, Stage, spline};
+use super::layer::{Attributes, Layer, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
-use crate::scene::{Failure, Node, Points, Track, Value, Values, damaged};
+use crate::scene::{Points, Reader, Track, Value, Values, damaged};
 use parser::{Contents, Parser, Stored};
 use scanner::Scanner;
 
-/// What a layer begins with.
 pub(super) const MAGIC: &[u8; 5] = b"#usda";
 /// Numbers of one value, those of a matrix.
 const MOST_NUMBERS: usize = 16;
-/// Arrays of points that stay in memory: a frame between two samples needs both, and so does the next one.
+/// Arrays of points that stay in memory: those around a frame, and around the next one.
 const KEPT: usize = 2;
 
-pub(super) struct Text<R> {
-    scanner: Scanner<R>,
+pub(super) struct Text<'a> {
+    scanner: Scanner<'a>,
     contents: Contents,
     /// Where points were read from, and these; the last ones first.
     read: Vec<(u64, Vec<f64>)>,
 }
 
-impl<R: Read + Seek> Text<R> {
+impl<'a> Text<'a> {
     /// Opens a layer, which begins as one does.
-    pub(super) fn open(source: R) -> Result<Self, Failure> {
+    pub(super) fn open(source: Reader<'a>) -> Result<Layer<'a>, Fault> {
         let mut scanner = Scanner::new(source)?;
-        let contents = Parser::parse(&mut scanner)?;
-        Ok(Self { scanner, contents, read: Vec::new() })
+        let mut contents = Parser::parse(&mut scanner)?;
+        let (nodes, prims) = (std::mem::take(&mut contents.nodes), std::mem::take(&mut contents.prims));
+        let stage = std::mem::take(&mut contents.stage);
+        Ok(Layer { stage, nodes, prims, source: Box::new(Self { scanner, contents, read: Vec::new() }) })
     }
 
-    /// Goes to where a value is.
-    fn enter(&mut self, value: Value) -> Result<Stored, Failure> {
+    fn enter(&mut self, value: Value) -> Result<Stored, Fault> {
         let stored = usize::try_from(value.0).ok().and_then(|index| self.contents.values.get(index).copied());
         let stored = stored.ok_or_else(|| damaged("it has a value that is nowhere"))?;
         if stored.is_blocked {
-            return Err(Fault::unsupported("has a value that is blocked at a time; export it again").into());
+            return Err(Fault::unsupported("has a value that is blocked at a time; export it again"));
         }
         self.scanner.go(stored.place)?;
         Ok(stored)
     }
 
     /// Whether another value follows in a list, whose last one may have a comma behind it.
-    fn follows(&mut self) -> Result<bool, Failure> {
+    fn follows(&mut self) -> Result<bool, Fault> {
         self.scanner.has(b',')?;
         Ok(!self.scanner.has(b']')?)
     }
 
-    fn parse_points(&mut self, index: u64) -> Result<Vec<f64>, Failure> {
+    fn parse_points(&mut self, index: u64) -> Result<Vec<f64>, Fault> {
         let Stored { count, is_double, .. } = self.enter(Value(index))?;
         let mut values = Vec::with_capacity(3 * count);
         self.scanner.expect(b'[')?;
@@ -74,23 +72,11 @@ fn rounded(number: f64, is_double: bool) -> f64 {
     if is_double { number } else { f64::from(number as f32) }
 }
 
-impl<R: Read + Seek + Send> Layer for Text<R> {
-    fn stage(&self) -> &Stage {
-        &self.contents.stage
-    }
-
-    fn prims(&self) -> &[Prim] {
-        &self.contents.prims
-    }
-
-    fn nodes(&self) -> &[Node] {
-        &self.contents.nodes
-    }
-
-    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Failure> {
+impl Attributes for Text<'_> {
+    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault> {
         let key = (prim, name.to_owned());
         if self.contents.splines.contains(&key) {
-            return Err(spline(name).into());
+            return Err(spline(name));
         }
         Ok(self.contents.attributes.get(&key).cloned().unwrap_or_default())
     }
@@ -99,7 +85,7 @@ impl<R: Read + Seek + Send> Layer for Text<R> {
         self.contents.properties.get(&prim).cloned().unwrap_or_default()
     }
 
-    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Failure> {
+    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
         self.enter(value)?;
         if !self.scanner.has(b'[')? {
             return Ok(vec![self.scanner.string()?]);
@@ -107,7 +93,7 @@ impl<R: Read + Seek + Send> Layer for Text<R> {
         let mut names = Vec::new();
         while self.follows()? {
             if names.len() == most {
-                return Err(damaged(&format!("it has a list of more names than {most}, which are the most")).into());
+                return Err(damaged(&format!("it has a list of more names than {most}, which are the most")));
             }
             names.push(self.scanner.string()?);
         }
@@ -115,8 +101,8 @@ impl<R: Read + Seek + Send> Layer for Text<R> {
     }
 }
 
-impl<R: Read + Seek + Send> Values for Text<R> {
-    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Failure> {
+impl Values for Text<'_> {
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Fault> {
         let Stored { is_double, is_quaternion, .. } = self.enter(value)?;
         let (mut numbers, mut depth) = (Vec::new(), 0_usize);
         loop {
@@ -140,10 +126,10 @@ impl<R: Read + Seek + Send> Values for Text<R> {
         Ok(numbers)
     }
 
-    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Failure> {
+    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault> {
         let count = self.enter(value)?.count;
         if count as u64 > most {
-            return Err(damaged(&format!("it has {count} numbers of faces where {most} are the most")).into());
+            return Err(damaged(&format!("it has {count} numbers of faces where {most} are the most")));
         }
         let mut numbers = Vec::with_capacity(count);
         self.scanner.expect(b'[')?;
@@ -157,12 +143,12 @@ impl<R: Read + Seek + Send> Values for Text<R> {
         Ok(numbers)
     }
 
-    fn points(&mut self, value: Value) -> Result<Points, Failure> {
+    fn points(&mut self, value: Value) -> Result<Points, Fault> {
         let count = self.enter(value)?.count;
         Ok(Points { start: value.0, count, scalar: Scalar::F64Little })
     }
 
-    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Failure> {
+    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Fault> {
         if let Some(known) = self.read.iter().position(|(index, _)| *index == points.start) {
             self.read[..=known].rotate_right(1);
         } else {
@@ -172,7 +158,7 @@ impl<R: Read + Seek + Send> Values for Text<R> {
         }
         let values = &self.read[0].1;
         if values.len() != out.len() {
-            return Err(damaged("its points are not a list of three numbers each").into());
+            return Err(damaged("its points are not a list of three numbers each"));
         }
         out.copy_from_slice(values);
         Ok(values.iter().all(|x| x.is_finite()))

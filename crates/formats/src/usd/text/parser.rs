@@ -1,10 +1,10 @@
 //! What a text says: its prims, and where the values of their attributes are.
 
 use std::collections::{HashMap, HashSet};
-use std::io::{Read, Seek};
 
 use super::scanner::{Place, Scanner, is_letter};
-use crate::scene::{Failure, Node, Track, Value};
+use crate::error::Fault;
+use crate::scene::{Node, Track, Value};
 use crate::usd::layer::{COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep};
 
 /// Words in front of the type of a property or of the key of a field.
@@ -34,7 +34,6 @@ pub(super) struct Stored {
     pub(super) is_quaternion: bool,
 }
 
-/// What was found.
 #[derive(Default)]
 pub(super) struct Contents {
     pub(super) stage: Stage,
@@ -44,12 +43,11 @@ pub(super) struct Contents {
     pub(super) attributes: HashMap<(usize, String), Track>,
     /// Of meshes their names and types, of others those of materials.
     pub(super) properties: HashMap<usize, Vec<(String, String)>>,
-    /// Attributes that splines animate.
     pub(super) splines: HashSet<(usize, String)>,
 }
 
-pub(super) struct Parser<'a, R> {
-    scanner: &'a mut Scanner<R>,
+pub(super) struct Parser<'a, 'b> {
+    scanner: &'a mut Scanner<'b>,
     contents: Contents,
     /// The prims that are open, from the outside to the inside.
     open: Vec<usize>,
@@ -63,9 +61,8 @@ enum Owner {
     Property,
 }
 
-impl<'a, R: Read + Seek> Parser<'a, R> {
-    /// All that the text says.
-    pub(super) fn parse(scanner: &'a mut Scanner<R>) -> Result<Contents, Failure> {
+impl<'a, 'b> Parser<'a, 'b> {
+    pub(super) fn parse(scanner: &'a mut Scanner<'b>) -> Result<Contents, Fault> {
         let mut parser = Self { scanner, contents: Contents::default(), open: Vec::new() };
         if parser.scanner.solid()? == Some(b'(') {
             parser.fields(Owner::Layer)?;
@@ -84,12 +81,12 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         }
     }
 
-    fn word(&mut self) -> Result<String, Failure> {
+    fn word(&mut self) -> Result<String, Fault> {
         Ok(self.scanner.word(b"_:.")?.to_owned())
     }
 
     /// The next word behind those that say how it is meant.
-    fn key(&mut self) -> Result<String, Failure> {
+    fn key(&mut self) -> Result<String, Fault> {
         loop {
             let word = self.word()?;
             if !MODIFIERS.contains(&word.as_str()) {
@@ -98,7 +95,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         }
     }
 
-    fn statement(&mut self) -> Result<(), Failure> {
+    fn statement(&mut self) -> Result<(), Fault> {
         let word = self.key()?;
         match (word.as_str(), self.open.last()) {
             ("def" | "over" | "class", _) => self.prim(word == "def"),
@@ -112,16 +109,16 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         }
     }
 
-    fn prim(&mut self, is_defined: bool) -> Result<(), Failure> {
+    fn prim(&mut self, is_defined: bool) -> Result<(), Fault> {
         if self.open.len() == DEEPEST as usize {
-            return Err(too_deep().into());
+            return Err(too_deep());
         }
         let kind = Kind::of(self.word()?.as_bytes());
         let name = self.scanner.string()?;
         let index = self.contents.prims.len();
         let (parent, depth) = (self.open.last().copied(), self.open.len() + 1);
         self.contents.nodes.push(Node { name: name.into_bytes().into(), parent, depth });
-        self.contents.prims.push(Prim { spec: index as u32, kind, is_there: is_defined, composed: None });
+        self.contents.prims.push(Prim { kind, is_there: is_defined, composed: None });
         if self.scanner.solid()? == Some(b'(') {
             self.fields(Owner::Prim(index))?;
         }
@@ -130,7 +127,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
     }
 
     /// What is said in round brackets of a layer, a prim or a property.
-    fn fields(&mut self, owner: Owner) -> Result<(), Failure> {
+    fn fields(&mut self, owner: Owner) -> Result<(), Fault> {
         self.scanner.expect(b'(')?;
         while !self.scanner.has(b')')? {
             // A comment has no key.
@@ -156,7 +153,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
     }
 
     /// A value that is a word or a string; empty for others, which are passed over.
-    fn short(&mut self) -> Result<String, Failure> {
+    fn short(&mut self) -> Result<String, Fault> {
         match self.scanner.solid()? {
             Some(b'"' | b'\'') => self.scanner.string(),
             Some(byte) if is_letter(byte) || b"+-.".contains(&byte) => Ok(self.scanner.word(b"+-._")?.to_owned()),
@@ -164,11 +161,11 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         }
     }
 
-    fn layer_field(&mut self, key: &str) -> Result<(), Failure> {
+    fn layer_field(&mut self, key: &str) -> Result<(), Fault> {
         if key == "subLayers" {
             return match self.scanner.pass()?.count {
                 0 => Ok(()),
-                _ => Err(composed("the layer", "sublayers").into()),
+                _ => Err(composed("the layer", "sublayers")),
             };
         }
         let value = self.short()?;
@@ -186,7 +183,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         Ok(())
     }
 
-    fn prim_field(&mut self, prim: usize, key: &str) -> Result<(), Failure> {
+    fn prim_field(&mut self, prim: usize, key: &str) -> Result<(), Fault> {
         let value = self.short()?;
         let prim = &mut self.contents.prims[prim];
         if key == "active" {
@@ -198,7 +195,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
     }
 
     /// A property behind its type, or an order of names, which has none.
-    fn property(&mut self, type_name: &str) -> Result<(), Failure> {
+    fn property(&mut self, type_name: &str) -> Result<(), Fault> {
         if self.scanner.has(b'[')? {
             self.scanner.expect(b']')?;
         }
@@ -218,7 +215,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         Ok(())
     }
 
-    fn value(&mut self, type_name: &str, full: &str) -> Result<(), Failure> {
+    fn value(&mut self, type_name: &str, full: &str) -> Result<(), Fault> {
         let (name, part) = full.split_once('.').unwrap_or((full, ""));
         let is_wanted = WANTED.contains(&name) || name.starts_with("xformOp");
         let Some(&prim) = self.open.last().filter(|_| is_wanted) else {
@@ -246,7 +243,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
         Ok(())
     }
 
-    fn stored(&mut self, type_name: &str) -> Result<Value, Failure> {
+    fn stored(&mut self, type_name: &str) -> Result<Value, Fault> {
         let passed = self.scanner.pass()?;
         self.contents.values.push(Stored {
             place: passed.place,
@@ -260,7 +257,7 @@ impl<'a, R: Read + Seek> Parser<'a, R> {
     }
 
     /// Time codes, ascending, and what is there; of those at one time the last.
-    fn samples(&mut self, type_name: &str) -> Result<Vec<(f64, Value)>, Failure> {
+    fn samples(&mut self, type_name: &str) -> Result<Vec<(f64, Value)>, Fault> {
         let mut samples = Vec::new();
         self.scanner.expect(b'{')?;
         while !self.scanner.has(b'}')? {

@@ -1,9 +1,9 @@
-//! Text byte by byte, block by block: words, strings, what is between them, and whole values that are passed over.
+//! Text byte by byte: words, strings, what is between, and whole values that are passed over.
 
-use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::io::{self, BufRead, BufReader, Seek};
 
-use crate::scene::Failure;
-use crate::scene::damaged;
+use crate::error::Fault;
+use crate::scene::{Reader, damaged};
 
 const BLOCK: usize = 1 << 16;
 /// Bytes of a word or of a string that is kept; programs write far fewer.
@@ -11,22 +11,20 @@ const LONGEST: usize = 1 << 12;
 /// Brackets within brackets of one value.
 const DEEPEST: usize = 64;
 
-/// A place in the text.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     offset: u64,
     line: u64,
 }
 
-pub(super) struct Scanner<R> {
-    source: BufReader<R>,
+pub(super) struct Scanner<'a> {
+    source: BufReader<Reader<'a>>,
     /// The place of the next byte.
     at: u64,
     line: u64,
     word: Vec<u8>,
 }
 
-/// A value that was passed over.
 pub(super) struct Passed {
     pub(super) place: Place,
     /// How many values it has in its outermost brackets.
@@ -35,9 +33,8 @@ pub(super) struct Passed {
     pub(super) is_none: bool,
 }
 
-impl<R: Read + Seek> Scanner<R> {
-    /// From the beginning on.
-    pub(super) fn new(mut source: R) -> io::Result<Self> {
+impl<'a> Scanner<'a> {
+    pub(super) fn new(mut source: Reader<'a>) -> io::Result<Self> {
         source.rewind()?;
         let source = BufReader::with_capacity(BLOCK, source);
         Ok(Self { source, at: 0, line: 1, word: Vec::new() })
@@ -54,7 +51,7 @@ impl<R: Read + Seek> Scanner<R> {
     }
 
     /// The fault of what no text of USD has, with the line.
-    pub(super) fn wrong(&self, what: &str) -> Failure {
+    pub(super) fn wrong(&self, what: &str) -> Fault {
         damaged(&format!("line {}: {what}", self.line)).into()
     }
 
@@ -68,7 +65,7 @@ impl<R: Read + Seek> Scanner<R> {
         self.at += 1;
     }
 
-    pub(super) fn next(&mut self) -> Result<u8, Failure> {
+    pub(super) fn next(&mut self) -> Result<u8, Fault> {
         let byte = self.peek()?.ok_or_else(|| self.wrong("the text ends too early"))?;
         self.pass_byte();
         self.line += u64::from(byte == b'\n');
@@ -76,7 +73,7 @@ impl<R: Read + Seek> Scanner<R> {
     }
 
     /// The next byte that is neither white space nor in a comment, and is still to come.
-    pub(super) fn solid(&mut self) -> Result<Option<u8>, Failure> {
+    pub(super) fn solid(&mut self) -> Result<Option<u8>, Fault> {
         while let Some(byte) = self.peek()? {
             match byte {
                 b'#' => self.pass_line()?,
@@ -99,7 +96,7 @@ impl<R: Read + Seek> Scanner<R> {
         Ok(None)
     }
 
-    fn pass_line(&mut self) -> Result<(), Failure> {
+    fn pass_line(&mut self) -> Result<(), Fault> {
         while self.peek()?.is_some_and(|byte| byte != b'\n' && byte != b'\r') {
             self.pass_byte();
         }
@@ -107,7 +104,7 @@ impl<R: Read + Seek> Scanner<R> {
     }
 
     /// Passes over what is there up to an end.
-    fn pass_to(&mut self, end: &[u8]) -> Result<(), Failure> {
+    fn pass_to(&mut self, end: &[u8]) -> Result<(), Fault> {
         let mut last = [0; 3];
         while !last.ends_with(end) {
             last = [last[1], last[2], self.next()?];
@@ -116,7 +113,7 @@ impl<R: Read + Seek> Scanner<R> {
     }
 
     /// Whether this byte is next, which is then passed over.
-    pub(super) fn has(&mut self, byte: u8) -> Result<bool, Failure> {
+    pub(super) fn has(&mut self, byte: u8) -> Result<bool, Fault> {
         let is_next = self.solid()? == Some(byte);
         if is_next {
             self.pass_byte();
@@ -124,7 +121,7 @@ impl<R: Read + Seek> Scanner<R> {
         Ok(is_next)
     }
 
-    pub(super) fn expect(&mut self, byte: u8) -> Result<(), Failure> {
+    pub(super) fn expect(&mut self, byte: u8) -> Result<(), Fault> {
         if self.has(byte)? {
             return Ok(());
         }
@@ -133,12 +130,12 @@ impl<R: Read + Seek> Scanner<R> {
     }
 
     /// The next byte as messages have it.
-    pub(super) fn found(&mut self) -> Result<String, Failure> {
+    pub(super) fn found(&mut self) -> Result<String, Fault> {
         Ok(self.solid()?.map_or_else(|| "the end".to_owned(), |byte| format!("{:?}", char::from(byte))))
     }
 
     /// Letters, digits and what `others` has of signs; empty where something else is next.
-    pub(super) fn word(&mut self, others: &[u8]) -> Result<&str, Failure> {
+    pub(super) fn word(&mut self, others: &[u8]) -> Result<&str, Fault> {
         self.solid()?;
         self.word.clear();
         while let Some(byte) = self.peek()?.filter(|byte| is_letter(*byte) || others.contains(byte)) {
@@ -150,12 +147,12 @@ impl<R: Read + Seek> Scanner<R> {
         }
         match std::str::from_utf8(&self.word) {
             Ok(word) => Ok(word),
-            Err(_) => Err(damaged(&format!("line {}: a word is not UTF-8", self.line)).into()),
+            Err(_) => Err(damaged(&format!("line {}: a word is not UTF-8", self.line))),
         }
     }
 
     /// A number, `inf` and `nan` among them.
-    pub(super) fn number(&mut self) -> Result<f64, Failure> {
+    pub(super) fn number(&mut self) -> Result<f64, Fault> {
         let found = self.word(b"+-.")?;
         if let Ok(number) = found.parse() {
             return Ok(number);
@@ -165,7 +162,7 @@ impl<R: Read + Seek> Scanner<R> {
     }
 
     /// What is between quotes, of which there may be three.
-    pub(super) fn string(&mut self) -> Result<String, Failure> {
+    pub(super) fn string(&mut self) -> Result<String, Fault> {
         self.solid()?;
         let quote = self.next()?;
         if !matches!(quote, b'"' | b'\'') {
@@ -196,8 +193,7 @@ impl<R: Read + Seek> Scanner<R> {
         Ok(String::from_utf8_lossy(&kept).into_owned())
     }
 
-    /// Passes over a value of any kind.
-    pub(super) fn pass(&mut self) -> Result<Passed, Failure> {
+    pub(super) fn pass(&mut self) -> Result<Passed, Fault> {
         let first = self.solid()?;
         let (place, mut count, mut open) = (self.place(), 0, Vec::new());
         loop {
@@ -242,7 +238,7 @@ impl<R: Read + Seek> Scanner<R> {
         Ok(Passed { place, count, is_none })
     }
 
-    fn pass_asset(&mut self) -> Result<(), Failure> {
+    fn pass_asset(&mut self) -> Result<(), Fault> {
         self.next()?;
         if self.peek()? != Some(b'@') {
             return self.pass_to(b"@");

@@ -1,4 +1,5 @@
-//! Writes a layer of one polygon mesh, and its cage where there is one, below one transform, frame by frame, in version 0.8.0 of the binary format, which USD reads since 2019.
+//! Writes a layer of one polygon mesh and its cage, if any, below one transform, frame by frame, in
+//! version 0.8.0 of the binary format, which USD reads since 2019.
 
 mod sink;
 mod tables;
@@ -8,17 +9,17 @@ use std::io::{self, Seek, Write};
 use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::units::{Units, Up};
 
-use super::binary::{ATTRIBUTE, MAGIC, PRIM, ROOT, kind};
+use super::binary::{ATTRIBUTE, CHILD_ONLY, LAST, MAGIC, PRIM, ROOT, SIBLING, kind};
 use crate::scene::bounds;
 use sink::Sink;
-use tables::{Next, Tables, integers};
+use tables::{Tables, integers};
 
 const VERSION: [u8; 3] = [0, 8, 0];
 /// Bits of a value: an array, one that is in place of its offset, one that is packed.
 const ARRAY: u64 = 1 << 63;
 const INLINED: u64 = 1 << 62;
 const PACKED: u64 = 1 << 61;
-/// Arrays of fewer whole numbers are not packed, nor are those of more, which LZ4 takes in several pieces.
+/// Shorter arrays of whole numbers are not packed, nor longer ones, which LZ4 has in pieces.
 const PACKED_FROM: usize = 16;
 const PACKED_TO: usize = 1 << 28;
 
@@ -26,7 +27,6 @@ const PACKED_TO: usize = 1 << 28;
 pub(crate) struct Scene {
     /// Name of the transform, below which the mesh is called `mesh`.
     pub(crate) name: String,
-    /// Frames per second.
     pub(crate) fps: f64,
     /// Time codes of all frames, ascending.
     pub(crate) codes: Vec<f64>,
@@ -103,7 +103,7 @@ impl<W: Write + Seek> MeshWriter<W> {
             ("upAxis", token(&mut tables, up)),
             ("primChildren", self.tokens(&mut tables, &[&name])?),
         ];
-        tables.spec(ROOT, "", Next::Child, &root);
+        tables.spec(ROOT, "", CHILD_ONLY, &root);
 
         let defined = ("specifier", INLINED | value(kind::SPECIFIER, 0));
         let uniform = ("variability", INLINED | value(kind::VARIABILITY, 1));
@@ -114,21 +114,21 @@ impl<W: Write + Seek> MeshWriter<W> {
         let meshes = std::mem::take(&mut self.meshes);
         let names: Vec<&str> = meshes.iter().map(|mesh| mesh.name).collect();
         transform.push(("primChildren", self.tokens(&mut tables, &names)?));
-        tables.spec(PRIM, &name, Next::Child, &transform);
+        tables.spec(PRIM, &name, CHILD_ONLY, &transform);
         if let Some(origin) = self.scene.origin {
             self.sink.align()?;
             let at = self.sink.put(origin.map(f64::to_le_bytes).as_flattened())?;
             let fields = [("typeName", token(&mut tables, "double3")), ("default", value(kind::VEC3D, at))];
-            tables.spec(ATTRIBUTE, TRANSLATE, Next::Sibling, &fields);
+            tables.spec(ATTRIBUTE, TRANSLATE, SIBLING, &fields);
             let order = ARRAY | self.list(kind::TOKEN, 1, &tables.token(TRANSLATE).to_le_bytes())?;
             let fields = [("typeName", token(&mut tables, "token[]")), uniform, ("default", order)];
-            tables.spec(ATTRIBUTE, ORDER, Next::Sibling, &fields);
+            tables.spec(ATTRIBUTE, ORDER, SIBLING, &fields);
         }
 
         for (k, mesh) in meshes.iter().enumerate() {
             let is_last = k + 1 == meshes.len();
-            let next = if is_last { Next::Child } else { Next::ChildAndSibling(1 + PROPERTIES.len() as i32) };
-            self.put_mesh(&mut tables, next, mesh, times)?;
+            let jump = if is_last { CHILD_ONLY } else { 1 + PROPERTIES.len() as i32 };
+            self.put_mesh(&mut tables, jump, mesh, times)?;
         }
 
         let contents = tables.write(&mut self.sink)?;
@@ -137,7 +137,7 @@ impl<W: Write + Seek> MeshWriter<W> {
     }
 
     /// A mesh and its properties; the cage is a guide, which programs show and do not render.
-    fn put_mesh(&mut self, tables: &mut Tables, next: Next, mesh: &Mesh, times: u64) -> io::Result<()> {
+    fn put_mesh(&mut self, tables: &mut Tables, jump: i32, mesh: &Mesh, times: u64) -> io::Result<()> {
         let [points_at, extents_at] = [self.samples(times, &mesh.points)?, self.samples(times, &mesh.extents)?];
         let first = mesh.points.first().copied().unwrap_or(ARRAY | value(kind::VEC3F, 0));
         let uniform = ("variability", INLINED | value(kind::VARIABILITY, 1));
@@ -147,22 +147,22 @@ impl<W: Write + Seek> MeshWriter<W> {
         let properties = ("properties", self.tokens(tables, &names)?);
         let prim =
             [("specifier", INLINED | value(kind::SPECIFIER, 0)), ("typeName", token(tables, "Mesh")), properties];
-        tables.spec(PRIM, mesh.name, next, &prim);
+        tables.spec(PRIM, mesh.name, jump, &prim);
         let kinds = ["float3[]", "int[]", "point3f[]", "token"];
         let [extent, integers, point, text] = kinds.map(|kind| ("typeName", token(tables, kind)));
         let [counts, corners] = mesh.faces;
-        tables.spec(ATTRIBUTE, names[0], Next::Sibling, &[extent, ("timeSamples", extents_at)]);
-        tables.spec(ATTRIBUTE, names[1], Next::Sibling, &[integers, ("default", counts)]);
-        tables.spec(ATTRIBUTE, names[2], Next::Sibling, &[integers, ("default", corners)]);
+        tables.spec(ATTRIBUTE, names[0], SIBLING, &[extent, ("timeSamples", extents_at)]);
+        tables.spec(ATTRIBUTE, names[1], SIBLING, &[integers, ("default", counts)]);
+        tables.spec(ATTRIBUTE, names[2], SIBLING, &[integers, ("default", corners)]);
         // Readers without a time take the first frame.
-        tables.spec(ATTRIBUTE, names[3], Next::Sibling, &[point, ("default", first), ("timeSamples", points_at)]);
+        tables.spec(ATTRIBUTE, names[3], SIBLING, &[point, ("default", first), ("timeSamples", points_at)]);
         // Otherwise programs subdivide it.
         let plain = ("default", token(tables, "none"));
-        let last = if is_guide { Next::Sibling } else { Next::None };
+        let last = if is_guide { SIBLING } else { LAST };
         tables.spec(ATTRIBUTE, names[4], last, &[text, uniform, plain]);
         if is_guide {
             let guide = ("default", token(tables, "guide"));
-            tables.spec(ATTRIBUTE, PURPOSE, Next::None, &[text, uniform, guide]);
+            tables.spec(ATTRIBUTE, PURPOSE, LAST, &[text, uniform, guide]);
         }
         Ok(())
     }

@@ -13,7 +13,6 @@ const LOCAL: usize = 30;
 
 pub(super) struct Sink<W> {
     out: W,
-    /// Bytes of the layer so far.
     at: u64,
     package: Option<Package>,
 }
@@ -21,7 +20,6 @@ pub(super) struct Sink<W> {
 /// A zip archive of one file that is stored as it is.
 struct Package {
     name: String,
-    /// Bytes before the file.
     before: usize,
     /// Of all but the head.
     crc: Crc,
@@ -84,7 +82,7 @@ impl Package {
     fn headers(&self, crc: u32, length: u32) -> [Vec<u8>; 2] {
         let filled = self.before - LOCAL - self.name.len();
         let [crc, length] = [crc, length].map(u32::to_le_bytes);
-        // The version that unpacks it, no flags, stored, 1 January 1980; then the sizes, and the length of the name.
+        // Version, no flags, stored, 1 January 1980; then the sizes, and the length of the name.
         let mut common = vec![10, 0, 0, 0, 0, 0, 0, 0, 0x21, 0];
         [crc, length, length].iter().for_each(|number| common.extend(number));
         common.extend((self.name.len() as u16).to_le_bytes());

@@ -8,30 +8,6 @@ use super::sink::Sink;
 /// A field of a prim or a property: its name and its value.
 pub(super) type Field<'a> = (&'a str, u64);
 
-/// Where the path after one lies in the tree.
-#[derive(Clone, Copy)]
-pub(super) enum Next {
-    /// Below it; it has no sibling.
-    Child,
-    /// Below it; its sibling comes so many paths later.
-    ChildAndSibling(i32),
-    /// Beside it.
-    Sibling,
-    /// Neither.
-    None,
-}
-
-impl Next {
-    fn jump(self) -> i32 {
-        match self {
-            Self::Child => -1,
-            Self::ChildAndSibling(paths) => paths,
-            Self::Sibling => 0,
-            Self::None => -2,
-        }
-    }
-}
-
 #[derive(Default)]
 pub(super) struct Tables {
     tokens: Vec<String>,
@@ -39,13 +15,12 @@ pub(super) struct Tables {
     fields: Vec<(i32, u64)>,
     sets: Vec<i32>,
     /// Last names, negative for properties, and where the next path is.
-    paths: Vec<(i32, i32)>,
+    paths: Vec<[i32; 2]>,
     /// Paths, first fields and kinds.
     specs: Vec<[i32; 3]>,
 }
 
 impl Tables {
-    /// The index of a name.
     pub(super) fn token(&mut self, text: &str) -> u32 {
         if let Some(&known) = self.known.get(text) {
             return known;
@@ -56,10 +31,10 @@ impl Tables {
         index
     }
 
-    /// Appends a prim or a property, after what it lies below.
-    pub(super) fn spec(&mut self, kind: u32, name: &str, next: Next, fields: &[Field<'_>]) {
+    /// Appends a prim or a property, after what it lies below; `jump` says where the next path is.
+    pub(super) fn spec(&mut self, kind: u32, name: &str, jump: i32, fields: &[Field<'_>]) {
         let (token, path) = (self.token(name) as i32, self.paths.len() as i32);
-        self.paths.push((if kind == crate::usd::binary::ATTRIBUTE { -token } else { token }, next.jump()));
+        self.paths.push([if kind == crate::usd::binary::ATTRIBUTE { -token } else { token }, jump]);
         self.specs.push([path, self.sets.len() as i32, kind as i32]);
         for &(name, value) in fields {
             let token = self.token(name) as i32;
@@ -72,57 +47,34 @@ impl Tables {
     /// Writes all; gives where the list of sections is.
     pub(super) fn write<W: Write + Seek>(&self, sink: &mut Sink<W>) -> io::Result<u64> {
         let text: Vec<u8> = self.tokens.iter().flat_map(|token| token.bytes().chain([0])).collect();
-        let column = |numbers: &mut dyn Iterator<Item = i32>| sized(&integers(&numbers.collect::<Vec<_>>()));
-        let count = |count: usize| (count as u64).to_le_bytes();
         let values: Vec<u8> = self.fields.iter().flat_map(|(_, value)| value.to_le_bytes()).collect();
+        let names: Vec<i32> = self.fields.iter().map(|field| field.0).collect();
+        let count = |count: usize| (count as u64).to_le_bytes().to_vec();
+        let column = |numbers: Vec<i32>| sized(&integers(&numbers));
         let paths = self.paths.len();
+        let [last_names, jumps] = [0, 1].map(|k| column(self.paths.iter().map(|path| path[k]).collect()));
+        let [at, first, kinds] = [0, 1, 2].map(|k| column(self.specs.iter().map(|spec| spec[k]).collect()));
         let sections = [
-            ("TOKENS", [&count(self.tokens.len())[..], &count(text.len()), &sized(&packed(&text))].concat()),
-            ("STRINGS", count(0).to_vec()),
-            (
-                "FIELDS",
-                [
-                    &count(self.fields.len())[..],
-                    &column(&mut self.fields.iter().map(|field| field.0)),
-                    &sized(&packed(&values)),
-                ]
-                .concat(),
-            ),
-            ("FIELDSETS", [&count(self.sets.len())[..], &column(&mut self.sets.iter().copied())].concat()),
-            (
-                "PATHS",
-                [
-                    &count(paths)[..],
-                    &count(paths),
-                    &column(&mut (0..paths as i32)),
-                    &column(&mut self.paths.iter().map(|path| path.0)),
-                    &column(&mut self.paths.iter().map(|path| path.1)),
-                ]
-                .concat(),
-            ),
-            (
-                "SPECS",
-                [&count(self.specs.len())[..]]
-                    .into_iter()
-                    .map(<[u8]>::to_vec)
-                    .chain((0..3).map(|k| column(&mut self.specs.iter().map(|spec| spec[k]))))
-                    .collect::<Vec<_>>()
-                    .concat(),
-            ),
+            ("TOKENS", [count(self.tokens.len()), count(text.len()), sized(&packed(&text))].concat()),
+            ("STRINGS", count(0)),
+            ("FIELDS", [count(self.fields.len()), column(names), sized(&packed(&values))].concat()),
+            ("FIELDSETS", [count(self.sets.len()), column(self.sets.clone())].concat()),
+            ("PATHS", [count(paths), count(paths), column((0..paths as i32).collect()), last_names, jumps].concat()),
+            ("SPECS", [count(self.specs.len()), at, first, kinds].concat()),
         ];
-        let mut list = count(sections.len()).to_vec();
+        let mut list = count(sections.len());
         for (name, bytes) in sections {
             let at = sink.put(&bytes)?;
             let mut entry = [0; 16];
             entry[..name.len()].copy_from_slice(name.as_bytes());
             list.extend(entry);
-            list.extend([at.to_le_bytes(), count(bytes.len())].concat());
+            list.extend(at.to_le_bytes());
+            list.extend(count(bytes.len()));
         }
         sink.put(&list)
     }
 }
 
-/// Bytes behind how many they are.
 fn sized(bytes: &[u8]) -> Vec<u8> {
     [&(bytes.len() as u64).to_le_bytes()[..], bytes].concat()
 }
