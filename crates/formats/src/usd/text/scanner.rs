@@ -52,7 +52,7 @@ impl<'a> Scanner<'a> {
 
     /// The fault of what no text of USD has, with the line.
     pub(super) fn wrong(&self, what: &str) -> Fault {
-        damaged(&format!("line {}: {what}", self.line)).into()
+        damaged(&format!("line {}: {what}", self.line))
     }
 
     fn peek(&mut self) -> io::Result<Option<u8>> {
