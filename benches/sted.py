@@ -1,4 +1,4 @@
-"""A measure like the spatio-temporal edge difference (Váša and Skala 2011), straightforward from the definition in crates/core/src/sted/mod.rs.
+"""A measure like the spatio-temporal edge difference (Váša and Skala 2011), straightforward from the definition in crates/core/src/sted.rs.
 
 Measures the captures of benches/codec.py. Tests hold the program's own implementation against this one: run as a script, it reads a capture
 as JSON and prints spatial part, temporal part and total.

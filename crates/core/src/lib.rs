@@ -1,4 +1,4 @@
-//! The mathematics of CageR: plain data in, plain data out; no I/O, no async, no threads of its own making.
+//! The mathematics of CageR: plain data in, plain data out; no I/O, no async, no own threads.
 
 mod batch;
 pub mod cage;
@@ -12,8 +12,8 @@ mod simd;
 pub mod spectral;
 pub mod sted;
 
-/// Version of the preparation of solvers: stored solvers of another version are recomputed. Decoding a container depends on
-/// [`coordinates::DEFINITION`] alone.
+/// Version of the preparation: stored solvers of another version are recomputed. Decoding a
+/// container depends on [`coordinates::DEFINITION`] alone.
 pub const SOLVER_VERSION: u32 = 9;
 
 /// Compiles the examples of the README.

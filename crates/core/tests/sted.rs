@@ -1,6 +1,6 @@
 //! STED: what it sees, what it does not, and a second implementation in numpy.
 
-use cager_core::sted::{Sted, StedError, StedMeter, StedOptions};
+use cager_core::sted::{Sted, StedError, StedMeter};
 use cager_geometry::mesh::Polygons;
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -54,14 +54,10 @@ fn noise(amplitude: f64, seed: u64) -> impl FnMut(usize, usize) -> f64 {
     move |_, _| amplitude * (2.0 * random.f64() - 1.0)
 }
 
-fn measured(captured: &Frames, decoded: &Frames, options: StedOptions) -> Sted {
-    let mut meter = StedMeter::new(&grid(), SIDE * SIDE, DIAGONAL, options).unwrap();
+fn sted(captured: &Frames, decoded: &Frames) -> Sted {
+    let mut meter = StedMeter::new(&grid(), SIDE * SIDE, DIAGONAL).unwrap();
     captured.iter().zip(decoded).for_each(|(a, b)| meter.add(a, b).unwrap());
     meter.result()
-}
-
-fn sted(captured: &Frames, decoded: &Frames) -> Sted {
-    measured(captured, decoded, StedOptions::default())
 }
 
 #[test]
@@ -106,7 +102,7 @@ fn the_size_and_unit_of_the_capture_change_nothing() {
     let scaled =
         |frames: &Frames| displaced(frames, |_, _| 0.0).iter().map(|f| f.iter().map(|x| 100.0 * x).collect()).collect();
     let (captured, found): (Frames, Frames) = (scaled(&capture()), scaled(&decoded));
-    let mut meter = StedMeter::new(&grid(), SIDE * SIDE, 100.0 * DIAGONAL, StedOptions::default()).unwrap();
+    let mut meter = StedMeter::new(&grid(), SIDE * SIDE, 100.0 * DIAGONAL).unwrap();
     captured.iter().zip(&found).for_each(|(a, b)| meter.add(a, b).unwrap());
     let here = sted(&capture(), &decoded);
     assert!((meter.result().total - here.total).abs() < 1e-10 * here.total);
@@ -142,7 +138,7 @@ fn one_frame_has_no_temporal_part_and_points_alone_have_no_spatial_one() {
     let found = sted(&capture()[..1].to_vec(), &decoded);
     assert_eq!((found.temporal, found.total), (None, found.spatial));
     assert!(found.total > 0.01);
-    let mut cloud = StedMeter::new(&Polygons::new(), SIDE * SIDE, DIAGONAL, StedOptions::default()).unwrap();
+    let mut cloud = StedMeter::new(&Polygons::new(), SIDE * SIDE, DIAGONAL).unwrap();
     capture().iter().zip(&decoded).for_each(|(a, b)| cloud.add(a, b).unwrap());
     let found = cloud.result();
     assert!(found.spatial.is_nan() && found.total.is_nan() && found.temporal.is_some_and(|part| part > 0.0));
@@ -152,17 +148,11 @@ fn one_frame_has_no_temporal_part_and_points_alone_have_no_spatial_one() {
 fn what_cannot_be_measured_is_refused_or_nan() {
     let mut faces = Polygons::new();
     faces.push(&[0, 1, 3]);
-    let options = StedOptions::default();
-    assert_eq!(StedMeter::new(&faces, 3, 1.0, options).err(), Some(StedError::NoSuchVertex { vertex: 3, points: 3 }));
-    for (diagonal, options) in [
-        (0.0, options),
-        (f64::NAN, options),
-        (1.0, StedOptions { rings: 0, ..options }),
-        (1.0, StedOptions { window: 1, ..options }),
-    ] {
-        assert!(matches!(StedMeter::new(&faces, 4, diagonal, options).err(), Some(StedError::Options { .. })));
+    assert_eq!(StedMeter::new(&faces, 3, 1.0).err(), Some(StedError::NoSuchVertex { vertex: 3, points: 3 }));
+    for diagonal in [0.0, f64::NAN] {
+        assert!(matches!(StedMeter::new(&faces, 4, diagonal).err(), Some(StedError::NoExtent { .. })));
     }
-    let mut meter = StedMeter::new(&faces, 4, 1.0, options).unwrap();
+    let mut meter = StedMeter::new(&faces, 4, 1.0).unwrap();
     meter.add(&[0.0; 12], &[0.0f32; 12]).unwrap();
     let refused = meter.add(&[0.0; 12], &[0.0; 9]).unwrap_err();
     assert_eq!(refused, StedError::Points { frame: 1, captured: 12, decoded: 9, expected: 12 });
@@ -183,7 +173,7 @@ fn more_threads_change_no_bit() {
     assert_eq!(on(1), on(3));
 }
 
-/// `benches/sted.py` from its own definition, with other constants too, and of a capture shorter than a window.
+/// `benches/sted.py` from its own definition, also of a capture shorter than a run of frames.
 #[test]
 fn numpy_finds_the_same() {
     let python = std::env::var("CAGER_PYTHON").unwrap_or_else(|_| "python3".to_owned());
@@ -192,31 +182,21 @@ fn numpy_finds_the_same() {
         return;
     }
     let decoded = displaced(&capture(), noise(0.004, 1));
-    let usual = StedOptions::default();
-    for (options, frames) in [
-        (usual, FRAMES),
-        (StedOptions { rings: 3, ..usual }, FRAMES),
-        (StedOptions { window: 2, dt: 0.2, weight: 0.3, ..usual }, FRAMES),
-        (StedOptions { rings: 2, window: 8, ..usual }, 4),
-    ] {
+    for frames in [FRAMES, 4] {
         let (captured, decoded) = (capture()[..frames].to_vec(), decoded[..frames].to_vec());
-        let found = measured(&captured, &decoded, options);
-        let [spatial, temporal, total] = by_numpy(&python, &captured, &decoded, options);
+        let found = sted(&captured, &decoded);
+        let [spatial, temporal, total] = by_numpy(&python, &captured, &decoded);
         for (a, b) in [(found.spatial, spatial), (found.temporal.unwrap(), temporal), (found.total, total)] {
-            assert!(
-                (a - b).abs() <= 1e-12 * b.abs(),
-                "{options:?}: {found:?}, but numpy has {spatial}, {temporal}, {total}"
-            );
+            assert!((a - b).abs() <= 1e-12 * b.abs(), "{found:?}, but numpy has {spatial}, {temporal}, {total}");
         }
     }
 }
 
-fn by_numpy(python: &str, captured: &Frames, decoded: &Frames, options: StedOptions) -> [f64; 3] {
+fn by_numpy(python: &str, captured: &Frames, decoded: &Frames) -> [f64; 3] {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../benches/sted.py");
     let faces: Vec<Vec<u32>> = grid().iter().map(<[u32]>::to_vec).collect();
-    let StedOptions { rings, window, dt, weight } = options;
     let input = format!(
-        r#"{{"faces": {faces:?}, "captured": {captured:?}, "decoded": {decoded:?}, "diagonal": {DIAGONAL}, "rings": {rings}, "window": {window}, "dt": {dt}, "weight": {weight}}}"#
+        r#"{{"faces": {faces:?}, "captured": {captured:?}, "decoded": {decoded:?}, "diagonal": {DIAGONAL}}}"#
     );
     let mut child =
         Command::new(python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");

@@ -1,5 +1,5 @@
-//! Meshes, their topology, spatial queries and dense linear algebra: plain data in, plain data out; nothing about cages. All results are independent
-//! of the number of threads.
+//! Meshes, their topology, spatial queries and dense linear algebra: plain data in, plain data out.
+//! All results are independent of the number of threads.
 
 pub mod linalg;
 pub mod mesh;

@@ -4,6 +4,8 @@ mod ears;
 
 pub use crate::vector::Point;
 use crate::vector::{cross, dot, norm, sub};
+use glam::DVec3;
+use std::collections::HashMap;
 
 /// Polygonal faces of any arity over some list of points.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -78,7 +80,7 @@ impl Polygons {
         faces.flat_map(|(face, &arity)| std::iter::repeat_n(face as u32, (arity as usize).saturating_sub(2))).collect()
     }
 
-    /// The faces as a fan of triangles each, where positions do not matter; see [`Model::triangles`].
+    /// The faces as a fan of triangles each; see [`Model::triangles`].
     pub fn triangulated(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::new();
         for face in self.iter() {
@@ -99,7 +101,7 @@ pub struct Model {
     pub faces: Polygons,
     /// Colours of the points, red, green and blue in sRGB; empty where there are none.
     pub colors: Vec<[u8; 3]>,
-    /// Normals of the points of a cloud, as they were read; empty for meshes, and where there are none.
+    /// Normals of the points of a cloud, as they were read; otherwise empty.
     pub normals: Vec<Point>,
 }
 
@@ -131,8 +133,8 @@ impl From<&Model> for TriMesh {
 }
 
 impl Model {
-    /// The faces as triangles, those of a face one after another as [`Polygons::polygon_of_triangle`] counts them: fans of convex faces, and concave ones
-    /// as they lie.
+    /// The faces as triangles, in the order of [`Polygons::polygon_of_triangle`]: fans of convex
+    /// faces, and concave ones as they lie.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::new();
         self.faces.iter().for_each(|face| ears::triangulate(face, &self.points, &mut triangles));
@@ -164,7 +166,26 @@ pub fn diagonal(points: &[Point]) -> f64 {
     norm(sub(high, low))
 }
 
-/// Generalised winding number of a closed triangle mesh around `x`: 1 inside, 0 outside (Van Oosterom and Strackee 1983).
+/// Of each vertex the sum of the triangles' normals around it, each as long as twice the area.
+pub fn vertex_normals<P: Into<DVec3>>(vertices: usize, at: impl Fn(u32) -> P, triangles: &[[u32; 3]]) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::ZERO; vertices];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|v| at(v).into());
+        let normal = (b - a).cross(c - a);
+        triangle.iter().for_each(|&v| normals[v as usize] += normal);
+    }
+    normals
+}
+
+/// The first vertex at each one's place: scans double vertices along the seams of their textures.
+pub fn welded(vertices: &[Point]) -> Vec<u32> {
+    let mut first = HashMap::with_capacity(vertices.len());
+    // 0 and −0 are one place.
+    let key = |p: &Point| p.map(|x| (x + 0.0).to_bits());
+    vertices.iter().enumerate().map(|(k, p)| *first.entry(key(p)).or_insert(k as u32)).collect()
+}
+
+/// Winding number of a closed triangle mesh around `x`: 1 inside, 0 outside.
 pub fn winding_number(vertices: &[Point], triangles: &[[u32; 3]], x: Point) -> f64 {
     let mut angle = 0.0;
     for triangle in triangles {

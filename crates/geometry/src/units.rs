@@ -1,4 +1,4 @@
-//! What coordinates mean, their unit and their upward axis, and the change from one meaning to another.
+//! What coordinates mean, their unit and upward axis, and the change from one meaning to another.
 
 use crate::mesh::Point;
 use std::fmt;
@@ -60,7 +60,7 @@ impl Units {
         Self { up: self.up.or(other.up), metres_per_unit: self.metres_per_unit.or(other.metres_per_unit) }
     }
 
-    /// What makes these coordinates those of another meaning. What one of both does not say is as the other has it.
+    /// The change to another meaning. What one does not say is as the other has it.
     pub fn change_to(self, other: Self) -> Change {
         /// Less than what programs round a unit by.
         const SAME: f64 = 1e-5;

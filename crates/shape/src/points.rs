@@ -1,7 +1,7 @@
 //! Points as vectors and as matrices, and what they determine: normals, moments.
 
 use cager_geometry::linalg::symmetric_eigen;
-use cager_geometry::mesh::Point;
+use cager_geometry::mesh::{self, Point};
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3};
 
@@ -40,11 +40,7 @@ pub(crate) fn area_vector<P: Into<DVec3>>(corners: [P; 3]) -> DVec3 {
 
 /// Unit normals of vertices, by area; zero for vertices without triangles.
 pub(crate) fn vertex_normals<P: Copy + Into<DVec3>>(vertices: &[P], triangles: &[[u32; 3]]) -> Vec<DVec3> {
-    let mut normals = vec![DVec3::ZERO; vertices.len()];
-    for triangle in triangles {
-        let normal = area_vector(triangle.map(|v| vertices[v as usize]));
-        triangle.iter().for_each(|&v| normals[v as usize] += normal);
-    }
+    let normals = mesh::vertex_normals(vertices.len(), |v| vertices[v as usize], triangles);
     normals.into_iter().map(DVec3::normalize_or_zero).collect()
 }
 

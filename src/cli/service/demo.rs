@@ -13,7 +13,7 @@ use cager_client::FnFrames;
 use cager_client::messages::SessionOptions;
 use cager_compare::report_page::{NO_PAGE, ReportPage};
 use cager_core::cage::Cage;
-use cager_core::sted::{Sted, StedMeter, StedOptions};
+use cager_core::sted::{Sted, StedMeter};
 use cager_demo::{Capture, Options};
 use cager_formats::{AtomicFile, Target, commit_together, open_frames, write_model};
 use cager_geometry::mesh::diagonal;
@@ -125,7 +125,7 @@ fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<Sted> {
     let n = capture.rest.points.len();
     let size = diagonal(&capture.rest.points);
     let mut reader = open_frames(decoded, n)?;
-    let mut sted = StedMeter::new(&capture.rest.faces, n, size, StedOptions::default())?;
+    let mut sted = StedMeter::new(&capture.rest.faces, n, size)?;
     let (mut truth, mut found) = (Vec::new(), Vec::new());
     for (t, said) in report.error.per_frame.iter().enumerate() {
         capture.frame(t, &mut truth);

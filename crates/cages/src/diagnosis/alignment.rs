@@ -28,8 +28,7 @@ pub struct Alignment {
 /// A change of axes.
 type Turn = fn(Point) -> Point;
 
-/// The smallest change of units, axes and position after which nine of ten points of a model are inside a cage; `None` where no common one achieves
-/// that.
+/// The smallest change of units, axes and position after which nine of ten points are inside.
 pub fn alignment(mesh: &TriMesh, model: &Model) -> Option<Alignment> {
     let stride = model.points.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<Point> = model.points.iter().step_by(stride).copied().collect();
@@ -46,7 +45,7 @@ pub fn alignment(mesh: &TriMesh, model: &Model) -> Option<Alignment> {
                     if moved { 0.5 * (low[k] + high[k] - cage_low[k] - cage_high[k]) } else { 0.0 }
                 });
                 changed.vertices.iter_mut().for_each(|p| *p = std::array::from_fn(|k| p[k] + shift[k]));
-                // A cage much larger than the model would enclose it by chance; one around a flat model is thicker than that.
+                // A much larger cage would enclose the model by chance; flat ones are thicker.
                 let size = |k: usize| high[k] - low[k];
                 let least = THICKNESS * (0..3).map(size).fold(0.0, f64::max);
                 let fits = (0..3).all(|k| cage_high[k] - cage_low[k] < 2.0 * size(k).max(least));

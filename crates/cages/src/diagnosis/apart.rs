@@ -5,12 +5,13 @@ use cager_geometry::mesh::{TriMesh, diagonal};
 use cager_geometry::spatial::self_intersections;
 use glam::DVec3;
 
-/// How far vertices go, as fractions of the diagonal: the shortest after which no faces touch there.
+/// How far vertices go over the diagonal: the shortest after which no faces touch there.
 const STEPS: [f64; 3] = [1e-3, 3e-3, 1e-2];
 /// No vertex goes farther than this share of its shortest edge.
 const OF_EDGE: f64 = 0.2;
 
-/// Positions after it, and the farthest move as a fraction of the diagonal; `None` where no vertices touch, or nothing separates their faces.
+/// Positions after it, and the farthest move over the diagonal; `None` where no vertices touch, or
+/// nothing separates their faces.
 pub(super) fn moved_apart(cage: &TriMesh) -> Option<(Vec<DVec3>, f64)> {
     let (_, touching) = same_place(cage, &cage.triangles);
     if touching.is_empty() {

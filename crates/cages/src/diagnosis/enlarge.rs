@@ -1,6 +1,6 @@
 //! Slight enlargement of a closed cage, only where points of the model are outside.
 
-use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, TriMesh, diagonal, vertex_normals};
 use cager_geometry::spatial::{Surface, self_intersections};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -12,11 +12,12 @@ const MARGIN: f64 = 5e-4;
 /// Largest displacement of a vertex in a round, as a fraction of the diagonal.
 const MAX_STEP: f64 = 0.01;
 const MAX_ROUNDS: usize = 60;
-/// Attempts of a round: in each, vertices of faces that would newly cut another go so much less far.
+/// Attempts of a round: in each, vertices of faces that would newly cut go so much less far.
 const MAX_ATTEMPTS: usize = 6;
 const SHORTER: f64 = 0.3;
 
-/// Vertices moved outwards along their normals until all points are inside, if that takes little and cuts no faces that were apart.
+/// Vertices moved out along their normals until all points are inside, if that takes little and
+/// cuts no faces that were apart.
 pub(super) fn enlarged(cage: &TriMesh, model: &Model) -> Option<Vec<DVec3>> {
     let extent = diagonal(&model.points);
     let start: Vec<DVec3> = cage.vertices.iter().map(|&p| p.into()).collect();
@@ -28,7 +29,8 @@ pub(super) fn enlarged(cage: &TriMesh, model: &Model) -> Option<Vec<DVec3>> {
         if pushes.is_empty() {
             return Some(positions);
         }
-        let normals = normals(&surface);
+        let normals = vertex_normals(positions.len(), |v| positions[v as usize], &cage.triangles);
+        let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
         let mut step = vec![0.0_f64; positions.len()];
         for (vertex, push) in pushes {
             step[vertex as usize] = step[vertex as usize].max(push.min(MAX_STEP * extent));
@@ -40,7 +42,7 @@ pub(super) fn enlarged(cage: &TriMesh, model: &Model) -> Option<Vec<DVec3>> {
     None
 }
 
-/// Moves vertices; those of faces that would newly cut another take smaller steps. Says whether any could move.
+/// Moves vertices, those of faces that would newly cut less far. Says whether any could move.
 fn advance(
     positions: &mut [DVec3],
     start: &[DVec3],
@@ -68,7 +70,7 @@ fn advance(
     false
 }
 
-/// For the corners of the faces nearest to points that are outside or too close, how far to move out.
+/// For the corners of the faces nearest to points outside or too close, how far to move out.
 fn pushes(surface: &Surface, model: &Model, margin: f64) -> Vec<(u32, f64)> {
     let of_point = |p: &[f64; 3]| {
         let p = DVec3::from(*p);
@@ -84,14 +86,4 @@ fn pushes(surface: &Surface, model: &Model, margin: f64) -> Vec<(u32, f64)> {
     };
     let found: Vec<[(u32, f64); 3]> = model.points.par_iter().with_min_len(256).filter_map(of_point).collect();
     found.into_iter().flatten().filter(|(_, push)| *push > 0.0).collect()
-}
-
-/// Normals of the vertices, faces weighted by area.
-fn normals(surface: &Surface) -> Vec<DVec3> {
-    let mut normals = vec![DVec3::ZERO; surface.vertices.len()];
-    for (f, triangle) in surface.triangles.iter().enumerate() {
-        let [a, b, c] = surface.corners(f as u32);
-        triangle.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
-    }
-    normals.into_iter().map(DVec3::normalize_or_zero).collect()
 }

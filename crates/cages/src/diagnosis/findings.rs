@@ -3,12 +3,11 @@
 use super::alignment::{Alignment, alignment};
 use super::influence::influence;
 use cager_core::cage::{CageError, Defects};
-use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, TriMesh, diagonal, welded};
 use cager_geometry::spatial::{outside, self_intersections};
 use cager_geometry::topology::{edges, fans};
-use std::collections::HashMap;
 
-/// What is wrong with a cage around a model. Vertices and faces are counted from 0; faces are triangles.
+/// What is wrong with a cage around a model. Vertices and triangles are counted from 0.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
     /// Vertices.
@@ -19,25 +18,24 @@ pub struct Findings {
     pub refusal: Option<CageError>,
     /// What keeps the mesh from being a cage.
     pub defects: Defects,
-    /// Pairs of vertices in the same place that are one: on open borders, of one face, or without faces.
+    /// Pairs of vertices in the same place that are one: on open borders, or without other faces.
     pub duplicate_vertices: Vec<[u32; 2]>,
-    /// Pairs of vertices in the same place at which closed parts of the surface touch: merged, they would be non-manifold.
+    /// Pairs of vertices in the same place at which closed parts touch.
     pub touching_vertices: Vec<[u32; 2]>,
     /// Vertices at which parts of the surface touch without a common edge.
     pub non_manifold_vertices: Vec<u32>,
     /// Pairs of faces that cut, touch or overlap one another.
     pub self_intersections: Vec<[u32; 2]>,
-    /// Whether it was examined if the cage encloses the model: not of a cage that cannot be encoded with, nor around a model without points or with some
-    /// that are not finite.
+    /// Whether it was examined if the cage encloses the model, as of usable cages.
     pub enclosure_examined: bool,
     /// Points of the model outside the cage, where there are any and they were looked for.
     pub outside: Option<Outside>,
-    /// A change of units, axes or position after which the cage would enclose most points that are outside.
+    /// A change after which the cage would enclose most points that are outside.
     pub alignment: Option<Alignment>,
     /// Vertices that move no point of the model.
     pub idle_vertices: Vec<u32>,
-    /// Ratio of the greatest to the least singular value of the mean value coordinates, infinite where they are singular; `None` where it was not
-    /// computed.
+    /// Condition number of the mean value coordinates, infinite where they are singular; `None`
+    /// where it was not computed.
     pub condition_number: Option<f64>,
 }
 
@@ -60,7 +58,7 @@ impl Findings {
         self.refusal.is_none()
     }
 
-    /// Whether the cage is also fit to be edited by hand: free of self-intersection and around all of the model.
+    /// Whether the cage is also fit to be edited: not self-intersecting, around all of the model.
     pub fn editable(&self) -> bool {
         self.usable()
             && self.self_intersections.is_empty()
@@ -97,17 +95,10 @@ pub fn check(mesh: &TriMesh, model: &Model) -> Findings {
     findings
 }
 
-/// Pairs of vertices with equal coordinates, each with the first of them: those that are one vertex, and those at which closed parts touch.
+/// Pairs of vertices with equal coordinates: those that are one, and those that only touch.
 pub(super) fn same_place(mesh: &TriMesh, faces: &[[u32; 3]]) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
-    let mut first: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut pairs = Vec::new();
-    for (v, p) in mesh.vertices.iter().enumerate() {
-        // −0 and 0 are the same place.
-        let at = *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(v as u32);
-        if at != v as u32 {
-            pairs.push([at, v as u32]);
-        }
-    }
+    let first = welded(&mesh.vertices);
+    let pairs: Vec<[u32; 2]> = first.into_iter().zip(0..).map(|(at, v)| [at, v]).filter(|[at, v]| at != v).collect();
     if pairs.is_empty() {
         return (pairs, Vec::new());
     }
@@ -131,10 +122,7 @@ pub(super) fn same_place(mesh: &TriMesh, faces: &[[u32; 3]]) -> (Vec<[u32; 2]>, 
 fn examine_fit(findings: &mut Findings, mesh: &TriMesh, model: &Model) {
     findings.enclosure_examined = true;
     let found = outside(mesh, &model.points);
-    let farthest = found.iter().fold(None, |best: Option<(u32, f64)>, &f| match best {
-        Some(b) if b.1 >= f.1 => Some(b),
-        _ => Some(f),
-    });
+    let farthest = found.iter().copied().reduce(|best, found| if best.1 >= found.1 { best } else { found });
     let extent = diagonal(&model.points).max(f64::MIN_POSITIVE);
     findings.outside = farthest.map(|(farthest, distance)| Outside {
         count: found.len(),

@@ -1,11 +1,11 @@
-//! Filling of holes without new vertices, by the triangles of least area (Barequet and Sharir 1995).
+//! Filling of holes without new vertices, by triangles of least area (Barequet and Sharir 1995).
 
 use glam::DVec3;
 
 /// Longest border loop that is filled; longer ones are left to the user.
 pub(super) const MAX_HOLE_EDGES: usize = 40;
 
-/// Faces that fill a border loop, given in their direction: one polygon where it has at most four corners, otherwise triangles.
+/// Faces that fill a border loop: one polygon of at most four corners, otherwise triangles.
 pub(super) fn fill(border: &[u32], position: impl Fn(u32) -> DVec3) -> Vec<Vec<u32>> {
     let n = border.len();
     if n <= 4 {

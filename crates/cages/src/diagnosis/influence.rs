@@ -1,4 +1,4 @@
-//! Influence of a cage's vertices on a model: vertices without effect, and the condition number of the coordinates.
+//! Vertices of a cage without effect on a model, and the condition number of the coordinates.
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
@@ -15,7 +15,7 @@ const MAX_ENTRIES: usize = 20_000_000;
 /// Cages with more vertices are not analysed: it would take minutes.
 const MAX_ANALYSED_VERTICES: usize = 2_000;
 
-/// Vertices that move no point, and the condition number of the mean value coordinates; neither of a cage of thousands of vertices.
+/// Vertices that move no point, and the condition number; not of thousands of vertices.
 pub(super) fn influence(mesh: &TriMesh, model: &Model) -> (Vec<u32>, Option<f64>) {
     let Ok(cage) = Cage::new(mesh.clone()) else { return (Vec::new(), None) };
     if mesh.vertices.len() > MAX_ANALYSED_VERTICES {

@@ -1,4 +1,4 @@
-//! Diagnosis of a cage: all its defects at once, and repair of those that can be repaired without changing its intent.
+//! Diagnosis of a cage: all its defects at once, and repair without changing its intent.
 
 mod alignment;
 mod apart;

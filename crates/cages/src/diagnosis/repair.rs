@@ -4,12 +4,13 @@ use super::apart::moved_apart;
 use super::enlarge::enlarged;
 use super::findings::{Findings, check};
 use super::holes::{MAX_HOLE_EDGES, fill};
+use super::messages::counted;
 use super::weld::same_place;
 use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
 use cager_geometry::spatial::{Nesting, part_volumes};
-use cager_geometry::topology::{border_loops, edges, fans, shells, sides};
+use cager_geometry::topology::{border_loops, edges, fans, orientations, shells, sides};
 use glam::DVec3;
-use std::collections::{HashSet, VecDeque};
+use std::collections::HashSet;
 
 /// A repaired cage.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,9 +23,10 @@ pub struct Repair {
     pub remaining: Findings,
 }
 
-/// Repairs a cage: merges doubled vertices along open borders, removes degenerate and doubled faces and loose vertices, splits vertices
-/// at which parts only touch and moves them a little inwards, makes the orientation consistent and outward, fills small holes, and moves vertices out
-/// slightly where points of the model are outside. What is left is not more than before: where it would be, vertices are not split, or nothing is done.
+/// Repairs a cage: merges doubled vertices along open borders, removes degenerate and doubled faces
+/// and loose vertices, splits vertices at which parts only touch and moves them a little inwards,
+/// makes the orientation consistent and outward, fills small holes, and moves vertices out slightly
+/// where points of the model are outside; all this only where no more is wrong afterwards.
 pub fn repair(cage: &Model, model: &Model) -> Repair {
     let repaired = attempt(cage, model, true);
     if repaired.changes.is_empty() {
@@ -77,9 +79,10 @@ struct Repairing {
 }
 
 impl Repairing {
-    fn changed(&mut self, count: usize, what: impl Fn(usize) -> String) {
+    /// Notes what was done with so many of something, unless they were none.
+    fn changed(&mut self, done: &str, count: usize, noun: &str, rest: &str) {
         if count > 0 {
-            self.changes.push(what(count));
+            self.changes.push(format!("{done} {}{rest}", counted(count, noun)));
         }
     }
 
@@ -88,16 +91,14 @@ impl Repairing {
         let points = &self.points;
         let sound = |v: &u32| points.get(*v as usize).is_some_and(|p| p.is_finite());
         self.faces.retain(|face| face.iter().all(sound));
-        self.changed(before - self.faces.len(), |n| {
-            format!("removed {} with missing or non-finite corners", counted(n, "face", "faces"))
-        });
+        self.changed("removed", before - self.faces.len(), "face", " with missing or non-finite corners");
     }
 
     fn merge_border_vertices(&mut self) {
         let target = same_place(&self.points, &self.faces);
         let merged = target.iter().enumerate().filter(|(v, t)| *v != **t as usize).count();
         self.faces.iter_mut().flatten().for_each(|v| *v = target[*v as usize]);
-        self.changed(merged, |n| format!("merged {} with another in the same place", counted(n, "vertex", "vertices")));
+        self.changed("merged", merged, "vertex", " with another in the same place");
     }
 
     fn drop_repeated_faces(&mut self) {
@@ -118,8 +119,8 @@ impl Repairing {
             seen.insert(key)
         });
         let doubled = before - degenerate - self.faces.len();
-        self.changed(degenerate, |n| format!("removed {} without area", counted(n, "face", "faces")));
-        self.changed(doubled, |n| format!("removed {} doubling another", counted(n, "face", "faces")));
+        self.changed("removed", degenerate, "face", " without area");
+        self.changed("removed", doubled, "face", " doubling another");
     }
 
     /// A vertex at which several parts of the surface touch becomes one for each.
@@ -135,44 +136,28 @@ impl Repairing {
                 }
             }
         }
-        self.changed(split, |n| {
-            format!("split {} at which parts of the surface only touched", counted(n, "vertex", "vertices"))
-        });
+        self.changed("split", split, "vertex", " at which parts of the surface only touched");
     }
 
     /// In each connected component, the minority of faces is flipped to agree with the majority.
     fn orient_consistently(&mut self) {
         let edges = edges(&self.faces);
-        let mut turned: Vec<Option<bool>> = vec![None; self.faces.len()];
+        let across = |f: u32, [a, b]: [u32; 2]| match edges.get(&[a.min(b), a.max(b)]).map(Vec::as_slice) {
+            Some(&[p, q]) => Some((if p.0 == f { q.0 } else { p.0 }, p.1 == q.1)),
+            _ => None,
+        };
+        let around = |(f, face): (u32, &Vec<u32>)| sides(face).filter_map(|side| across(f, side)).collect();
+        let neighbours: Vec<Vec<(u32, bool)>> = (0..).zip(&self.faces).map(around).collect();
         let mut flips = 0;
-        for start in 0..self.faces.len() {
-            if turned[start].is_some() {
-                continue;
-            }
-            turned[start] = Some(false);
-            let mut part = vec![start];
-            let mut queue = VecDeque::from([start]);
-            while let Some(f) = queue.pop_front() {
-                for [a, b] in sides(&self.faces[f]) {
-                    let Some([p, q]) = edges.get(&[a.min(b), a.max(b)]).map(Vec::as_slice) else { continue };
-                    let (own, other) = if p.0 as usize == f { (p, q) } else { (q, p) };
-                    if turned[other.0 as usize].is_none() {
-                        turned[other.0 as usize] = Some(turned[f].unwrap_or(false) != (own.1 == other.1));
-                        part.push(other.0 as usize);
-                        queue.push_back(other.0 as usize);
-                    }
-                }
-            }
-            let against = part.iter().filter(|&&f| turned[f] == Some(true)).count();
+        for part in orientations(&neighbours) {
+            let against = part.iter().filter(|(_, turned)| *turned).count();
             let turn = 2 * against <= part.len();
-            for f in part {
-                if (turned[f] == Some(true)) == turn {
-                    self.faces[f].reverse();
-                    flips += 1;
-                }
+            for (face, _) in part.into_iter().filter(|(_, turned)| *turned == turn) {
+                self.faces[face as usize].reverse();
+                flips += 1;
             }
         }
-        self.changed(flips, |n| format!("turned {} around to agree with the rest", counted(n, "face", "faces")));
+        self.changed("turned", flips, "face", " around to agree with the rest");
     }
 
     fn fill_holes(&mut self) {
@@ -182,7 +167,7 @@ impl Repairing {
             let new = fill(border, |v| self.points[v as usize]);
             self.faces.extend(new);
         }
-        self.changed(small.len(), |n| format!("filled {}", counted(n, "hole", "holes")));
+        self.changed("filled", small.len(), "hole", "");
     }
 
     fn orient_outwards(&mut self) {
@@ -205,7 +190,7 @@ impl Repairing {
         let to_turn = self.faces.iter_mut().zip(&labels).filter(|(_, label)| signs[**label as usize] < 0);
         to_turn.for_each(|(face, _)| face.reverse());
         let turned = signs.iter().filter(|sign| **sign < 0).count();
-        self.changed(turned, |n| format!("turned {} to point outwards", counted(n, "part", "parts")));
+        self.changed("turned", turned, "part", " to point outwards");
     }
 
     fn labelled(&self, labels: &[u32]) -> (TriMesh, Vec<u32>) {
@@ -225,9 +210,7 @@ impl Repairing {
                 kept.push(self.points[v]);
             }
         }
-        self.changed(self.points.len() - kept.len(), |n| {
-            format!("removed {} that no face uses any more", counted(n, "vertex", "vertices"))
-        });
+        self.changed("removed", self.points.len() - kept.len(), "vertex", " that no face uses any more");
         self.points = kept;
         self.faces.iter_mut().flatten().for_each(|v| *v = new[*v as usize]);
     }
@@ -239,7 +222,7 @@ impl Repairing {
         self.points = positions;
         self.changes.push(format!(
             "moved {} inwards, by {:.2} % of the diagonal at most, as others lay in the same place",
-            counted(moved, "vertex", "vertices"),
+            counted(moved, "vertex"),
             100.0 * farthest
         ));
     }
@@ -255,9 +238,9 @@ impl Repairing {
         self.points = positions;
         self.changes.push(format!(
             "moved {} outwards, by {:.2} % of the diagonal at most, around {} that were outside",
-            counted(moved, "vertex", "vertices"),
+            counted(moved, "vertex"),
             100.0 * farthest,
-            counted(outside.count, "point", "points"),
+            counted(outside.count, "point"),
         ));
     }
 
@@ -266,8 +249,4 @@ impl Repairing {
         self.faces.iter().for_each(|face| faces.push(face));
         Model { points: self.points.iter().map(DVec3::to_array).collect(), faces, ..Model::default() }
     }
-}
-
-fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }

@@ -1,6 +1,6 @@
 //! Welding of coincident vertices along open borders, where flat shading and UV seams split them.
 
-use cager_geometry::mesh::{Model, Polygons, diagonal};
+use cager_geometry::mesh::{Model, diagonal};
 use cager_geometry::topology::edges;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -19,7 +19,8 @@ pub struct Welded {
     pub merged: usize,
 }
 
-/// Merges vertices in the same place where the surface is open; `None` where no two are. Parts of a closed surface that touch stay apart.
+/// Merges vertices in the same place where the surface is open; `None` where no two are. Parts of a
+/// closed surface that touch stay apart.
 pub fn weld(model: &Model) -> Option<Welded> {
     if model.faces.indices().iter().any(|&v| v as usize >= model.points.len()) {
         return None;
@@ -43,12 +44,8 @@ pub fn weld(model: &Model) -> Option<Welded> {
             target[first as usize]
         };
     }
-    let mut merged_faces = Polygons::new();
-    for face in faces {
-        let corners: Vec<u32> = face.iter().map(|&v| target[v as usize]).collect();
-        merged_faces.push(&corners);
-    }
-    Some(Welded { model: Model { points: kept, faces: merged_faces, colors, ..Model::default() }, target, merged })
+    let faces = model.faces.renamed(&target);
+    Some(Welded { model: Model { points: kept, faces, colors, ..Model::default() }, target, merged })
 }
 
 /// For each vertex, the first one in its place, where both lie on open borders; otherwise itself.

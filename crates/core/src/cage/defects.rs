@@ -1,6 +1,5 @@
 //! All that keeps a triangle mesh from being a cage, and its edges.
 
-use super::edges::{Edge, Face};
 use super::error::CageError;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Nesting, part_volumes};
@@ -8,11 +7,31 @@ use cager_geometry::topology::UnionFind;
 use cager_geometry::vector::{cross, dot, norm, sub};
 use std::collections::HashMap;
 
+/// An edge of a cage, shared by exactly two faces.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// Its ends, the smaller index first.
+    pub vertices: [u32; 2],
+    /// The faces at it, in the mesh's order.
+    pub faces: [u32; 2],
+}
+
+/// A face of a cage with its edges.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// Corners, counter-clockwise seen from outside.
+    pub vertices: [u32; 3],
+    /// `edges[i]` is the edge opposite corner i.
+    pub edges: [u32; 3],
+    /// +1 where the face runs along the edge from the smaller vertex index, −1 otherwise.
+    pub signs: [f64; 3],
+}
+
 /// A face whose height is below this fraction of its longest edge has no usable normal.
 const FLAT: f64 = 1e-12;
 
-/// What keeps a mesh from being a cage: closed, edge-manifold, consistently and outwardly oriented, without degenerate faces. Vertices and faces are counted
-/// from 0; lists ascend, pairs by their second entry.
+/// What keeps a mesh from being a closed, edge-manifold, consistently and outwardly oriented cage.
+/// Vertices and faces are counted from 0; lists ascend, pairs by their second entry.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Defects {
     /// Vertices with coordinates that are NaN or infinite.
@@ -33,7 +52,7 @@ pub struct Defects {
     pub inconsistent_edges: Vec<[u32; 2]>,
     /// Connected parts of the surface.
     pub components: usize,
-    /// Parts that point inwards inside another part; not looked for where edges or coordinates are defective, nor are the next.
+    /// Parts that point inwards inside another; like the next, not of defective edges or points.
     pub cavities: usize,
     /// Parts that point inwards without being a cavity, each by its first face.
     pub inward_parts: Vec<u32>,
@@ -48,7 +67,7 @@ type FacesAtEdge = Vec<(u32, bool)>;
 /// A mesh's defects, and its faces whose vertices exist, with their edges.
 pub(super) struct Examination {
     pub(super) defects: Defects,
-    /// In the order in which the faces first refer to them; complete, and what faces refer to, only where edges have no defects.
+    /// In the order in which the faces first refer to them; complete only where edges are sound.
     pub(super) edges: Vec<Edge>,
     pub(super) faces: Vec<Face>,
 }

@@ -1,11 +1,9 @@
 //! A validated cage: a closed, outward-oriented triangle mesh with its edges.
 
 mod defects;
-mod edges;
 mod error;
 
-pub use defects::Defects;
-pub use edges::{Edge, Face};
+pub use defects::{Defects, Edge, Face};
 pub use error::CageError;
 
 use cager_geometry::mesh::{Point, TriMesh, diagonal};

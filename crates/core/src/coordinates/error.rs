@@ -1,32 +1,15 @@
-/// Why coordinates cannot be computed for a model and its cage.
+/// Why coordinates cannot be computed. Points ascend; the distance is over the cage's diagonal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)]
 pub enum CoordinatesError {
-    /// Points outside the cage, where the system is not defined.
     #[error("{} outside the cage ({}), by up to {:.2} % of its diagonal, where {system} coordinates do not exist; enlarge the cage or use mean value coordinates (mvc)", counted(.points), listed(.points), 100.0 * .distance)]
-    Outside {
-        /// The system's name.
-        system: &'static str,
-        /// The points, counted from 0, ascending.
-        points: Vec<u32>,
-        /// Largest distance to the cage over the cage's diagonal.
-        distance: f64,
-    },
+    Outside { system: &'static str, points: Vec<u32>, distance: f64 },
     /// A factorisation failed, or refinement did not reach the accuracy.
     #[error("{system} coordinates could not be computed for this cage: {reason}; use mean value coordinates (mvc)")]
-    NotComputed {
-        /// The system's name.
-        system: &'static str,
-        /// What happened.
-        reason: String,
-    },
+    NotComputed { system: &'static str, reason: String },
     /// A plan of boundary elements that is not one of this cage.
     #[error("the boundary elements of {system} coordinates do not fit the cage: {reason}; get the file again")]
-    BadPlan {
-        /// The system's name.
-        system: &'static str,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
+    BadPlan { system: &'static str, reason: &'static str },
 }
 
 fn counted(points: &[u32]) -> String {

@@ -1,20 +1,18 @@
-//! Green coordinates of a closed triangle mesh (Lipman, Levin and Cohen-Or 2008): vertices and face normals.
+//! Green coordinates of a closed triangle mesh (Lipman, Levin and Cohen-Or 2008).
 //!
-//! `x = Σ φ_v v + Σ ψ_f n_f` by Green's third identity, with the closed forms of `layer.rs`. The φ sum to one inside, to zero outside and to a value
-//! in between on the cage itself. The deficit `t = 1 − Σ φ` is distributed over the nearest face, with corners `v_i` and unit normal `n`, by the
-//! point's affine coordinates `x = Σ α_i v_i + β n`: `t α_i` is added to the φ of the corners and `t β` to the ψ of the face. Inside, t is zero; on a
-//! face, an edge or a vertex the result is the limit from inside; outside it is the analytic continuation through that face (Lipman et al. 2008, §5),
-//! which jumps where another face becomes the nearest.
+//! `x = Σ φ_v v + Σ ψ_f n_f` by Green's third identity, with the closed forms of `layer.rs`. The φ
+//! sum to one inside and to zero outside. The deficit `t = 1 − Σ φ` goes to the nearest face, with
+//! corners `v_i` and unit normal `n`, by the point's affine coordinates `x = Σ α_i v_i + β n`: `t
+//! α_i` to the φ of the corners and `t β` to the ψ of the face. On the cage the result is the limit
+//! from inside; outside it is the analytic continuation through that face (§5), which jumps where
+//! another face becomes the nearest.
 //!
-//! Normals have the length ℓ, the square root of the mean area of the faces, so that `Φ` is dimensionless and all rows of a cage are lengths.
+//! Normals have the length ℓ, the square root of the mean area of the faces: `Φ` has no unit.
 
 use super::layer::{self, FaceBasis, Layers, Scratch};
-use super::{
-    CageValues, CoordinateSystem, Coordinates, CoordinatesError, DependentNormals, ElementPlan, PointwiseCoordinates,
-    pointwise_coordinates, refuse_plan,
-};
+use super::{CageValues, CoordinateSystem, Coordinates, DependentNormals, PointwiseCoordinates, pointwise_coordinates};
 use crate::cage::Cage;
-use crate::simd::{LANES, Lanes};
+use crate::simd::{LANES, Lanes, store};
 use cager_geometry::mesh::{self, Point};
 use cager_geometry::vector;
 use faer::MatMut;
@@ -22,16 +20,16 @@ use faer::MatMut;
 /// Green coordinates: cage vertices and face normals, defined inside and outside the cage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Green {
-    /// Normals are functions of the vertices, see [`DependentNormals`]: the vertices are the unknowns, and the inversion is nonlinear.
+    /// Normals are functions of the vertices, see [`DependentNormals`]: the inversion is nonlinear.
     #[default]
     Consistent,
-    /// Normals are independent unknowns, as in Thiery et al. 2012, who report it as their least stable case.
+    /// Normals are independent unknowns: the least stable case of Thiery et al. 2012.
     Free,
 }
 
 /// Rows that sum to one within this are not completed by affine coordinates.
 const COMPLETE: f64 = 1e-13;
-/// Faces whose distances differ by less than this fraction, as they do at a common edge, are equally near.
+/// Faces whose distances differ by less than this fraction are equally near.
 const EQUALLY_NEAR: f64 = 1e-9;
 /// Points closer to the cage than this fraction of its size lie on it.
 const ON_CAGE: f64 = 1e-13;
@@ -57,16 +55,6 @@ impl CoordinateSystem for Green {
     fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
     }
-
-    fn coordinates(
-        &self,
-        cage: &Cage,
-        points: &[Point],
-        plan: Option<&ElementPlan>,
-    ) -> Result<Coordinates, CoordinatesError> {
-        refuse_plan(self.name(), plan)?;
-        Ok(coordinates(cage, points))
-    }
 }
 
 fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
@@ -85,7 +73,7 @@ fn normal_length(layers: &Layers) -> f64 {
     layers.mean_area().sqrt()
 }
 
-/// Fills `rows`, the coordinates of the points from `first` on, and returns those points that lie outside.
+/// Fills the rows of the points from `first` on; returns the points that lie outside.
 fn rows_of(
     layers: &Layers,
     length: f64,
@@ -100,8 +88,8 @@ fn rows_of(
         let x = layers.group(points, first + start);
         layer::group_potentials(layers, &x, scratch);
         let (mut phi, mut psi) = rows.as_mut().split_at_col_mut(vertices);
-        layer::write_group(phi.as_mut(), start, &scratch.double, layer::INVERSE_4PI);
-        layer::write_group(psi.as_mut(), start, &scratch.single, layer::INVERSE_4PI / length);
+        store(phi.as_mut(), start, scratch.double.iter().map(|&w| (w * layer::INVERSE_4PI).0));
+        store(psi.as_mut(), start, scratch.single.iter().map(|&w| (w * (layer::INVERSE_4PI / length)).0));
         let total = scratch.double.iter().fold(Lanes::ZERO, |sum, &w| sum + w) * layer::INVERSE_4PI;
         for l in 0..LANES.min(count - start) {
             let missing = 1.0 - total.0[l];
@@ -130,8 +118,8 @@ fn from_corner(layers: &Layers, face: &FaceBasis, x: Point) -> Point {
     vector::sub(x, corner)
 }
 
-/// The nearest faces, several where a shared edge or vertex is nearest, and the weight of each. Weights fall with the angle between a face's normal
-/// and the direction to the point, so that they vary continuously across edges.
+/// The nearest faces and their weights, which fall with the angle between normal and direction to
+/// the point, so that they vary continuously across edges.
 fn nearest_faces(layers: &Layers, x: Point, missing: f64) -> Vec<(usize, f64)> {
     let distance2 =
         |face: &FaceBasis| mesh::distance2_to_triangle(face.vertices.map(|v| layers.vertices()[v as usize]), x);

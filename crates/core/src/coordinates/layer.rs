@@ -1,21 +1,20 @@
-//! Single- and double-layer potentials of a triangle mesh in closed form, for Green coordinates and boundary elements.
+//! Single- and double-layer potentials of a triangle mesh in closed form.
 //!
-//! For a point `x`, with `r = y − x`: the double layer of the hat function of a vertex, `φ_v = ∫ hat_v (r·n) / 4π|r|³`, and
-//! the single layer of a face, `ψ_f = ∫_f 1 / 4π|r|`. A harmonic function `u` inside a closed mesh is
-//! `u(x) = Σ φ_v u_v + Σ ψ_f ∂u/∂n` if it is linear and its normal derivative constant on each face (Green's third identity;
-//! Lipman, Levin and Cohen-Or 2008, Eq. 3).
+//! For a point `x`, with `r = y − x`: the double layer of a vertex's hat function, `φ_v = ∫ hat_v
+//! (r·n) / 4π|r|³`, and the single layer of a face, `ψ_f = ∫_f 1 / 4π|r|`. A harmonic `u` inside a
+//! closed mesh is `u(x) = Σ φ_v u_v + Σ ψ_f ∂u/∂n` if it is linear and its normal derivative
+//! constant on each face (Lipman, Levin and Cohen-Or 2008, Eq. 3).
 //!
-//! Both follow from the solid angle `Ω` of each face and from `L = ∫ 1/|r|` along each edge. An edge's `L` enters its two faces
-//! with opposite signs and `Ω` enters `φ` and `ψ` with opposite signs, so that linear functions are reproduced to rounding
-//! wherever the point lies, even where `Ω` and `L` themselves are inaccurate: at edges, where `L` is infinite, it is clamped, since its factors
-//! vanish there. Weights within a face are formed from coordinates along and across its longest edge,
-//! whose rounding cancels even in faces a million times longer than wide.
+//! Both follow from the solid angle `Ω` of each face and from `L = ∫ 1/|r|` along each edge. `L`
+//! enters an edge's two faces, and `Ω` φ and ψ, with opposite signs, so that linear functions are
+//! reproduced to rounding wherever the point lies, even where `Ω` and `L` are inaccurate: at edges,
+//! where `L` is infinite, it is clamped. Weights within a face are formed from coordinates along
+//! and across its longest edge, whose rounding cancels in faces a million times longer than wide.
 
 use crate::cage::{Cage, Face};
-use crate::simd::{LANES, Lanes, angle, dot, gather, ln_ratio, multiversion};
+use crate::simd::{Lanes, angle, dot, gather, ln_ratio, multiversion};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector;
-use faer::MatMut;
 
 /// Closer to the plane of a face than this fraction of its longest edge, a point lies in it.
 const IN_PLANE: f64 = 1e-13;
@@ -25,7 +24,7 @@ const LARGEST: f64 = 1.329_227_995_784_916e36;
 /// A closed triangle mesh, prepared for the potentials of its layers.
 #[derive(Clone, Debug)]
 pub(crate) struct Layers {
-    /// Scaled by a power of two to a size near one, so that nothing overflows and results do not depend on the cage's scale.
+    /// Scaled by a power of two to a size near one, so that nothing overflows.
     vertices: Vec<Point>,
     scale: f64,
     /// Ends and length.
@@ -34,8 +33,8 @@ pub(crate) struct Layers {
     triangles: Vec<[u32; 3]>,
 }
 
-/// A face in its own coordinates: its longest edge runs from the first corner, at the origin, to the second, at `(length, 0)`;
-/// the third is at `(foot · length, height)`.
+/// A face in its own coordinates: its longest edge runs from the first corner, at the origin, to
+/// the second, at `(length, 0)`; the third is at `(foot · length, height)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FaceBasis {
     /// Corners, counter-clockwise.
@@ -61,7 +60,7 @@ impl FaceBasis {
         let top = (0..3).fold(0, |a, b| if lengths[b] > lengths[a] { b } else { a });
         let (first, second) = ((top + 1) % 3, (top + 2) % 3);
         let [v0, v1, v2] = [first, second, top].map(|i| face.vertices[i]);
-        // The sides that meet opposite the longest edge are the shortest two: their product rounds least.
+        // The sides opposite the longest edge are the shortest two: their product rounds least.
         let product = vector::cross(between(v2, v0), between(v2, v1));
         let double_area = vector::norm(product);
         let length = lengths[top];
@@ -90,8 +89,8 @@ impl FaceBasis {
         self.axes[2]
     }
 
-    /// Affine coordinates of `x` with respect to the face's corners, in the order of [`Self::vertices`], and the coefficient of its unit normal.
-    /// Takes `x − v₀`, in the unit of [`Layers`].
+    /// Affine coordinates of `x`, given as `x − v₀` in the unit of [`Layers`], by the corners in
+    /// the order of [`Self::vertices`], and the coefficient of the unit normal.
     pub(super) fn affine_coordinates(&self, x: Point) -> ([f64; 3], f64) {
         let [p, q, h] = self.axes.map(|axis| vector::dot(axis, x));
         let across = q / self.height;
@@ -157,7 +156,7 @@ impl Layers {
         }
     }
 
-    /// The points from `first` on, in the unit of the prepared mesh; lanes beyond the last point repeat it.
+    /// The points from `first` on, in the unit of the prepared mesh; the last point is repeated.
     pub(super) fn group(&self, points: &[Point], first: usize) -> [Lanes; 3] {
         gather(|l| points[(first + l).min(points.len() - 1)].map(|c| c * self.scale))
     }
@@ -165,19 +164,6 @@ impl Layers {
 
 /// `1/4π`.
 pub(super) const INVERSE_4PI: f64 = 1.0 / (4.0 * std::f64::consts::PI);
-
-/// Writes one lane group, times a factor, into the rows from `start` on, as far as there are rows.
-pub(super) fn write_group(mut rows: MatMut<'_, f64>, start: usize, values: &[Lanes], factor: f64) {
-    let count = LANES.min(rows.nrows() - start);
-    for (j, &value) in values.iter().enumerate() {
-        let scaled = value * factor;
-        let mut entries = rows.as_mut().col_mut(j).subrows_mut(start, count);
-        match entries.as_mut().try_as_col_major_mut() {
-            Some(entries) => entries.as_slice_mut().copy_from_slice(&scaled.0[..count]),
-            None => entries.iter_mut().zip(scaled.0).for_each(|(entry, value)| *entry = value),
-        }
-    }
-}
 
 /// What [`edge_logarithm`] gives.
 pub(super) struct EdgeLogarithm {
@@ -187,7 +173,7 @@ pub(super) struct EdgeLogarithm {
     pub(super) cosine: Lanes,
 }
 
-/// `∫ 1/|r|` along an edge of this length between `a` and `b`, each as seen from the point and followed by its distance.
+/// `∫ 1/|r|` along an edge between `a` and `b`, as seen from the point, and their distances.
 #[inline(always)]
 pub(super) fn edge_logarithm(a: &[Lanes; 4], b: &[Lanes; 4], length: f64) -> EdgeLogarithm {
     let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -206,68 +192,66 @@ pub(super) fn edge_logarithm(a: &[Lanes; 4], b: &[Lanes; 4], length: f64) -> Edg
 
 multiversion! {
     /// Potentials at one lane group, left in the scratch.
-    pub(super) fn group_potentials(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scratch) = group_potentials_generic;
-}
-
-#[inline(always)]
-fn group_potentials_generic(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scratch) {
-    for (j, v) in layers.vertices.iter().enumerate() {
-        let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
-        let corner = &mut scratch.corners[j];
-        corner[3] = dot(&r, &r).sqrt();
-        corner[0] = r[0];
-        corner[1] = r[1];
-        corner[2] = r[2];
-        scratch.double[j] = Lanes::ZERO;
-    }
-    for (k, &([a, b], length)) in layers.edges.iter().enumerate() {
-        let (a, b) = (&scratch.corners[a as usize], &scratch.corners[b as usize]);
-        let edge = &mut scratch.edges[k];
-        let logarithm = edge_logarithm(a, b, length);
-        edge[0] = logarithm.value;
-        edge[1] = logarithm.cosine;
-    }
-    for (f, face) in layers.faces.iter().enumerate() {
-        let [v0, v1, v2] = face.vertices.map(|v| v as usize);
-        let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
-        let (l0, l1, l2) = (e0[0], e1[0], e2[0]);
-        let (c0, c1, c2) = (&scratch.corners[v0], &scratch.corners[v1], &scratch.corners[v2]);
-        let along = |axis: &Point| c0[0] * axis[0] + c0[1] * axis[1] + c0[2] * axis[2];
-        let (p, q, h) = (along(&face.axes[0]), along(&face.axes[1]), along(&face.axes[2]));
-        let sine = h * (face.length * face.height);
-        let cosine = c0[3] * c1[3] * c2[3] + e0[1] * c0[3] + e1[1] * c1[3] + e2[1] * c2[3];
-        let half = angle(sine.map(f64::abs), cosine);
-        let least = IN_PLANE * face.length;
-        let omega = half.zip(h, |a, h| {
-            if h > least {
-                2.0 * a
-            } else if h < -least {
-                -2.0 * a
-            } else {
-                0.0
-            }
-        });
-        let across = q * (1.0 / face.height);
-        let first = p * (1.0 / face.length);
-        let [n0, n1] = face.normals;
-        let wx = l0 * n0[0] + l1 * n1[0];
-        let wy = l0 * n0[1] + l1 * n1[1] - l2;
-        let s = across * omega + h * wy * (1.0 / face.height);
-        let t = first * omega + h * wx * (1.0 / face.length);
-        let second = s * face.foot - t;
-        scratch.double[v2] = scratch.double[v2] - s;
-        scratch.double[v1] = scratch.double[v1] + second;
-        scratch.double[v0] = scratch.double[v0] + (omega + s - second);
-        let weight1 = across * face.foot - first;
-        let weight0 = across - weight1 + 1.0;
-        let around = weight0 * face.heights[0] * l0 + weight1 * face.heights[1] * l1 - q * l2;
-        scratch.single[f] = around - h * omega;
+    pub(super) fn group_potentials(layers: &Layers, x: &[Lanes; 3], scratch: &mut Scratch) {
+        for (j, v) in layers.vertices.iter().enumerate() {
+            let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
+            let corner = &mut scratch.corners[j];
+            corner[3] = dot(&r, &r).sqrt();
+            corner[0] = r[0];
+            corner[1] = r[1];
+            corner[2] = r[2];
+            scratch.double[j] = Lanes::ZERO;
+        }
+        for (k, &([a, b], length)) in layers.edges.iter().enumerate() {
+            let (a, b) = (&scratch.corners[a as usize], &scratch.corners[b as usize]);
+            let edge = &mut scratch.edges[k];
+            let logarithm = edge_logarithm(a, b, length);
+            edge[0] = logarithm.value;
+            edge[1] = logarithm.cosine;
+        }
+        for (f, face) in layers.faces.iter().enumerate() {
+            let [v0, v1, v2] = face.vertices.map(|v| v as usize);
+            let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
+            let (l0, l1, l2) = (e0[0], e1[0], e2[0]);
+            let (c0, c1, c2) = (&scratch.corners[v0], &scratch.corners[v1], &scratch.corners[v2]);
+            let along = |axis: &Point| c0[0] * axis[0] + c0[1] * axis[1] + c0[2] * axis[2];
+            let (p, q, h) = (along(&face.axes[0]), along(&face.axes[1]), along(&face.axes[2]));
+            let sine = h * (face.length * face.height);
+            let cosine = c0[3] * c1[3] * c2[3] + e0[1] * c0[3] + e1[1] * c1[3] + e2[1] * c2[3];
+            let half = angle(sine.map(f64::abs), cosine);
+            let least = IN_PLANE * face.length;
+            let omega = half.zip(h, |a, h| {
+                if h > least {
+                    2.0 * a
+                } else if h < -least {
+                    -2.0 * a
+                } else {
+                    0.0
+                }
+            });
+            let across = q * (1.0 / face.height);
+            let first = p * (1.0 / face.length);
+            let [n0, n1] = face.normals;
+            let wx = l0 * n0[0] + l1 * n1[0];
+            let wy = l0 * n0[1] + l1 * n1[1] - l2;
+            let s = across * omega + h * wy * (1.0 / face.height);
+            let t = first * omega + h * wx * (1.0 / face.length);
+            let second = s * face.foot - t;
+            scratch.double[v2] = scratch.double[v2] - s;
+            scratch.double[v1] = scratch.double[v1] + second;
+            scratch.double[v0] = scratch.double[v0] + (omega + s - second);
+            let weight1 = across * face.foot - first;
+            let weight0 = across - weight1 + 1.0;
+            let around = weight0 * face.heights[0] * l0 + weight1 * face.heights[1] * l1 - q * l2;
+            scratch.single[f] = around - h * omega;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::{LANES, store};
     use cager_geometry::mesh::TriMesh;
     use faer::Mat;
 
@@ -278,8 +262,8 @@ mod tests {
         let mut scratch = layers.scratch();
         for start in (0..points.len()).step_by(LANES) {
             group_potentials(layers, &layers.group(points, start), &mut scratch);
-            write_group(phi.as_mut(), start, &scratch.double, INVERSE_4PI);
-            write_group(psi.as_mut(), start, &scratch.single, INVERSE_4PI / layers.scale);
+            store(phi.as_mut(), start, scratch.double.iter().map(|&w| (w * INVERSE_4PI).0));
+            store(psi.as_mut(), start, scratch.single.iter().map(|&w| (w * (INVERSE_4PI / layers.scale)).0));
         }
         (phi, psi)
     }
@@ -334,9 +318,8 @@ mod tests {
 
     #[test]
     fn groups_are_written_into_rows_of_any_layout() {
-        let values = [Lanes([1.0; LANES]), Lanes([2.0; LANES])];
         let mut rows = Mat::zeros(2, LANES + 1);
-        write_group(rows.transpose_mut(), 1, &values, 3.0);
+        store(rows.transpose_mut(), 1, [[3.0; LANES], [6.0; LANES]].into_iter());
         assert!((0..LANES).all(|l| (rows[(0, l + 1)], rows[(1, l + 1)]) == (3.0, 6.0)), "{rows:?}");
         assert_eq!((rows[(0, 0)], rows[(1, 0)]), (0.0, 0.0));
     }

@@ -1,4 +1,5 @@
-//! Cage coordinates: each point as a linear combination `P = Φ·Y` of the rows Y of a cage, its vertices and, for Green coordinates, its face normals.
+//! Cage coordinates: points as linear combinations `P = Φ·Y` of a cage's rows Y, its vertices and,
+//! for Green coordinates, its face normals.
 
 mod error;
 mod green;
@@ -15,7 +16,7 @@ pub use normals::{DependentNormals, Derivative};
 
 use crate::cage::Cage;
 use crate::simd::LANES;
-use cager_geometry::linalg::zeros;
+use cager_geometry::linalg::{BLOCK_ROWS, zeros};
 use cager_geometry::mesh::Point;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
@@ -34,20 +35,21 @@ pub struct Coordinates {
     pub plan: Option<ElementPlan>,
 }
 
-/// Version of the definition of the coordinate systems, stored in containers because decoders recompute the coordinates. It increases when a change
-/// moves a decoded point by more than 1e-7 of the diagonal; those before it then remain supported. 1 and 2 were never released.
+/// Version of the coordinate systems, stored in containers because decoders recompute the
+/// coordinates. It increases when a decoded point moves by more than 1e-7 of the diagonal; those
+/// before then remain supported. 1 and 2 were never released.
 pub const DEFINITION: u32 = 3;
 
-/// How a numerical solution was refined. Stored in reports: the names of fields are part of the format.
+/// How a numerical solution was refined. The names of fields are part of the report's format.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Refinement {
     /// Boundary elements of the last solution.
     pub elements: usize,
     /// Solutions after the first.
     pub refinements: usize,
-    /// An estimate of how far a coordinate of a point is from the limit, at most 1e-3 but where a warning says otherwise: the largest of what the
-    /// highest degrees of the elements change of one, what one was corrected by to make linear functions exact, and the residual that the iteration
-    /// left of the equations on the cage, those of unknowns that it left out and of damped ones as well.
+    /// Estimate of how far a coordinate is from the limit, at most 1e-3 but where a warning says
+    /// otherwise: the largest of what the highest degrees change, what linear functions were
+    /// corrected by, and the residual of the equations on the cage.
     #[serde(deserialize_with = "crate::numbers::number_or_null")]
     pub change: f64,
 }
@@ -78,7 +80,7 @@ pub type PointwiseCoordinates = fn(&Cage, &[Point]) -> Coordinates;
 pub struct CageValues {
     /// Those of the rest pose, columns × 3. The vertices come first.
     pub rest: Vec<Point>,
-    /// How normals are computed from the vertices, for systems in which the vertices alone are unknown.
+    /// How normals are computed from the vertices, where the vertices alone are unknown.
     pub dependent_normals: Option<DependentNormals>,
 }
 
@@ -93,13 +95,13 @@ impl CageValues {
         self.rest.len()
     }
 
-    /// Unknowns m of a cage: rows stored per frame. Equal to the number of columns unless some values are functions of others.
+    /// Unknowns m of a cage: the rows stored per frame.
     pub fn unknowns(&self) -> usize {
         self.columns() - self.dependent_normals.as_ref().map_or(0, |normals| normals.faces().len())
     }
 }
 
-/// A system of cage coordinates. Every implementation passes the suite in `crates/core/tests/conformance.rs`.
+/// A system of cage coordinates. Each passes the suite in `crates/core/tests/conformance.rs`.
 pub trait CoordinateSystem: Sync {
     /// The name on the command line, in reports and in containers.
     fn name(&self) -> &'static str;
@@ -107,25 +109,29 @@ pub trait CoordinateSystem: Sync {
     /// The values of a cage.
     fn values(&self, cage: &Cage) -> CageValues;
 
-    /// `Φ` for these points. Rows sum to one; runs on the current rayon pool; the result does not depend on it. With a plan, a numerical solution is
-    /// found on the elements of an earlier one instead of elements chosen for these points; with the earlier points the bits are the same.
+    /// `Φ` for these points. Rows sum to one; the threads of the pool do not matter. With a plan, a
+    /// numerical solution is found on the elements of an earlier one.
     ///
     /// # Errors
-    /// A cage or points for which the system is not defined; a plan made for another cage or another system.
+    /// A cage or points for which the system is not defined; a plan of another cage or system.
     fn coordinates(
         &self,
         cage: &Cage,
         points: &[Point],
         plan: Option<&ElementPlan>,
-    ) -> Result<Coordinates, CoordinatesError>;
+    ) -> Result<Coordinates, CoordinatesError> {
+        match (self.pointwise(), plan) {
+            (Some(pointwise), None) => Ok(pointwise(cage, points)),
+            _ => Err(CoordinatesError::BadPlan { system: self.name(), reason: "they have none" }),
+        }
+    }
 
-    /// [`Self::coordinates`] for systems in which a row of `Φ` depends on its own point alone and always exists, so that `Φ` can be computed in
-    /// chunks.
+    /// [`Self::coordinates`] where a row of `Φ` depends on its own point alone and always exists.
     fn pointwise(&self) -> Option<PointwiseCoordinates> {
         None
     }
 
-    /// Bytes that computing takes beside `Φ`, at the most, for any points in this cage; with a plan, on its elements, nothing where it is refused.
+    /// Bytes that computing takes beside `Φ`, at the most, for any points; of a refused plan none.
     fn working_bytes(&self, _cage: &Cage, _plan: Option<&ElementPlan>) -> u64 {
         0
     }
@@ -142,8 +148,8 @@ pub trait CoordinateSystem: Sync {
 /// Points that one parallel task computes: a few lane groups.
 const TASK_POINTS: usize = 8 * LANES;
 
-/// Coordinates whose rows depend on their own points alone, task by task: `work` fills the rows from that of the given point on, and returns the points of
-/// them that lie outside.
+/// Coordinates whose rows depend on their own points alone, task by task: `work` fills the rows
+/// from that of the given point on, and returns the points that lie outside.
 fn pointwise_coordinates<S>(
     points: usize,
     columns: usize,
@@ -157,7 +163,19 @@ fn pointwise_coordinates<S>(
     Coordinates { phi, outside, refinement: None, plan: None }
 }
 
-/// Refuses a plan for a system that is no numerical solution.
-fn refuse_plan(system: &'static str, plan: Option<&ElementPlan>) -> Result<(), CoordinatesError> {
-    plan.map_or(Ok(()), |_| Err(CoordinatesError::BadPlan { system, reason: "they have none" }))
+/// Approximate memory of one chunk of coordinates, in both precisions together.
+const CHUNK_BYTES: usize = 96 << 20;
+
+/// Computes coordinates chunk by chunk, in whole blocks; `work` gets each one's first point.
+pub(crate) fn for_each_chunk(
+    pointwise: PointwiseCoordinates,
+    cage: &Cage,
+    points: &[Point],
+    columns: usize,
+    mut work: impl FnMut(usize, &Coordinates),
+) {
+    let size = (CHUNK_BYTES / (12 * columns)).max(1).next_multiple_of(BLOCK_ROWS);
+    for (part, points) in points.chunks(size).enumerate() {
+        work(part * size, &pointwise(cage, points));
+    }
 }

@@ -1,9 +1,9 @@
-//! Face normals as functions of the vertices of a deformed cage (Lipman, Levin and Cohen-Or 2008, Eq. 8): the unit normal
-//! of each face, times the factor by which the face is stretched.
+//! Face normals as functions of the vertices of a deformed cage (Lipman, Levin and Cohen-Or 2008,
+//! Eq. 8): the unit normal of each face, times the factor by which the face is stretched.
 //!
-//! With edges `u`, `v` of a face at rest and `u'`, `v'` of the deformed one,
-//! `s² = (|u'|²|v|² − 2 (u'·v')(u·v) + |v'|²|u|²) / 8 area²`, which is the mean of the squares of the two factors by which the
-//! face is stretched. The normal of a face collapsed to a line or a point is zero.
+//! With edges `u`, `v` of a face at rest and `u'`, `v'` of the deformed one, `s² = (|u'|²|v|² − 2
+//! (u'·v')(u·v) + |v'|²|u|²) / 8 area²`, the mean square of the face's two factors of stretch. The
+//! normal of a collapsed face is zero.
 
 use crate::cage::Cage;
 use cager_geometry::mesh::Point;
@@ -13,7 +13,7 @@ use cager_geometry::vector::{cross, dot, norm, sub};
 #[derive(Clone, Debug, PartialEq)]
 pub struct DependentNormals {
     faces: Vec<[u32; 3]>,
-    /// Of each face, what `|u'|²`, `u'·v'` and `|v'|²` are multiplied with to give the square of the normal's length.
+    /// Of each face, factors of `|u'|²`, `u'·v'` and `|v'|²` in the square of the normal's length.
     weights: Vec<[f64; 3]>,
 }
 
@@ -33,8 +33,7 @@ impl DependentNormals {
         Self { weights: weights.collect(), faces }
     }
 
-    /// Reassembles it from [`Self::faces`] and [`Self::weights`]; `None` where their lengths differ, an index is out of range or a weight is not
-    /// finite.
+    /// From [`Self::faces`] and [`Self::weights`]; `None` where they do not fit together.
     pub fn from_parts(faces: Vec<[u32; 3]>, weights: Vec<[f64; 3]>, vertices: usize) -> Option<Self> {
         let fits = faces.len() == weights.len()
             && faces.iter().flatten().all(|&v| (v as usize) < vertices)
@@ -47,7 +46,7 @@ impl DependentNormals {
         &self.faces
     }
 
-    /// Of each face, what `|u'|²`, `u'·v'` and `|v'|²` are multiplied with to give the square of the normal's length.
+    /// Of each face, factors of `|u'|²`, `u'·v'` and `|v'|²` in the square of the normal's length.
     pub fn weights(&self) -> &[[f64; 3]] {
         &self.weights
     }
@@ -62,7 +61,7 @@ impl DependentNormals {
         })
     }
 
-    /// Derivatives of the normal of each face with respect to the edges from its first corner to the other two.
+    /// Derivatives of each face's normal by the edges from its first corner to the other two.
     pub fn derivatives(&self, vertices: &[Point]) -> Vec<Derivative> {
         let of_face = |(&face, weights): (&[u32; 3], &[f64; 3])| {
             let [u, v] = edges(face, |i| vertices[i as usize]);

@@ -80,7 +80,7 @@ impl Sums {
     }
 }
 
-/// Whether an error is larger than the largest before it. One that is NaN is larger than all others, so that it is not lost among them.
+/// Whether an error is larger than the largest before it; NaN is larger than all others.
 fn exceeds(error: f64, largest: f64) -> bool {
     error > largest || error.is_nan() && !largest.is_nan()
 }
@@ -118,51 +118,48 @@ fn largest(decoded: [&[f32]; 3], truth: [&[f64]; 3], centre: &Point) -> usize {
 }
 
 multiversion! {
-    fn strip_sums(decoded: [&[f32]; 3], truth: [&[f64]; 3], centre: &Point, sums: &mut Sums) = strip_sums_generic;
-}
-
-#[inline(always)]
-fn strip_sums_generic(decoded: [&[f32]; 3], truth: [&[f64]; 3], centre: &Point, sums: &mut Sums) {
-    const WIDE: usize = 8;
-    let mut squared = [0.0f64; WIDE];
-    let mut largest = [0.0f64; WIDE];
-    let mut second = [0.0f64; WIDE];
-    let mut first = [[0.0f64; WIDE]; 3];
-    let count = decoded[0].len();
-    let mut start = 0;
-    while start < count {
-        let width = WIDE.min(count - start);
-        let mut e2 = [0.0f64; WIDE];
-        for k in 0..3 {
-            let mut d = [0.0f32; WIDE];
-            let mut t = [0.0f64; WIDE];
-            d[..width].copy_from_slice(&decoded[k][start..start + width]);
-            t[..width].copy_from_slice(&truth[k][start..start + width]);
-            for l in 0..WIDE {
-                let used = if l < width { 1.0 } else { 0.0 };
-                // Rounded as a decoder's output is, so that the figure is what a user would measure.
-                let out = f64::from((f64::from(d[l]) + centre[k]) as f32);
-                let e = (out - t[l]) * used;
-                e2[l] += e * e;
-                let about = (t[l] - centre[k]) * used;
-                first[k][l] += about;
-                second[l] += about * about;
+    fn strip_sums(decoded: [&[f32]; 3], truth: [&[f64]; 3], centre: &Point, sums: &mut Sums) {
+        const WIDE: usize = 8;
+        let mut squared = [0.0f64; WIDE];
+        let mut largest = [0.0f64; WIDE];
+        let mut second = [0.0f64; WIDE];
+        let mut first = [[0.0f64; WIDE]; 3];
+        let count = decoded[0].len();
+        let mut start = 0;
+        while start < count {
+            let width = WIDE.min(count - start);
+            let mut e2 = [0.0f64; WIDE];
+            for k in 0..3 {
+                let mut d = [0.0f32; WIDE];
+                let mut t = [0.0f64; WIDE];
+                d[..width].copy_from_slice(&decoded[k][start..start + width]);
+                t[..width].copy_from_slice(&truth[k][start..start + width]);
+                for l in 0..WIDE {
+                    let used = if l < width { 1.0 } else { 0.0 };
+                    // Rounded as a decoder's output is.
+                    let out = f64::from((f64::from(d[l]) + centre[k]) as f32);
+                    let e = (out - t[l]) * used;
+                    e2[l] += e * e;
+                    let about = (t[l] - centre[k]) * used;
+                    first[k][l] += about;
+                    second[l] += about * about;
+                }
             }
+            for l in 0..WIDE {
+                squared[l] += e2[l];
+                largest[l] = if e2[l] > largest[l] { e2[l] } else { largest[l] };
+            }
+            start += width;
         }
         for l in 0..WIDE {
-            squared[l] += e2[l];
-            largest[l] = if e2[l] > largest[l] { e2[l] } else { largest[l] };
-        }
-        start += width;
-    }
-    for l in 0..WIDE {
-        sums.squared += squared[l];
-        // The sum is NaN where one of its terms is.
-        let largest = if squared[l].is_nan() { f64::NAN } else { largest[l] };
-        sums.largest = if exceeds(largest, sums.largest) { largest } else { sums.largest };
-        sums.second += second[l];
-        for k in 0..3 {
-            sums.first[k] += first[k][l];
+            sums.squared += squared[l];
+            // The sum is NaN where one of its terms is.
+            let largest = if squared[l].is_nan() { f64::NAN } else { largest[l] };
+            sums.largest = if exceeds(largest, sums.largest) { largest } else { sums.largest };
+            sums.second += second[l];
+            for k in 0..3 {
+                sums.first[k] += first[k][l];
+            }
         }
     }
 }

@@ -1,22 +1,20 @@
-//! Decoding: positions `P = Φ·Y` in single precision from a cage's rows Y, including the normals where these are functions of its vertices; and
-//! errors against a capture.
+//! Decoding: positions `P = Φ·Y` in single precision from a cage's rows Y, and their errors.
 
 mod error;
 mod phi;
 mod poles;
 
 pub use error::FrameError;
-pub(crate) use phi::for_each_chunk;
 pub use poles::{Bound, Survey, beside_poles};
 
 use crate::batch::{BATCH, product_columns};
 use crate::cage::Cage;
-use crate::coordinates::{DependentNormals, PointwiseCoordinates};
-use cager_geometry::linalg;
+use crate::coordinates::{DependentNormals, PointwiseCoordinates, for_each_chunk};
+use cager_geometry::linalg::{self, BLOCK_ROWS};
 use cager_geometry::mesh::Point;
 use error::{Sums, block_sums};
 use faer::{Mat, MatRef};
-use phi::{BLOCK_ROWS, Phi, padded, to_padded_single};
+use phi::{Phi, padded, to_padded_single};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -26,7 +24,7 @@ pub struct Decoder {
     /// Shared by the solvers of one analysis.
     phi: Phi,
     points: usize,
-    /// Number of leading columns of `Φ` that multiply vertices, which follow a translation; the others multiply normals.
+    /// Number of leading columns of `Φ` that multiply vertices; the others multiply normals.
     positions: usize,
     /// Computes the normals from the vertices; `None` where normals are rows of the cage.
     normals: Option<Arc<DependentNormals>>,
@@ -39,7 +37,7 @@ impl Decoder {
         Self { phi, points, positions, normals: None }
     }
 
-    /// A decoder that stores the coordinates of these points in single precision, computing them chunk by chunk.
+    /// Stores the coordinates of these points in single precision, computed chunk by chunk.
     pub fn with_stored_coordinates(
         pointwise: PointwiseCoordinates,
         cage: &Cage,
@@ -56,8 +54,8 @@ impl Decoder {
         Self { phi: Phi::Stored(Arc::new(phi)), points: points.len(), positions: cage.vertices().len(), normals: None }
     }
 
-    /// A decoder that recomputes the coordinates of these points chunk by chunk at every use, with bit-identical results: for models whose `Φ`
-    /// exceeds memory.
+    /// Recomputes the coordinates of these points chunk by chunk at every use, to the same bits:
+    /// for models whose `Φ` exceeds memory.
     pub fn with_recomputed_coordinates(
         pointwise: PointwiseCoordinates,
         cage: &Cage,
@@ -69,8 +67,8 @@ impl Decoder {
         Self { phi, points: points.len(), positions, normals: None }
     }
 
-    /// Takes coordinates in single precision, n × `columns`, row-major, as the service sends them to clients that decode; the first `positions`
-    /// columns multiply vertices. Results are bit-identical to those of the decoder that they came from.
+    /// Takes coordinates in single precision, n × `columns`, row-major, as the service sends them;
+    /// the first `positions` columns multiply vertices.
     ///
     /// # Panics
     /// Where the values are not whole rows.
@@ -153,9 +151,8 @@ impl Decoder {
         self.coordinates().map_or(0, |phi| 4 * phi.nrows() * phi.ncols())
     }
 
-    /// Positions of frames, each n × 3 interleaved, from their cages, each m × 3 interleaved, in batches of [`BATCH`].
-    ///
-    /// The result of a frame is bit-identical whatever the other frames.
+    /// Positions of frames, each n × 3 interleaved, from their cages, each m × 3 interleaved. The
+    /// result of a frame is bit-identical whatever the other frames.
     ///
     /// # Panics
     /// Where the lengths do not fit.
@@ -198,10 +195,8 @@ impl Decoder {
         });
     }
 
-    /// The largest sum of sizes that [`Self::decode`] adds up for a coordinate of a point in any of these cages, or more: its rounding errors are a fraction of it.
-    ///
-    /// # Panics
-    /// Where the lengths do not fit.
+    /// The largest sum of sizes that [`Self::decode`] adds up for a coordinate of a point in any of
+    /// these cages, or more: its rounding errors are a fraction of it.
     pub fn largest_sum(&self, cages: &[&[f32]]) -> f64 {
         // Of each column, along each axis.
         let mut sizes = vec![[0.0f32; 3]; self.columns()];
@@ -230,10 +225,7 @@ impl Decoder {
         f64::from(largest)
     }
 
-    /// Errors of frames: what [`Self::decode`] gives for these cages against the capture's own positions.
-    ///
-    /// # Panics
-    /// Where the lengths do not fit.
+    /// Errors of frames: what [`Self::decode`] gives against the capture's own positions.
     pub fn measure<T: Copy + Into<f64> + Sync>(&self, cages: &[&[f32]], frames: &[&[T]]) -> Vec<FrameError> {
         assert_eq!(cages.len(), frames.len(), "one frame per cage");
         let n = self.points();
@@ -263,8 +255,8 @@ impl Decoder {
         (0..frames.len()).map(|f| Sums::total(blocks.iter().map(|b| &b[f])).into_error(n)).collect()
     }
 
-    /// The matrix that `Φ` multiplies, three columns per cage and padding, and the cages' centres. Vertices are relative to their centre, to keep
-    /// precision far from the origin.
+    /// The matrix that `Φ` multiplies, three columns per cage and padding, and the cages' centres,
+    /// to which vertices are relative.
     fn values(&self, cages: &[&[f32]]) -> (Mat<f32>, Vec<Point>) {
         let m = self.unknowns();
         assert!(cages.iter().all(|c| c.len() == 3 * m), "every cage has every unknown");

@@ -2,17 +2,11 @@
 
 use super::poles::Bound;
 use crate::cage::Cage;
-use crate::coordinates::{Coordinates, PointwiseCoordinates};
+use crate::coordinates::{PointwiseCoordinates, for_each_chunk};
 use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef};
 use std::sync::Arc;
-
-/// Rows of Φ that one task multiplies: their product with a batch of cages stays in the second-level cache.
-pub(super) const BLOCK_ROWS: usize = 1024;
-
-/// Approximate memory of one chunk of coordinates, in both precisions together.
-const CHUNK_BYTES: usize = 96 << 20;
 
 /// `Φ` in single precision, n × columns, column-major, padded with zero rows to a whole tile.
 #[derive(Clone, Debug)]
@@ -68,7 +62,7 @@ impl Phi {
         }
     }
 
-    /// Calls `work` for each chunk in order, with its first row and its rows; all chunks but the last are whole blocks.
+    /// Calls `work` with the first row of each chunk and its rows, whole blocks but for the last.
     pub(super) fn for_each_part(&self, mut work: impl FnMut(usize, MatRef<'_, f32>)) {
         match self {
             Self::Stored(phi) => work(0, (**phi).as_ref()),
@@ -98,21 +92,7 @@ impl Phi {
     }
 }
 
-/// Computes coordinates chunk by chunk, in whole blocks except for the last; calls `work` with the first point of each chunk and its coordinates.
-pub(crate) fn for_each_chunk(
-    pointwise: PointwiseCoordinates,
-    cage: &Cage,
-    points: &[Point],
-    columns: usize,
-    mut work: impl FnMut(usize, &Coordinates),
-) {
-    let size = (CHUNK_BYTES / (12 * columns)).max(1).next_multiple_of(BLOCK_ROWS);
-    for (part, points) in points.chunks(size).enumerate() {
-        work(part * size, &pointwise(cage, points));
-    }
-}
-
-/// Puts rows of points that are bound in the place of others: pairs of a row and its place among those bound.
+/// Replaces rows of bound points: pairs of a row and its place among those bound.
 fn put(phi: &mut Mat<f32>, bound: &Bound, rows: impl Iterator<Item = (usize, usize)>) {
     for (row, at) in rows {
         (0..phi.ncols()).for_each(|j| phi[(row, j)] = bound.rows[(at, j)] as f32);

@@ -1,12 +1,11 @@
 //! Points of another model beside poles of its coordinates.
 //!
-//! Mean values have poles where their weights add up to zero: outside of a cage, and inside one that cuts itself, as designed ones may. Beside a pole a
-//! point's coordinates are large and change quickly. The capture's own points there were in the fit of its cages, which follow them all the same; a
-//! point between them was in none, and lands anywhere.
+//! Mean values have poles where their weights add up to zero: outside of a cage, and inside one
+//! that cuts itself. Beside a pole a point's coordinates are large and change quickly. The
+//! capture's own points there were in the fit of its cages; one between them lands anywhere.
 
-use super::phi::for_each_chunk;
 use crate::cage::Cage;
-use crate::coordinates::PointwiseCoordinates;
+use crate::coordinates::{PointwiseCoordinates, for_each_chunk};
 use crate::inversion::PrepareError;
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::{Point, TriMesh};
@@ -19,12 +18,12 @@ use std::collections::HashMap;
 const LARGE: f64 = 2.0;
 /// Coordinates whose sizes add up to less have a usable derivative.
 const GOOD: f64 = 1.5;
-/// Of so many points of the capture's model, evenly spaced, the nearest good one gives the derivative.
+/// Of so many of the model's points, evenly spaced, the nearest good one gives the derivative.
 const CANDIDATES: usize = 20_000;
 /// Step of the derivative, and the longest way that needs none, as shares of the cage's diagonal.
 const STEP: f64 = 1e-5;
 const NO_WAY: f64 = 1e-12;
-/// Coordinates that are bound, at the most: 128 MB of rows, and up to three times that of derivatives. A model with more is in another place than the cage.
+/// Coordinates that are bound, at the most: 128 MB of rows. A model with more is in another place.
 const MAX_ENTRIES: usize = 1 << 24;
 
 /// What is to be known of another model's points in a cage.
@@ -78,11 +77,9 @@ impl Bound {
         Self { places: Vec::new(), rows: zeros(0, 0) }
     }
 
-    /// Binds those of some `points` that are `beside` poles to the model that the cages were fitted to: they get the coordinates of the nearest place on
-    /// it, and for the way from there the first order of a good point's. Affine motions stay exact. The model's own points keep theirs.
-    ///
-    /// # Errors
-    /// [`PrepareError::TooManyBesidePoles`].
+    /// Binds those of some `points` that are `beside` poles to the model that the cages were fitted
+    /// to: they get the coordinates of the nearest place on it, and for the way from there the
+    /// first order of a good point's. The model's own points keep theirs.
     pub fn new(
         pointwise: PointwiseCoordinates,
         cage: &Cage,
@@ -126,7 +123,7 @@ fn tree(points: &[Point]) -> Bvh {
     Bvh::new(&boxes)
 }
 
-/// The nearest of the points of a tree; the first where there is none, as of points that are not finite.
+/// The nearest of a tree's points; the first where there is none, as of points that are not finite.
 fn nearest(tree: &Bvh, points: &[Point], p: Point) -> usize {
     let found = tree.nearest(p.into(), f64::INFINITY, |i| distance(points[i as usize], p).powi(2));
     found.map_or(0, |(i, _)| i as usize)

@@ -1,14 +1,10 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
-use super::checks::{
-    check, coordinates_bytes, outside, reject_far_points, reject_unreproduced_point, reproduction_error,
-};
-use super::{PreparationReport, PrepareContext, PrepareError, SolverOptions, Step};
-
-use super::Handles;
+use super::checks::{check, coordinates_bytes, outside, reject_far_points, reject_missed, reproduction_error};
+use super::{Handles, PreparationReport, PrepareContext, PrepareError, SolverOptions, Step};
 use crate::cage::Cage;
-use crate::coordinates::{CageValues, CoordinateSystem, MeanValue, PointwiseCoordinates};
-use crate::decode::{Decoder, for_each_chunk};
+use crate::coordinates::{CageValues, CoordinateSystem, MeanValue, PointwiseCoordinates, for_each_chunk};
+use crate::decode::Decoder;
 use crate::morton::morton_order;
 use cager_geometry::mesh::{Point, diagonal};
 use faer::Mat;
@@ -39,22 +35,56 @@ pub(crate) struct AnalysedCoordinates {
 }
 
 impl AnalysedCoordinates {
-    /// Of all points, or, for a solver that reads these handles, of a sample of a very large model, once points and options are checked.
+    /// Of all points, or, for a solver with these handles, of a sample of a very large model.
     pub(crate) fn checked(
         (system, cage, points): (&dyn CoordinateSystem, &Cage, &[Point]),
         options: SolverOptions,
         handles: Option<Handles>,
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
-        check(points, system.values(cage).unknowns(), options, context.memory)?;
+        let values = system.values(cage);
+        let (m, columns) = (values.unknowns(), values.columns());
+        check(points, m, options, context.memory)?;
         reject_far_points(cage, points)?;
         context.begin(Step::Coordinates)?;
-        coordinates(system, cage, points, handles, context)
+        let copies = if handles.is_none() { 3 } else { 2 };
+        let check_memory = |rows: usize| {
+            let needed = coordinates_bytes(rows, columns, copies);
+            let gigabytes = 1e-9 * needed as f64;
+            let too_large = PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes };
+            if needed > context.memory { Err(too_large) } else { Ok(()) }
+        };
+        let sampled = system
+            .pointwise()
+            .and_then(|pointwise| Some((pointwise, sample(points, m, handles, context.analysed_entries)?)));
+        if let Some((pointwise, sample)) = sampled {
+            check_memory(sample.len())?;
+            return of_sample(values, pointwise, cage, points, sample, context.stores_coordinates);
+        }
+        check_memory(points.len())?;
+        let found = system.coordinates(cage, points, None)?;
+        let (mut phi, mut rest) = (found.phi, values.rest);
+        let worst = reproduction_error(phi.as_ref(), &rest, cage, points);
+        reject_missed(worst, cage, diagonal(points))?;
+        let mut decoder = None;
+        if values.dependent_normals.is_some() {
+            decoder = Some(
+                Decoder::new(phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals),
+            );
+            drop(phi);
+            phi = MeanValue.coordinates(cage, points, None)?.phi;
+            rest.truncate(m);
+        }
+        let (refinement, plan) = (found.refinement, found.plan);
+        let preparation = PreparationReport { refinement, plan, ..report(cage, points, &found.outside, worst.1) };
+        let (points, diagonal) = (points.to_vec(), diagonal(points));
+        Ok(Self { phi, points, sample: None, decoder, rest, diagonal, preparation })
     }
 }
 
-/// A sample of points spaced evenly along a space-filling curve; `None` where all points are analysed, as for every choice of handles. It has at least as many points as the handles
-/// read, except with [`Handles::All`], for which the sample stands for all. Its density follows that of the model.
+/// A sample of points spaced evenly along a space-filling curve, so that its density follows the
+/// model's; `None` where all points are analysed. At least as many as the handles read, except with
+/// [`Handles::All`], for which the sample stands for all.
 fn sample(points: &[Point], unknowns: usize, handles: Option<Handles>, entries: usize) -> Option<Vec<u32>> {
     let read = match handles? {
         Handles::All => 0,
@@ -68,49 +98,6 @@ fn sample(points: &[Point], unknowns: usize, handles: Option<Handles>, entries: 
     let mut sample: Vec<u32> = (0..count).map(|k| order[(2 * k + 1) * points.len() / (2 * count)]).collect();
     sample.sort_unstable();
     Some(sample)
-}
-
-/// Coordinates of all points, or, for a solver that reads these handles, of a sample of a very large model.
-fn coordinates(
-    system: &dyn CoordinateSystem,
-    cage: &Cage,
-    points: &[Point],
-    handles: Option<Handles>,
-    context: &PrepareContext<'_>,
-) -> Result<AnalysedCoordinates, PrepareError> {
-    let copies = if handles.is_none() { 3 } else { 2 };
-    let values = system.values(cage);
-    let (m, columns) = (values.unknowns(), values.columns());
-    let check_memory = |rows: usize| {
-        let needed = coordinates_bytes(rows, columns, copies);
-        let gigabytes = 1e-9 * needed as f64;
-        let too_large = PrepareError::OutOfMemory { points: points.len(), unknowns: m, gigabytes };
-        if needed > context.memory { Err(too_large) } else { Ok(()) }
-    };
-    let sampled = system
-        .pointwise()
-        .and_then(|pointwise| Some((pointwise, sample(points, m, handles, context.analysed_entries)?)));
-    if let Some((pointwise, sample)) = sampled {
-        check_memory(sample.len())?;
-        return of_sample(values, pointwise, cage, points, sample, context.stores_coordinates);
-    }
-    check_memory(points.len())?;
-    let found = system.coordinates(cage, points, None)?;
-    let (mut phi, mut rest) = (found.phi, values.rest);
-    let worst = reproduction_error(phi.as_ref(), &rest, cage, points);
-    reject_unreproduced_point(worst.0, worst.1, cage, diagonal(points))?;
-    let mut decoder = None;
-    if values.dependent_normals.is_some() {
-        decoder =
-            Some(Decoder::new(phi.as_ref(), cage.vertices().len()).with_dependent_normals(values.dependent_normals));
-        drop(phi);
-        phi = MeanValue.coordinates(cage, points, None)?.phi;
-        rest.truncate(m);
-    }
-    let (refinement, plan) = (found.refinement, found.plan);
-    let preparation = PreparationReport { refinement, plan, ..report(cage, points, &found.outside, worst.1) };
-    let (points, diagonal) = (points.to_vec(), diagonal(points));
-    Ok(AnalysedCoordinates { phi, points, sample: None, decoder, rest, diagonal, preparation })
 }
 
 fn of_sample(
@@ -144,11 +131,11 @@ fn of_sample(
             }
         });
     });
-    // A part of the cage may be determined by very few points, which the sample could miss: add those with the largest coordinates of each column.
+    // A part of the cage may be determined by very few points, which the sample could miss.
     sample.extend(nearest.iter().flatten().map(|&(_, point)| point));
     sample.sort_unstable();
     sample.dedup();
-    reject_unreproduced_point(worst.0, worst.1, cage, diagonal(points))?;
+    reject_missed(worst, cage, diagonal(points))?;
     let decoder = if keeps { Decoder::with_stored_coordinates } else { Decoder::with_recomputed_coordinates }(
         pointwise, cage, points, columns,
     );

@@ -12,17 +12,15 @@ use rayon::prelude::*;
 /// Coordinates with a larger affine reproduction error, over the diagonal, are rejected.
 const NOT_REPRODUCED: f64 = 1e-6;
 
-/// Largest distance of a point from the cage, in diagonals of the cage. The coordinates of a point farther away are so large that, beside them, the
-/// others may fall below [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE).
+/// Largest distance of a point from the cage, in diagonals of the cage. Beside those of a point
+/// farther away, other coordinates may fall below
+/// [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE).
 const FAR: f64 = 1e5;
 
 /// Points outside by at most this fraction of the diagonal count as lying on the cage.
 const ON_THE_CAGE: f64 = 1e-9;
 
 /// Rejects points so far from the cage that their coordinates are dominated by rounding.
-///
-/// # Errors
-/// [`PrepareError::TooFar`].
 pub fn reject_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareError> {
     let [a, b, c] = cage.vertices()[0];
     for (point, p) in points.iter().enumerate() {
@@ -34,13 +32,8 @@ pub fn reject_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareErr
     Ok(())
 }
 
-/// Rejects a point whose coordinates are dominated by rounding. The smaller diagonal counts, since a stray point enlarges that of the model.
-pub(super) fn reject_unreproduced_point(
-    point: usize,
-    error: f64,
-    cage: &Cage,
-    diagonal: f64,
-) -> Result<(), PrepareError> {
+/// Rejects a point whose coordinates are dominated by rounding.
+pub(super) fn reject_missed((point, error): (usize, f64), cage: &Cage, diagonal: f64) -> Result<(), PrepareError> {
     let relative = error / diagonal.min(cage.diagonal());
     if relative.is_nan() || relative > NOT_REPRODUCED {
         return Err(PrepareError::NotReproduced { point, error: relative });
@@ -70,10 +63,7 @@ pub(super) fn check(
     check_options(points.len(), unknowns, options, memory)
 }
 
-/// Checks options for so many points and unknowns, where the covariance of handles may take so many bytes of memory.
-///
-/// # Errors
-/// Those variants of [`PrepareError`] that concern options.
+/// Checks options for so many points and unknowns; handles may take `memory` bytes.
 pub fn check_options(points: usize, unknowns: usize, options: SolverOptions, memory: u64) -> Result<(), PrepareError> {
     if options.regularizer.has_threshold() && options.spectrum > unknowns {
         return Err(PrepareError::SpectrumTooLarge { spectrum: options.spectrum, unknowns });
@@ -93,14 +83,14 @@ pub fn check_options(points: usize, unknowns: usize, options: SolverOptions, mem
     Ok(())
 }
 
-/// Bytes of `copies` double-precision matrices n × m. Whoever knows what is free compares them to it: a system that promises more memory than it has
-/// would grant any amount, and end the program where it is used.
+/// Bytes of `copies` double-precision matrices n × m, to be compared with what is free: a system
+/// may promise more memory than it has, and end the program where it is used.
 pub fn coordinates_bytes(points: usize, unknowns: usize, copies: usize) -> u64 {
     [points, unknowns, copies].into_iter().fold(8, |bytes, factor| bytes.saturating_mul(factor as u64))
 }
 
-/// Of the points reported as outside, those that neither lie on the cage nor inside a self-overlapping part of it; and their largest distance to the
-/// cage over the diagonal.
+/// Of the points reported as outside, those neither on the cage nor inside a self-overlapping part
+/// of it; and their largest distance over the diagonal.
 pub(super) fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f64) -> (Vec<u32>, f64) {
     // Relative to a vertex, so that a cage far from the origin keeps its digits.
     let origin = cage.vertices()[0];
@@ -119,23 +109,17 @@ pub(super) fn outside(cage: &Cage, points: &[Point], found: &[u32], diagonal: f6
     (measured.into_iter().map(|(i, _)| i).collect(), farthest)
 }
 
-/// The point of the largest `|Φ C − P|`, and that distance. Measured about the cage's first vertex: far from the origin the
-/// sum itself would round.
-pub(super) fn reproduction_error(
-    phi: MatRef<'_, f64>,
-    unknowns: &[Point],
-    cage: &Cage,
-    points: &[Point],
-) -> (usize, f64) {
+/// The point of the largest `|Φ C − P|`, and that distance, about the cage's first vertex.
+pub(super) fn reproduction_error(phi: MatRef<'_, f64>, rest: &[Point], cage: &Cage, points: &[Point]) -> (usize, f64) {
     let o = cage.vertices()[0];
-    let c = about_first(unknowns, cage.vertices().len());
+    let c = about_first(rest, cage.vertices().len());
     let product = tall_product(phi, c.as_ref());
     let error =
         |(i, p): (usize, &Point)| (i, (0..3).map(|k| (product[(i, k)] - (p[k] - o[k])).powi(2)).sum::<f64>().sqrt());
     points.iter().enumerate().map(error).fold((0, 0.0), |a, b| if b.1 > a.1 || b.1.is_nan() { b } else { a })
 }
 
-/// Unknowns relative to the first vertex, m × 3, which keeps precision; the target does not depend on translations.
+/// Unknowns relative to the first vertex, m × 3, for precision.
 pub(crate) fn about_first(unknowns: &[Point], positions: usize) -> Mat<f64> {
     Mat::from_fn(unknowns.len(), 3, |i, k| unknowns[i][k] - if i < positions { unknowns[0][k] } else { 0.0 })
 }

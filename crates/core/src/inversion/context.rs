@@ -16,13 +16,13 @@ pub struct PreparationReport {
     pub affine_reproduction_error: f64,
     /// Condition number of `Φ`, over its rank.
     pub condition_full: f64,
-    /// Condition number of the rows read, over their rank. NaN in an analysis for rows that are given later.
+    /// Condition number of the rows read, over their rank; NaN of rows that are given later.
     pub condition_handles: f64,
-    /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and where every point is read, otherwise of the rows read. Of
-    /// 1,024 unknowns or more, of which few are regularised, only the first one and the last are computed; the others are NaN. None where all
-    /// points are solved for by normal equations.
+    /// Singular values of the inverted matrix, descending: of `Φ` for spread handles and all
+    /// points, otherwise of the rows read. Of 1,024 unknowns or more, few of them regularised,
+    /// those between the first and the last are NaN. None where normal equations are solved.
     pub singular_values: Vec<f64>,
-    /// Singular directions below [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE): the points hardly determine them.
+    /// Directions below [`WEAK_SINGULAR_VALUE`](crate::regularize::WEAK_SINGULAR_VALUE).
     pub weak: usize,
     /// How the handles of maximum volume were found; zeros where none were looked for.
     pub maxvol: Volume,
@@ -59,14 +59,14 @@ impl Step {
 /// How to prepare a solver, apart from its options.
 #[derive(Clone, Copy)]
 pub struct PrepareContext<'a> {
-    /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix); the others have one of their own.
+    /// Δ of [`Regularizer::Matrix`](crate::regularize::Regularizer::Matrix).
     pub matrix: Option<&'a SparseMatrix>,
-    /// Whether the decoder of a model of very many points stores their coordinates, four bytes per point and column, or recomputes them at every use.
+    /// Whether a decoder of very many points stores their coordinates or recomputes them.
     pub stores_coordinates: bool,
-    /// Largest number of entries of `Φ`, points × unknowns, up to which all points are analysed; of a model with more, a sample is. With eight points per
-    /// unknown or fewer all of them always are.
+    /// Entries of `Φ` up to which all points are analysed; of a larger model, with more than eight
+    /// points per unknown, a sample is.
     pub analysed_entries: usize,
-    /// Most bytes that the coordinates, or the covariance of handles, may take; what needs more is refused before any of it is taken.
+    /// Most bytes that the coordinates, or the covariance of handles, may take.
     pub memory: u64,
     /// Called before each step begins; `Break` ends the preparation with [`PrepareError::Stopped`].
     pub before_step: &'a dyn Fn(Step) -> ControlFlow<()>,

@@ -1,17 +1,18 @@
 //! Least squares over all points, regularised over the whole spectrum, by its normal equations:
-//! `(ΦᵀΦ + w ΔᵀΔ) C = Φᵀ P + w ΔᵀΔ C₀` with `w = λ n/m`, so that λ is relative to the mean square error of the points.
+//! `(ΦᵀΦ + w ΔᵀΔ) C = Φᵀ P + w ΔᵀΔ C₀` with `w = λ n/m`: λ is beside the mean square error.
 
 use super::{
     AnalysedCoordinates, Handles, Nearness, PreparationReport, PrepareContext, PrepareError, RegularizationTarget,
-    Solver, SolverOptions, Step, about_first, failed, padded_to_tiles, with_unit_row_sums,
+    Solver, SolverOptions, Step, about_first, failed, with_unit_row_sums,
 };
+use crate::batch::padded_to_tiles;
 use crate::cage::Cage;
 use crate::decode::Decoder;
 use crate::regularize::{Reference, Regularizer, WEAK_SINGULAR_VALUE, add_term};
 use cager_geometry::linalg::{self, svd};
 use faer::{Mat, MatRef};
 
-/// Pivots of the normal equations below this fraction of their diagonal entries leave too few digits: singular directions solve such systems.
+/// Pivots below this fraction of their diagonal entries leave too few digits.
 const SMALLEST_PIVOT: f64 = 1e-10;
 
 /// Whether the options ask for all points and a term over the whole spectrum.
@@ -21,10 +22,7 @@ pub(super) fn applies(options: SolverOptions, unknowns: usize) -> bool {
     options.handles == Handles::All && is_complete && options.lambda > 0.0
 }
 
-/// The solver of such options; gives the coordinates back where the normal equations are too ill-conditioned.
-///
-/// # Errors
-/// [`PrepareError::Stopped`], and where a decomposition does not converge.
+/// The solver of such options; the coordinates where the equations are too ill-conditioned.
 pub(super) fn solver(
     found: AnalysedCoordinates,
     cage: &Cage,
@@ -40,7 +38,7 @@ pub(super) fn solver(
     let gram = linalg::lower_product(phi.transpose(), phi);
     let mut system = gram.clone();
     add_term(&mut system, delta, weight);
-    // The inverse, the target of the rest cage, and what a translation of that cage would add to it.
+    // The inverse, the target of the rest cage, and what a translation of that would add to it.
     let reference = options.regularizer.reference();
     let mut right = Mat::<f64>::identity(m, m);
     let mut term = Mat::<f64>::zeros(m, m);

@@ -1,6 +1,7 @@
-//! Cages that stay near their frames. What a cage cannot follow of a frame is left over in every singular direction, and moves the cage by that over the
-//! singular value: beyond the s directions that the term holds, weak ones may take vertices hundreds of diagonals away. Such a frame is solved once more,
-//! held to the shape of the rest cage over the whole spectrum, `min ‖A (C' − C)‖² + λ ‖Δ (C' − C_R)‖²`, with the smallest λ that keeps the cage near.
+//! Cages that stay near their frames. What a cage cannot follow is left over in every singular
+//! direction, and moves the cage by that over the singular value: weak directions may take vertices
+//! hundreds of diagonals away. Such a frame is solved once more, held to the rest cage's shape over
+//! the whole spectrum, `min ‖A (C' − C)‖² + λ ‖Δ (C' − C_R)‖²`, with the smallest λ that does.
 
 use crate::cage::Cage;
 use crate::regularize::{add_term, cage_laplacian};
@@ -10,14 +11,13 @@ use cager_geometry::spatial::Aabb;
 use faer::Mat;
 use std::sync::OnceLock;
 
-/// A cage is near its frame where no vertex is farther from the box around the points read than the rest cage's farthest and so many diagonals.
+/// A cage is near where no vertex leaves the box around the points by more than at rest and this.
 const NEAR: f64 = 1.0;
-/// From so many diagonals on, a frame has the held cage alone. In between it has a mixture, so that cages do not jump from frame to frame; that is at most
-/// 1.25 diagonals away.
+/// From so many diagonals on, a frame has the held cage alone; before, a mixture.
 const FAR: f64 = 2.0;
-/// Weights λ that are tried in turn, beside the mean square error. Under the last the rest cage moves along as it is.
+/// Weights λ that are tried in turn; under the last the rest cage moves along as it is.
 const WEIGHTS: [f64; 10] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e4, 1e6];
-/// Weight of displacements themselves beside that of their differences, for parts of a cage that no point determines.
+/// Weight of displacements themselves, for parts of a cage that no point determines.
 const DISPLACEMENT: f64 = 1e-3;
 
 /// What brings cages back to their frames.
@@ -80,12 +80,12 @@ impl Nearness {
         8 * self.data.factor.nrows() * self.data.factor.ncols()
     }
 
-    /// Brings the cage of a frame back where it is far from it, and says whether it was; `diagonal` is that of the rest pose.
+    /// Brings the cage of a frame back where it is far from it, and says whether it was.
     pub(super) fn keep(&self, cage: &mut [Point], frame: &Aabb, diagonal: f64) -> bool {
         let unit = diagonal.max(frame.size().length());
         let vertices = self.cage.vertices().len();
         let share = |distance: f64| (((distance - self.data.margin) / unit - NEAR) / (FAR - NEAR)).min(1.0);
-        // Seldom is even a corner of the box around the cage far, and boxes are found faster than distances of all vertices.
+        // Seldom is even the box around the cage far, and it is found faster than all distances.
         let around = Aabb::around_all(&cage[..vertices]);
         if share(frame.max_distance2(&around).sqrt()) <= 0.0 {
             return false;
@@ -105,7 +105,7 @@ impl Nearness {
     /// The cage nearest to fitting what this one fits that is near.
     fn held(&self, cage: &[Point], is_near: impl Fn(&[Point]) -> bool) -> Vec<Point> {
         let (m, vertices) = (cage.len(), self.cage.vertices().len());
-        // By the calling thread: whoever waits for it must not be given other work, which may wait for it too.
+        // By the calling thread: whoever waits for it must not be given work that waits for it too.
         let of_factor = || linalg::mirrored(linalg::gram(self.data.factor.as_ref(), usize::MAX));
         let gram = self.gram.get_or_init(of_factor);
         // Displacements, and a translation by one.

@@ -3,6 +3,7 @@
 use super::consistent::Consistent;
 use super::nearness::{Nearness, NearnessParts};
 use super::{PreparationReport, RegularizationTarget, Solver};
+use crate::batch::padded_to_tiles;
 use crate::coordinates::DependentNormals;
 use crate::decode::Decoder;
 use faer::{Mat, MatRef};
@@ -11,7 +12,7 @@ use std::sync::Arc;
 /// The data of a solver as plain arrays.
 #[derive(Clone, Debug)]
 pub struct SolverParts {
-    /// Indices of the points read; where every point is read, those of maximum volume, if they were chosen.
+    /// Indices of the points read; of all points, those of maximum volume, if they were chosen.
     pub handles: Vec<u32>,
     /// Whether the inversion reads every point instead of the handles.
     pub reads_all: bool,
@@ -60,8 +61,7 @@ impl Solver {
         &self.target
     }
 
-    /// Data of the consistent inversion, if any: the definition of the normals, the Gram matrix of the rows read, columns × columns, and the weight λ
-    /// of the linear start.
+    /// The normals' definition, the Gram matrix of the rows read, and the linear start's weight λ.
     pub fn dependent(&self) -> Option<(&DependentNormals, MatRef<'_, f64>, f64)> {
         let consistent = self.consistent.as_ref()?;
         Some((self.decoder.dependent_normals()?, consistent.gram(), consistent.weight()))
@@ -78,7 +78,7 @@ impl Solver {
         Self { nearness: None, ..self }
     }
 
-    /// Reassembles a solver whose results are bit-identical to those of the original. `None` where the parts are inconsistent.
+    /// A solver with bit-identical results; `None` where the parts are inconsistent.
     pub fn from_parts(parts: SolverParts) -> Option<Self> {
         let SolverParts {
             handles,
@@ -117,7 +117,7 @@ impl Solver {
             Some(parts) => Some(Arc::new(Nearness::from_parts(parts).filter(|nearness| nearness.unknowns() == m)?)),
             None => None,
         };
-        let operator = super::padded_to_tiles(operator);
+        let operator = padded_to_tiles(operator);
         Some(Self { handles, reads_all, operator, target, consistent, nearness, decoder, diagonal, preparation })
     }
 }

@@ -9,10 +9,7 @@ use crate::spectral::Analysis;
 use cager_geometry::mesh::Point;
 
 impl Solver {
-    /// The checks of [`Self::prepare`] that need no computation; the covariance of handles may take `memory` bytes.
-    ///
-    /// # Errors
-    /// See [`PrepareError`].
+    /// The checks of [`Self::prepare`] that need no computation; handles may take `memory` bytes.
     pub fn check(
         system: &dyn CoordinateSystem,
         cage: &Cage,
@@ -25,10 +22,7 @@ impl Solver {
         Ok(system.check(cage, points)?)
     }
 
-    /// Computes coordinates, handles, spectrum and operator. Runs on the current rayon pool; its result does not depend on it.
-    ///
-    /// # Errors
-    /// See [`PrepareError`].
+    /// Computes coordinates, handles, spectrum and operator. The threads of the pool do not matter.
     pub fn prepare(
         system: &dyn CoordinateSystem,
         cage: &Cage,
@@ -39,9 +33,6 @@ impl Solver {
     }
 
     /// As [`Self::prepare`], with a custom matrix, progress and cancellation.
-    ///
-    /// # Errors
-    /// See [`PrepareError`].
     pub fn prepare_with(
         system: &dyn CoordinateSystem,
         cage: &Cage,

@@ -1,4 +1,4 @@
-//! Inversion of frames: one matrix product per batch, followed by the consistent inversion where normals are functions of the vertices.
+//! Inversion of frames: a matrix product per batch, then the consistent inversion if there is one.
 
 use super::consistent::Consistent;
 use super::context::PreparationReport;
@@ -12,7 +12,7 @@ use cager_geometry::spatial::Aabb;
 use faer::{Accum, Mat};
 use std::sync::Arc;
 
-/// A prepared inversion: `C_t = R · H_t`, plus a constant or a linear function of the previous cage for some terms.
+/// A prepared inversion: `C_t = R · H_t`, plus what the reference cage contributes.
 #[derive(Clone, Debug)]
 pub struct Solver {
     pub(crate) handles: Vec<u32>,
@@ -55,9 +55,9 @@ impl Solver {
         &self.preparation
     }
 
-    /// Indices of the points read, K, in the order in which they are read. With [`Handles::All`](super::Handles::All) every point is
-    /// read: these are those of maximum volume, or none where no handles were chosen; for a very large model they are its sample, and no
-    /// other point is read.
+    /// Indices of the points read, K, in their order. With [`Handles::All`](super::Handles::All)
+    /// every point is read: these are those of maximum volume, or none; for a very large model they
+    /// are the sample that is read.
     pub fn handles(&self) -> &[u32] {
         &self.handles
     }
@@ -80,34 +80,18 @@ impl Solver {
         self.decoder.size_bytes() + operator + consistent + nearness + 4 * self.handles.len()
     }
 
-    /// Whether every cage depends on the previous frame's, so that frames have to be inverted in order.
+    /// Whether cages depend on the previous frame's, so that frames have to be inverted in order.
     pub fn follows_previous(&self) -> bool {
         self.target.is_previous()
     }
 
-    /// The cages of frames, in batches of [`BATCH`]. Where cages depend on the previous frame, these are consecutive frames, and `previous` is the
-    /// cage of the frame before them, `None` at the beginning. Other solvers ignore it.
-    ///
-    /// The cage of a frame is bit-identical whatever the other frames, and whichever rows are given.
+    /// The cages of frames. Where cages depend on the previous frame, these are consecutive frames,
+    /// and `previous` is the cage before them, `None` at the beginning. The cage of a frame is
+    /// bit-identical whatever the other frames, and whichever rows are given.
     ///
     /// # Panics
     /// Where lengths do not fit, or the solver reads every point and only handles are given.
     pub fn invert<T: Copy + Into<f64>>(
-        &self,
-        rows: Rows,
-        previous: Option<&[f32]>,
-        frames: &[&[T]],
-    ) -> Vec<InvertedFrame> {
-        let mut solved: Vec<InvertedFrame> = Vec::with_capacity(frames.len());
-        for batch in frames.chunks(BATCH) {
-            let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
-            let batch = self.invert_batch(rows, before, batch);
-            solved.extend(batch);
-        }
-        solved
-    }
-
-    fn invert_batch<T: Copy + Into<f64>>(
         &self,
         rows: Rows,
         previous: Option<&[f32]>,
@@ -119,45 +103,38 @@ impl Solver {
             Rows::Handles => (self.handles.len(), "every frame has every handle"),
         };
         assert!(frames.iter().all(|f| f.len() == 3 * given), "{every}");
+        assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
         let is_given = rows == Rows::Handles || self.reads_all;
         let point_of_row = |row: usize| if is_given { row } else { self.handles[row] as usize };
-        assert!(previous.is_none_or(|cage| cage.len() == 3 * self.decoder.unknowns()), "a cage has every unknown");
-        let (mut cages, boxes) = self.linear(frames, point_of_row);
-        let position = |frame: usize, row: usize| {
-            let point = point_of_row(row);
-            [0, 1, 2].map(|k| frames[frame][3 * point + k].into())
-        };
-        if let (Some(consistent), false) = (&self.consistent, self.follows_previous()) {
-            let mut held = Vec::with_capacity(frames.len());
-            for (cage, around) in cages.iter_mut().zip(&boxes) {
-                self.target.add(cage, None, self.decoder.positions());
-                held.push(self.keep_near(cage, around));
-            }
-            let found = consistent.refine(&self.decoder, &mut cages, position, self.diagonal);
-            let inverted = |((cage, found), held): ((&Vec<Point>, _), bool)| InvertedFrame {
-                cage: single(cage),
-                convergence: Some(found),
-                held,
-            };
-            return cages.iter().zip(found).zip(held).map(inverted).collect();
-        }
         let mut solved: Vec<InvertedFrame> = Vec::with_capacity(frames.len());
-        for (f, (mut cage, around)) in cages.into_iter().zip(&boxes).enumerate() {
-            let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
-            self.target.add(&mut cage, before, self.decoder.positions());
-            let held = self.keep_near(&mut cage, around);
-            let mut cage = [cage];
-            let refine = |consistent: &Arc<Consistent>| {
-                consistent.refine(&self.decoder, &mut cage, |_, row| position(f, row), self.diagonal).pop()
-            };
-            let convergence = self.consistent.as_ref().and_then(refine);
-            solved.push(InvertedFrame { cage: single(&cage[0]), convergence, held });
+        // Cages that depend on the previous one are finished one by one.
+        let together = if self.follows_previous() { 1 } else { BATCH };
+        for batch in frames.chunks(BATCH) {
+            let (mut cages, boxes) = self.linear(batch, point_of_row);
+            let parts = cages.chunks_mut(together).zip(boxes.chunks(together));
+            for ((cages, boxes), frames) in parts.zip(batch.chunks(together)) {
+                let before = solved.last().map(|inverted| inverted.cage.as_slice()).or(previous);
+                let finish_linear = |(cage, around): (&mut Vec<Point>, &Aabb)| {
+                    self.target.add(cage, before, self.decoder.positions());
+                    self.nearness.as_ref().is_some_and(|nearness| nearness.keep(cage, around, self.diagonal))
+                };
+                let held: Vec<bool> = cages.iter_mut().zip(boxes).map(finish_linear).collect();
+                let position = |frame: usize, row: usize| {
+                    let point = point_of_row(row);
+                    [0, 1, 2].map(|k| frames[frame][3 * point + k].into())
+                };
+                let refine =
+                    |consistent: &Arc<Consistent>| consistent.refine(&self.decoder, cages, position, self.diagonal);
+                let found = self.consistent.as_ref().map(refine);
+                let inverted = |(f, cage): (usize, &Vec<Point>)| InvertedFrame {
+                    cage: cage.as_flattened().iter().map(|&x| x as f32).collect(),
+                    convergence: found.as_ref().map(|found| found[f]),
+                    held: held[f],
+                };
+                solved.extend(cages.iter().enumerate().map(inverted));
+            }
         }
         solved
-    }
-
-    fn keep_near(&self, cage: &mut [Point], around: &Aabb) -> bool {
-        self.nearness.as_ref().is_some_and(|nearness| nearness.keep(cage, around, self.diagonal))
     }
 
     /// `R · H`, and the box around the points that are read of each frame.
@@ -173,8 +150,7 @@ impl Solver {
         let mut block = Mat::<f64>::zeros(BLOCK_ROWS.min(columns), width);
         let mut read = vec![[0.0; 3]; block.nrows()];
         let mut boxes = vec![Aabb::EMPTY; frames.len()];
-        let mut first = 0;
-        while first < columns {
+        for first in (0..columns).step_by(BLOCK_ROWS) {
             let rows = BLOCK_ROWS.min(columns - first);
             for (f, (frame, around)) in frames.iter().zip(&mut boxes).enumerate() {
                 for (i, place) in read[..rows].iter_mut().enumerate() {
@@ -186,26 +162,11 @@ impl Solver {
                 }
                 *around = around.union(&Aabb::around_all(&read[..rows]));
             }
-            linalg::multiply_add(
-                cages.as_mut(),
-                if first == 0 { Accum::Replace } else { Accum::Add },
-                self.operator.as_ref().subrows(first, rows).transpose(),
-                block.as_ref().subrows(0, rows),
-                1.0,
-            );
-            first += rows;
+            let accumulate = if first == 0 { Accum::Replace } else { Accum::Add };
+            let operator = self.operator.as_ref().subrows(first, rows).transpose();
+            linalg::multiply_add(cages.as_mut(), accumulate, operator, block.as_ref().subrows(0, rows), 1.0);
         }
         let cage = |f: usize| (0..m).map(|j| [0, 1, 2].map(|k| cages[(j, 3 * f + k)])).collect();
         ((0..frames.len()).map(cage).collect(), boxes)
     }
-}
-
-fn single(cage: &[Point]) -> Vec<f32> {
-    cage.as_flattened().iter().map(|&x| x as f32).collect()
-}
-
-/// Zero columns up to a whole tile, see `product_columns`.
-pub(crate) fn padded_to_tiles(mut operator: Mat<f64>) -> Mat<f64> {
-    operator.resize_with(operator.nrows(), operator.ncols().next_multiple_of(linalg::TILE_ROWS), |_, _| 0.0);
-    operator
 }

@@ -1,8 +1,9 @@
-//! Regularisation towards a reference cage: what it adds to `R · H`.
+//! Regularisation towards a reference cage: what it adds to `R · H`; and row sums corrected so that
+//! cages follow a translation exactly, despite truncation, damping or rounding.
 
-use super::translations::with_zero_row_sums;
 use cager_geometry::mesh::Point;
 use faer::Mat;
+use faer::reborrow::Reborrow;
 
 /// The cage towards which solutions are regularised, as its contribution to the solution.
 #[derive(Clone, Debug)]
@@ -21,7 +22,7 @@ pub enum RegularizationTarget {
 }
 
 impl RegularizationTarget {
-    /// Towards the previous frame's cage by this linear map of it, and at first towards the rest cage.
+    /// Towards the previous frame's cage by this linear map of it, and at first the rest cage.
     pub(crate) fn towards_previous(to_cage: Mat<f64>, rest: &[Point], positions: usize) -> Self {
         let first = rest.iter().flatten().map(|&x| x as f32).collect();
         Self::Previous { operator: with_zero_row_sums(to_cage, positions), first }
@@ -76,4 +77,29 @@ impl RegularizationTarget {
             }
         }
     }
+}
+
+/// Makes the rows of R for vertices sum to one, those for normals to zero. Takes and returns `Rᵀ`.
+pub(crate) fn with_unit_row_sums(mut operator: Mat<f64>, positions: usize) -> Mat<f64> {
+    let read = operator.nrows();
+    for j in 0..operator.ncols() {
+        let column = operator.col_mut(j);
+        let sum: f64 = column.rb().iter().sum();
+        let share = (if j < positions { 1.0 } else { 0.0 } - sum) / read as f64;
+        for x in column.iter_mut() {
+            *x += share;
+        }
+    }
+    operator
+}
+
+/// Makes the entries of every row that multiply vertices sum to zero.
+pub(crate) fn with_zero_row_sums(mut target: Mat<f64>, positions: usize) -> Mat<f64> {
+    for i in 0..target.nrows() {
+        let share = (0..positions).map(|j| target[(i, j)]).sum::<f64>() / positions as f64;
+        for j in 0..positions {
+            target[(i, j)] -= share;
+        }
+    }
+    target
 }

@@ -3,8 +3,8 @@
 use crate::cage::Cage;
 use faer::Mat;
 
-/// `Δ = I − D⁻¹A`: of the graph of vertices, v × v; where there are unknown normals, a second block of the graph of faces.
-/// The blocks need no scaling: unknown normals are vectors in the unit of the vertices.
+/// `Δ = I − D⁻¹A` of the graph of vertices, v × v; with unknown normals, a second block of the
+/// graph of faces. Both have the unit of the vertices and need no scaling.
 pub(crate) fn cage_laplacian(cage: &Cage, unknowns: usize) -> Mat<f64> {
     let v = cage.vertices().len();
     let mut degree = vec![0.0; v];

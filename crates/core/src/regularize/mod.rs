@@ -1,8 +1,8 @@
-//! Sub-spectral regularisation (Thiery, Tierny and Boubekeur 2012, §5) and the baselines it is compared with.
+//! Sub-spectral regularisation (Thiery, Tierny and Boubekeur 2012, §5) and its baselines.
 //!
-//! A term `λ‖Δ (C − C₀)‖²` is a quadratic penalty on the cage C, applied only to the singular directions with the smallest singular values. With
-//! `A = U Σ Vᵀ` and `C = V q` every method here is a matrix `T` in `q = T (Uᵀ H)`, to which a term with a reference cage adds a linear function of
-//! that cage.
+//! A term `λ‖Δ (C − C₀)‖²` is applied only to the directions with the smallest singular values.
+//! With `A = U Σ Vᵀ` and `C = V q` every method is a matrix `T` in `q = T (Uᵀ H)`, to which a
+//! reference cage adds a linear function of that cage.
 
 mod laplacian;
 
@@ -15,18 +15,16 @@ use faer::{Mat, MatRef};
 /// How the unstable end of the spectrum is treated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Regularizer {
-    /// Smooth the last s singular directions by the cage Laplacian: minimise `λ‖Δ C‖² + ‖Φ□ C − H‖²` over them, the others
-    /// fixed by the data (Eq. 5–7). It penalises the difference of each vertex from the mean of its neighbours, and of each unknown normal from
-    /// the mean of those of adjacent faces. It does not preserve the rest cage's shape ("destructive", §5.1), hence the small s.
+    /// Smooth the last s singular directions by the cage Laplacian: minimise `λ‖Δ C‖² + ‖Φ□ C −
+    /// H‖²` over them, the others fixed by the data (Eq. 5–7). Penalises how vertices and unknown
+    /// normals differ from the mean of their neighbours; destroys the rest cage's shape (§5.1).
     Laplacian,
-    /// As the Laplacian, but keep the rest cage's shape: `λ‖Δ C − Δ C_R‖²`, so that a frame that equals the rest pose gives the rest
-    /// cage and sharp features survive (Savoye and Franco 2010). Not invariant to rotation: parts rotated far from the rest pose shrink in the
-    /// regularised directions.
+    /// As the Laplacian, but keep the rest cage's shape: `λ‖Δ C − Δ C_R‖²`, so that sharp features
+    /// survive (Savoye and Franco 2010). Parts rotated far from the rest pose shrink.
     #[default]
     Differential,
-    /// As the Laplacian, but keep the shape of the previous frame's cage: `λ‖Δ C_t − Δ C_{t−1}‖²`, and that of the rest
-    /// cage for the first frame. Global translations are not penalised. Every frame depends on all before it: frames have to be inverted in
-    /// order, and one cannot be inverted without its predecessor's cage.
+    /// As the Laplacian, but keep the shape of the previous frame's cage, `λ‖Δ C_t − Δ C_{t−1}‖²`,
+    /// and of the rest cage at first, up to translations. Frames have to be inverted in order.
     Temporal,
     /// As the Laplacian, with a custom Δ: see [`SparseMatrix`].
     Matrix,
@@ -36,8 +34,7 @@ pub enum Regularizer {
     TruncatedSvd,
     /// Damp every direction: `σ/(σ² + α²)` in place of `1/σ`, with α = λ.
     Tikhonov,
-    /// The Laplacian over the whole spectrum: the classical regularised least squares. Any other term does the same at the
-    /// threshold s = m.
+    /// The Laplacian over the whole spectrum, as any other term does at the threshold s = m.
     Global,
 }
 
@@ -83,17 +80,14 @@ impl Regularizer {
         matches!(self, Self::Laplacian | Self::Differential | Self::Temporal | Self::Matrix)
     }
 
-    /// Δ of its term for a cage of which this many rows are unknown, rows × unknowns: the given matrix for [`Self::Matrix`], otherwise the cage
-    /// Laplacian. Where there are more unknowns than vertices, those after the vertices are one direction per face. [`Self::None`] applies it only
-    /// to directions that no point determines; [`Self::TruncatedSvd`] and [`Self::Tikhonov`] do not use it.
-    ///
-    /// # Errors
-    /// A matrix that is missing or does not fit the cage.
+    /// Δ of its term for a cage with so many unknown rows: the given matrix for [`Self::Matrix`],
+    /// otherwise the cage Laplacian. [`Self::None`] applies it only to directions that no point
+    /// determines; [`Self::TruncatedSvd`] and [`Self::Tikhonov`] do not use it.
     pub fn delta(self, matrix: Option<&SparseMatrix>, cage: &Cage, unknowns: usize) -> Result<Mat<f64>, TermError> {
         match self {
             Self::Matrix => {
                 let (matrix, vertices) = (matrix.ok_or(TermError::Missing)?, cage.vertices().len());
-                // Where face normals are unknown too, a matrix with one column per vertex does not affect them.
+                // A matrix with one column per vertex does not affect unknown normals.
                 if ![unknowns, vertices].contains(&matrix.columns()) {
                     return Err(TermError::Columns { columns: matrix.columns(), vertices, unknowns });
                 }
@@ -149,7 +143,7 @@ fn expected(vertices: usize, unknowns: usize) -> String {
     format!("{vertices} vertices, or {unknowns} unknowns with the normals of its faces")
 }
 
-/// Directions with a singular value below this fraction of the largest amplify single-precision cages beyond use.
+/// Directions below this fraction of the largest singular value amplify rounding beyond use.
 pub const WEAK_SINGULAR_VALUE: f64 = 1e-6;
 
 /// Adds `weight · ΔᵀΔ`, for a Δ of few entries in each row.

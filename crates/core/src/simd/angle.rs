@@ -3,7 +3,7 @@
 use super::Lanes;
 use super::lanes::polynomial;
 
-/// Coefficients of `atan(x)/x` in `x²` on `|x| ≤ tan(π/8)`: a Chebyshev fit with an error below 2e-18.
+/// Coefficients of `atan(x)/x` in `x²` on `|x| ≤ tan(π/8)`: a Chebyshev fit to 2e-18.
 const ATAN: [f64; 12] = [
     1.0,
     -0.3333333333333312,

@@ -1,9 +1,9 @@
-//! The ratio of an angle to its sine and the derivative of that ratio, in single precision, as functions of the cosine: they have no singularity but at π.
+//! The ratio of an angle to its sine, and its derivative, as functions of the cosine.
 
 use super::Singles;
 use std::f32::consts::FRAC_PI_2;
 
-/// Chebyshev fits in `1 − cos θ` on `[0, 1]`: of `θ/(2 sin θ)` to 1e-8, and of its derivative by the cosine to 7e-8.
+/// Chebyshev fits in `1 − cos θ` on `[0, 1]` of `θ/(2 sin θ)` to 1e-8, of its derivative to 7e-8.
 const RATIO: [f32; 10] = [
     0.5,
     0.166_667_86,
@@ -29,7 +29,7 @@ const SLOPE: [f32; 10] = [
     -0.038_718_08,
 ];
 
-/// `θ/(2 sin θ)` from the cosine and the reciprocal sine; beyond a right angle from the supplement's, `(π/sin θ − θ'/sin θ')/2`.
+/// `θ/(2 sin θ)` from cosine and reciprocal sine; beyond a right angle `(π/sin θ − θ'/sin θ')/2`.
 #[inline(always)]
 pub(crate) fn half_angle_over_sine(cosine: Singles, inverse_sine: Singles) -> Singles {
     let near = polynomial(&RATIO, cosine.map(|c| 1.0 - c.abs()));

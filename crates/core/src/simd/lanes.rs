@@ -1,6 +1,7 @@
 //! A value for each of eight points, and their arithmetic.
 
 use cager_geometry::mesh::Point;
+use faer::MatMut;
 use std::ops::{Add, Mul, Sub};
 
 /// Points or entries that one lane group holds.
@@ -108,6 +109,18 @@ pub(crate) fn gather(point: impl Fn(usize) -> Point) -> [Lanes; 3] {
 /// Points in lane groups, the last one filled up with `beyond`.
 pub(crate) fn grouped(points: &[Point], beyond: Point) -> Vec<[Lanes; 3]> {
     points.chunks(LANES).map(|points| gather(|l| points.get(l).copied().unwrap_or(beyond))).collect()
+}
+
+/// Writes lane groups, one for each column, into the rows from `start` on, as far as there are rows.
+pub(crate) fn store<T: Copy>(mut rows: MatMut<'_, T>, start: usize, groups: impl Iterator<Item = [T; LANES]>) {
+    let count = LANES.min(rows.nrows() - start);
+    for (j, values) in groups.enumerate() {
+        let mut entries = rows.as_mut().col_mut(j).subrows_mut(start, count);
+        match entries.as_mut().try_as_col_major_mut() {
+            Some(entries) => entries.as_slice_mut().copy_from_slice(&values[..count]),
+            None => entries.iter_mut().zip(values).for_each(|(entry, value)| *entry = value),
+        }
+    }
 }
 
 /// What dot and cross products take: a lane group of either precision.

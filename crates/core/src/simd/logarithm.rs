@@ -19,8 +19,8 @@ const ATANH: [f64; 12] = [
     1.0 / 23.0,
 ];
 
-/// `ln(a/b)` for `a ≥ b > 0`, normal numbers less than a factor of 2⁵⁰⁰ apart. `near` is `(a − b)/(a + b)` as it is known
-/// without cancellation; it counts where the ratio is near one.
+/// `ln(a/b)` for `a ≥ b > 0`, less than a factor of 2⁵⁰⁰ apart. `near` is `(a − b)/(a + b)` as
+/// known without cancellation; it counts where the ratio is near one.
 #[inline(always)]
 pub(crate) fn ln_ratio(a: Lanes, b: Lanes, near: Lanes) -> Lanes {
     // The difference of two patterns is the logarithm of the ratio to within 0.09, in units of 2⁵².

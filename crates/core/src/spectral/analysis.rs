@@ -1,5 +1,4 @@
-//! Analysis of a rest pose and its cage: coordinates, maximum-volume handles and singular value decompositions, shared by solvers with different
-//! options.
+//! Analysis of a rest pose and its cage, shared by solvers with different options.
 
 use super::maxvol::MaxVol;
 use super::normal_factor::NormalFactor;
@@ -16,17 +15,16 @@ use cager_geometry::linalg::svd::{self, LastDirections, Svd};
 use cager_geometry::mesh::Point;
 use faer::MatRef;
 
-/// From this many unknowns on, only the directions that a term acts on are computed where no more of a decomposition is needed.
+/// From so many unknowns on, only the directions that a term acts on are computed.
 const PARTIAL_SVD_FROM: usize = 1024;
 /// They are found on their own only where there are at least this many unknowns for each.
 const MIN_UNKNOWNS_PER_DIRECTION: usize = 32;
 
-/// Analysis of a rest pose and its cage, from which solvers with any options follow at the cost of their operator alone.
+/// Analysis of a rest pose and its cage, from which solvers with any options follow at the cost of
+/// their operator alone. It holds `Φ` in double precision as well.
 ///
-/// It holds `Φ` in double precision as well; for a single solver use [`Solver::prepare`](crate::inversion::Solver::prepare).
-///
-/// For a system whose normals are functions of the vertices, it analyses mean value coordinates of the same cage and points, from which the nonlinear
-/// inversion starts. Only the decoder and the reproduction errors are the system's own.
+/// Where normals are functions of the vertices, it analyses mean value coordinates, from which the
+/// nonlinear inversion starts. Only the decoder and the reproduction errors are the system's own.
 pub struct Analysis {
     /// Without a decoder.
     pub(super) found: AnalysedCoordinates,
@@ -49,10 +47,7 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Computes coordinates, handles and decompositions. Runs on the current rayon pool; its result does not depend on it.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`](crate::inversion::Solver::prepare).
+    /// Computes coordinates, handles and decompositions. The threads of the pool do not matter.
     pub fn new(
         system: &dyn CoordinateSystem,
         cage: &Cage,
@@ -64,10 +59,7 @@ impl Analysis {
         Self::of(found, cage, None, None, context)
     }
 
-    /// As [`Self::new`], computing only what solvers with these handles need. A model of very many points is analysed on a sample.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`](crate::inversion::Solver::prepare).
+    /// Only what solvers with these handles need; very many points are analysed on a sample.
     pub fn for_options(
         system: &dyn CoordinateSystem,
         cage: &Cage,
@@ -87,7 +79,7 @@ impl Analysis {
         context: &PrepareContext<'_>,
     ) -> Result<Self, PrepareError> {
         let (options, m) = (options.without_idle_term(), found.phi.ncols());
-        // An unregularised start is regularised nevertheless, in as many directions as are ill-conditioned.
+        // An unregularised start is regularised in as many directions as are ill-conditioned.
         let is_dependent = found.decoder.as_ref().is_some_and(|decoder| decoder.dependent_normals().is_some());
         let acts_on_last = options.regularizer == Regularizer::None || options.regularizer.is_sub_spectral();
         let is_partial = !is_dependent
@@ -152,12 +144,7 @@ impl Analysis {
         Ok(Self { found, cage, decoder, basis, square, factor, all, rank, last, memory })
     }
 
-    /// Indices of the points analysed; `None` where all are.
-    pub(super) fn sample(&self) -> Option<&[u32]> {
-        self.found.sample.as_deref()
-    }
-
-    /// Results of the preparation; the singular values are empty, see [`Self::handle_spectrum`] and [`Self::full_spectrum`].
+    /// Results of the preparation; the singular values are empty.
     pub fn preparation(&self) -> &PreparationReport {
         &self.found.preparation
     }
@@ -172,23 +159,22 @@ impl Analysis {
         self.found.phi.as_ref()
     }
 
-    /// Rows of maximum volume, and how they were found; `None` of an analysis for solvers that read every point.
+    /// Rows of maximum volume, and how they were found; `None` where every point is read.
     pub fn handles(&self) -> Option<&MaxVol> {
         self.basis.as_ref().map(|basis| &basis.handles)
     }
 
-    /// Singular values of `Φ□`, descending; empty for an analysis [for options](Self::for_options) that do not need them.
+    /// Singular values of `Φ□`, descending; empty for options that do not need them.
     pub fn handle_spectrum(&self) -> &[f64] {
         self.square.as_ref().map_or(&[], |svd| &svd.sigma)
     }
 
-    /// Right singular vectors of `Φ□`, m × m, one per column in the order of [`Self::handle_spectrum`]; 0 × 0 where there are none.
+    /// Right singular vectors of `Φ□`, m × m, one per column; 0 × 0 where there are none.
     pub fn handle_vectors(&self) -> MatRef<'_, f64> {
         self.square.as_ref().map_or(MatRef::from_column_major_slice(&[], 0, 0), |svd| svd.v.as_ref())
     }
 
-    /// Singular values of `Φ`, descending. Those of `ΦᵀΦ` are their squares. Of an analysis [for options](Self::for_options) that do
-    /// not need them, none.
+    /// Singular values of `Φ`, descending; empty for options that do not need them.
     pub fn full_spectrum(&self) -> &[f64] {
         self.all.as_ref().map_or(&[], |all| &all.sigma)
     }

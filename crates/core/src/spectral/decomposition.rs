@@ -2,7 +2,7 @@
 
 use super::analysis::{Analysis, directions, enough};
 use super::farthest::farthest_points;
-use super::interpolation::{Drift, Samples, interpolated};
+use super::interpolation::{Drift, interpolated};
 use super::normal_factor::{NormalFactor, RANK_TOLERANCE};
 use super::rectangular::rectangular_rows;
 use super::row_basis::RowBasis;
@@ -11,8 +11,8 @@ use cager_geometry::linalg;
 use cager_geometry::linalg::svd::{self, LastDirections, Svd};
 use faer::{Mat, MatRef};
 
-/// `x = Lᵀ H` of the rows read H, and the singular directions of A: x are the coefficients `Uᵀ H`, or, where only the last directions are known, the
-/// cage without a term.
+/// `x = Lᵀ H` of the rows read H, and the singular directions of A: x are the coefficients `Uᵀ H`,
+/// or, where only the last directions are known, the cage without a term.
 pub(super) struct Decomposition {
     /// The rows read; where every point is read, none.
     pub(super) handles: Vec<u32>,
@@ -96,7 +96,6 @@ impl Decomposition {
     fn of_samples(analysis: &Analysis, basis: &RowBasis, count: usize) -> Result<Self, PrepareError> {
         let (phi, points) = (analysis.found.phi.as_ref(), &analysis.found.points);
         let (handles, reach) = farthest_points(points, &basis.handles.rows, count);
-        let samples = Samples { points, rows: &handles, reach };
         let others = linalg::rows_of(phi, &handles[basis.rank..]);
         let others = linalg::product(others.as_ref(), basis.to_basis.as_ref());
         let (to_coefficients, directions) = coefficients(analysis)?;
@@ -114,7 +113,7 @@ impl Decomposition {
             let rows = linalg::rows_of(phi, &handles);
             NormalFactor::of(rows.as_ref()).rank_and_condition(None)
         };
-        let (left, condition) = rayon::join(|| interpolated(&samples, &drift), condition);
+        let (left, condition) = rayon::join(|| interpolated(points, &handles, reach, &drift), condition);
         let left = left.ok_or(failed("interpolation between the handles"))?;
         let (_, condition) = condition.ok_or(failed("singular value decomposition of the rows"))?;
         let (rows, rank, directions) = (phi.nrows(), basis.rank, directions.clone());

@@ -1,8 +1,9 @@
-//! Farthest-point sampling: each next point is the one farthest from all before it (Eldar, Lindenbaum, Porat and Zeevi 1997).
+//! Farthest-point sampling: each next point is the one farthest from all before it (Eldar,
+//! Lindenbaum, Porat and Zeevi 1997).
 //!
-//! Points are sorted along a space-filling curve into blocks with bounding boxes. A new sample can lower distances in a
-//! block only if it is closer to the box than the block's largest distance to a sample so far; others are skipped, so that all samples together
-//! cost little more than a few passes.
+//! Points are sorted along a space-filling curve into blocks with boxes. A sample can lower
+//! distances in a block only if it is closer to the box than the block's largest distance so far;
+//! other blocks are skipped, so that all samples together cost a few passes.
 
 use crate::morton::morton_order;
 use crate::simd::{LANES, Lanes, grouped, multiversion};
@@ -15,7 +16,7 @@ const BLOCK_POINTS: usize = 32 * LANES;
 /// Blocks per task.
 const TASK_BLOCKS: usize = 64;
 
-/// Adds points to `start` until there are `count`; returns them, `start` first, and the distance of the farthest point from its
+/// Adds points to `start` until there are `count`, and says how far the farthest point is from its
 /// nearest sample. Ties go to the point that comes first along the curve.
 pub(crate) fn farthest_points(points: &[Point], start: &[u32], count: usize) -> (Vec<u32>, f64) {
     let (mut blocks, place) = sorted_blocks(points);
@@ -47,7 +48,7 @@ struct Block {
     around: Aabb,
     ids: Vec<u32>,
     places: Vec<[Lanes; 3]>,
-    /// Squared distances to the nearest sample; −1 for samples themselves, and in the lanes that are not used.
+    /// Squared distances to the nearest sample; −1 for samples themselves and unused lanes.
     squared: Vec<Lanes>,
     /// The largest of them, and where it is.
     farthest: f64,
@@ -84,32 +85,29 @@ impl Block {
 }
 
 multiversion! {
-    /// Lowers the squared distances to those to `p` where these are smaller; returns the index of the largest.
-    fn update_nearest(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> usize = update_nearest_generic;
-}
-
-#[inline(always)]
-fn update_nearest_generic(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> usize {
-    let p = [Lanes::splat(p[0]), Lanes::splat(p[1]), Lanes::splat(p[2])];
-    let (mut largest, mut group_of) = (Lanes::splat(-2.0), Lanes::ZERO);
-    for (g, (place, squared)) in places.iter().zip(squared).enumerate() {
-        let d = [place[0] - p[0], place[1] - p[1], place[2] - p[2]];
-        let to_p = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        *squared = squared.zip(to_p, |old, new| if new < old { new } else { old });
-        for l in 0..LANES {
-            let longer = squared.0[l] > largest.0[l];
-            group_of.0[l] = if longer { g as f64 } else { group_of.0[l] };
-            largest.0[l] = if longer { squared.0[l] } else { largest.0[l] };
+    /// Lowers the squared distances to those to `p`; returns the index of the largest.
+    fn update_nearest(places: &[[Lanes; 3]], squared: &mut [Lanes], p: &Point) -> usize {
+        let p = [Lanes::splat(p[0]), Lanes::splat(p[1]), Lanes::splat(p[2])];
+        let (mut largest, mut group_of) = (Lanes::splat(-2.0), Lanes::ZERO);
+        for (g, (place, squared)) in places.iter().zip(squared).enumerate() {
+            let d = [place[0] - p[0], place[1] - p[1], place[2] - p[2]];
+            let to_p = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            *squared = squared.zip(to_p, |old, new| if new < old { new } else { old });
+            for l in 0..LANES {
+                let longer = squared.0[l] > largest.0[l];
+                group_of.0[l] = if longer { g as f64 } else { group_of.0[l] };
+                largest.0[l] = if longer { squared.0[l] } else { largest.0[l] };
+            }
         }
-    }
-    let mut at = (largest.0[0], group_of.0[0] as usize * LANES);
-    for l in 1..LANES {
-        let here = (largest.0[l], group_of.0[l] as usize * LANES + l);
-        if here.0 > at.0 || (here.0 == at.0 && here.1 < at.1) {
-            at = here;
+        let mut at = (largest.0[0], group_of.0[0] as usize * LANES);
+        for l in 1..LANES {
+            let here = (largest.0[l], group_of.0[l] as usize * LANES + l);
+            if here.0 > at.0 || (here.0 == at.0 && here.1 < at.1) {
+                at = here;
+            }
         }
+        at.1
     }
-    at.1
 }
 
 /// All points in blocks along the Morton curve, and the position of each point on it.

@@ -1,6 +1,5 @@
-//! Inversion by the singular directions of chosen rows (Thiery, Tierny and Boubekeur 2012): what `--handles`, thresholds of the spectrum and the
-//! paper's baselines need beside least squares over all points. An [`Analysis`] of a rest pose and its cage is computed once; solvers with any options
-//! follow from it.
+//! Inversion by the singular directions of chosen rows (Thiery, Tierny and Boubekeur 2012): what
+//! `--handles`, thresholds and the paper's baselines need beside least squares over all points.
 
 mod analysis;
 mod decomposition;

@@ -4,16 +4,16 @@ use cager_geometry::linalg;
 use cager_geometry::linalg::svd::{self, LastDirections};
 use faer::{Mat, MatRef};
 
-/// Singular values below this fraction of the largest are taken for zero: coordinates are not accurate to more.
+/// Singular values below this fraction of the largest are zero: coordinates are not more accurate.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-11;
 
-/// Condition number of `Φ` up to which the Cholesky factor of `ΦᵀΦ` keeps ten of sixteen digits, or, of the direction that the points determine least, six.
+/// Condition number of `Φ` up to which the Cholesky factor of `ΦᵀΦ` keeps ten of sixteen digits.
 const CHOLESKY_IS_SAFE: f64 = 1e5;
 
 /// Upper triangular R with `ΦᵀΦ = RᵀR`, which has the singular values and right vectors of `Φ`.
 pub(crate) struct NormalFactor {
     factor: Mat<f64>,
-    /// The inverse of R, its largest singular value and its smallest; `None` where `Φ` is ill-conditioned, and R that of its QR factorisation.
+    /// The inverse of R and its ends of the spectrum; `None` where `Φ` is ill-conditioned.
     conditioned: Option<(Mat<f64>, [f64; 2])>,
 }
 
@@ -53,7 +53,7 @@ impl NormalFactor {
         svd::last_directions(inverse.as_ref(), *first, count)
     }
 
-    /// Numerical rank and the condition number over it, from all singular values where they are known. `None` where these do not converge.
+    /// Numerical rank and the condition number over it, from all singular values if known.
     pub(crate) fn rank_and_condition(&self, known: Option<&[f64]>) -> Option<(usize, f64)> {
         if let Some((_, [first, last])) = &self.conditioned {
             return Some((self.factor.ncols(), first / last));

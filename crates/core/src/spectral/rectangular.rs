@@ -1,8 +1,8 @@
 //! More rows than columns by leverage: rectangular maximum volume (Mikhalev and Oseledets 2018).
 //!
-//! Adding row i multiplies the volume `det(Φ_Sᵀ Φ_S)^½` by `(1 + ℓ_i)^½` with the leverage `ℓ_i = φ_i (Φ_Sᵀ Φ_S)⁻¹ φ_iᵀ`, so
-//! the greedy choice is the largest. Leverages only fall as rows are added: old ones are bounds, and few have to be computed
-//! anew for each row.
+//! Row i multiplies the volume `det(Φ_Sᵀ Φ_S)^½` by `(1 + ℓ_i)^½` with the leverage `ℓ_i = φ_i
+//! (Φ_Sᵀ Φ_S)⁻¹ φ_iᵀ`; the greedy choice is the largest. Leverages only fall as rows are added: old
+//! ones are bounds, and few are computed anew.
 
 use super::row_basis::RowBasis;
 use cager_geometry::linalg;

@@ -25,12 +25,10 @@ pub(crate) fn row_basis(phi: MatRef<'_, f64>) -> Option<RowBasis> {
     Some(RowBasis { handles, square, rank: m, to_basis })
 }
 
-/// As many handles as the rank, or fewer, by the right singular vectors of a `Φ` whose columns are dependent.
-///
-/// `None` where there are none.
+/// As many handles as the rank, or fewer, by the right singular vectors of `Φ`.
 pub(crate) fn deficient_basis(phi: MatRef<'_, f64>, v: MatRef<'_, f64>, mut rank: usize) -> Option<RowBasis> {
     loop {
-        // Coordinates in the right singular vectors of the rank, one fewer each time a borderline singular value is still too small.
+        // One direction fewer each time a borderline singular value is still too small.
         let range = v.subcols(0, rank);
         let projected = linalg::tall_product(phi, range);
         match maxvol::maxvol(projected.as_ref(), maxvol::tolerance(rank)) {

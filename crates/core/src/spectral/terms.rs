@@ -17,17 +17,15 @@ pub(super) struct Term {
     pub(super) weight: f64,
 }
 
-/// `C = data · x + target · C₀` for the coefficients x of a [`Decomposition`](super::decomposition::Decomposition).
+/// `C = data · x + target · C₀` for the coefficients x of a `Decomposition`.
 pub(super) struct SpectralMap {
     pub(super) data: Mat<f64>,
     /// m × m; `None` where the term has no reference or regularises no direction.
     pub(super) target: Option<Mat<f64>>,
 }
 
-/// The map of a term. Directions beyond the rank are always placed by Δ, except by the two baselines without a term; terms also place those with a
-/// singular value below [`WEAK_SINGULAR_VALUE`] of the largest.
-///
-/// `None` where a factorisation fails.
+/// The map of a term; `None` where a factorisation fails. Directions beyond the rank are always
+/// placed by Δ, except by the two baselines without a term; terms also place weak ones.
 pub(super) fn spectral_map(directions: &LastDirections, rank: usize, term: &Term) -> Option<SpectralMap> {
     let m = directions.v.nrows();
     let scaled = |factor: &dyn Fn(usize, f64) -> f64| {
@@ -47,7 +45,7 @@ pub(super) fn spectral_map(directions: &LastDirections, rank: usize, term: &Term
     }
 }
 
-/// The last s directions minimise `w‖Δ (C_low + V_high q) − Δ C₀‖² + ‖Σ_high q − U_highᵀ H‖²`; the others are fixed by the data.
+/// The last s directions minimise `w‖Δ (C_low + V_high q) − Δ C₀‖² + ‖Σ_high q − U_highᵀ H‖²`.
 fn sub_spectral(directions: &LastDirections, rank: usize, s: usize, term: &Term) -> Option<SpectralMap> {
     let LastDirections { sigma, v, .. } = directions;
     let m = v.nrows();
@@ -74,8 +72,8 @@ fn sub_spectral(directions: &LastDirections, rank: usize, s: usize, term: &Term)
     Some(SpectralMap { data, target: target.map(|target| linalg::product(high, target.as_ref())) })
 }
 
-/// Minimises `w‖Δ V_high q − …‖² + ‖Σ_high q − …‖²` for the right-hand sides of the data, s columns of normal equations each, and for that of
-/// the reference, `w (Δ V_high)ᵀ Δ C₀`, where the term has one. `sigma` has fewer than s values where the last directions span the null space.
+/// Minimises `w‖Δ V_high q − …‖² + ‖Σ_high q − …‖²` for the right-hand sides of the data and for
+/// that of the reference, `w (Δ V_high)ᵀ Δ C₀`. `sigma` is shorter beside a null space.
 fn place(
     delta_high: MatRef<'_, f64>,
     coupling: MatRef<'_, f64>,
@@ -97,8 +95,8 @@ fn place(
     }
     let solved = match linalg::solve_definite_within(system.clone(), right.clone(), 1e-13, rounding_level) {
         Some(solved) => solved,
-        // Neither Δ nor any point determines the position of some connected component: add a small multiple of the identity, which keeps it near the
-        // origin.
+        // Nothing determines where some connected component is: a small multiple of the identity
+        // keeps it near the origin.
         None => {
             let size = (0..s).map(|i| system[(i, i)]).fold(0.0, f64::max);
             for i in 0..s {

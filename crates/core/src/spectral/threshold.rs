@@ -1,4 +1,4 @@
-//! Automatic choice of the spectrum threshold: the largest one whose additional error on sample frames stays within a bound.
+//! Automatic choice of the spectrum threshold by the error on sample frames.
 
 use super::HandleSystem;
 use crate::inversion::{BATCH, PrepareError, Rows, Solver, SolverOptions};
@@ -15,7 +15,7 @@ pub struct Threshold {
     pub spectrum: usize,
     /// Frames measured.
     pub frames: usize,
-    /// Mean L2 error of these frames over the rest diagonal for every threshold that was tried, ascending by threshold.
+    /// Mean L2 error of these frames over the rest diagonal for every threshold tried, ascending.
     pub tried: Vec<(usize, f64)>,
 }
 
@@ -28,12 +28,9 @@ impl Threshold {
 }
 
 impl HandleSystem<'_> {
-    /// The largest threshold found at which the mean L2 error of these frames, each n × 3 interleaved, exceeds that at threshold 0 by no more
-    /// than the fraction `bound`. Every threshold is measured by the solver that it gives. Where cages follow their predecessors the frames are
-    /// the first of the capture, in order.
-    ///
-    /// # Errors
-    /// As [`Solver::prepare`].
+    /// The largest threshold found at which the mean L2 error of these frames, each n × 3
+    /// interleaved, exceeds that at threshold 0 by no more than the fraction `bound`. Where cages
+    /// follow their predecessors the frames are the first of the capture, in order.
     ///
     /// # Panics
     /// Where a frame's length does not fit, or there is none.
@@ -54,16 +51,12 @@ impl HandleSystem<'_> {
         let (mut fits, mut exceeds) = (0, m + 1);
         // Exponential search, then bisection.
         let mut next = 1;
-        while fits < m && exceeds > m {
-            let s = next.min(m);
-            tried.push((s, error(s)?));
-            (fits, exceeds) = if tried.last().is_some_and(|&(_, l2)| l2 <= most) { (s, exceeds) } else { (fits, s) };
+        while fits < m && exceeds - fits > 1 {
+            let s = if exceeds > m { next.min(m) } else { fits.midpoint(exceeds) };
+            let l2 = error(s)?;
+            tried.push((s, l2));
+            (fits, exceeds) = if l2 <= most { (s, exceeds) } else { (fits, s) };
             next += (next / 2).max(1);
-        }
-        while exceeds - fits > 1 && exceeds <= m {
-            let s = fits.midpoint(exceeds);
-            tried.push((s, error(s)?));
-            (fits, exceeds) = if tried.last().is_some_and(|&(_, l2)| l2 <= most) { (s, exceeds) } else { (fits, s) };
         }
         tried.sort_by_key(|&(s, _)| s);
         Ok(Threshold { spectrum: fits, frames: frames.len(), tried })

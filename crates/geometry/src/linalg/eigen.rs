@@ -5,7 +5,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::{Mat, MatRef, Par};
 
-/// Eigenvalues of a symmetric matrix, descending, and their vectors as columns; `None` where it is not finite.
+/// Eigenvalues of a symmetric matrix, descending, and their vectors as columns.
 pub fn eigen(a: MatRef<'_, f64>) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = a.nrows();
     if !a.is_all_finite() {

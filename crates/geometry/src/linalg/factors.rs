@@ -1,5 +1,4 @@
-//! Factorisations and solves. Large solves are shared by the threads of the current rayon pool in blocks of columns; everything else is sequential
-//! unless noted.
+//! Factorisations and solves, large ones shared by the rayon pool in blocks of columns.
 
 use super::products::{BLOCK_COLUMNS, PARALLEL_THRESHOLD};
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -28,7 +27,7 @@ impl<T> Pivoted<T> {
     }
 }
 
-/// LU with partial pivoting of an n × m matrix, n ≥ m, done in place. Runs on the rayon pool, with bit-identical results for any number of threads.
+/// LU with partial pivoting of an n × m matrix, n ≥ m, to the same bits on any threads.
 pub fn pivoted<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> Pivoted<T> {
     let m = a.ncols();
     let [forward, _] = lu_in_place(a.as_mut(), Par::rayon(0));
@@ -39,7 +38,7 @@ pub fn pivoted<T: faer::traits::RealField + Copy + Into<f64>>(mut a: Mat<T>) -> 
     Pivoted { factors: a, order: forward.into_iter().map(|r| r as u32).collect(), smallest }
 }
 
-/// LU with partial pivoting, in place: the rows of the matrix in the order of those of L, and the place of each in it.
+/// LU with partial pivoting, in place: the matrix's rows in the order of those of L, and back.
 fn lu_in_place<T: faer::traits::RealField>(a: MatMut<'_, T>, par: Par) -> [Vec<usize>; 2] {
     use lu::partial_pivoting::factor;
     let (n, m) = a.shape();
@@ -76,7 +75,7 @@ pub fn inverse(a: MatRef<'_, f64>) -> (Mat<f64>, f64) {
     (result, log_volume)
 }
 
-/// Calls `work` for blocks of columns that depend on the shape alone; a single block where the multiplications, `each` per column, are few.
+/// Calls `work` for blocks of columns that depend on the shape alone.
 fn in_column_blocks(a: MatMut<'_, f64>, each: usize, work: impl Fn(MatMut<'_, f64>) + Send + Sync) {
     if a.ncols().saturating_mul(each) < PARALLEL_THRESHOLD || a.ncols() <= BLOCK_COLUMNS {
         return work(a);
@@ -95,7 +94,7 @@ pub fn upper_factor(mut a: Mat<f64>) -> Mat<f64> {
     Mat::from_fn(m, m, |i, j| if i <= j { a[(i, j)] } else { 0.0 })
 }
 
-/// Lower Cholesky factor in place of a symmetric positive definite matrix, zeros above; `None` where it is not definite.
+/// Lower Cholesky factor, zeros above; `None` where the matrix is not definite.
 pub fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     cholesky_in_place(a.as_mut(), Par::Seq)?;
     for j in 1..a.nrows() {
@@ -106,7 +105,7 @@ pub fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     Some(a)
 }
 
-/// Lower Cholesky factor in place of the lower triangle of a symmetric positive definite matrix; `None` where it is not definite.
+/// Cholesky factor in place of the lower triangle; `None` where the matrix is not definite.
 pub fn cholesky_in_place(a: MatMut<'_, f64>, par: Par) -> Option<()> {
     use cholesky::llt::factor;
     let mut memory = MemBuffer::new(factor::cholesky_in_place_scratch::<f64>(a.nrows(), par, Default::default()));
@@ -114,8 +113,9 @@ pub fn cholesky_in_place(a: MatMut<'_, f64>, par: Par) -> Option<()> {
     Some(())
 }
 
-/// Cholesky factor with diagonal pivoting of a symmetric positive semidefinite matrix, from its lower triangle: L, m × r for the numerical rank r, with
-/// a diagonal that falls, and the row of the matrix that each row of L belongs to. `None` where the matrix is indefinite beyond rounding.
+/// Cholesky factor with diagonal pivoting, from the lower triangle: L, m × r for the numerical rank
+/// r, with a diagonal that falls, and the row of the matrix that each row of L belongs to. `None`
+/// where the matrix is indefinite beyond rounding.
 pub fn pivoted_cholesky(mut a: Mat<f64>) -> Option<(Mat<f64>, Vec<usize>)> {
     use cholesky::llt_pivoting::factor;
     let m = a.nrows();
@@ -133,8 +133,8 @@ pub fn solve_definite(a: Mat<f64>, b: Mat<f64>) -> Option<Mat<f64>> {
     solve_definite_within(a, b, 0.0, 0.0)
 }
 
-/// As [`solve_definite`]; `None` also where a pivot is no more than rounding: the fraction `relative` of its diagonal entry, or a
-/// diagonal entry no larger than `absolute`.
+/// As [`solve_definite`]; `None` also where a pivot is no more than the fraction `relative` of its
+/// diagonal entry, or a diagonal entry no larger than `absolute`.
 pub fn solve_definite_within(a: Mat<f64>, mut b: Mat<f64>, relative: f64, absolute: f64) -> Option<Mat<f64>> {
     let diagonal: Vec<f64> = (0..a.nrows()).map(|i| a[(i, i)]).collect();
     let l = cholesky(a)?;

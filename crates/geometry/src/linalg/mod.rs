@@ -1,9 +1,8 @@
-//! Dense linear algebra on faer: products, factorisations, eigenvalues and singular values whose bits do not depend on the number of threads.
+//! Dense linear algebra on faer, whose bits do not depend on the number of threads.
 
 mod eigen;
 mod factors;
 mod products;
-mod rotation;
 mod small;
 mod sparse;
 mod sparse_cholesky;
@@ -19,8 +18,7 @@ pub use products::{
     BLOCK_ROWS, TILE_COLUMNS, TILE_ROWS, accumulate_product, gram, lower_product, mirrored, multiply, multiply_add,
     product, rows_of, tall_product, to_double, to_single, transposed_product,
 };
-pub use rotation::nearest_rotation;
-pub use small::symmetric_eigen;
+pub use small::{nearest_rotation, symmetric_eigen};
 pub use sparse::SparseMatrix;
 pub use sparse_cholesky::{SparseCholesky, SparsePattern};
 pub use zeros::zeros;

@@ -1,4 +1,4 @@
-//! Products, sequential or in blocks that depend on the shape alone, so that results are bit-identical for any number of threads.
+//! Products, sequential or in blocks that depend on the shape alone: the same bits on any threads.
 
 use super::zeros;
 use faer::linalg::matmul::matmul;
@@ -19,13 +19,12 @@ const PARTS_AT_ONCE: [usize; 2] = [4, 16];
 /// Entries of all those parts, beyond which only the least number is computed at the same time.
 const MAX_PART_ENTRIES: usize = 1 << 24;
 
-/// Rows of products whose results must not depend on the width are padded to a multiple of this: at the edges of small matrices the kernels sum in
-/// another order.
+/// Rows of products whose results must not depend on the width are padded to a multiple of this.
 pub const TILE_ROWS: usize = 16;
 /// Columns likewise.
 pub const TILE_COLUMNS: usize = 4;
 
-/// The lower triangle of the square matrix `A · B`; zeros above it, but for squares on the diagonal.
+/// The lower triangle of the square matrix `A · B`; zeros above, but for squares on the diagonal.
 pub fn lower_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let n = a.nrows();
     let mut out = zeros(n, n);
@@ -55,7 +54,8 @@ pub fn multiply<T: RealField + Copy>(out: MatMut<'_, T>, a: MatRef<'_, T>, b: Ma
     multiply_add(out, Accum::Replace, a, b, one());
 }
 
-/// `out = α A B`, or what is added to it, sequentially. A column has the same bits whatever other columns there are, where these are whole tiles.
+/// `out = α A B`, or what is added to it, sequentially. A column has the same bits whatever other
+/// columns there are, where these are whole tiles.
 pub fn multiply_add<T: RealField + Copy>(
     out: MatMut<'_, T>,
     accumulate: Accum,
@@ -115,7 +115,8 @@ pub fn accumulate_product<T: RealField + Copy>(
     });
 }
 
-/// `AᵀA`, its lower triangle and zeros above, summed over blocks of so many rows; a single block is computed by the calling thread.
+/// `AᵀA`, its lower triangle and zeros above, summed over blocks of so many rows; a single block is
+/// computed by the calling thread.
 pub fn gram<T: RealField + Copy>(a: MatRef<'_, T>, block_rows: usize) -> Mat<T> {
     let m = a.ncols();
     let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);

@@ -16,8 +16,8 @@ pub struct SparseMatrix {
 }
 
 impl SparseMatrix {
-    /// Takes entries (row, column, value) in any order; those of the same place are added up. `None` where one lies outside,
-    /// is not finite or beyond 1e100.
+    /// Takes entries (row, column, value) in any order; those of the same place are added up.
+    /// `None` where one lies outside, is not finite or beyond 1e100.
     pub fn new(rows: usize, columns: usize, mut entries: Vec<(u32, u32, f64)>) -> Option<Self> {
         let inside = |&(i, j, _): &(u32, u32, f64)| (i as usize) < rows && (j as usize) < columns;
         if !entries.iter().all(inside) {
@@ -50,8 +50,8 @@ impl SparseMatrix {
         &self.entries
     }
 
-    /// A matrix with as many columns and the same `‖Δ C‖` for every C, of at most four times as many rows as there are `unknowns`, beyond whose
-    /// number no entry lies.
+    /// A matrix with the same `‖Δ C‖` for every C, of at most four times as many rows as
+    /// `unknowns`, beyond which no entry lies.
     pub fn compressed(&self, unknowns: usize) -> Mat<f64> {
         let rows: Vec<&[(u32, u32, f64)]> = self.entries.chunk_by(|a, b| a.0 == b.0).collect();
         let mut delta = Mat::zeros(rows.len().min(4 * unknowns), unknowns);

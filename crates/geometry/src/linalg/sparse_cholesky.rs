@@ -1,4 +1,4 @@
-//! Sparse symmetric systems: Cholesky factors of faer with approximate minimum degree ordering, computed and solved by one thread.
+//! Sparse symmetric systems: faer's Cholesky factors with approximate minimum degree ordering.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub struct SparseCholesky {
 }
 
 impl SparsePattern {
-    /// Places (row, column) of an n × n matrix in its lower triangle, or in its upper one, which counts as the same; a place may come more than once.
+    /// Places (row, column) of an n × n matrix in either triangle; a place may come more than once.
     /// `None` where one lies outside, or there is not enough memory.
     pub fn new(n: usize, places: &[(u32, u32)]) -> Option<Self> {
         let lower = |&(i, j): &(u32, u32)| (i.min(j), i.max(j));
@@ -53,8 +53,8 @@ impl SparsePattern {
         Some(Self { pattern, slots, symbolic: Arc::new(symbolic) })
     }
 
-    /// The factor of the matrix with these values at the places in the order in which they were given; those of the same place are added up. `None` where
-    /// the matrix is not definite.
+    /// The factor of the matrix with these values at the given places, added up where one comes
+    /// twice. `None` where the matrix is not definite.
     ///
     /// # Panics
     /// With another number of values than of places.

@@ -1,11 +1,11 @@
-//! Triangles of a polygon as it lies in space: a fan where the polygon is convex, otherwise ears clipped in its plane (Meisters 1975).
+//! Triangles of a polygon: a fan where it is convex, otherwise ears (Meisters 1975).
 
 use super::Point;
 use crate::vector::{cross, dot, norm, sub};
 
 /// Triangles of less than this share of the polygon's area have none.
 const NO_AREA: f64 = 1e-12;
-/// Corners of a polygon whose ears are looked for, which takes their square or more; larger ones are fans.
+/// Corners of a polygon whose ears are looked for, in quadratic time; larger ones are fans.
 const MOST_CORNERS: usize = 8192;
 
 /// Appends the triangles of a face: two fewer than it has corners, oriented as it is.
@@ -44,7 +44,7 @@ pub(super) fn triangulate(face: &[u32], points: &[Point], triangles: &mut Vec<[u
     fan(&left.iter().map(|&k| face[k]).collect::<Vec<_>>(), triangles);
 }
 
-/// The corners in the plane of the polygon, counter-clockwise, and twice its area; none of a polygon without area.
+/// The corners in the polygon's plane, counter-clockwise, and twice its area; none without area.
 fn flattened(at: &[Point]) -> Option<(Vec<[f64; 2]>, f64)> {
     let from_first = |k: usize| sub(at[k], at[0]);
     // Newell's normal.

@@ -17,7 +17,7 @@ impl Aabb {
 
     /// The least box around some points; coordinates that are NaN count for nothing.
     pub fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
-        // `DVec3::min` may give the NaN, and the box of all before it would be lost; comparisons with it are false.
+        // `DVec3::min` may give the NaN; comparisons with it are false.
         points.into_iter().fold(Self::EMPTY, |b, p| Self {
             low: DVec3::select(p.cmplt(b.low), p, b.low),
             high: DVec3::select(p.cmpgt(b.high), p, b.high),

@@ -6,8 +6,8 @@ use glam::DVec3;
 /// Items of a leaf at most.
 const LEAF: usize = 4;
 
-/// A bounding volume hierarchy: a complete binary tree in breadth-first order, split at the median of the longest axis, so that the
-/// tree's shape follows from the number of items alone and boxes can be refitted when items move.
+/// A bounding volume hierarchy: a complete binary tree in breadth-first order, split at the median
+/// of the longest axis, so that its shape follows from the number of items alone.
 #[derive(Clone, Debug)]
 pub struct Bvh {
     /// Items in the order of the leaves.
@@ -53,7 +53,7 @@ impl Bvh {
         }
     }
 
-    /// Fits the boxes above one item that has moved. An item with an empty box is found by no query any more.
+    /// Fits the boxes above an item that has moved. One with an empty box is found no more.
     pub fn refit_item(&mut self, item: u32, item_box: impl Fn(u32) -> Aabb) {
         let leaf = self.leaf_of[item as usize] as usize;
         self.refit_leaf(leaf, &item_box);
@@ -68,8 +68,8 @@ impl Bvh {
         }
     }
 
-    /// Calls `found` with every item of a leaf whose box overlaps `query` – a superset of the items that do – until it returns `false`.
-    /// Says whether all were visited.
+    /// Calls `found` with every item of a leaf whose box overlaps `query` – a superset of the items
+    /// that do – until it returns `false`. Says whether all were visited.
     pub fn visit(&self, query: &Aabb, mut found: impl FnMut(u32) -> bool) -> bool {
         let mut stack = [0_u32; 64];
         let mut height = 1;
@@ -94,8 +94,8 @@ impl Bvh {
         true
     }
 
-    /// The item nearest to `p` by `distance2`, the squared distance to an item, among those nearer than `√limit2`. Of items at the
-    /// same distance, the first one met.
+    /// The item nearest to `p` by `distance2`, the squared distance to an item, among those nearer
+    /// than `√limit2`; the first one met of several.
     pub fn nearest(&self, p: DVec3, limit2: f64, mut distance2: impl FnMut(u32) -> f64) -> Option<(u32, f64)> {
         let mut best = None;
         let mut limit2 = limit2;
@@ -171,8 +171,8 @@ pub enum Node<'a> {
     Leaf(&'a [u32]),
 }
 
-/// Which items a call of [`sort_into_leaves`] orders: those of `1 << levels` leaves, the first of them `leaf`, the items' place in the
-/// order of all `n` items being `start`.
+/// The items that [`sort_into_leaves`] orders: those of `1 << levels` leaves from `leaf` on, from
+/// `start` on in the order of all.
 #[derive(Clone, Copy)]
 struct Part {
     start: usize,

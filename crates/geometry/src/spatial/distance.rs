@@ -1,4 +1,4 @@
-//! Distances between points, segments and triangles, with the closest points (Ericson, Real-Time Collision Detection, 5.1).
+//! Distances between points, segments and triangles (Ericson, Real-Time Collision Detection, 5.1).
 //! Degenerate segments and triangles are allowed.
 
 use glam::DVec3;

@@ -6,16 +6,16 @@ use crate::mesh::TriMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Pairs of one face after which no more are looked for: thousands of parts in one place have as many as the square of their number.
+/// Pairs of one face after which no more are looked for: thousands of parts may be in one place.
 const MAX_PAIRS_OF_FACE: usize = 1_000;
 /// Pairs of all faces likewise.
 pub const MAX_PAIRS: usize = 1_000_000;
 /// Faces that are looked at before their pairs are counted.
 const FACES_AT_A_TIME: usize = 1 << 10;
 
-/// Pairs of faces that cut, touch or overlap one another beyond the vertices and edges that they share, in ascending order. Faces
-/// that are folded flat onto a neighbour, and doubled faces, are among them. Faces that name vertices that do not exist are left out, and so are pairs
-/// beyond a thousand of the same first face and a million in all.
+/// Pairs of faces that cut, touch or overlap beyond the vertices and edges that they share,
+/// ascending; also faces folded flat onto a neighbour, and doubled ones. Left out are faces with
+/// vertices that do not exist, and pairs beyond a thousand of one face and a million in all.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let vertices: Vec<DVec3> = mesh.vertices.iter().map(|&p| p.into()).collect();
     let valid = |t: &[u32; 3]| t.iter().all(|&v| vertices.get(v as usize).is_some_and(|p| p.is_finite()));
@@ -50,7 +50,7 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[u32; 2]> {
     found
 }
 
-/// Whether two triangles have a point in common beyond the vertices and the edge that they share by index.
+/// Whether two triangles have a point in common beyond the vertices and the edge that they share.
 pub fn triangles_intersect(faces: [[u32; 3]; 2], corners: [[DVec3; 3]; 2]) -> bool {
     let [first, second] = faces;
     let shared = |v: &u32| second.contains(v);
@@ -100,7 +100,7 @@ pub fn segment_triangle(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     turns.iter().all(|s| *s >= 0.0) || turns.iter().all(|s| *s <= 0.0)
 }
 
-/// Whether triangles (b, c, a) and (c, b, d) over the common edge `b`–`c` lie in one plane on the same side of that edge.
+/// Whether triangles (b, c, a) and (c, b, d) lie in one plane on the same side of `b`–`c`.
 fn folded(b: DVec3, c: DVec3, a: DVec3, d: DVec3) -> bool {
     if orient3d(b, c, a, d) != 0.0 {
         return false;

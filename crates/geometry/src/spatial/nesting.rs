@@ -1,4 +1,4 @@
-//! Which connected parts of a mesh lie inside others: rays through one tree over the faces of all of them.
+//! Which connected parts of a mesh lie inside others, by rays through one tree over all faces.
 
 use super::surface::crossing;
 use super::{Aabb, Surface};
@@ -16,7 +16,7 @@ pub struct Nesting<'a> {
 }
 
 impl<'a> Nesting<'a> {
-    /// Of triangles whose vertices exist, and the part that each belongs to: numbers from 0 on without gaps.
+    /// Of triangles whose vertices exist, and the part of each, numbered from 0 on without gaps.
     pub fn new(vertices: &[Point], triangles: &[[u32; 3]], part_of: &'a [u32]) -> Self {
         let mut first = vec![0; part_of.iter().max().map_or(0, |&last| last as usize + 1)];
         for (face, &part) in part_of.iter().enumerate().rev() {
@@ -35,7 +35,7 @@ impl<'a> Nesting<'a> {
         self.first[part as usize]
     }
 
-    /// Whether other parts have a part inside, each counted by its `sign`: 1 as it is, −1 turned inside out.
+    /// Whether other parts have a part inside, each counted by its `sign`: −1 turned inside out.
     pub fn is_enclosed(&self, part: u32, sign: impl Fn(u32) -> i32) -> bool {
         let [a, b, c] = self.surface.corners(self.first[part as usize]);
         // A vertex may lie on a part that it only touches.
@@ -53,7 +53,7 @@ impl<'a> Nesting<'a> {
     }
 }
 
-/// Signed volumes of the parts of a triangle mesh, each relative to a vertex of its own, so that a mesh far from the origin keeps its digits.
+/// Signed volumes of the parts of a triangle mesh, each relative to one of its vertices.
 pub fn part_volumes(vertices: &[Point], triangles: &[[u32; 3]], part_of: &[u32]) -> Vec<f64> {
     let mut parts: Vec<Option<(Point, f64)>> = vec![None; part_of.iter().max().map_or(0, |&last| last as usize + 1)];
     for (triangle, &part) in triangles.iter().zip(part_of) {

@@ -1,4 +1,4 @@
-//! A triangle mesh with a tree over its faces: nearest points, and on which side of a closed mesh a point lies.
+//! A triangle mesh with a tree over its faces: nearest points, and the side that a point is on.
 
 use super::distance::{closest_on_triangle, point_triangle2};
 use super::predicates::{orient2d, orient3d};
@@ -7,8 +7,8 @@ use crate::mesh::{Point, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// A triangle mesh that can be asked for distances and winding numbers. Corners may coincide: a triangle with one corner three times
-/// is a point, with two corners a segment.
+/// A triangle mesh that can be asked for distances and winding numbers. Corners may coincide: a
+/// triangle may be a point or a segment.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// Positions.
@@ -67,8 +67,8 @@ impl Surface {
         self.tree.nearest(p, limit * limit, |face| point_triangle2(p, self.corners(face))).map(|(_, d2)| d2.sqrt())
     }
 
-    /// Winding number of a closed surface around `p`: 1 inside an outward-oriented cage, 0 outside. Counts the faces that a ray along
-    /// x crosses, with exact predicates and the point moved by infinitely little where it would meet an edge.
+    /// Winding number of a closed surface around `p`: 1 inside an outward-oriented cage, 0 outside.
+    /// Counts the faces that a ray along x crosses, exactly, the point moved by infinitely little.
     pub fn winding(&self, p: DVec3) -> i32 {
         let ray = Aabb { low: p, high: DVec3::new(f64::INFINITY, p.y, p.z) };
         let mut winding = 0;
@@ -91,7 +91,7 @@ impl From<&TriMesh> for Surface {
     }
 }
 
-/// The points outside a closed, outward-oriented cage, ascending, each with its distance from the cage.
+/// The points outside a closed, outward-oriented cage, ascending, each with its distance from it.
 pub fn outside(cage: &TriMesh, points: &[Point]) -> Vec<(u32, f64)> {
     let surface = Surface::from(cage);
     let farness = |(i, p): (usize, &Point)| {
@@ -101,7 +101,7 @@ pub fn outside(cage: &TriMesh, points: &[Point]) -> Vec<(u32, f64)> {
     points.par_iter().enumerate().with_min_len(256).filter_map(farness).collect()
 }
 
-/// +1 where the ray from `p` along x leaves through a triangle, −1 where it enters, 0 where it misses.
+/// +1 where the ray from `p` along x leaves through a triangle, −1 where it enters, else 0.
 #[inline]
 pub fn crossing(p: DVec3, [a, b, c]: [DVec3; 3]) -> i32 {
     if p.y < a.y.min(b.y).min(c.y) || p.y > a.y.max(b.y).max(c.y) {
@@ -127,7 +127,7 @@ pub fn crossing(p: DVec3, [a, b, c]: [DVec3; 3]) -> i32 {
     }
 }
 
-/// Sign of the turn a, b, p in the y–z plane with `p` moved by (ε, ε²); 0 only where a and b coincide there.
+/// Sign of the turn a, b, p in the y–z plane with `p` moved by (ε, ε²); 0 where a and b coincide.
 fn turn(a: DVec3, b: DVec3, p: DVec3) -> i32 {
     let sign = |x: f64| {
         if x > 0.0 {

@@ -1,15 +1,15 @@
-//! Generalised winding numbers of open meshes and polygon soups (Jacobson et al. 2013), with distant faces taken together by their
-//! dipoles (Barill et al. 2018).
+//! Generalised winding numbers of open meshes and polygon soups (Jacobson et al. 2013), with
+//! distant faces taken together by their dipoles (Barill et al. 2018).
 
 use super::bvh::Node;
 use super::{Aabb, Surface};
 use glam::{DMat3, DVec3};
 use std::f64::consts::PI;
 
-/// A cluster stands for its faces from this many radii on. The error is about one hundredth at most.
+/// A cluster stands for its faces from so many radii on, with an error of one hundredth at most.
 const FAR: f64 = 3.0;
 
-/// The winding number of any triangles, fast: 1 inside a closed outward-oriented surface, and in between near holes.
+/// The winding number of any triangles: 1 inside a closed surface, in between near holes.
 #[derive(Clone, Debug)]
 pub struct GeneralizedWinding<'a> {
     surface: &'a Surface,
@@ -25,7 +25,7 @@ struct Cluster {
     radius2: f64,
     /// Sum of the faces' normals, of length area each.
     normal: DVec3,
-    /// Sum of (centre of face − centre) ⊗ normal: column k holds the sum times component k of the normal.
+    /// Sum of (centre of face − centre) ⊗ normal: column k times component k of the normal.
     moment: DMat3,
     area: f64,
 }
@@ -76,7 +76,7 @@ impl<'a> GeneralizedWinding<'a> {
     }
 }
 
-/// Signed solid angle of a triangle seen from `p` (Van Oosterom and Strackee 1983); positive from behind.
+/// Solid angle of a triangle seen from `p`, positive from behind (Van Oosterom and Strackee 1983).
 pub fn solid_angle(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let (a, b, c) = (a - p, b - p, c - p);
     let (la, lb, lc) = (a.length(), b.length(), c.length());

@@ -3,7 +3,7 @@
 use super::{UnionFind, faces_around};
 use std::collections::BTreeMap;
 
-/// Every edge, with the smaller vertex first, and the faces at it, each with whether it runs from the smaller to the larger vertex.
+/// Every edge, the smaller vertex first, and the faces at it, with whether they run from that one.
 pub type Edges = BTreeMap<[u32; 2], Vec<(u32, bool)>>;
 
 /// Sides of a polygon, in its direction.
@@ -22,7 +22,7 @@ pub fn edges(faces: &[impl AsRef<[u32]>]) -> Edges {
     edges
 }
 
-/// The number of the connected part that each face belongs to, by edges shared by two faces, and how many parts there are.
+/// The connected part of each face, by edges shared by two faces, and how many parts there are.
 pub fn shells(faces: usize, edges: &Edges) -> (Vec<u32>, u32) {
     let mut shells = UnionFind::new(faces);
     for users in edges.values().filter(|u| u.len() == 2) {
@@ -31,7 +31,29 @@ pub fn shells(faces: usize, edges: &Edges) -> (Vec<u32>, u32) {
     shells.numbered()
 }
 
-/// The faces around each vertex, grouped by connection over edges at that vertex: one group at a manifold vertex.
+/// The connected parts of faces, each in the order of a walk from its first face, with whether a
+/// face has to be turned to agree with it. Takes neighbours, and whether they run against.
+pub fn orientations(neighbours: &[Vec<(u32, bool)>]) -> Vec<Vec<(u32, bool)>> {
+    let (mut seen, mut parts) = (vec![false; neighbours.len()], Vec::new());
+    for start in 0..neighbours.len() {
+        if std::mem::replace(&mut seen[start], true) {
+            continue;
+        }
+        let (mut part, mut next) = (vec![(start as u32, false)], 0);
+        while let Some(&(face, turned)) = part.get(next) {
+            for &(other, against) in &neighbours[face as usize] {
+                if !std::mem::replace(&mut seen[other as usize], true) {
+                    part.push((other, turned != against));
+                }
+            }
+            next += 1;
+        }
+        parts.push(part);
+    }
+    parts
+}
+
+/// The faces around each vertex, grouped by edges at that vertex: one group at a manifold vertex.
 pub fn fans(vertices: usize, faces: &[impl AsRef<[u32]>]) -> Vec<Vec<Vec<u32>>> {
     let fans_at = |(v, faces_at): (usize, Vec<u32>)| {
         let mut fans: Vec<(Vec<u32>, Vec<u32>)> = Vec::new();
@@ -62,8 +84,7 @@ pub fn fans(vertices: usize, faces: &[impl AsRef<[u32]>]) -> Vec<Vec<Vec<u32>>> 
     faces_around(vertices, faces).into_iter().enumerate().map(fans_at).collect()
 }
 
-/// Border loops, each as its vertices in the direction in which a face would have to run that fills it. Borders that branch are left
-/// out.
+/// Border loops, in the direction in which a face would fill them, but for those that branch.
 pub fn border_loops(edges: &Edges) -> Vec<Vec<u32>> {
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for ([a, b], users) in edges.iter().filter(|(_, u)| u.len() == 1) {

@@ -1,11 +1,9 @@
-//! Which vertices, edges and faces of a mesh meet: polygons of any arity and triangles, without assumptions on their validity.
+//! Which vertices, edges and faces of a mesh meet, without assumptions on their validity.
 
 mod adjacency;
 mod edges;
-mod rings;
 mod union_find;
 
-pub use adjacency::Adjacency;
-pub use edges::{Edges, border_loops, edges, fans, shells, sides};
-pub use rings::{faces_around, ring};
+pub use adjacency::{Adjacency, faces_around, ring};
+pub use edges::{Edges, border_loops, edges, fans, orientations, shells, sides};
 pub use union_find::UnionFind;

@@ -28,7 +28,7 @@ impl UnionFind {
         a != b
     }
 
-    /// The number of each item's set, in the order of their least items, and how many sets there are.
+    /// The number of each item's set, in the order of their least items, and how many there are.
     pub fn numbered(mut self) -> (Vec<u32>, u32) {
         let mut labels = vec![0; self.parent.len()];
         let mut count = 0;

@@ -3,9 +3,9 @@
 use cager_geometry::vector::Point;
 
 use super::nearest::NearestPoints;
-use super::orientation::welded;
 use super::rigidity::node_edges;
 use super::sampling::spread;
+use super::welded;
 use crate::points::vectors;
 
 /// Points of a model that are spread over it, and the edges between those whose surroundings touch.

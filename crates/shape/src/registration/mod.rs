@@ -22,13 +22,14 @@ mod template;
 
 pub use align::{AlignOptions, Alignment, align, align_pairs, alignments, least_turned};
 pub use anchors::Anchors;
+pub use cager_geometry::mesh::welded;
 pub use closeness::MeasuredSurface;
 pub use fit::FitOptions;
 pub use graph::NodeGraph;
 pub use matching::{KnownMatches, OrientedPoints};
 pub use nearest::NearestPoints;
 pub use observation::{Observation, ObservationError, ObservationNotes, ObservationOptions};
-pub use orientation::{outward, welded};
+pub use orientation::outward;
 pub use sampling::{SurfacePoint, farthest, sample_surface, surface_vertices};
 pub use stages::{Registration, StageOptions};
 pub use target::Target;

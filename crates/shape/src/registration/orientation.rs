@@ -1,8 +1,8 @@
 //! Triangles turned to face outwards.
 
-use std::collections::HashMap;
-
 use crate::points::renamed;
+use cager_geometry::mesh::welded;
+use cager_geometry::topology::orientations;
 use cager_geometry::vector::{Point, cross, dot, mean, sub};
 use rayon::prelude::*;
 
@@ -35,14 +35,6 @@ pub fn outward(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     oriented(vertices, triangles).triangles
 }
 
-/// The first vertex at each one's place: scans double vertices along the seams of their textures, where no surface is cut.
-pub fn welded(vertices: &[Point]) -> Vec<u32> {
-    let mut first = HashMap::with_capacity(vertices.len());
-    // 0 and −0 are one place.
-    let key = |p: &Point| p.map(|x| (x + 0.0).to_bits());
-    vertices.iter().enumerate().map(|(k, p)| *first.entry(key(p)).or_insert(k as u32)).collect()
-}
-
 /// Two faces that meet at an edge of no other face.
 struct Link {
     faces: [u32; 2],
@@ -73,35 +65,20 @@ fn turn_parts(vertices: &[Point], triangles: &mut [[u32; 3]], links: &[Link]) ->
         of_face[f as usize].push((g, against));
         of_face[g as usize].push((f, against));
     }
-    let mut turn: Vec<Option<bool>> = vec![None; triangles.len()];
     let mut turned = 0;
-    for first in 0..triangles.len() {
-        if turn[first].is_some() {
-            continue;
-        }
-        turn[first] = Some(false);
-        let mut part = vec![first];
-        let mut next = 0;
-        while let Some(&face) = part.get(next) {
-            let own = turn[face] == Some(true);
-            for &(other, against) in &of_face[face] {
-                if turn[other as usize].is_none() {
-                    turn[other as usize] = Some(own != against);
-                    part.push(other as usize);
-                }
-            }
-            next += 1;
-        }
-        let turned_to = |face: usize, turn: bool| {
-            let [a, b, c] = triangles[face];
-            if turn { [a, c, b] } else { [a, b, c] }
-        };
-        let faces: Vec<[u32; 3]> = part.iter().map(|&face| turned_to(face, turn[face] == Some(true))).collect();
+    for part in orientations(&of_face) {
+        let faces: Vec<[u32; 3]> = part
+            .iter()
+            .map(|&(face, turn)| {
+                let [a, b, c] = triangles[face as usize];
+                if turn { [a, c, b] } else { [a, b, c] }
+            })
+            .collect();
         let corners: Vec<Point> = faces.iter().flatten().map(|&v| vertices[v as usize]).collect();
         let inside_out = volume6(vertices, &faces, mean(&corners)) < 0.0;
-        for &face in &part {
-            if (turn[face] == Some(true)) != inside_out {
-                triangles[face].swap(1, 2);
+        for (face, turn) in part {
+            if turn != inside_out {
+                triangles[face as usize].swap(1, 2);
                 turned += 1;
             }
         }

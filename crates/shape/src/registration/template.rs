@@ -7,10 +7,10 @@ use faer::{Mat, MatRef};
 use glam::DVec3;
 
 use super::dense_rows::DenseRows;
-use super::orientation::welded;
 use super::rigidity::{Rigidity, node_edges};
 use super::sampling::{SurfacePoint, sample_surface, spread, surface_vertices};
 use super::sparse_rows::SparseRows;
+use super::welded;
 use crate::points::{plain, renamed, row_points, vectors, vertex_normals};
 
 /// How closely a template is looked at.

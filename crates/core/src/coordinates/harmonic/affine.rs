@@ -1,4 +1,4 @@
-//! What makes linear functions exact: every column of data is split into its best linear function and a rest.
+//! Makes linear functions exact, by the best linear function of every column of data.
 
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::mean;
@@ -6,9 +6,8 @@ use cager_geometry::vector::mean;
 use faer::Mat;
 use faer::MatMut;
 
-/// The linear functions that fit the hat functions of a cage best: value and gradient for each vertex.
-///
-/// With `V̂ = [1 V]`, v × 4, it is the pseudo-inverse `M`, 4 × v: `M V̂ = 1`.
+/// The linear functions that fit the hat functions best: with `V̂ = [1 V]`, v × 4, the
+/// pseudo-inverse `M`, 4 × v.
 pub(super) struct AffineFit {
     /// Subtracted from positions before anything else.
     centre: Point,
@@ -47,8 +46,7 @@ impl AffineFit {
         Self { centre, columns, rows }
     }
 
-    /// Makes the rows of these points reproduce linear functions exactly. Returns the largest change of an entry, NaN
-    /// where an entry is not finite.
+    /// Makes these points' rows reproduce linear functions; returns the largest change, or NaN.
     pub(super) fn complete(&self, mut a: MatMut<'_, f64>, points: impl Iterator<Item = Point>) -> f64 {
         let mut missing: Vec<[f64; 4]> = points.map(|x| row(x, self.centre)).collect();
         for (j, row) in self.rows.iter().enumerate() {

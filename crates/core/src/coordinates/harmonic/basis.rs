@@ -1,6 +1,4 @@
-//! Polynomials on a triangle: orthonormal, sorted by degree, so that a lower degree is the first part of a higher one.
-
-use super::quadrature::Rule;
+//! Orthonormal polynomials on a triangle, sorted by degree.
 
 /// Highest degree.
 pub(super) const MAX_DEGREE: usize = 6;
@@ -18,7 +16,7 @@ pub(super) const fn place(a: usize, b: usize) -> usize {
     degree * (degree + 1) / 2 + b
 }
 
-/// Orthonormal polynomials in `α, β`, the second and third barycentric coordinate: the mean of each one's square over the triangle is one.
+/// Orthonormal polynomials in barycentric coordinates `α, β`: each one's square has the mean one.
 pub(super) struct Basis {
     /// Row k: the coefficients of polynomial k over the monomials, of which it has the first k + 1.
     pub(super) coefficients: [[f64; MAX_FUNCTIONS]; MAX_FUNCTIONS],
@@ -56,16 +54,6 @@ impl Basis {
         for (k, value) in values.iter_mut().enumerate() {
             *value = (0..=k).map(|j| self.coefficients[k][j] * monomials[j]).sum();
         }
-    }
-
-    /// Values at the nodes of a rule, times their weights: row q holds all polynomials at node q.
-    pub(super) fn weighted(&self, rule: &Rule) -> Vec<[f64; MAX_FUNCTIONS]> {
-        let at = |node: &[f64; 3]| {
-            let mut values = [0.0; MAX_FUNCTIONS];
-            self.values([node[0], node[1]], &mut values);
-            values.map(|v| node[2] * v)
-        };
-        rule.nodes.iter().map(at).collect()
     }
 }
 

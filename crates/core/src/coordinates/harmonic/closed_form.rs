@@ -1,12 +1,12 @@
 //! Potentials of polynomial densities on a triangle near it, in closed form.
 //!
-//! With `ρ = y − x'` from the projection `x'` of x, `h` its height and `R = √(ρ² + h²)`, the gradient of R is `ρ/R` and the divergence of
-//! `ρ M R` is `2 M R + (ρ·∇M) R + M (R² − h²)/R`. So the integrals `I[M] = ∫ M/R` and `J[M] = ∫ M R` of monomials M in the barycentric
-//! coordinates α, β follow from those of lower degree and from integrals of R along the edges.
+//! With `ρ = y − x'` from the projection `x'` of x, `h` its height and `R = √(ρ² + h²)`, the
+//! gradient of R is `ρ/R` and the divergence of `ρ M R` is `2 M R + (ρ·∇M) R + M (R² − h²)/R`. So
+//! `I[M] = ∫ M/R` and `J[M] = ∫ M R` of monomials M in α, β follow from lower degrees and from
+//! integrals of R along the edges.
 
 use super::basis::{MAX_DEGREE, MAX_FUNCTIONS, functions, place};
-use super::quadrature::GAUSS_6;
-use super::tables::Tables;
+use super::quadrature::{GAUSS_6, Tables};
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, edge_logarithm};
 use crate::simd::{LANES, Lanes, angle, dot};

@@ -1,12 +1,18 @@
-//! Boundary elements: triangles on the cage's faces, each with a polynomial density of its own degree.
+//! Boundary elements: triangles on the cage's faces, each with a polynomial density.
 
 use super::basis::functions;
-use super::limits::MIN_DEGREE;
 use super::triangle::Triangle;
 use crate::simd::{LANES, Lanes, dot, grouped, multiversion};
 use cager_geometry::mesh::{Point, distance2_to_triangle};
 use cager_geometry::vector::{self, middle, sub};
 use rayon::prelude::*;
+
+/// Elements that refining may make, unless there are half as many at first.
+pub(super) const MAX_ELEMENTS: usize = 2500;
+/// Elements up to which all have so many low degrees: the equations of low unknowns are dense.
+pub(super) const LOW_DEGREES: [(usize, usize); 3] = [(1300, 2), (3000, 1), (10_000, 0)];
+/// Least degree that refining gives an element.
+pub(super) const MIN_DEGREE: usize = 3;
 
 /// One element.
 #[derive(Clone, Debug)]
@@ -16,19 +22,19 @@ pub(super) struct Element {
     pub(super) face: u32,
     /// Degree of its density; one less in the coarse space.
     pub(super) degree: usize,
-    /// Cuts of the face that come before this element where its division is written in preorder, as in a plan.
+    /// Cuts of the face that come before this element in preorder, as in a plan.
     pub(super) cuts: Vec<u8>,
-    /// Cuts above it from before the first solution: unknowns are in the order of this number, and otherwise of faces and preorder.
+    /// Cuts above it from before the first solution, by which unknowns are sorted.
     depth: u32,
 }
 
-/// The cut into four parts; smaller numbers are those of the corner from which a cut goes to the middle of the opposite side.
+/// The cut into four; smaller numbers are those of the corner from which a triangle is halved.
 pub(super) const QUARTERS: u8 = 7;
 /// What is added to the number of a corner where the cut was made after the first solution.
 pub(super) const LATER: u8 = 8;
 
 impl Element {
-    /// A face as a whole.
+    /// A face.
     pub(super) fn face(face: usize, corners: [Point; 3]) -> Self {
         Self { triangle: Triangle::new(corners), face: face as u32, degree: 0, cuts: Vec::new(), depth: 0 }
     }
@@ -63,7 +69,7 @@ impl Element {
         (0..3).find(|&i| (1..3).all(|j| length2(i) > TIE * length2((i + j) % 3))).map(|top| top as u8)
     }
 
-    /// Highest degree that a triangle of this shape is given: polynomials of high degree nearly depend on each other in thin ones.
+    /// Highest degree for this shape: in thin ones high polynomials nearly depend on each other.
     fn most(&self) -> usize {
         let aspect = self.triangle.diameter() / self.triangle.height();
         MAX_ASPECT.iter().find(|(limit, _)| aspect < *limit).map_or(MIN_DEGREE, |m| m.1)
@@ -77,42 +83,38 @@ impl Element {
 
 multiversion! {
     /// Distance from a triangle to the nearest of these points, but for those as good as on it.
-    fn nearest(triangle: &Triangle, points: &[[Lanes; 3]]) -> f64 = nearest_generic;
-}
-
-#[inline(always)]
-fn nearest_generic(triangle: &Triangle, points: &[[Lanes; 3]]) -> f64 {
-    let Triangle { centre, radius, corners, .. } = triangle;
-    let mut nearest = f64::INFINITY;
-    let mut near2 = f64::INFINITY;
-    let least2 = (ON * triangle.diameter()).powi(2);
-    for group in points {
-        let r = [group[0] - centre[0], group[1] - centre[1], group[2] - centre[2]];
-        let d2 = dot(&r, &r);
-        if !d2.any(Lanes::splat(near2), |d2, near2| d2 < near2) {
-            continue;
-        }
-        for l in 0..LANES {
-            if d2.0[l] < near2 {
-                let found = distance2_to_triangle(*corners, group.map(|c| c.0[l]));
-                if found < nearest && found >= least2 {
-                    nearest = found;
-                    near2 = (nearest.sqrt() + radius).powi(2);
+    fn nearest(triangle: &Triangle, points: &[[Lanes; 3]]) -> f64 {
+        let Triangle { centre, radius, corners, .. } = triangle;
+        let mut nearest = f64::INFINITY;
+        let mut near2 = f64::INFINITY;
+        let least2 = (ON * triangle.diameter()).powi(2);
+        for group in points {
+            let r = [group[0] - centre[0], group[1] - centre[1], group[2] - centre[2]];
+            let d2 = dot(&r, &r);
+            if !d2.any(Lanes::splat(near2), |d2, near2| d2 < near2) {
+                continue;
+            }
+            for l in 0..LANES {
+                if d2.0[l] < near2 {
+                    let found = distance2_to_triangle(*corners, group.map(|c| c.0[l]));
+                    if found < nearest && found >= least2 {
+                        nearest = found;
+                        near2 = (nearest.sqrt() + radius).powi(2);
+                    }
                 }
             }
         }
+        nearest.sqrt()
     }
-    nearest.sqrt()
 }
 
 /// Nearest point, in diameters, from which on each degree is enough.
 const ENOUGH: [(f64, usize); 4] = [(0.4, 3), (0.18, 4), (0.1, 5), (0.06, 6)];
 /// Points nearer than this are left to what is known on the surface.
 const ON: f64 = 0.01;
-/// Ratio of length to height below which a triangle may have each degree; any may have the smallest.
+/// Ratio of length to height below which a triangle may have each degree.
 const MAX_ASPECT: [(f64, usize); 3] = [(4.0, 6), (8.0, 5), (14.0, 4)];
-/// Sides are of different length when their squares differ by more than this factor: cages with symmetries are divided alike,
-/// however their vertices are ordered.
+/// Sides differ when their squares do by more than this factor: symmetric cages are divided alike.
 const TIE: f64 = 1.0 + 1e-9;
 /// No elements are divided for the sake of their shape once there are so many.
 pub(super) const MAX_ELEMENTS_FOR_SHAPE: usize = 1200;
@@ -174,7 +176,7 @@ pub(super) fn refined(unknowns: &Unknowns, marked: &[bool]) -> Vec<Element> {
     out
 }
 
-/// Where the unknowns are: those of low degree of all elements are solved for together, those above around each vertex.
+/// Low unknowns of all elements are solved for together, high ones around each vertex.
 pub(super) struct Unknowns {
     pub(super) elements: Vec<Element>,
     /// Places of the elements in preorder, face by face.

@@ -1,25 +1,26 @@
 //! Rows of `Φ` from the densities.
 //!
-//! Very near the surface the densities' finite degree shows. There the values on the surface help, which are the hat functions: the error at the
-//! nearest place on the surface is subtracted, as far as it reaches into the cage, so that values are exact on the surface and continuous near it.
+//! Very near the surface the densities' finite degree shows. The values on the surface are the hat
+//! functions: the error at the nearest place there is subtracted, as far as it reaches into the
+//! cage, so that values are exact on the surface and continuous near it.
 
 use super::affine::AffineFit;
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::Unknowns;
 use super::near::{Group, Near};
 use super::potential::potentials;
-use super::solve::{Densities, Part};
+use super::quadrature::Tables;
+use super::solve::{Part, Solved};
 use super::surface::{ClosestPoint, Surface};
-use super::tables::Tables;
-use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials, write_group};
-use crate::simd::{LANES, Lanes, multiversion};
+use crate::coordinates::layer::{self, INVERSE_4PI, Layers, group_potentials};
+use crate::simd::{LANES, Lanes, multiversion, store};
 use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-/// Points that one parallel task computes: some lane groups, which share one product with the low densities.
+/// Points that one task computes: some lane groups, which share one product with the low densities.
 const TASK_POINTS: usize = 16 * LANES;
 /// High unknowns count up to this many radii from their element's centre.
 const HIGH_RANGE: f64 = 4.0;
@@ -33,7 +34,7 @@ pub(super) struct Solution<'a> {
     pub(super) surface: &'a Surface<'a>,
     pub(super) affine: &'a AffineFit,
     pub(super) unknowns: &'a Unknowns,
-    pub(super) densities: &'a Densities,
+    pub(super) densities: &'a Solved,
 }
 
 /// Coordinates, and how far they are from final.
@@ -58,7 +59,7 @@ struct TaskResult {
 /// Working memory of one task.
 struct Scratch {
     layers: layer::Scratch,
-    /// Single layers of the low polynomials, points × unknowns, and their products with the densities.
+    /// Single layers of the low polynomials, points × unknowns, times the densities.
     singles: Mat<f32>,
     products: Mat<f32>,
     /// Hat functions' double layers and high densities, and changes, of one lane group by vertex.
@@ -129,7 +130,7 @@ fn evaluate_task(
                 scratch.values[v as usize].0[l] += near.shares[i] * weight;
             }
         }
-        write_group(rows.as_mut(), start, &scratch.values, 1.0);
+        store(rows.as_mut(), start, scratch.values.iter().map(|value| value.0));
         let largest =
             scratch.change.iter().fold(Lanes::ZERO, |a, c| a.zip(*c, |a, c| if c.abs() > a { c.abs() } else { a }));
         for l in 0..filled {
@@ -143,8 +144,7 @@ fn evaluate_task(
             }
         }
     }
-    // The densities are right to some 1e-3, for which single precision is more than enough; what it loses of linear functions
-    // is put back with the rest.
+    // Densities are right to some 1e-3: single precision is enough.
     let mut products = scratch.products.as_mut().subrows_mut(0, count);
     matmul(products.as_mut(), Accum::Replace, scratch.singles.as_ref().subrows(0, count), low, 1.0, Par::Seq);
     for (row, product) in rows.as_mut().col_iter_mut().zip(products.col_iter()) {
@@ -225,35 +225,31 @@ fn is_within(centre: &Point, limit: f64, x: &[Lanes; 3]) -> Lanes {
 
 multiversion! {
     /// Adds the changes of one element, and its high densities if the points are near.
-    fn add_part(part: &Part, all: usize, low: usize, near: bool, potentials: &[Lanes; MAX_FUNCTIONS], values: &mut [Lanes], change: &mut [Lanes])
-        = add_part_generic;
-}
-
-#[inline(always)]
-fn add_part_generic(
-    part: &Part,
-    all: usize,
-    low: usize,
-    near: bool,
-    potentials: &[Lanes; MAX_FUNCTIONS],
-    values: &mut [Lanes],
-    change: &mut [Lanes],
-) {
-    let used = if near { all } else { low };
-    for (c, &v) in part.vertices.iter().enumerate() {
-        if !part.change.is_empty() {
-            let mut sum = Lanes::ZERO;
-            for (potential, &density) in potentials[..used].iter().zip(&part.change[c * all..]) {
-                sum = sum + *potential * density;
+    fn add_part(
+        part: &Part,
+        all: usize,
+        low: usize,
+        near: bool,
+        potentials: &[Lanes; MAX_FUNCTIONS],
+        values: &mut [Lanes],
+        change: &mut [Lanes],
+    ) {
+        let used = if near { all } else { low };
+        for (c, &v) in part.vertices.iter().enumerate() {
+            if !part.change.is_empty() {
+                let mut sum = Lanes::ZERO;
+                for (potential, &density) in potentials[..used].iter().zip(&part.change[c * all..]) {
+                    sum = sum + *potential * density;
+                }
+                change[v as usize] = change[v as usize] + sum;
             }
-            change[v as usize] = change[v as usize] + sum;
-        }
-        if near {
-            let mut sum = Lanes::ZERO;
-            for (potential, &density) in potentials[low..all].iter().zip(&part.high[c * (all - low)..]) {
-                sum = sum + *potential * density;
+            if near {
+                let mut sum = Lanes::ZERO;
+                for (potential, &density) in potentials[low..all].iter().zip(&part.high[c * (all - low)..]) {
+                    sum = sum + *potential * density;
+                }
+                values[v as usize] = values[v as usize] + sum;
             }
-            values[v as usize] = values[v as usize] + sum;
         }
     }
 }

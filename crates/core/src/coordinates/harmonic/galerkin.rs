@@ -1,11 +1,10 @@
-//! The discrete equations `∫ b (S q) = ∫ b (½ u − K u)`: Galerkin's method for the first-kind equation of the single layer S, with
-//! the double layer K of the cage's hat functions taken exactly.
+//! The discrete equations `∫ b (S q) = ∫ b (½ u − K u)`: Galerkin's method for the first-kind
+//! equation of the single layer S, with the double layer K of the cage's hat functions exact.
 
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::elements::{Element, Unknowns};
 use super::potential::potentials;
-use super::quadrature::Rule;
-use super::tables::Tables;
+use super::quadrature::{Rule, Tables};
 use super::triangle::Triangle;
 use crate::coordinates::layer::{INVERSE_4PI, Layers, group_potentials};
 use crate::simd::{LANES, Lanes, gather, multiversion};
@@ -26,7 +25,7 @@ pub(super) struct Outer {
     far: OuterRule,
 }
 
-/// Nodes in groups of eight, the last one filled up with weights of zero, and the weighted polynomials at each node.
+/// Nodes in groups of eight, filled up with weights of zero, and the weighted polynomials there.
 struct OuterRule {
     nodes: Vec<[Lanes; 2]>,
     weighted: Vec<[f64; MAX_FUNCTIONS]>,
@@ -34,7 +33,7 @@ struct OuterRule {
 
 impl OuterRule {
     fn new(tables: &Tables, rule: &Rule) -> Self {
-        let values = tables.basis.weighted(rule);
+        let values = rule.weighted(&tables.basis);
         let groups = rule.nodes.len().div_ceil(LANES);
         let mut nodes = vec![[Lanes::splat(1.0 / 3.0); 2]; groups];
         let mut weighted = vec![[0.0; MAX_FUNCTIONS]; LANES * groups];
@@ -67,21 +66,17 @@ struct BlockScratch {
 
 multiversion! {
     /// Sums over the nodes of weights times potentials.
-    fn contract(weights: &[[f64; MAX_FUNCTIONS]], potentials: &[[Lanes; GROUPS]], out: &mut [[Lanes; GROUPS]])
-        = contract_generic;
-}
-
-#[inline(always)]
-fn contract_generic(weights: &[[f64; MAX_FUNCTIONS]], potentials: &[[Lanes; GROUPS]], out: &mut [[Lanes; GROUPS]]) {
-    for (i, row) in out.iter_mut().enumerate() {
-        let mut sums = [Lanes::ZERO; GROUPS];
-        for (weights, potentials) in weights.iter().zip(potentials) {
-            let weight = weights[i];
-            for g in 0..GROUPS {
-                sums[g] = sums[g] + potentials[g] * weight;
+    fn contract(weights: &[[f64; MAX_FUNCTIONS]], potentials: &[[Lanes; GROUPS]], out: &mut [[Lanes; GROUPS]]) {
+        for (i, row) in out.iter_mut().enumerate() {
+            let mut sums = [Lanes::ZERO; GROUPS];
+            for (weights, potentials) in weights.iter().zip(potentials) {
+                let weight = weights[i];
+                for g in 0..GROUPS {
+                    sums[g] = sums[g] + potentials[g] * weight;
+                }
             }
+            *row = sums;
         }
-        *row = sums;
     }
 }
 
@@ -137,7 +132,7 @@ impl NearPairs {
         Self { pairs, around }
     }
 
-    /// The elements near this one, itself among them, each with the entries: rows belong to this element, columns to the other.
+    /// The elements near this one, itself included, with entries: its rows × the other's columns.
     pub(super) fn of(&self, element: usize) -> impl Iterator<Item = (usize, MatRef<'_, f64>)> {
         self.around[element].iter().map(move |&place| {
             let (a, b, entries) = &self.pairs[place as usize];

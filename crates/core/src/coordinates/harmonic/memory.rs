@@ -1,9 +1,8 @@
 //! How much memory boundary elements take.
 
 use super::basis::{MAX_FUNCTIONS, functions};
-use super::elements::{Element, MAX_ELEMENTS_FOR_SHAPE, Unknowns};
+use super::elements::{Element, LOW_DEGREES, MAX_ELEMENTS, MAX_ELEMENTS_FOR_SHAPE, Unknowns};
 use super::galerkin::is_near;
-use super::limits::{LOW_DEGREES, MAX_ELEMENTS};
 use super::patch::MAX_PATCH_UNKNOWNS;
 use cager_geometry::mesh::Point;
 use rayon::prelude::*;
@@ -18,8 +17,7 @@ pub(super) fn needed(unknowns: &Unknowns, vertices: usize) -> u64 {
     bytes(unknowns.low_count(), unknowns.high_count(), vertices, near)
 }
 
-/// Upper bound of [`needed`]: for the most elements, of the highest degree, that refining these faces may end with. Elements have about as many near ones as
-/// the faces.
+/// Upper bound of [`needed`], for the most elements that refining may end with.
 pub(super) fn upper_bound(faces: &[[Point; 3]], vertices: usize) -> u64 {
     let whole: Vec<Element> = faces.iter().enumerate().map(|(f, &corners)| Element::face(f, corners)).collect();
     let elements = MAX_ELEMENTS.max(2 * faces.len().max(MAX_ELEMENTS_FOR_SHAPE)).min(LOW_DEGREES[2].0);
@@ -28,7 +26,7 @@ pub(super) fn upper_bound(faces: &[[Point; 3]], vertices: usize) -> u64 {
     bytes(low, elements * MAX_FUNCTIONS, vertices, pairs * (MAX_FUNCTIONS * MAX_FUNCTIONS) as u64)
 }
 
-/// The dense equations in double and in single precision, right-hand sides and densities, entries of near pairs, and a patch per thread.
+/// Dense equations in both precisions, right-hand sides, densities, near pairs, a patch per thread.
 fn bytes(low: usize, high: usize, vertices: usize, near: u64) -> u64 {
     let [low, high, vertices] = [low, high, vertices].map(|count| count as u64);
     let patches = rayon::current_num_threads() as u64 * (MAX_PATCH_UNKNOWNS * MAX_PATCH_UNKNOWNS) as u64;

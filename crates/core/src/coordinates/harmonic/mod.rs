@@ -1,25 +1,24 @@
 //! Harmonic coordinates (Joshi, Meyer, DeRose, Green and Sanocki 2007) by boundary elements.
 //!
-//! The coordinate of a cage vertex is harmonic inside the cage, and on it the hat function `u` of that vertex. With the single layer `S`
-//! and the double layer `K` of the cage, Green's representation formula is `u = S q − K u` inside and `S q = ½ u + K u` on the faces, up to
-//! the signs of the layers; the unknown is the normal derivative `q`. It is approximated by polynomials on elements that divide the
-//! faces, and found by Galerkin's method: symmetric positive definite equations, one factorisation for all vertices
-//! ([`galerkin`], [`solve`]). The double layer of hat functions has a closed form, and is exact.
+//! The coordinate of a cage vertex is harmonic inside the cage, and on it the hat function `u` of
+//! that vertex. With the single layer `S` and the double layer `K` of the cage, `u = S q − K u`
+//! inside and `S q = ½ u + K u` on the faces, up to the signs of the layers; the unknown is the
+//! normal derivative `q`. It is approximated by polynomials on elements that divide the faces, and
+//! found by Galerkin's method: definite equations, one factorisation for all vertices
+//! ([`galerkin`], [`solve`]). The double layer of hat functions is exact.
 //!
-//! Elements are divided, or get a higher degree, where that changes a coordinate of one of the points ([`elements`]): the difference
-//! to the solution without the highest degrees is known with the solution itself. Refining ends when it is below 1e-3 everywhere, and
-//! the difference is reported. Values near faces and edges are tied to those on the surface ([`evaluate`]); they are
-//! never clamped, which would lose linear functions. Those have densities that are constant on faces; what quadrature misses
-//! of them is put back by a small correction of all coordinates ([`affine`]), so that they are exact to rounding.
+//! Elements are divided, or get a higher degree, where that changes a coordinate of one of the
+//! points ([`elements`]): the difference to the solution without the highest degrees is known with
+//! the solution itself, and reported once it is below 1e-3 everywhere. Values near faces and edges
+//! are tied to those on the surface ([`evaluate`]), never clamped; linear functions are made exact
+//! by a small correction of all coordinates ([`affine`]).
 
 mod affine;
 mod basis;
 mod closed_form;
 mod elements;
-mod equations;
 mod evaluate;
 mod galerkin;
-mod limits;
 mod memory;
 mod near;
 mod patch;
@@ -28,17 +27,15 @@ mod potential;
 mod quadrature;
 mod solve;
 mod surface;
-mod tables;
 mod triangle;
 
 use super::layer::Layers;
 use super::{CageValues, CoordinateSystem, Coordinates, CoordinatesError, Refinement};
 use crate::cage::Cage;
 use cager_geometry::mesh::Point;
-use elements::Unknowns;
+use elements::{LOW_DEGREES, MAX_ELEMENTS, Unknowns};
 use evaluate::{Evaluated, Solution};
 use faer::Mat;
-use limits::{LOW_DEGREES, MAX_ELEMENTS};
 pub use plan::ElementPlan;
 use solve::SolveRecord;
 use surface::{ClosestPoint, Side, Surface};
@@ -105,7 +102,7 @@ fn solve_for(
     let closest_points = surface.closest_points(&points);
     check_inside(&closest_points, cage.diagonal() * layers.scale())?;
     let problem = Problem {
-        tables: tables::Tables::new(),
+        tables: quadrature::Tables::new(),
         affine: affine::AffineFit::new(layers.vertices()),
         corners: layers.triangles().iter().map(|t| t.map(|v| layers.vertices()[v as usize])).collect(),
         layers: &layers,
@@ -132,7 +129,7 @@ fn check_inside(closest_points: &[ClosestPoint], diagonal: f64) -> Result<(), Co
 
 /// What is to be solved, in the unit of the layers.
 struct Problem<'a> {
-    tables: tables::Tables,
+    tables: quadrature::Tables,
     affine: affine::AffineFit,
     /// Corners of the faces.
     corners: Vec<[Point; 3]>,
@@ -142,7 +139,7 @@ struct Problem<'a> {
     closest_points: &'a [ClosestPoint],
 }
 
-/// Solves on finer and finer elements until that changes nothing more, or no more of them are allowed.
+/// Solves on finer and finer elements until that changes nothing, or no more of them are allowed.
 fn refine(problem: &Problem<'_>) -> Result<Coordinates, CoordinatesError> {
     let Problem { corners, points, closest_points, .. } = problem;
     let inside = closest_points.iter().zip(*points).filter(|(closest, _)| closest.side == Side::Inside);
@@ -211,10 +208,9 @@ fn solve_on(
     let outer = galerkin::Outer::new(tables);
     let operator = galerkin::operator(tables, &outer, unknowns);
     let sides = galerkin::right_hand_sides(&outer, layers, unknowns);
-    let solve::Solved { densities, record, residual } =
-        solve::solve(operator, &sides, unknowns, layers.triangles(), given, measures)
-            .ok_or_else(|| not_computed("the equations on its faces are singular in double precision".to_owned()))?;
-    let solution = Solution { tables, layers, surface, affine, unknowns, densities: &densities };
+    let solved = solve::solve(operator, &sides, unknowns, layers.triangles(), given, measures)
+        .ok_or_else(|| not_computed("the equations on its faces are singular in double precision".to_owned()))?;
+    let solution = Solution { tables, layers, surface, affine, unknowns, densities: &solved };
     let found = evaluate::evaluate(&solution, points, closest_points, Refinement::TOLERANCE);
     // Written so that NaN is an error.
     if !(found.correction <= MISSED && found.change.is_finite()) {
@@ -223,7 +219,7 @@ fn solve_on(
             found.correction
         )));
     }
-    Ok((found, record, residual))
+    Ok((found, solved.record, solved.residual))
 }
 
 #[cfg(test)]
@@ -247,7 +243,8 @@ mod tests {
         value.expect("a value")
     }
 
-    /// That records which leave more of the equations say so, by no less than coordinates are off for it.
+    /// That records which leave more of the equations say so, by no less than coordinates are off
+    /// for it.
     fn shows_in_the_residual(change: impl FnOnce(&mut SolveRecord)) {
         solved(|problem, unknowns, (found, mut record, residual)| {
             assert!(residual > 0.0 && residual < 1e-3, "{residual:e}");

@@ -1,5 +1,5 @@
-//! Correction near the surface: the densities leave an error in the boundary values, which decays inside over the length of an
-//! element. The error at the closest point of the surface, times a share from 0 to 1, is subtracted at each point.
+//! Correction near the surface: the densities leave an error in the boundary values, which decays
+//! over the length of an element. A share of the error at the closest point is subtracted.
 
 use super::elements::Unknowns;
 use super::surface::{ClosestPoint, Side, Surface};
@@ -53,8 +53,8 @@ impl<'a> Near<'a> {
         Self { points, closest_points, shares, inwards: surface.thickness() }
     }
 
-    /// Eight points, their closest points moved just inside, and the shares; the last point is repeated where there are no more. Points on
-    /// the surface skip the evaluation at themselves; `off_surface` marks the others.
+    /// Eight points, their closest points moved just inside, and the shares; the last point is
+    /// repeated. `off_surface` marks the points that are not evaluated on the surface alone.
     pub(super) fn group(&self, first: usize) -> Group {
         let mut group =
             Group { x: [Lanes::ZERO; 3], y: [Lanes::ZERO; 3], share: Lanes::ZERO, off_surface: Lanes::ZERO };

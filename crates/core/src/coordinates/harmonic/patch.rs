@@ -1,15 +1,28 @@
-//! The high unknowns of one vertex's hat function, together with the low ones of the elements where they matter.
+//! The high unknowns of one vertex's hat function, with the low ones of the same elements.
 
 use super::basis::functions;
 use super::elements::Unknowns;
-use super::equations::{Equations, RESIDUAL};
+use super::galerkin::{NearPairs, RightHandSides};
 use cager_geometry::linalg::cholesky_in_place;
 use faer::linalg::triangular_solve;
 use faer::{Mat, MatMut, MatRef, Par};
 
+/// An element belongs to a vertex's patch where the residual of the low unknowns, as a value on the
+/// boundary, is above this; the iteration ends where all are below.
+pub(super) const RESIDUAL: f64 = 3e-4;
+
+/// The equations of all unknowns.
+pub(super) struct Equations<'a> {
+    pub(super) near: &'a NearPairs,
+    /// The low unknowns with each other, the lower triangle.
+    pub(super) far: &'a Mat<f32>,
+    pub(super) b: &'a RightHandSides,
+    pub(super) unknowns: &'a Unknowns,
+}
+
 /// Unknowns of a patch at most.
 pub(super) const MAX_PATCH_UNKNOWNS: usize = 1600;
-/// Where the entries of thin elements are not exact enough to be definite, diagonals grow by these fractions, one after the other.
+/// Fractions by which diagonals grow until the equations of thin elements are definite.
 pub(super) const DAMPING: [f64; 5] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1];
 
 /// Makes the diagonal larger by a fraction of it.
@@ -19,21 +32,18 @@ pub(super) fn damp(mut a: MatMut<'_, f64>, fraction: f64) {
     }
 }
 
-/// Smallest pivot of a factorisation over the diagonal entry it began as, where a damping is chosen: far above what rounding changes, so
-/// that the factorisation succeeds on every machine.
+/// Smallest pivot over its diagonal entry where a damping is chosen: far above rounding.
 const MIN_PIVOT: f64 = 1e-6;
 
-/// Factors the lower triangle of a symmetric matrix; whether it is definite, and by `safely` how the matrix is rounded has no say in that.
+/// Factors the lower triangle; whether it is definite, `safely` beyond rounding.
 pub(super) fn factor(mut matrix: MatMut<'_, f64>, par: Par, safely: bool) -> bool {
     let diagonal: Vec<f64> = (0..matrix.nrows()).map(|k| matrix[(k, k)]).collect();
     cholesky_in_place(matrix.as_mut(), par).is_some()
         && (!safely || diagonal.iter().enumerate().all(|(k, entry)| matrix[(k, k)].powi(2) >= MIN_PIVOT * entry))
 }
 
-/// The first of [`DAMPING`], from the given one on, with which a factorisation succeeds.
-///
-/// A plan gives the one that succeeded where it was made. In plans of programs up to 0.2 it may fail by the rounding of other instructions:
-/// coordinates that are off by about what the larger diagonal changes are better than none.
+/// The first of [`DAMPING`], from the given one on, with which a factorisation succeeds. That of a
+/// plan of programs up to 0.2 may fail by rounding: a larger one is better than none.
 pub(super) fn least_damping(given: Option<u8>, mut succeeds: impl FnMut(f64) -> bool) -> Option<u8> {
     (given.unwrap_or(0)..DAMPING.len() as u8).find(|&step| succeeds(DAMPING[usize::from(step)]))
 }
@@ -45,14 +55,14 @@ pub(super) fn zeroed(memory: &mut Vec<f64>, rows: usize, columns: usize) -> MatM
     MatMut::from_column_major_slice_mut(memory, rows, columns)
 }
 
-/// The elements on which one vertex's hat function has high unknowns, ascending, each with the vertex's column there.
+/// The elements where a hat function has high unknowns, ascending, with its column there.
 pub(super) struct Patch {
     pub(super) places: Vec<(u32, u32)>,
     /// Which of [`DAMPING`] its matrix takes, where that is known.
     pub(super) damping: Option<u8>,
 }
 
-/// Chooses the elements of each of `m` vertices' patches among the candidates, by the residuals that the low unknowns leave there.
+/// Chooses the elements of each vertex's patch by the residuals that the low unknowns leave there.
 pub(super) fn choose(unknowns: &Unknowns, candidates: &[Vec<u32>], residuals: &[Mat<f64>], m: usize) -> Vec<Vec<u32>> {
     let mut sizes: Vec<Vec<(f64, u32)>> = vec![Vec::new(); m];
     for (e, (vertices, residual)) in candidates.iter().zip(residuals).enumerate() {
@@ -88,8 +98,8 @@ pub(super) struct Step {
     pub(super) damping: u8,
 }
 
-/// Where the unknowns of a patch are in its matrix: first the low ones of all elements, then the others but for the highest degree, then
-/// those. The highest degrees are last, so that the solution without them is that of the leading parts of the factor.
+/// Rows of a patch's unknowns: the low ones of all elements, others, then those of the highest
+/// degrees, so that the solution without these is that of the leading parts of the factor.
 struct Layout {
     /// For each element the row of each of its unknowns.
     rows: Vec<Vec<usize>>,
@@ -171,7 +181,7 @@ fn fill_low(mut matrix: MatMut<'_, f64>, equations: &Equations<'_>, patch: &Patc
     }
 }
 
-/// Writes all entries of elements that are near each other, below the diagonal; high unknowns of others do not act on each other.
+/// Writes all entries of elements near each other, below the diagonal; others are zero.
 fn fill_near(mut matrix: MatMut<'_, f64>, equations: &Equations<'_>, patch: &Patch, layout: &Layout) {
     let place_of = |element: usize| patch.places.binary_search_by_key(&(element as u32), |place| place.0).ok();
     for (&(e, _), columns) in patch.places.iter().zip(&layout.rows) {

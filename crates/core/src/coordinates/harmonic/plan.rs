@@ -1,9 +1,8 @@
-//! What refining decided, as bytes: which elements there are, of which degrees, and how their equations were solved. Containers keep it, so
-//! that a decoder solves the same equations by the same steps and decides nothing; `docs/FORMAT.md` has the layout.
+//! What refining decided, as bytes: elements, degrees, and how their equations were solved. A
+//! decoder repeats it and decides nothing; `docs/FORMAT.md` has the layout.
 
 use super::basis::{MAX_DEGREE, functions};
-use super::elements::{Element, LATER, QUARTERS, Unknowns};
-use super::limits::{LOW_DEGREES, MIN_DEGREE};
+use super::elements::{Element, LATER, LOW_DEGREES, MIN_DEGREE, QUARTERS, Unknowns};
 use super::patch::{DAMPING, MAX_PATCH_UNKNOWNS};
 use super::solve::{MAX_ITERATIONS, SolveRecord};
 use cager_geometry::mesh::Point;
@@ -46,10 +45,8 @@ impl ElementPlan {
         Self { bytes }
     }
 
-    /// Elements and the record for a cage with these faces and so many vertices. Takes no more memory than elements that refining may make.
-    ///
-    /// # Errors
-    /// What is wrong with the bytes.
+    /// Elements and record for a cage with these faces and so many vertices, or what is wrong with
+    /// the bytes. Takes no more memory than elements that refining may make.
     pub(super) fn read(&self, faces: &[[Point; 3]], vertices: usize) -> Result<(Unknowns, SolveRecord), &'static str> {
         let Some((&[low_degree, damping, iterations], mut rest)) = self.bytes.split_first_chunk() else {
             return Err("it is cut");

@@ -1,11 +1,9 @@
-//! Potentials of polynomial densities on a triangle, `∫ q(y) / 4π|x − y| dy`, for eight points at a time.
-//!
-//! Near the triangle in closed form, farther away by quadrature, very far with a few points for the lowest degrees.
+//! Potentials `∫ q(y) / 4π|x − y| dy` of polynomial densities on a triangle, for eight points at a
+//! time: near it in closed form, farther away by quadrature.
 
 use super::basis::{MAX_FUNCTIONS, functions};
 use super::closed_form::closed_form;
-use super::quadrature::Rule;
-use super::tables::Tables;
+use super::quadrature::{Rule, Tables};
 use super::triangle::Triangle;
 use crate::coordinates::layer::INVERSE_4PI;
 use crate::simd::{LANES, Lanes, dot, multiversion};
@@ -18,61 +16,57 @@ const COARSE_FROM: f64 = 20.0;
 const COARSE_DEGREE: usize = 2;
 
 multiversion! {
-    /// Potentials at one lane group of the polynomials up to a degree on a triangle; as many entries of `out` are written.
-    pub(super) fn potentials(tables: &Tables, triangle: &Triangle, degree: usize, x: &[Lanes; 3], out: &mut [Lanes; MAX_FUNCTIONS])
-        = potentials_generic;
-}
-
-#[inline(always)]
-fn potentials_generic(
-    tables: &Tables,
-    triangle: &Triangle,
-    degree: usize,
-    x: &[Lanes; 3],
-    out: &mut [Lanes; MAX_FUNCTIONS],
-) {
-    let c = &triangle.centre;
-    let r = [x[0] - Lanes::splat(c[0]), x[1] - Lanes::splat(c[1]), x[2] - Lanes::splat(c[2])];
-    let distance2 = dot(&r, &r);
-    let at = |radii: f64| (radii * triangle.radius) * (radii * triangle.radius);
-    let (far, farther) = (at(QUADRATURE_FROM), at(COARSE_FROM));
-    let count = functions(degree);
-    let (mut near_any, mut far_any, mut farther_any) = (false, false, false);
-    for l in 0..LANES {
-        let d = distance2.0[l];
-        near_any |= d <= far;
-        far_any |= (d > far) & (d <= farther);
-        farther_any |= d > farther;
-    }
-    if near_any & !far_any & !farther_any {
-        closed_form(tables, triangle, degree, x, out);
-        return;
-    }
-    for value in &mut out[..count] {
-        *value = Lanes::ZERO;
-    }
-    let mut part = [Lanes::ZERO; MAX_FUNCTIONS];
-    if farther_any {
-        let low = degree.min(COARSE_DEGREE);
-        quadrature(triangle, &tables.coarse, low, x, &mut part);
-        let keep = distance2.map(|d| if d > farther { 1.0 } else { 0.0 });
-        for k in 0..functions(low) {
-            out[k] = part[k] * keep;
+    /// Potentials at one lane group of the polynomials up to a degree, written to `out`.
+    pub(super) fn potentials(
+        tables: &Tables,
+        triangle: &Triangle,
+        degree: usize,
+        x: &[Lanes; 3],
+        out: &mut [Lanes; MAX_FUNCTIONS],
+    ) {
+        let c = &triangle.centre;
+        let r = [x[0] - Lanes::splat(c[0]), x[1] - Lanes::splat(c[1]), x[2] - Lanes::splat(c[2])];
+        let distance2 = dot(&r, &r);
+        let at = |radii: f64| (radii * triangle.radius) * (radii * triangle.radius);
+        let (far, farther) = (at(QUADRATURE_FROM), at(COARSE_FROM));
+        let count = functions(degree);
+        let (mut near_any, mut far_any, mut farther_any) = (false, false, false);
+        for l in 0..LANES {
+            let d = distance2.0[l];
+            near_any |= d <= far;
+            far_any |= (d > far) & (d <= farther);
+            farther_any |= d > farther;
         }
-    }
-    if far_any {
-        quadrature(triangle, &tables.fine, degree, x, &mut part);
-        let keep = distance2.map(|d| if (d > far) & (d <= farther) { 1.0 } else { 0.0 });
-        for k in 0..count {
-            out[k] = out[k] + part[k] * keep;
+        if near_any & !far_any & !farther_any {
+            closed_form(tables, triangle, degree, x, out);
+            return;
         }
-    }
-    if near_any {
-        closed_form(tables, triangle, degree, x, &mut part);
-        for k in 0..count {
-            for l in 0..LANES {
-                if distance2.0[l] <= far {
-                    out[k].0[l] = part[k].0[l];
+        for value in &mut out[..count] {
+            *value = Lanes::ZERO;
+        }
+        let mut part = [Lanes::ZERO; MAX_FUNCTIONS];
+        if farther_any {
+            let low = degree.min(COARSE_DEGREE);
+            quadrature(triangle, &tables.coarse, low, x, &mut part);
+            let keep = distance2.map(|d| if d > farther { 1.0 } else { 0.0 });
+            for k in 0..functions(low) {
+                out[k] = part[k] * keep;
+            }
+        }
+        if far_any {
+            quadrature(triangle, &tables.fine, degree, x, &mut part);
+            let keep = distance2.map(|d| if (d > far) & (d <= farther) { 1.0 } else { 0.0 });
+            for k in 0..count {
+                out[k] = out[k] + part[k] * keep;
+            }
+        }
+        if near_any {
+            closed_form(tables, triangle, degree, x, &mut part);
+            for k in 0..count {
+                for l in 0..LANES {
+                    if distance2.0[l] <= far {
+                        out[k].0[l] = part[k].0[l];
+                    }
                 }
             }
         }
@@ -109,7 +103,8 @@ mod tests {
     use cager_geometry::mesh::Point;
     use cager_geometry::vector;
 
-    /// The same by brute force: the triangle divided until its parts are small against their distance.
+    /// The same by brute force: the triangle divided until its parts are small against their
+    /// distance.
     fn divided(
         tables: &Tables,
         whole: &Triangle,

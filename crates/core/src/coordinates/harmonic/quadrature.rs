@@ -1,6 +1,8 @@
-//! Quadrature on a triangle: rules of Gauss in collapsed coordinates, and symmetric ones of low degree.
+//! Quadrature on a triangle, with the polynomials at its nodes.
 
-/// Nodes `[α, β, weight]` in the second and third barycentric coordinate; the weights add up to one.
+use super::basis::{Basis, MAX_FUNCTIONS};
+
+/// Nodes `[α, β, weight]` in barycentric coordinates; the weights add up to one.
 pub(super) struct Rule {
     pub(super) nodes: Vec<[f64; 3]>,
 }
@@ -43,6 +45,35 @@ impl Rule {
         }
         nodes.extend(self.nodes.iter().map(|n| [0.5 - 0.5 * n[0], 0.5 - 0.5 * n[1], 0.25 * n[2]]));
         Self { nodes }
+    }
+
+    /// Values of the polynomials at the nodes, times their weights: a row per node.
+    pub(super) fn weighted(&self, basis: &Basis) -> Vec<[f64; MAX_FUNCTIONS]> {
+        let at = |node: &[f64; 3]| {
+            let mut values = [0.0; MAX_FUNCTIONS];
+            basis.values([node[0], node[1]], &mut values);
+            values.map(|v| node[2] * v)
+        };
+        self.nodes.iter().map(at).collect()
+    }
+}
+
+/// What the potentials of all triangles need.
+pub(super) struct Tables {
+    pub(super) basis: Basis,
+    /// Rules with the polynomials at their nodes, times the weights.
+    pub(super) fine: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
+    pub(super) coarse: (Rule, Vec<[f64; MAX_FUNCTIONS]>),
+}
+
+impl Tables {
+    pub(super) fn new() -> Self {
+        let basis = Basis::new();
+        let with = |rule: Rule| {
+            let values = rule.weighted(&basis);
+            (rule, values)
+        };
+        Self { fine: with(Rule::degree_8()), coarse: with(Rule::degree_5()), basis }
     }
 }
 

@@ -1,14 +1,14 @@
-//! Densities of all hat functions: low unknowns of all elements together, high ones in a patch around each vertex, in turn.
+//! Densities of all hat functions: low unknowns of all elements together, high ones in a patch
+//! around each vertex, in turn.
 //!
-//! The density of a hat function is smooth away from its star, so that its high unknowns count on a few elements only. Solving for all
-//! low unknowns, then for all unknowns of the patch with the residual that is left, then for the low ones again is a
-//! multiplicative Schwarz iteration, which gains more than a digit an iteration.
+//! A hat function's density is smooth away from its star, so that its high unknowns count on a few
+//! elements only. Solving for all low unknowns, then for the patch with the residual that is left,
+//! then for the low ones again is a multiplicative Schwarz iteration.
 
 use super::basis::functions;
 use super::elements::Unknowns;
-use super::equations::{Equations, RESIDUAL};
 use super::galerkin::{NearPairs, Operator, RightHandSides};
-use super::patch::{self, DAMPING, Patch, damp, zeroed};
+use super::patch::{self, DAMPING, Equations, Patch, RESIDUAL, damp, zeroed};
 use cager_geometry::linalg;
 use faer::linalg::{matmul::matmul, triangular_solve};
 use faer::prelude::IntoConst;
@@ -26,13 +26,6 @@ pub(super) struct Part {
     pub(super) high: Vec<f64>,
     /// What the highest degree changes of all unknowns, by vertex; empty where nobody asks.
     pub(super) change: Vec<f64>,
-}
-
-/// Densities of all hat functions.
-pub(super) struct Densities {
-    /// Low unknowns, each times vertices.
-    pub(super) low: Mat<f64>,
-    pub(super) parts: Vec<Part>,
 }
 
 /// A matrix in single precision, from the row on that belongs to each column; zeros above.
@@ -73,16 +66,19 @@ pub(super) struct SolveRecord {
     pub(super) patches: Vec<Vec<u32>>,
 }
 
-/// Densities, and how they were found.
+/// Densities of all hat functions, and how they were found.
 pub(super) struct Solved {
-    pub(super) densities: Densities,
+    /// Low unknowns, each times vertices.
+    pub(super) low: Mat<f64>,
+    pub(super) parts: Vec<Part>,
     pub(super) record: SolveRecord,
-    /// The largest residual of all equations, damped ones and those of unknowns that were left out among them, as a value on the
-    /// boundary: harmonic functions being largest there, about as much as a coordinate can be off for it. Zero where it is not measured.
+    /// The largest residual of all equations, damped ones and unknowns left out included, as a
+    /// value on the boundary: about as much as a coordinate can be off. Zero if not measured.
     pub(super) residual: f64,
 }
 
-/// Solves for all densities, by this record where it is given, and `measures` what that leaves; `None` where the equations are not definite.
+/// Solves for all densities, by this record if any, and `measures` what that leaves; `None` where
+/// the equations are not definite.
 pub(super) fn solve(
     operator: Operator,
     b: &RightHandSides,
@@ -91,8 +87,7 @@ pub(super) fn solve(
     given: Option<&SolveRecord>,
     measures: bool,
 ) -> Option<Solved> {
-    // The factor takes the place of the matrix, of which the patches need entries between elements that are not near, those on and
-    // below the diagonal.
+    // The factor replaces the matrix, of which the patches need the lower triangle.
     let far = lower_in_single(operator.low.as_ref(), |j| j - j % unknowns.low);
     let low_system = LowSystem::new(operator.low, &far, given.map(|record| record.damping))?;
     let equations = Equations { near: &operator.near, far: &far, b, unknowns };
@@ -136,7 +131,7 @@ pub(super) fn solve(
         iterations,
         patches: patches.iter().map(|patch| patch.places.iter().map(|place| place.0).collect()).collect(),
     };
-    Some(Solved { densities: Densities { low, parts: parts(unknowns, high, &patches, &changes) }, record, residual })
+    Some(Solved { low, parts: parts(unknowns, high, &patches, &changes), record, residual })
 }
 
 /// The equations of the low unknowns, factored.
@@ -188,7 +183,7 @@ fn candidates(near: &NearPairs, unknowns: &Unknowns, faces: &[[u32; 3]]) -> Vec<
     (0..unknowns.elements.len()).into_par_iter().map(of).collect()
 }
 
-/// The patches of these elements for each vertex, and the high unknowns of each element for these vertices, zero.
+/// Each vertex's patch of these elements, and each element's high unknowns for its vertices, zero.
 fn patches(unknowns: &Unknowns, elements: &[Vec<u32>]) -> (Vec<Patch>, Vec<High>) {
     let mut vertices: Vec<Vec<u32>> = vec![Vec::new(); unknowns.elements.len()];
     let mut patches = Vec::with_capacity(elements.len());
@@ -250,7 +245,7 @@ impl Equations<'_> {
         patch::choose(self.unknowns, candidates, &self.residuals(low, &high, candidates), low.ncols())
     }
 
-    /// The largest residual, see [`Solved::residual`]; the low unknowns were solved for with diagonals larger by the fraction `damping`.
+    /// See [`Solved::residual`]; the low unknowns' diagonals were larger by the fraction `damping`.
     fn largest_residual(&self, low: MatRef<'_, f64>, high: &[High], candidates: &[Vec<u32>], damping: f64) -> f64 {
         let l = self.unknowns.low;
         let residuals = self.residuals(low, high, candidates);
@@ -267,7 +262,7 @@ impl Equations<'_> {
         residuals.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
-    /// What the equations of the high unknowns leave: for every element, its high unknowns × the vertices that are asked for, ascending.
+    /// What the equations of each element's high unknowns leave: those × the vertices asked for.
     fn residuals(&self, low: MatRef<'_, f64>, high: &[High], vertices: &[Vec<u32>]) -> Vec<Mat<f64>> {
         let (unknowns, b) = (self.unknowns, self.b);
         let of = |memory: &mut Vec<f64>, e: usize| {

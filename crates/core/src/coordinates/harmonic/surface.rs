@@ -33,8 +33,8 @@ pub(super) struct Surface<'a> {
     /// Centre and radius of each face.
     spheres: Vec<(Point, f64)>,
     normals: Vec<Point>,
-    /// Sums of the normals around each vertex by angle, and the faces across the edges opposite each corner: which tell the
-    /// sides of edges and vertices apart (Bærentzen and Aanæs 2005).
+    /// Sums of the normals around each vertex by angle, and the faces across the edges opposite
+    /// each corner: they tell the sides of edges and vertices apart (Bærentzen and Aanæs 2005).
     vertex_normals: Vec<Point>,
     across: Vec<[u32; 3]>,
     /// Distance up to which points are on it.
@@ -119,8 +119,7 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// The point of a triangle that is nearest to x, and its barycentric coordinates. From distances to the edges, which are exact in
-/// thin triangles too.
+/// The point of a triangle nearest to x, and its weights, by distances to the edges.
 fn nearest_in_triangle(corners: [Point; 3], normal: Point, x: Point) -> ([f64; 3], Point) {
     let mut weights = [0.0; 3];
     let mut nearest: Option<([f64; 3], Point)> = None;

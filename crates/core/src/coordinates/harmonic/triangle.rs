@@ -3,7 +3,7 @@
 use cager_geometry::mesh::Point;
 use cager_geometry::vector;
 
-/// A triangle that carries a polynomial density, whose barycentric coordinates 1 − α − β, α and β belong to its corners in order.
+/// A triangle with a density; 1 − α − β, α and β belong to its corners in order.
 #[derive(Clone, Debug)]
 pub(super) struct Triangle {
     pub(super) corners: [Point; 3],

@@ -1,30 +1,28 @@
-//! Mean value coordinates as a function of the cage, in single precision: values, and the derivative of any function of them by the
-//! cage's vertices in reverse mode.
+//! Mean value coordinates as a function of the cage, in single precision: values, and derivatives
+//! by the cage's vertices in reverse mode.
 //!
-//! With `W` the unnormalised weights, `Φ = W/ΣW`, and per face `w_i = (g_i·m)/(det d_i)`, where `g_i = u_j × u_k`,
-//! `det = u_0·g_0` and `m = Σ f_e g_e`, `f = θ/(2 sin θ)` a function of the cosine; all of it is smooth away from the cage's faces. A face that a
-//! point sees edge-on has weights of zero, their limit beside the face.
+//! With `W` the unnormalised weights, `Φ = W/ΣW`, and per face `w_i = (g_i·m)/(det d_i)`, where
+//! `g_i = u_j × u_k`, `det = u_0·g_0` and `m = Σ f_e g_e`, `f = θ/(2 sin θ)` a function of the
+//! cosine: smooth away from the cage's faces. A face seen edge-on has weights of zero.
 
 use super::MeanValue;
 use crate::cage::{Cage, Face};
-use crate::simd::{LANES, Singles, cross, dot, half_angle_over_sine, half_angle_over_sine_slope, multiversion};
+use crate::simd::{LANES, Singles, cross, dot, half_angle_over_sine, half_angle_over_sine_slope, multiversion, store};
 use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
-use faer::{Mat, MatMut, MatRef};
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-/// Points of one task: partial gradients are added up task by task, so that the sum does not depend on the number of threads.
+/// Points of one task: gradients are added up by tasks, whatever the number of threads.
 const TASK_POINTS: usize = 16 * LANES;
-/// Square of the sine under which faces are seen edge-on: from there the rounding of their derivatives outweighs what they add.
+/// Square of the sine under which faces are seen edge-on: rounding outweighs their derivatives.
 const EDGE_ON: f32 = 1e-6;
 /// Least square of an edge's sine.
 const TOUCHING: f32 = 1e-12;
 
 impl MeanValue {
-    /// `Φ`, n × m, for points off the cage's surface: accurate to about 1e-4, mostly far better, without the special cases of [`coordinates`] for
-    /// points at the surface and thin cages. Runs on the current rayon pool; the result does not depend on it.
-    ///
-    /// [`coordinates`]: crate::coordinates::CoordinateSystem::coordinates
+    /// `Φ`, n × m, for points off the cage's surface: accurate to about 1e-4, mostly far better,
+    /// without the special cases at the surface and of thin cages.
     pub fn smooth_coordinates(self, cage: &Cage, points: &[Point]) -> Mat<f32> {
         let vertices = Unit::of(cage).vertices(cage);
         let mut phi = zeros(points.len(), cage.vertices().len());
@@ -36,15 +34,15 @@ impl MeanValue {
                     let filled = LANES.min(rows.nrows() - start);
                     let x = Unit::of(cage).lanes(&points[start..start + filled]);
                     let scale = forward(cage, &vertices, x, scratch);
-                    store(rows.as_mut().subrows_mut(start, filled), &scratch.weights, scale);
+                    store(rows.as_mut(), start, scratch.weights.iter().map(|&weight| (weight * scale).0));
                 }
             },
         );
         phi
     }
 
-    /// Gradient of `Σ_ij g_ij Φ_ij` by the cage's vertices, v × 3, where `upstream` holds `g`, n × m, and `Φ` is [`Self::smooth_coordinates`]. Runs
-    /// on the current rayon pool; the result does not depend on it.
+    /// Gradient of `Σ_ij g_ij Φ_ij` by the cage's vertices, v × 3, where `upstream` holds `g`, n ×
+    /// m, and `Φ` is [`Self::smooth_coordinates`].
     pub fn gradient(self, cage: &Cage, points: &[Point], upstream: MatRef<'_, f32>) -> Vec<Point> {
         let unit = Unit::of(cage);
         let vertices = unit.vertices(cage);
@@ -80,7 +78,7 @@ impl MeanValue {
     }
 }
 
-/// The unit in which positions fit single precision: differences from a vertex, as fractions of the cage's diagonal.
+/// Positions that fit single precision: differences from a vertex over the cage's diagonal.
 #[derive(Clone, Copy)]
 struct Unit {
     origin: Point,
@@ -152,7 +150,7 @@ struct Adjoint {
     weights: Vec<Singles>,
     /// Derivative by each unit vector.
     directions: Vec<[Singles; 3]>,
-    /// Derivative by each edge's mean-vector term, then by its cross product where that enters on its own; zeros between lane groups.
+    /// Derivative by each edge's mean-vector term, then by its cross product.
     edges: Vec<[Singles; 6]>,
     /// Derivative by the vertices, over all lane groups of a task.
     total: Vec<[Singles; 3]>,
@@ -170,23 +168,7 @@ impl Adjoint {
     }
 }
 
-/// Writes the coordinates of a lane group's points, one for each row.
-fn store(mut rows: MatMut<'_, f32>, weights: &[Singles], scale: Singles) {
-    let filled = rows.nrows();
-    for (column, &weight) in rows.as_mut().col_iter_mut().zip(weights) {
-        let values = (weight * scale).0;
-        match column.try_as_col_major_mut() {
-            Some(column) => match column.as_slice_mut().as_chunks_mut() {
-                ([all], _) => *all = values,
-                (_, some) => some.copy_from_slice(&values[..filled]),
-            },
-            None => unreachable!("a matrix of its own has contiguous columns"),
-        }
-    }
-}
-
-/// Derivatives by the weights from those by their quotients: `(g_ij − Σ_k g_ik Φ_ik)/ΣW`, over the distances. Lanes that repeat the last point
-/// contribute zero.
+/// Derivatives by the weights, `(g_ij − Σ_k g_ik Φ_ik)/ΣW` over the distances.
 fn load(upstream: MatRef<'_, f32>, scale: Singles, scratch: &Scratch, out: &mut [Singles]) {
     let mut mean = Singles::ZERO;
     for ((value, column), &weight) in out.iter_mut().zip(upstream.col_iter()).zip(&scratch.weights) {
@@ -204,51 +186,43 @@ fn load(upstream: MatRef<'_, f32>, scale: Singles, scratch: &Scratch, out: &mut 
 
 multiversion! {
     /// Unnormalised weights of one lane group, left in the scratch; returns one over their sums.
-    fn forward(cage: &Cage, vertices: &[[f32; 3]], x: [Singles; 3], scratch: &mut Scratch) -> Singles = forward_generic;
-}
-
-multiversion! {
-    /// Adds the derivative by the vertices for one lane group.
-    fn backward(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) -> () = backward_generic;
-}
-
-#[inline(always)]
-fn forward_generic(cage: &Cage, vertices: &[[f32; 3]], x: [Singles; 3], scratch: &mut Scratch) -> Singles {
-    for (j, v) in vertices.iter().enumerate() {
-        let r = [Singles::splat(v[0]) - x[0], Singles::splat(v[1]) - x[1], Singles::splat(v[2]) - x[2]];
-        let square = dot(&r, &r).map(|d| if d < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { d });
-        let inverse = square.sqrt().map(|d| 1.0 / d);
-        scratch.nearness[j] = inverse;
-        let direction = &mut scratch.directions[j];
-        direction[0] = r[0] * inverse;
-        direction[1] = r[1] * inverse;
-        direction[2] = r[2] * inverse;
-        scratch.weights[j] = Singles::ZERO;
-    }
-    for (edge, out) in cage.edges().iter().zip(&mut scratch.edges) {
-        let [a, b] = edge.vertices.map(|v| &scratch.directions[v as usize]);
-        // The difference keeps the relative accuracy where the edge is seen under a small angle.
-        let c = cross(a, &[b[0] - a[0], b[1] - a[1], b[2] - a[2]]);
-        let square = dot(&c, &c);
-        out.cross[0] = c[0];
-        out.cross[1] = c[1];
-        out.cross[2] = c[2];
-        out.square = square;
-        out.ratio = half_angle_over_sine(dot(a, b), inverse_sine(square));
-    }
-    for face in cage.faces() {
-        let seen = FaceTerms::new(face, scratch);
-        for i in 0..3 {
-            let weight = &mut scratch.weights[face.vertices[i] as usize];
-            *weight = *weight + dot(&seen.mean, &seen.g[i]) * seen.inverse;
+    fn forward(cage: &Cage, vertices: &[[f32; 3]], x: [Singles; 3], scratch: &mut Scratch) -> Singles {
+        for (j, v) in vertices.iter().enumerate() {
+            let r = [Singles::splat(v[0]) - x[0], Singles::splat(v[1]) - x[1], Singles::splat(v[2]) - x[2]];
+            let square = dot(&r, &r).map(|d| if d < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { d });
+            let inverse = square.sqrt().map(|d| 1.0 / d);
+            scratch.nearness[j] = inverse;
+            let direction = &mut scratch.directions[j];
+            direction[0] = r[0] * inverse;
+            direction[1] = r[1] * inverse;
+            direction[2] = r[2] * inverse;
+            scratch.weights[j] = Singles::ZERO;
         }
+        for (edge, out) in cage.edges().iter().zip(&mut scratch.edges) {
+            let [a, b] = edge.vertices.map(|v| &scratch.directions[v as usize]);
+            // The difference keeps the relative accuracy where the edge is seen under a small angle.
+            let c = cross(a, &[b[0] - a[0], b[1] - a[1], b[2] - a[2]]);
+            let square = dot(&c, &c);
+            out.cross[0] = c[0];
+            out.cross[1] = c[1];
+            out.cross[2] = c[2];
+            out.square = square;
+            out.ratio = half_angle_over_sine(dot(a, b), inverse_sine(square));
+        }
+        for face in cage.faces() {
+            let seen = FaceTerms::new(face, scratch);
+            for i in 0..3 {
+                let weight = &mut scratch.weights[face.vertices[i] as usize];
+                *weight = *weight + dot(&seen.mean, &seen.g[i]) * seen.inverse;
+            }
+        }
+        let mut total = Singles::ZERO;
+        for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
+            *weight = *weight * nearness;
+            total = total + *weight;
+        }
+        total.map(|t| 1.0 / t)
     }
-    let mut total = Singles::ZERO;
-    for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
-        *weight = *weight * nearness;
-        total = total + *weight;
-    }
-    total.map(|t| 1.0 / t)
 }
 
 #[inline(always)]
@@ -287,60 +261,62 @@ impl FaceTerms {
     }
 }
 
-#[inline(always)]
-fn backward_generic(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
-    let Adjoint { weights, directions, edges, total } = adjoint;
-    let (weights, directions) = (weights.as_slice(), directions.as_mut_slice());
-    directions.fill([Singles::ZERO; 3]);
-    for face in cage.faces() {
-        let seen = FaceTerms::new(face, scratch);
-        let vertices = face.vertices.map(|v| v as usize);
-        // Written out: the closure of an array's `map` stays a call, compiled for another instruction set.
-        let [v0, v1, v2] = vertices;
-        let by_face @ [a0, a1, a2] =
-            [weights[v0] * seen.inverse, weights[v1] * seen.inverse, weights[v2] * seen.inverse];
-        let [g0, g1, g2] = &seen.g;
-        // ∂E/∂m, and −∂E/∂det.
-        let by_mean = [
-            g0[0] * a0 + g1[0] * a1 + g2[0] * a2,
-            g0[1] * a0 + g1[1] * a1 + g2[1] * a2,
-            g0[2] * a0 + g1[2] * a1 + g2[2] * a2,
-        ];
-        let by_det = dot(&seen.mean, &by_mean) * seen.inverse;
-        for i in 0..3 {
-            let sign = face.signs[i] as f32;
-            let edge = &mut edges[face.edges[i] as usize];
-            let own = by_face[i] * sign;
-            for k in 0..3 {
-                edge[k] = edge[k] + by_mean[k] * sign;
-                edge[3 + k] = edge[3 + k] + seen.mean[k] * own;
-            }
-            let direction = &mut directions[vertices[i]];
-            for k in 0..3 {
-                direction[k] = direction[k] - seen.g[i][k] * by_det;
+multiversion! {
+    /// Adds the derivative by the vertices for one lane group.
+    fn backward(cage: &Cage, scratch: &Scratch, adjoint: &mut Adjoint) {
+        let Adjoint { weights, directions, edges, total } = adjoint;
+        let (weights, directions) = (weights.as_slice(), directions.as_mut_slice());
+        directions.fill([Singles::ZERO; 3]);
+        for face in cage.faces() {
+            let seen = FaceTerms::new(face, scratch);
+            let vertices = face.vertices.map(|v| v as usize);
+            // Written out: the closure of a `map` would be compiled for another instruction set.
+            let [v0, v1, v2] = vertices;
+            let by_face @ [a0, a1, a2] =
+                [weights[v0] * seen.inverse, weights[v1] * seen.inverse, weights[v2] * seen.inverse];
+            let [g0, g1, g2] = &seen.g;
+            // ∂E/∂m, and −∂E/∂det.
+            let by_mean = [
+                g0[0] * a0 + g1[0] * a1 + g2[0] * a2,
+                g0[1] * a0 + g1[1] * a1 + g2[1] * a2,
+                g0[2] * a0 + g1[2] * a1 + g2[2] * a2,
+            ];
+            let by_det = dot(&seen.mean, &by_mean) * seen.inverse;
+            for i in 0..3 {
+                let sign = face.signs[i] as f32;
+                let edge = &mut edges[face.edges[i] as usize];
+                let own = by_face[i] * sign;
+                for k in 0..3 {
+                    edge[k] = edge[k] + by_mean[k] * sign;
+                    edge[3 + k] = edge[3 + k] + seen.mean[k] * own;
+                }
+                let direction = &mut directions[vertices[i]];
+                for k in 0..3 {
+                    direction[k] = direction[k] - seen.g[i][k] * by_det;
+                }
             }
         }
-    }
-    for ((edge, term), by) in cage.edges().iter().zip(&scratch.edges).zip(edges) {
-        let [a, b] = edge.vertices.map(|v| v as usize);
-        let (ua, ub) = (scratch.directions[a], scratch.directions[b]);
-        let slope = half_angle_over_sine_slope(dot(&ua, &ub), inverse_sine(term.square));
-        let by_t = (by[0] * term.cross[0] + by[1] * term.cross[1] + by[2] * term.cross[2]) * slope;
-        let by_c = [by[3] + by[0] * term.ratio, by[4] + by[1] * term.ratio, by[5] + by[2] * term.ratio];
-        let (to_a, to_b) = (cross(&ub, &by_c), cross(&by_c, &ua));
-        for k in 0..3 {
-            directions[a][k] = directions[a][k] + to_a[k] + ub[k] * by_t;
-            directions[b][k] = directions[b][k] + to_b[k] + ua[k] * by_t;
+        for ((edge, term), by) in cage.edges().iter().zip(&scratch.edges).zip(edges) {
+            let [a, b] = edge.vertices.map(|v| v as usize);
+            let (ua, ub) = (scratch.directions[a], scratch.directions[b]);
+            let slope = half_angle_over_sine_slope(dot(&ua, &ub), inverse_sine(term.square));
+            let by_t = (by[0] * term.cross[0] + by[1] * term.cross[1] + by[2] * term.cross[2]) * slope;
+            let by_c = [by[3] + by[0] * term.ratio, by[4] + by[1] * term.ratio, by[5] + by[2] * term.ratio];
+            let (to_a, to_b) = (cross(&ub, &by_c), cross(&by_c, &ua));
+            for k in 0..3 {
+                directions[a][k] = directions[a][k] + to_a[k] + ub[k] * by_t;
+                directions[b][k] = directions[b][k] + to_b[k] + ua[k] * by_t;
+            }
+            // For the next lane group.
+            *by = [Singles::ZERO; 6];
         }
-        // For the next lane group.
-        *by = [Singles::ZERO; 6];
-    }
-    for j in 0..total.len() {
-        let (u, by, near) = (&scratch.directions[j], &directions[j], scratch.nearness[j]);
-        let radial = dot(u, by) * near + weights[j] * scratch.weights[j];
-        let total = &mut total[j];
-        for k in 0..3 {
-            total[k] = total[k] + by[k] * near - u[k] * radial;
+        for j in 0..total.len() {
+            let (u, by, near) = (&scratch.directions[j], &directions[j], scratch.nearness[j]);
+            let radial = dot(u, by) * near + weights[j] * scratch.weights[j];
+            let total = &mut total[j];
+            for k in 0..3 {
+                total[k] = total[k] + by[k] * near - u[k] * radial;
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Mean value weights of a face as the integrals that define them (Ju, Schaefer and Warren 2005):
-//! `w_i = h ∫ λ_i / |r|⁴ dA`, with `r` from the point to the face, `h` the height of the face's plane over the point and `λ_i` the
-//! barycentric coordinates. The integrands have one sign, so nothing cancels, however flat or far away the face appears.
+//! `w_i = h ∫ λ_i / |r|⁴ dA`, with `r` from the point to the face, `h` the height of the face's
+//! plane and `λ_i` the barycentric coordinates. The integrands have one sign, so nothing cancels.
 
 use cager_geometry::mesh::{Point, distance2_to_triangle};
 use cager_geometry::vector::{along, cross, dot, middle, sub};
@@ -16,7 +16,7 @@ const GAUSS: [[f64; 2]; 8] = [
     [0.898_333_238_706_813_4, 0.111_190_517_226_687_24],
     [0.980_144_928_248_768_1, 0.050_614_268_145_188_13],
 ];
-/// Pieces are halved until their longest side is at most this fraction of their distance: the rule is then exact to rounding.
+/// Pieces are halved until their longest side is at most this fraction of their distance.
 const MAX_SIDE_OVER_DISTANCE: f64 = 0.35;
 /// Halvings at most; a longest side is halved by every second one.
 const MAX_HALVINGS: u32 = 120;
@@ -38,8 +38,8 @@ fn longest(sides: &[Point; 3]) -> usize {
     (0..3).fold(0, |best, i| if dot(sides[i], sides[i]) > dot(sides[best], sides[best]) { i } else { best })
 }
 
-/// Adds `∫ λ_i / |r|⁴ dA` over a piece, given by its corners and their barycentric coordinates, in the unit in which the face's area is one half.
-/// `share` is the piece's fraction of that area.
+/// Adds `∫ λ_i / |r|⁴ dA` over a piece, given by its corners, their barycentric coordinates and its
+/// share of the face's area, in the unit in which that is one half.
 fn integrate(corners: [Point; 3], barycentric: [Point; 3], share: f64, depth: u32, sums: &mut Point) {
     let [a, b, c] = corners;
     let sides = [sub(c, b), sub(a, c), sub(b, a)];

@@ -1,21 +1,19 @@
-//! Mean value coordinates of a closed triangle mesh (Ju, Schaefer and Warren 2005), in mean-vector form.
+//! Mean value coordinates of a closed triangle mesh (Ju, Schaefer and Warren 2005).
 //!
-//! Seen from a point `x`, a face covers a spherical triangle with corners `u_i`, the unit vectors from `x` to its vertices.
-//! Its mean vector is `m = ½ Σ θ_i n_i` over its three edges: `θ_i` the angle an edge is seen under and `n_i` the unit
-//! normal of the plane through `x` and the edge. The weights are the solution of `Σ w_i d_i u_i = m`. Each edge term enters
-//! two faces with opposite signs, so the mean vectors of a closed cage add up to zero whatever the rounding of the terms, and
-//! affine reproduction depends only on the three-by-three solves. These cancel where a face is seen edge-on and where a point lies outside
-//! a thin cage or far outside: there the weights are integrated, see `integral.rs`.
+//! Seen from a point `x`, a face covers a spherical triangle with corners `u_i`, the unit vectors
+//! to its vertices. Its mean vector is `m = ½ Σ θ_i n_i` over its three edges: `θ_i` the angle an
+//! edge is seen under and `n_i` the unit normal of the plane through `x` and the edge. The weights
+//! solve `Σ w_i d_i u_i = m`. Each edge term enters two faces with opposite signs, so that the mean
+//! vectors of a closed cage add up to zero whatever the rounding, and affine reproduction depends
+//! on the three-by-three solves alone. These cancel where a face is seen edge-on and where a point
+//! lies outside a thin cage or far away: there the weights are integrated, see `integral.rs`.
 
 mod gradient;
 mod integral;
 
-use super::{
-    CageValues, CoordinateSystem, Coordinates, CoordinatesError, ElementPlan, PointwiseCoordinates,
-    pointwise_coordinates, refuse_plan,
-};
+use super::{CageValues, CoordinateSystem, Coordinates, PointwiseCoordinates, pointwise_coordinates};
 use crate::cage::{Cage, Edge, Face};
-use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion};
+use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion, store};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector;
 use faer::MatMut;
@@ -24,13 +22,13 @@ use faer::MatMut;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MeanValue;
 
-/// Closer to a vertex than this fraction of the cage's diagonal, a point has the coordinates of the vertex.
+/// Closer to a vertex than this fraction of the diagonal, a point has the vertex's coordinates.
 const VERTEX_TOLERANCE: f64 = 1e-13;
-/// A point that sees an edge under an angle whose sine is below this, from between its ends, lies on the edge.
+/// A point that sees an edge from between its ends under a smaller sine lies on the edge.
 const EDGE_TOLERANCE: f64 = 1e-11;
 /// Estimated error of an entry from which the weights of a face are integrated.
 const ENTRY_TOLERANCE: f64 = 1e-11;
-/// Length of a face's mean vector from which a point is so near to the face that the plain formula does not cancel.
+/// Length of a face's mean vector from which the plain formula does not cancel.
 const SAFE_MEAN_LENGTH: f64 = 0.1;
 /// What takes the place of 1/0 where a point lies on a face.
 const INV_ZERO: f64 = 1e100;
@@ -46,16 +44,6 @@ impl CoordinateSystem for MeanValue {
 
     fn pointwise(&self) -> Option<PointwiseCoordinates> {
         Some(coordinates)
-    }
-
-    fn coordinates(
-        &self,
-        cage: &Cage,
-        points: &[Point],
-        plan: Option<&ElementPlan>,
-    ) -> Result<Coordinates, CoordinatesError> {
-        refuse_plan(self.name(), plan)?;
-        Ok(coordinates(cage, points))
     }
 }
 
@@ -74,8 +62,7 @@ struct Scratch {
     directions: Vec<[Lanes; 3]>,
     /// Reciprocal distances to each cage vertex.
     nearness: Vec<Lanes>,
-    /// Terms of each edge; three are half the mean-vector term `½ θ n`, and the fourth is the factor that turns it into
-    /// `u_a × u_b`.
+    /// Of each edge: `½ θ n`, and the factor that turns it into `u_a × u_b`.
     edges: Vec<[Lanes; 4]>,
     /// Unnormalised weights.
     weights: Vec<Lanes>,
@@ -93,7 +80,7 @@ impl Scratch {
     }
 }
 
-/// Fills `rows`, the coordinates of the points from `first` on, and returns those points that lie outside.
+/// Fills the rows of the points from `first` on; returns the points that lie outside.
 fn task_coordinates(
     cage: &Cage,
     points: &[Point],
@@ -113,7 +100,8 @@ fn task_coordinates(
                 total.0[l] = accurate_weights(cage, scratch, at(l), l, total.0[l]);
             }
         }
-        store(rows.as_mut().subrows_mut(start, filled), &scratch.weights, total.map(|t| 1.0 / t));
+        let scale = total.map(|t| 1.0 / t);
+        store(rows.as_mut(), start, scratch.weights.iter().map(|&weight| (weight * scale).0));
         for l in 0..filled {
             match on[l] {
                 On::Nothing if total.0[l] <= 0.0 => outsiders.push((first + start + l) as u32),
@@ -127,16 +115,6 @@ fn task_coordinates(
         }
     }
     outsiders
-}
-
-/// Writes the coordinates of a lane group's points, one for each row.
-fn store(mut rows: MatMut<'_, f64>, weights: &[Lanes], scale: Lanes) {
-    for (j, &weight) in weights.iter().enumerate() {
-        let values = (weight * scale).0;
-        for l in 0..rows.nrows() {
-            rows[(l, j)] = values[l];
-        }
-    }
 }
 
 /// What of the cage a point lies on, where the weights have no finite limit.
@@ -164,8 +142,7 @@ fn set_row(rows: &mut MatMut<'_, f64>, row: usize, entries: &[(usize, f64)]) {
     }
 }
 
-/// Computes the weights of lane l's point again, integrated for faces whose rounding matters; `total` is about the sum of all weights. Returns
-/// that sum.
+/// Computes the weights of lane l's point again, integrated where rounding matters; their sum.
 #[cold]
 fn accurate_weights(cage: &Cage, scratch: &mut Scratch, x: Point, l: usize, total: f64) -> f64 {
     for weight in &mut scratch.weights {
@@ -201,8 +178,8 @@ fn face_weights(cage: &Cage, scratch: &Scratch, face: &Face, x: Point, l: usize,
     if weights.iter().all(|w| w.is_finite()) { weights } else { numerators.map(|n| n * INV_ZERO) }
 }
 
-/// Whether rounding may change entries by more than [`ENTRY_TOLERANCE`], from the square of what a face's determinant amplifies it by, the
-/// reciprocal distance of the nearest vertex and the sum of all weights.
+/// Whether rounding may change entries by more than [`ENTRY_TOLERANCE`], from the square of a
+/// determinant's amplification, the nearest reciprocal distance and the sum of all weights.
 fn is_inaccurate(loss2: f64, nearest: f64, total: f64) -> bool {
     let error = f64::EPSILON * loss2.sqrt() * nearest / total.abs();
     error.is_nan() || error > ENTRY_TOLERANCE
@@ -210,81 +187,78 @@ fn is_inaccurate(loss2: f64, nearest: f64, total: f64) -> bool {
 
 multiversion! {
     /// Unnormalised weights of one lane group, left in the scratch; returns their sums.
-    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums = group_weights_generic;
+    fn group_weights(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums {
+        let mut on = [On::Nothing; LANES];
+        let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
+        for (j, v) in cage.vertices().iter().enumerate() {
+            let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
+            let d = dot(&r, &r).sqrt();
+            let inverse = d.map(|d| 1.0 / d);
+            scratch.nearness[j] = inverse;
+            let direction = &mut scratch.directions[j];
+            direction[0] = r[0] * inverse;
+            direction[1] = r[1] * inverse;
+            direction[2] = r[2] * inverse;
+            scratch.weights[j] = Lanes::ZERO;
+            if d.any(d, |d, _| d <= near_vertex) {
+                note_vertex(&mut on, j, &d, near_vertex);
+            }
+        }
+        for (k, edge) in cage.edges().iter().enumerate() {
+            let a = &scratch.directions[edge.vertices[0] as usize];
+            let b = &scratch.directions[edge.vertices[1] as usize];
+            let c = cross(a, b);
+            let s2 = dot(&c, &c);
+            let s = s2.sqrt();
+            let t = dot(a, b);
+            let theta = angle(s, t);
+            let inverse = (theta * s).map(|p| if p > 0.0 { 1.0 / p } else { 0.0 });
+            let degenerate = inverse.map(|i| if i > 0.0 { 0.0 } else { 1.0 });
+            let half = theta * theta * inverse * 0.5 + degenerate * 0.5;
+            let back = s2 * inverse * 2.0 + degenerate * 2.0;
+            // One by one: an array would be built on the stack and copied.
+            let term = &mut scratch.edges[k];
+            term[0] = c[0] * half;
+            term[1] = c[1] * half;
+            term[2] = c[2] * half;
+            term[3] = back;
+            if s.any(t, |s, t| (s < EDGE_TOLERANCE) & (t < 0.0)) {
+                note_edge(&mut on, edge, &s, &t);
+            }
+        }
+        // The largest square of what the determinant of a face amplifies rounding by.
+        let mut loss2 = Lanes::splat(1.0);
+        for face in cage.faces() {
+            let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
+            let [s0, s1, s2] = face.signs;
+            let g0 = [e0[0] * s0, e0[1] * s0, e0[2] * s0];
+            let g1 = [e1[0] * s1, e1[1] * s1, e1[2] * s1];
+            let g2 = [e2[0] * s2, e2[1] * s2, e2[2] * s2];
+            let (back0, back1, back2) = (e0[3], e1[3], e2[3]);
+            let m = [g0[0] + g1[0] + g2[0], g0[1] + g1[1] + g2[1], g0[2] + g1[2] + g2[2]];
+            let [v0, v1, v2] = face.vertices.map(|v| v as usize);
+            let det = dot(&scratch.directions[v0], &g0) * back0;
+            let inverse = det.map(|d| 1.0 / d);
+            let w = [dot(&m, &g0) * back0 * inverse, dot(&m, &g1) * back1 * inverse, dot(&m, &g2) * back2 * inverse];
+            let own = (dot(&g0, &g0) + dot(&g1, &g1)) * inverse * inverse;
+            loss2 = loss2.zip(own, |a, b| if a < b { b } else { a });
+            scratch.weights[v0] = scratch.weights[v0] + w[0];
+            scratch.weights[v1] = scratch.weights[v1] + w[1];
+            scratch.weights[v2] = scratch.weights[v2] + w[2];
+        }
+        let mut total = Lanes::ZERO;
+        let mut nearest = Lanes::ZERO;
+        for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
+            *weight = *weight * nearness;
+            total = total + *weight;
+            nearest = nearest.zip(nearness, |a, b| if a < b { b } else { a });
+        }
+        let inaccurate = std::array::from_fn(|l| is_inaccurate(loss2.0[l], nearest.0[l], total.0[l]));
+        Sums { total, on, inaccurate }
+    }
 }
 
-#[inline(always)]
-fn group_weights_generic(cage: &Cage, x: [Lanes; 3], scratch: &mut Scratch) -> Sums {
-    let mut on = [On::Nothing; LANES];
-    let near_vertex = VERTEX_TOLERANCE * cage.diagonal();
-    for (j, v) in cage.vertices().iter().enumerate() {
-        let r = [Lanes::splat(v[0]) - x[0], Lanes::splat(v[1]) - x[1], Lanes::splat(v[2]) - x[2]];
-        let d = dot(&r, &r).sqrt();
-        let inverse = d.map(|d| 1.0 / d);
-        scratch.nearness[j] = inverse;
-        let direction = &mut scratch.directions[j];
-        direction[0] = r[0] * inverse;
-        direction[1] = r[1] * inverse;
-        direction[2] = r[2] * inverse;
-        scratch.weights[j] = Lanes::ZERO;
-        if d.any(d, |d, _| d <= near_vertex) {
-            note_vertex(&mut on, j, &d, near_vertex);
-        }
-    }
-    for (k, edge) in cage.edges().iter().enumerate() {
-        let a = &scratch.directions[edge.vertices[0] as usize];
-        let b = &scratch.directions[edge.vertices[1] as usize];
-        let c = cross(a, b);
-        let s2 = dot(&c, &c);
-        let s = s2.sqrt();
-        let t = dot(a, b);
-        let theta = angle(s, t);
-        let inverse = (theta * s).map(|p| if p > 0.0 { 1.0 / p } else { 0.0 });
-        let degenerate = inverse.map(|i| if i > 0.0 { 0.0 } else { 1.0 });
-        let half = theta * theta * inverse * 0.5 + degenerate * 0.5;
-        let back = s2 * inverse * 2.0 + degenerate * 2.0;
-        // One by one: an array would be built on the stack and copied.
-        let term = &mut scratch.edges[k];
-        term[0] = c[0] * half;
-        term[1] = c[1] * half;
-        term[2] = c[2] * half;
-        term[3] = back;
-        if s.any(t, |s, t| (s < EDGE_TOLERANCE) & (t < 0.0)) {
-            note_edge(&mut on, edge, &s, &t);
-        }
-    }
-    // The largest square of what the determinant of a face amplifies rounding by.
-    let mut loss2 = Lanes::splat(1.0);
-    for face in cage.faces() {
-        let [e0, e1, e2] = face.edges.map(|e| &scratch.edges[e as usize]);
-        let [s0, s1, s2] = face.signs;
-        let g0 = [e0[0] * s0, e0[1] * s0, e0[2] * s0];
-        let g1 = [e1[0] * s1, e1[1] * s1, e1[2] * s1];
-        let g2 = [e2[0] * s2, e2[1] * s2, e2[2] * s2];
-        let (back0, back1, back2) = (e0[3], e1[3], e2[3]);
-        let m = [g0[0] + g1[0] + g2[0], g0[1] + g1[1] + g2[1], g0[2] + g1[2] + g2[2]];
-        let [v0, v1, v2] = face.vertices.map(|v| v as usize);
-        let det = dot(&scratch.directions[v0], &g0) * back0;
-        let inverse = det.map(|d| 1.0 / d);
-        let w = [dot(&m, &g0) * back0 * inverse, dot(&m, &g1) * back1 * inverse, dot(&m, &g2) * back2 * inverse];
-        let own = (dot(&g0, &g0) + dot(&g1, &g1)) * inverse * inverse;
-        loss2 = loss2.zip(own, |a, b| if a < b { b } else { a });
-        scratch.weights[v0] = scratch.weights[v0] + w[0];
-        scratch.weights[v1] = scratch.weights[v1] + w[1];
-        scratch.weights[v2] = scratch.weights[v2] + w[2];
-    }
-    let mut total = Lanes::ZERO;
-    let mut nearest = Lanes::ZERO;
-    for (weight, &nearness) in scratch.weights.iter_mut().zip(&scratch.nearness) {
-        *weight = *weight * nearness;
-        total = total + *weight;
-        nearest = nearest.zip(nearness, |a, b| if a < b { b } else { a });
-    }
-    let inaccurate = std::array::from_fn(|l| is_inaccurate(loss2.0[l], nearest.0[l], total.0[l]));
-    Sums { total, on, inaccurate }
-}
-
-// Kept out of the loops: inlined, what they do lane by lane would keep the compiler from vectorising the loops, roots included.
+// Kept out of the loops, which the compiler would not vectorise with them inlined.
 
 #[cold]
 #[inline(never)]

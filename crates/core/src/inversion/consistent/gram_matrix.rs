@@ -1,18 +1,12 @@
-//! Gram matrix of the points read, from the decoder's single-precision coordinates, so that the minimised error is that of decoding.
+//! Gram matrix of the points read, from the decoder's single-precision coordinates.
 
 use crate::decode::Decoder;
-use cager_geometry::linalg::BLOCK_ROWS;
+use cager_geometry::linalg::{BLOCK_ROWS, to_double};
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
 
 /// Columns of the Gram matrix that one task computes.
 const TASK_COLUMNS: usize = 64;
-
-/// Rows of Φ, in double precision.
-pub(super) fn rows_of(decoder: &Decoder, rows: &[u32]) -> Mat<f64> {
-    let phi = decoder.rows(rows);
-    Mat::from_fn(rows.len(), phi.ncols(), |i, j| f64::from(phi[(i, j)]))
-}
 
 /// Puts `count` rows of Φ from `first` on into a matrix in double precision.
 pub(super) fn convert(decoder: &Decoder, first: usize, count: usize, out: &mut Mat<f64>) {
@@ -35,7 +29,7 @@ pub(super) fn convert(decoder: &Decoder, first: usize, count: usize, out: &mut M
 pub(super) fn gram(decoder: &Decoder, rows: Option<&[u32]>, share: f64) -> Mat<f64> {
     let total = decoder.columns();
     let mut gram = Mat::<f64>::zeros(total, total);
-    let rows_read = rows.map(|rows| rows_of(decoder, rows));
+    let rows_read = rows.map(|rows| to_double(decoder.rows(rows).as_ref()));
     gram.as_mut().par_col_chunks_mut(TASK_COLUMNS).enumerate().for_each(|(task, mut columns)| {
         let (left, width) = (task * TASK_COLUMNS, columns.ncols());
         if let Some(rows) = &rows_read {

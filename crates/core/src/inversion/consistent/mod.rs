@@ -1,36 +1,33 @@
-//! Consistent inversion: Gauss–Newton for coordinates whose face normals N(C) are functions of the cage's vertices C.
+//! Consistent inversion: Gauss–Newton where face normals N(C) are functions of the vertices C.
 //!
-//! It minimises `E(C) = (v/K) Σ |Φ_v C + Φ_f N(C) − P|² + λ ‖Δ (C − C₀)‖²` over the K points read, with the cage Laplacian Δ over the v vertices. The
-//! start and reference C₀ is the cage of a linear inversion with mean value coordinates. λ is positive even without regularisation, so that
+//! It minimises `E(C) = (v/K) Σ |Φ_v C + Φ_f N(C) − P|² + λ ‖Δ (C − C₀)‖²` over the K points read,
+//! with the cage Laplacian Δ over the v vertices. The start and reference C₀ is the cage of a
+//! linear inversion with mean value coordinates. λ is positive even without regularisation, so that
 //! directions that the points hardly determine stay near C₀.
 //!
-//! Each step is solved by conjugate gradients, preconditioned by the inverse of `(v/K) Φ_vᵀΦ_v + λ ΔᵀΔ`. A step that does not lower E is halved a few
-//! times; if it still does not, it is not taken and the iteration ends, so that E never exceeds its value at C₀. All frames of a batch share the
+//! Each step is solved by conjugate gradients, preconditioned by the inverse of `(v/K) Φ_vᵀΦ_v + λ
+//! ΔᵀΔ`. A step that does not lower E is halved a few times; if it still does not, it is not taken
+//! and the iteration ends, so that E never exceeds its value at C₀. All frames of a batch share the
 //! products with `G = (v/K) ΦᵀΦ`; the result of a frame does not depend on the other frames.
 
 mod gram_matrix;
-mod outcome;
 mod state;
 
-pub use outcome::Outcome;
+pub use state::Outcome;
 
+use crate::batch::{padded_to_tiles, product_columns};
 use crate::coordinates::DependentNormals;
 use crate::decode::Decoder;
-use cager_geometry::linalg;
+use cager_geometry::linalg::{self, BLOCK_ROWS};
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{along, dot, sub};
 use faer::{Accum, Mat, MatRef};
-use state::FrameState;
-
-use crate::batch::product_columns;
-use cager_geometry::linalg::BLOCK_ROWS;
+use state::{ConjugateGradients, FrameState, products};
 
 /// Maximum number of Gauss–Newton steps per frame.
 const MAX_STEPS: usize = 24;
 /// Maximum number of conjugate gradient iterations per step.
 const MAX_CG_ITERATIONS: usize = 8;
-/// Conjugate gradients stop at this fraction of the initial preconditioned squared residual.
-const CG_TOLERANCE: f64 = 1e-4;
 /// A step that lowers E by less than this fraction is the last.
 const TOLERANCE: f64 = 1e-3;
 /// Maximum number of lengths at which a step is tried, each half of the one before.
@@ -58,7 +55,7 @@ pub struct Convergence {
 pub(crate) struct Consistent {
     /// `G`, T × T for T = v + f; padded with zero columns to a whole tile.
     gram: Mat<f64>,
-    /// `G` plus `λ ΔᵀΔ` in the block of the vertices, for the conjugate gradients; padded with zero rows to a whole tile.
+    /// `G` plus `λ ΔᵀΔ` in the block of the vertices; padded with zero rows to a whole tile.
     curvature: Mat<f32>,
     /// Inverse of the block of the vertices, v × v; padded likewise.
     preconditioner: Mat<f32>,
@@ -75,12 +72,11 @@ pub(crate) struct Consistent {
 impl Consistent {
     /// `G` of the given rows, or of all points for `None`.
     pub(crate) fn gram_of(decoder: &Decoder, rows: Option<&[u32]>) -> Mat<f64> {
-        let read = rows.map_or(decoder.points(), <[u32]>::len);
-        gram_matrix::gram(decoder, rows, decoder.positions() as f64 / read as f64)
+        gram_matrix::gram(decoder, rows, share(decoder, rows))
     }
 
-    /// Prepares the inversion from the [`Self::gram_of`] of the same points. `None` where the factorisation fails, or where normals are not functions
-    /// of the vertices.
+    /// Prepares the inversion from [`Self::gram_of`] the same points. `None` where the
+    /// factorisation fails, or normals are not functions of the vertices.
     pub(crate) fn from_gram(decoder: &Decoder, rows: Option<&[u32]>, weight: f64, gram: Mat<f64>) -> Option<Self> {
         let neighbours = neighbours(decoder.dependent_normals()?, decoder.positions());
         let (v, total) = (decoder.positions(), decoder.columns());
@@ -105,20 +101,14 @@ impl Consistent {
         let mut curvature = gram.clone();
         curvature.submatrix_mut(0, 0, v, v).copy_from(&system);
         let single = |a: &Mat<f64>| linalg::to_single(a.as_ref(), a.nrows().next_multiple_of(linalg::TILE_ROWS));
-        let (curvature, preconditioner) = (single(&curvature), single(&preconditioner));
-        let whole = |mut a: Mat<f64>| {
-            let columns = a.ncols().next_multiple_of(linalg::TILE_ROWS);
-            a.resize_with(a.nrows(), columns, |_, _| 0.0);
-            a
-        };
         Some(Self {
-            gram: whole(gram),
-            curvature,
-            preconditioner,
-            rows: rows.map(|rows| whole(gram_matrix::rows_of(decoder, rows))),
+            gram: padded_to_tiles(gram),
+            curvature: single(&curvature),
+            preconditioner: single(&preconditioner),
+            rows: rows.map(|rows| padded_to_tiles(linalg::to_double(decoder.rows(rows).as_ref()))),
             neighbours,
             weight,
-            share: v as f64 / rows.map_or(decoder.points(), <[u32]>::len) as f64,
+            share: share(decoder, rows),
         })
     }
 
@@ -139,7 +129,8 @@ impl Consistent {
         doubles(&self.gram) + singles(&self.curvature) + singles(&self.preconditioner) + rows
     }
 
-    /// Refines the cages of a batch in place. `point(f, i)` is the i-th point read of frame f; `diagonal` is the unit of the reported distances.
+    /// Refines the cages of a batch in place. `point(f, i)` is the i-th point read of frame f;
+    /// distances are over `diagonal`.
     pub(crate) fn refine(
         &self,
         decoder: &Decoder,
@@ -162,26 +153,25 @@ impl Consistent {
                     frame.outcome = Some(Outcome::Converged);
                 }
             }
-            if frames.iter().all(|frame| frame.outcome.is_some()) {
+            let mut open: Vec<&mut FrameState> = frames.iter_mut().filter(|frame| frame.outcome.is_none()).collect();
+            if open.is_empty() {
                 break;
             }
-            let steps = self.steps(dependent, &frames);
-            self.line_search(dependent, &mut frames, &steps);
+            let steps = self.steps(dependent, &open);
+            self.line_search(dependent, &mut open, &steps);
         }
         let vertices = decoder.positions() as f64;
         let length = |energy: f64| (energy.max(0.0) / vertices).sqrt() / diagonal;
-        for (frame, cage) in frames.iter().zip(cages.iter_mut()) {
+        let convergence = |(frame, cage): (&FrameState, &mut Vec<Point>)| {
             frame.write(cage);
-        }
-        frames
-            .iter()
-            .map(|frame| Convergence {
+            Convergence {
                 steps: frame.steps,
                 start: length(frame.start_energy),
                 residual: length(frame.energy - self.regularization_energy(frame, &frame.cage)),
                 outcome: frame.outcome.unwrap_or(Outcome::StepLimit),
-            })
-            .collect()
+            }
+        };
+        frames.iter().zip(cages).map(convergence).collect()
     }
 
     /// Right-hand sides `(v/K) Φᵀ P`, and `(v/K) Σ |P|²`.
@@ -196,8 +186,7 @@ impl Consistent {
             let count = BLOCK_ROWS.min(read - first);
             for (f, frame) in frames.iter_mut().enumerate() {
                 for i in 0..count {
-                    let p = point(f, first + i);
-                    let p = sub(p, frame.origin);
+                    let p = sub(point(f, first + i), frame.origin);
                     frame.squared_positions += self.share * dot(p, p);
                     for k in 0..3 {
                         block[(i, 3 * f + k)] = self.share * p[k];
@@ -220,91 +209,67 @@ impl Consistent {
         }
     }
 
-    /// The Gauss–Newton step of each frame that has not converged.
-    fn steps(&self, dependent: &DependentNormals, frames: &[FrameState]) -> Vec<Vec<Point>> {
-        let mut searches: Vec<_> = frames
-            .iter()
-            .map(|frame| {
-                frame
-                    .outcome
-                    .is_none()
-                    .then(|| state::ConjugateGradients::new(dependent, frame, &self.regularization_gradient(frame)))
-            })
-            .collect();
+    /// The Gauss–Newton step of each frame.
+    fn steps(&self, dependent: &DependentNormals, frames: &[&mut FrameState]) -> Vec<Vec<Point>> {
+        let start = |frame: &&mut FrameState| {
+            let gradient = self.apply_regularization(&frame.displacement(&frame.cage));
+            ConjugateGradients::new(dependent, frame, &gradient)
+        };
+        let mut searches: Vec<ConjugateGradients> = frames.iter().map(start).collect();
         for iteration in 0..MAX_CG_ITERATIONS {
-            let residuals: Vec<Vec<Point>> =
-                searches.iter().map(|s| active(s).map_or(Vec::new(), state::ConjugateGradients::residual)).collect();
-            let preconditioned = state::products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
-            for (search, preconditioned) in searches.iter_mut().zip(preconditioned) {
-                if let Some(search) = search {
-                    search.update_direction(&preconditioned, iteration == 0, CG_TOLERANCE);
-                }
+            let mut open: Vec<_> = searches.iter_mut().filter(|search| !search.done).collect();
+            let residuals: Vec<&[Point]> = open.iter().map(|search| search.residual.as_slice()).collect();
+            let preconditioned = products(self.preconditioner.as_ref(), &residuals, |x| x as f32, f64::from);
+            for (search, preconditioned) in open.iter_mut().zip(preconditioned) {
+                search.update_direction(&preconditioned, iteration == 0);
             }
-            if searches.iter().flatten().all(state::ConjugateGradients::is_done) {
+            open.retain(|search| !search.done);
+            if open.is_empty() {
                 break;
             }
-            let moved: Vec<Vec<Point>> =
-                searches.iter().map(|s| active(s).map_or(Vec::new(), |s| s.jacobian_product(dependent))).collect();
-            let products = state::products(self.curvature.as_ref(), &moved, |x| x as f32, f64::from);
-            for (search, products) in searches.iter_mut().zip(products) {
-                if let Some(search) = search {
-                    search.advance(dependent, &products);
-                }
+            let moved: Vec<Vec<Point>> = open.iter().map(|search| search.jacobian_product(dependent)).collect();
+            let products = products(self.curvature.as_ref(), &moved, |x| x as f32, f64::from);
+            for (search, products) in open.into_iter().zip(products) {
+                search.advance(dependent, &products);
             }
         }
-        searches.into_iter().map(|search| search.map_or(Vec::new(), state::ConjugateGradients::into_step)).collect()
+        searches.into_iter().map(|search| search.step).collect()
     }
 
     /// Backtracking line search: takes each step, halved until it lowers E.
-    fn line_search(&self, dependent: &DependentNormals, frames: &mut [FrameState], steps: &[Vec<Point>]) {
+    fn line_search(&self, dependent: &DependentNormals, frames: &mut [&mut FrameState], steps: &[Vec<Point>]) {
         let mut length = 1.0;
-        let mut waiting: Vec<bool> = frames.iter().map(|frame| frame.outcome.is_none()).collect();
+        let mut open: Vec<(&mut &mut FrameState, &Vec<Point>)> = frames.iter_mut().zip(steps).collect();
         for _ in 0..MAX_STEP_TRIALS {
-            let trials: Vec<(Vec<Point>, Vec<Point>)> = frames
-                .iter()
-                .zip(steps)
-                .zip(&waiting)
-                .map(|((frame, step), &waits)| {
-                    if !waits {
-                        return Default::default();
-                    }
-                    let moved = |(c, s): (&Point, &Point)| along(*c, length, *s);
-                    let cage: Vec<Point> = frame.cage.iter().zip(step).map(moved).collect();
-                    let values = frame.values(dependent, &cage);
-                    (cage, values)
-                })
-                .collect();
-            let (moved, values): (Vec<_>, Vec<_>) = trials.into_iter().unzip();
-            let products = self.gram_product(&values);
-            for (f, (cage, products)) in moved.into_iter().zip(products).enumerate() {
-                let frame = &mut frames[f];
-                if !waiting[f] {
-                    continue;
-                }
-                let energy = frame.data_energy(&values[f], &products) + self.regularization_energy(frame, &cage);
+            let trial = |(frame, step): &(&mut &mut FrameState, &Vec<Point>)| {
+                let cage: Vec<Point> = frame.cage.iter().zip(*step).map(|(c, s)| along(*c, length, *s)).collect();
+                let values = frame.values(dependent, &cage);
+                (cage, values)
+            };
+            let (moved, values): (Vec<_>, Vec<_>) = open.iter().map(trial).unzip();
+            let mut trials = moved.into_iter().zip(self.gram_product(&values)).zip(&values);
+            open.retain_mut(|(frame, _)| {
+                let Some(((cage, products), values)) = trials.next() else { return true };
+                let energy = frame.data_energy(values, &products) + self.regularization_energy(frame, &cage);
                 if energy < frame.energy {
-                    waiting[f] = false;
                     frame.steps += 1;
                     if frame.energy - energy < TOLERANCE * energy {
                         frame.outcome = Some(Outcome::Converged);
                     }
                     (frame.cage, frame.products, frame.energy) = (cage, products, energy);
+                    return false;
                 }
-            }
-            if !waiting.contains(&true) {
-                return;
-            }
+                true
+            });
             length *= 0.5;
         }
-        for (frame, waits) in frames.iter_mut().zip(waiting) {
-            if waits {
-                frame.outcome = Some(if frame.steps == 0 { Outcome::KeptStart } else { Outcome::Converged });
-            }
+        for (frame, _) in open {
+            frame.outcome = Some(if frame.steps == 0 { Outcome::KeptStart } else { Outcome::Converged });
         }
     }
 
     fn gram_product(&self, values: &[Vec<Point>]) -> Vec<Vec<Point>> {
-        state::products(self.gram.transpose(), values, |x| x, |x| x)
+        products(self.gram.transpose(), values, |x| x, |x| x)
     }
 
     /// `Δ x`.
@@ -333,18 +298,14 @@ impl Consistent {
     fn regularization_energy(&self, frame: &FrameState, cage: &[Point]) -> f64 {
         self.weight * self.laplacian(&frame.displacement(cage)).iter().map(|&b| dot(b, b)).sum::<f64>()
     }
-
-    fn regularization_gradient(&self, frame: &FrameState) -> Vec<Point> {
-        self.apply_regularization(&frame.displacement(&frame.cage))
-    }
 }
 
-/// The conjugate gradients of a frame, unless they have ended.
-fn active(search: &Option<state::ConjugateGradients>) -> Option<&state::ConjugateGradients> {
-    search.as_ref().filter(|search| !search.is_done())
+/// v/K.
+fn share(decoder: &Decoder, rows: Option<&[u32]>) -> f64 {
+    decoder.positions() as f64 / rows.map_or(decoder.points(), <[u32]>::len) as f64
 }
 
-/// Neighbours of each vertex of a closed mesh, each once: the two faces of an edge run along it in opposite directions.
+/// Neighbours of each vertex, each once: an edge's two faces run along it in opposite directions.
 fn neighbours(dependent: &DependentNormals, vertices: usize) -> Vec<Vec<u32>> {
     let mut neighbours = vec![Vec::new(); vertices];
     for &[a, b, c] in dependent.faces() {

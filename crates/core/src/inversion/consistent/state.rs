@@ -1,13 +1,26 @@
-//! State of one frame during the consistent inversion, and the conjugate gradients of its Gauss–Newton step.
+//! State of a frame during the consistent inversion, and the conjugate gradients of a step.
 
-use super::outcome::Outcome;
 use crate::batch::product_columns;
 use crate::coordinates::DependentNormals;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector::{add, along, combination, dot, mean, sub};
 use faer::{Mat, MatRef};
 
-/// State of one frame. Positions are relative to the centre of the initial cage, to keep precision far from the origin.
+/// Conjugate gradients stop at this fraction of the initial preconditioned squared residual.
+const CG_TOLERANCE: f64 = 1e-4;
+
+/// How the inversion of one frame ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The last step lowered E by less than the tolerance, or no further step lowered it.
+    Converged,
+    /// The maximum number of steps was taken, each of which lowered E.
+    StepLimit,
+    /// No step lowered E: the cage is that of the linear start.
+    KeptStart,
+}
+
+/// State of one frame. Positions are relative to the centre of the initial cage, for precision.
 pub(super) struct FrameState {
     pub(super) origin: Point,
     start: Vec<Point>,
@@ -67,16 +80,16 @@ impl FrameState {
     }
 }
 
-/// Conjugate gradients on `(JᵀGJ + λΔᵀΔ) d = −½ ∇E`, where `J` is the derivative of a cage's values.
+/// Conjugate gradients on `(JᵀGJ + λΔᵀΔ) d = −½ ∇E`, `J` the derivative of a cage's values.
 pub(super) struct ConjugateGradients {
     derivatives: Vec<[[Point; 3]; 2]>,
-    step: Vec<Point>,
-    residual: Vec<Point>,
+    pub(super) step: Vec<Point>,
+    pub(super) residual: Vec<Point>,
     direction: Vec<Point>,
     /// Inner product of the residual with the preconditioned residual, and its initial value.
     size: f64,
     first_size: f64,
-    done: bool,
+    pub(super) done: bool,
 }
 
 impl ConjugateGradients {
@@ -93,29 +106,14 @@ impl ConjugateGradients {
         Self { derivatives, step: zeros.clone(), direction: zeros, residual, size: 0.0, first_size: 0.0, done: false }
     }
 
-    pub(super) fn residual(&self) -> Vec<Point> {
-        self.residual.clone()
-    }
-
-    pub(super) fn is_done(&self) -> bool {
-        self.done
-    }
-
-    pub(super) fn into_step(self) -> Vec<Point> {
-        self.step
-    }
-
     /// Computes the next search direction from the preconditioned residual.
-    pub(super) fn update_direction(&mut self, preconditioned: &[Point], first: bool, tolerance: f64) {
-        if self.done {
-            return;
-        }
+    pub(super) fn update_direction(&mut self, preconditioned: &[Point], first: bool) {
         let size: f64 = self.residual.iter().zip(preconditioned).map(|(&r, &z)| dot(r, z)).sum();
         if first {
             self.first_size = size;
         }
         // Negated, so that NaN ends the iteration as well.
-        if !(size > tolerance * self.first_size || (first && size > 0.0)) {
+        if !(size > CG_TOLERANCE * self.first_size || (first && size > 0.0)) {
             self.done = true;
             return;
         }
@@ -139,9 +137,6 @@ impl ConjugateGradients {
 
     /// Steps along the direction d; takes the product of the curvature matrix with `J d`.
     pub(super) fn advance(&mut self, dependent: &DependentNormals, products: &[Point]) {
-        if self.done {
-            return;
-        }
         let image = transposed_jacobian_product(dependent, &self.derivatives, products);
         let curvature: f64 = self.direction.iter().zip(&image).map(|(&d, &i)| dot(d, i)).sum();
         let length = self.size / curvature;
@@ -159,14 +154,10 @@ impl ConjugateGradients {
 }
 
 /// `Jᵀ w` of values w, T × 3.
-fn transposed_jacobian_product(
-    dependent: &DependentNormals,
-    derivatives: &[[[Point; 3]; 2]],
-    w: &[Point],
-) -> Vec<Point> {
+fn transposed_jacobian_product(normals: &DependentNormals, derivatives: &[[[Point; 3]; 2]], w: &[Point]) -> Vec<Point> {
     let vertices = w.len() - derivatives.len();
     let mut out = w[..vertices].to_vec();
-    for ((&[a, b, c], derivative), w) in dependent.faces().iter().zip(derivatives).zip(&w[vertices..]) {
+    for ((&[a, b, c], derivative), w) in normals.faces().iter().zip(derivatives).zip(&w[vertices..]) {
         let [u, v] = derivative.map(|rows| combination(*w, rows));
         for k in 0..3 {
             out[a as usize][k] -= u[k] + v[k];
@@ -177,31 +168,27 @@ fn transposed_jacobian_product(
     out
 }
 
-/// `A · X` for the X of every frame that has one, as columns of one matrix. The result of a frame does not depend, bit for bit, on the others.
+/// `A · X` for the X of every frame, each the same bits whatever the others.
 pub(super) fn products<T: faer::traits::RealField + Copy>(
     a: MatRef<'_, T>,
-    frames: &[Vec<Point>],
+    frames: &[impl AsRef<[Point]>],
     to: impl Fn(f64) -> T,
     from: impl Fn(T) -> f64,
 ) -> Vec<Vec<Point>> {
-    let some: Vec<&Vec<Point>> = frames.iter().filter(|frame| !frame.is_empty()).collect();
-    if some.is_empty() {
-        return vec![Vec::new(); frames.len()];
+    if frames.is_empty() {
+        return Vec::new();
     }
-    let width = product_columns(some.len());
+    let width = product_columns(frames.len());
     let mut columns = Mat::<T>::zeros(a.ncols(), width);
-    for (f, frame) in some.iter().enumerate() {
+    for (f, frame) in frames.iter().enumerate() {
         for k in 0..3 {
-            for (to_entry, row) in columns.col_as_slice_mut(3 * f + k).iter_mut().zip(frame.iter()) {
-                *to_entry = to(row[k]);
+            for (entry, row) in columns.col_as_slice_mut(3 * f + k).iter_mut().zip(frame.as_ref()) {
+                *entry = to(row[k]);
             }
         }
     }
     let mut out = Mat::<T>::zeros(a.nrows(), width);
     cager_geometry::linalg::multiply(out.as_mut(), a, columns.as_ref());
-    let mut place = 0..;
     let rows = |f: usize| (0..a.ncols()).map(|j| [0, 1, 2].map(|k| from(out[(j, 3 * f + k)]))).collect();
-    let of_frame =
-        |frame: &Vec<Point>| if frame.is_empty() { Vec::new() } else { place.next().map_or(Vec::new(), rows) };
-    frames.iter().map(of_frame).collect()
+    (0..frames.len()).map(rows).collect()
 }

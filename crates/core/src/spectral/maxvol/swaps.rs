@@ -1,6 +1,5 @@
 //! Swaps of rows, in single precision, among the rows that may take part in them.
 
-use super::handles::Swap;
 use crate::simd::multiversion;
 use cager_geometry::linalg;
 use faer::MatRef;
@@ -11,12 +10,23 @@ const CANDIDATE: f32 = 0.9;
 /// Candidates of one task when their rows of B are computed.
 const TASK_ROWS: usize = 256;
 
+/// One exchange: the row of the matrix that became a handle, and which handle it replaced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swap {
+    /// The new row.
+    pub row: u32,
+    /// Position of the replaced one among the picked rows.
+    pub position: u32,
+    /// `|B_ij|`, by which the volume grew.
+    pub growth: f64,
+}
+
 /// The rows that take part, from the largest entry of every row.
 pub(super) fn candidates(row_max: &[f32]) -> Vec<u32> {
     (0..row_max.len() as u32).filter(|&i| row_max[i as usize] > CANDIDATE).collect()
 }
 
-/// Rows of B that take part in the swaps, row-major. Single precision: the pass that follows is in double.
+/// Rows of B that take part in the swaps, row-major, in single precision.
 pub(super) struct CandidateRows {
     /// Which rows they are.
     rows: Vec<u32>,
@@ -27,12 +37,7 @@ pub(super) struct CandidateRows {
 
 impl CandidateRows {
     /// B at the candidates, for the handles `picked`, whose inverse is given.
-    pub(super) fn computed(
-        phi: MatRef<'_, f64>,
-        candidates: Vec<u32>,
-        picked: &[u32],
-        inverse: MatRef<'_, f64>,
-    ) -> Self {
+    pub(super) fn new(phi: MatRef<'_, f64>, candidates: Vec<u32>, picked: &[u32], inverse: MatRef<'_, f64>) -> Self {
         let width = phi.ncols();
         let mut entries = vec![0.0f32; candidates.len() * width];
         let mut row_max = vec![0.0f32; candidates.len()];
@@ -65,7 +70,7 @@ impl CandidateRows {
     pub(super) fn swap(mut self, picked: &mut [u32], tolerance: f64) -> Vec<Swap> {
         // Rounding of the updates must not end the swaps just above the tolerance.
         let target = (1.0 + 0.2 * tolerance) as f32;
-        // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds the volume.
+        // Each swap multiplies the volume by more than 1 + τ, and Hadamard's inequality bounds it.
         let limit = 100 * self.width + 1000;
         let mut swaps = Vec::new();
         while swaps.len() < limit {
@@ -107,36 +112,33 @@ impl CandidateRows {
 }
 
 multiversion! {
-    fn update_rows(entries: &mut [f32], row_max: &mut [f32], direction: &[f32], column: usize) = update_rows_generic;
-}
-
-#[inline(always)]
-fn update_rows_generic(entries: &mut [f32], row_max: &mut [f32], direction: &[f32], column: usize) {
-    const WIDE: usize = 16;
-    for (row, max) in entries.chunks_exact_mut(direction.len()).zip(row_max) {
-        let factor = row[column];
-        // Rows of other handles, among many, are left as they are.
-        if factor == 0.0 {
-            continue;
-        }
-        let mut lanes = [0.0f32; WIDE];
-        let mut chunks = row.chunks_exact_mut(WIDE);
-        let mut steps = direction.chunks_exact(WIDE);
-        for (chunk, step) in (&mut chunks).zip(&mut steps) {
-            for l in 0..WIDE {
-                chunk[l] -= factor * step[l];
-                let size = chunk[l].abs();
-                lanes[l] = if size > lanes[l] { size } else { lanes[l] };
+    fn update_rows(entries: &mut [f32], row_max: &mut [f32], direction: &[f32], column: usize) {
+        const WIDE: usize = 16;
+        for (row, max) in entries.chunks_exact_mut(direction.len()).zip(row_max) {
+            let factor = row[column];
+            // Rows of other handles, among many, are left as they are.
+            if factor == 0.0 {
+                continue;
             }
+            let mut lanes = [0.0f32; WIDE];
+            let mut chunks = row.chunks_exact_mut(WIDE);
+            let mut steps = direction.chunks_exact(WIDE);
+            for (chunk, step) in (&mut chunks).zip(&mut steps) {
+                for l in 0..WIDE {
+                    chunk[l] -= factor * step[l];
+                    let size = chunk[l].abs();
+                    lanes[l] = if size > lanes[l] { size } else { lanes[l] };
+                }
+            }
+            let mut largest = 0.0;
+            for (x, step) in chunks.into_remainder().iter_mut().zip(steps.remainder()) {
+                *x -= factor * step;
+                largest = if x.abs() > largest { x.abs() } else { largest };
+            }
+            for size in lanes {
+                largest = if size > largest { size } else { largest };
+            }
+            *max = largest;
         }
-        let mut largest = 0.0;
-        for (x, step) in chunks.into_remainder().iter_mut().zip(steps.remainder()) {
-            *x -= factor * step;
-            largest = if x.abs() > largest { x.abs() } else { largest };
-        }
-        for size in lanes {
-            largest = if size > largest { size } else { largest };
-        }
-        *max = largest;
     }
 }

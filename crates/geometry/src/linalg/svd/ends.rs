@@ -1,5 +1,5 @@
-//! The largest and the smallest singular value alone, by the method of Lanczos (1950) with every vector kept orthogonal to all
-//! before: some dozens of products where a decomposition takes as many as columns.
+//! The largest and the smallest singular value alone, by the method of Lanczos (1950) with every
+//! vector kept orthogonal to all before: some dozens of products.
 
 use crate::linalg;
 use faer::{Mat, MatRef};

@@ -1,6 +1,5 @@
-//! The last singular values of a square matrix with their vectors, from its inverse: Rayleigh and Ritz's method on a block Krylov
-//! space of `(MᵀM)⁻¹` (Golub and Underwood 1977). For twenty of 3,000 directions it takes some 256 products of the inverse and of its
-//! transpose with a vector.
+//! The last singular values of a square matrix with their vectors, from its inverse: Rayleigh and
+//! Ritz's method on a block Krylov space of `(MᵀM)⁻¹` (Golub and Underwood 1977).
 
 use super::svd;
 use crate::linalg;
@@ -48,7 +47,8 @@ impl LastDirections {
     }
 }
 
-/// The last `count` singular values of M and their vectors, from `M⁻¹` and the first of the values. `None` where they do not converge.
+/// The last `count` singular values of M and their vectors, from `M⁻¹` and the first of the values.
+/// `None` where they do not converge.
 pub fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize) -> Option<LastDirections> {
     let m = inverse.ncols();
     let width = (count + MARGIN).min(m);
@@ -68,7 +68,7 @@ pub fn last_directions(inverse: MatRef<'_, f64>, first: f64, count: usize) -> Op
         let image = linalg::tall_product(inverse.transpose(), new);
         append(&mut space, new);
         append(&mut images, image.as_ref());
-        // Of the images `M⁻ᵀ X = U S Wᵀ` the singular vectors of M are U and `X W`, its singular values 1/S.
+        // Of `M⁻ᵀ X = U S Wᵀ` the singular vectors of M are U and `X W`, its singular values 1/S.
         let ritz = svd(images.as_ref())?;
         let values = &ritz.sigma[..count.min(ritz.sigma.len())];
         let settled = known.len() == count

@@ -1,5 +1,5 @@
-//! Singular value decomposition, by faer: bidiagonalisation, then divide and conquer (Gu and Eisenstat 1995). Sequential, so that the
-//! bits do not depend on the number of threads.
+//! Singular value decomposition, by faer: bidiagonalisation, then divide and conquer (Gu and
+//! Eisenstat 1995). Sequential, so that the bits do not depend on the number of threads.
 
 mod ends;
 mod last;
@@ -12,7 +12,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::svd::{ComputeSvdVectors, SvdParams, svd as decompose, svd_scratch};
 use faer::{Auto, Mat, MatRef, Par};
 
-/// Size from which divide and conquer splits a bidiagonal matrix; faer's own choice of 128 is slower at some hundred columns.
+/// Size from which a bidiagonal matrix is split; faer's 128 is slower at some hundred columns.
 const SPLIT_FROM: usize = 32;
 
 /// `A = U Σ Vᵀ` of a K × m matrix.
