@@ -1,5 +1,5 @@
-//! Singular values of `Φ□`, `Φ` and `ΦᵀΦ` (the paper's Figs. 6 and 9), and where the singular vectors of
-//! `Φ□` live on the cage (Figs. 11 and 15).
+//! Singular values of `Φ□`, `Φ` and `ΦᵀΦ` (the paper's Figs. 6 and 9), and where the singular
+//! vectors of `Φ□` live on the cage (Figs. 11 and 15).
 
 use cager_core::spectral::Analysis;
 use serde::Serialize;
