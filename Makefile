@@ -202,7 +202,7 @@ $(LINT)/bin/python: Makefile
 		kubernetes-validate==1.37.0 promql-parser==0.11.0 pyyaml
 	@touch $@
 
-package: ## pack the libraries as they are published, each built from its package alone; VERIFY=--no-verify leaves the building out
+package: ## pack the libraries as they are published, each built from its package alone; VERIFY=--no-verify leaves the building out, as CI does, and takes some 20 s; needs the network
 	$(CARGO) package --workspace --locked --allow-dirty $(VERIFY) --exclude cager --exclude cager-compare --exclude cager-fuzz --exclude cager-service --exclude cager-store
 
 doc: ## build the API documentation

@@ -170,7 +170,7 @@ pub(crate) fn cage_of(rest: &Model, mut mesh: TriMesh, origin: Option<Point>, fo
     move_to(origin, &mut mesh.vertices);
     let cage = cage(mesh.clone())?;
     match cage_mismatch(&mesh, rest).filter(|_| !force) {
-        Some(what) => Err(of("cage", format!("{what}, or pass --force to go on"))),
+        Some(what) => Err(of("cage", format!("{what}, or pass force=True to go on"))),
         None => Ok(cage),
     }
 }

@@ -79,7 +79,6 @@ impl From<Fault> for PyErr {
             // The sentences are those of the command line.
             Fault::Told(words) => CagerError::new_err(
                 words
-                    .replace("pass --force", "pass force=True")
                     .replace(
                         "is there already; name another file",
                         "is there already; name another file, or pass overwrite=True",

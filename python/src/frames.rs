@@ -5,7 +5,7 @@ use crate::fault::{Fault, of};
 use crate::watch::Watch;
 use cager_capture::belonging::{Belonging, Pass};
 use cager_capture::encode::sample_frames;
-use cager_capture::mismatch::{self, Mismatch, mismatches};
+use cager_capture::mismatch::{self, mismatches};
 use cager_capture::origin::move_to;
 use cager_formats::{Error, FrameReader};
 use cager_geometry::mesh::{Model, Point};
@@ -49,18 +49,13 @@ impl<'a> Frames<'a> {
             sample_frames(&mut self.open(), mismatch::FRAMES, false).map_err(|error| Fault::Told(error.to_string()))?;
         let found = mismatches(rest, &samples);
         let Some(first) = found.first() else {
-            self.belonging = Belonging::new((Path::new("rest"), rest), false);
+            self.belonging = Belonging::new((Path::new("rest"), rest), false, ", or pass force=True to go on");
             return Ok(());
         };
-        let advice = match first {
-            Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
-            Mismatch::Axes(_) => "export both with the same axes".to_owned(),
-            Mismatch::Units(_) => "scale one of them".to_owned(),
-            Mismatch::Mirrored(mirroring) => Mismatch::mirrored_advice(*mirroring),
-        };
+        let advice = first.advice();
         let words: Vec<String> = found.iter().map(ToString::to_string).collect();
         let what = format!(
-            "does not look like a capture of rest: {}; {advice}, or pass --force to go on",
+            "does not look like a capture of rest: {}; {advice}, or pass force=True to go on",
             words.join(", and ")
         );
         Err(of(self.name, what))
@@ -124,10 +119,9 @@ impl FrameReader for ArrayFrames<'_> {
         }
         move_to(self.frames.origin, out.as_chunks_mut().0);
         self.next += 1;
-        let pass = self.pass.as_mut();
-        let found =
-            pass.and_then(|pass| pass.compare(out.as_chunks().0, None, Path::new(self.frames.name), frame as f64));
-        found.map_or(Ok(()), |found| found.refuse_or_note())?;
+        if let Some(pass) = &mut self.pass {
+            pass.compare(out.as_chunks().0, None, Path::new(self.frames.name), frame as f64)?;
+        }
         Ok(true)
     }
 

@@ -125,7 +125,7 @@ impl<'a> Motion<'a> {
         let no_frames = args.rest.iter().chain(&args.improve);
         let mut files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
         files.rest_units = units;
-        check_capture(&mut files, (&args.rest[0], rest), &args.checks, false)?;
+        check_capture(&mut files, (&args.rest[0], rest), &args.checks)?;
         Ok(Self { start, options, files })
     }
 }

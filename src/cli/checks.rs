@@ -1,16 +1,16 @@
 //! Checks before an encoding or a design that rest pose, cage and capture match. A mismatch is an error, or a warning with --force.
 
-use super::dry_run::read_files;
-use super::warn;
-use anyhow::{Result, bail};
-use cager_cages::diagnosis::weld;
-use cager_capture::belonging::Belonging;
-use cager_capture::encode::{EncodeError, sample_frames};
-use cager_capture::frames::CaptureFiles;
-use cager_capture::mismatch::{self, Mismatch, cage_mismatch, mismatches};
+use super::{warn, warning};
+use anyhow::Result;
+use cager_capture::checks;
+use cager_capture::encode::EncodeError;
+use cager_capture::frames::{CaptureFiles, Hints};
+use cager_capture::mismatch::Mismatch;
 use cager_capture::timing::Timing;
-use cager_formats::RATES;
-use cager_geometry::mesh::{Model, TriMesh, diagonal};
+use cager_core::cage::CageError;
+use cager_formats::Error::{PointCount, SeveralSequences};
+use cager_formats::{FrameSelection, RATES};
+use cager_geometry::mesh::{Model, TriMesh};
 use cager_geometry::units::Up;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -105,135 +105,101 @@ pub(super) fn checked_files<'a>(
     points: usize,
     no_frames: impl IntoIterator<Item = &'a PathBuf>,
 ) -> CaptureFiles {
-    let mut files = CaptureFiles::new(path, points);
-    files.allow_gaps = args.allow_gaps;
+    let mut files = CaptureFiles { path: path.to_owned(), points, ..unnamed_files(args) };
     files.selection.no_frames = no_frames.into_iter().cloned().collect();
-    files.selection.join_sequences = args.all_files;
-    files.selection.prim.clone_from(&args.prim);
-    files.selection.rate = args.sample_rate;
-    files.selection.animation.clone_from(&args.animation);
     files
 }
 
-/// The files of a capture for a rest pose, which is welded first if it should be.
-pub(super) fn capture_files<'a>(
-    args: &CaptureArgs,
-    path: &Path,
-    rest: &mut Model,
-    no_frames: impl IntoIterator<Item = &'a PathBuf>,
-) -> CaptureFiles {
-    let mut files = checked_files(&args.checks, path, rest.points.len(), no_frames);
-    files.timing = (&args.timing).into();
-    files.up = args.up;
-    if let Some(welded) = args.weld.then(|| weld(rest)).flatten() {
-        *rest = welded.model;
-        files.points = rest.points.len();
-        files.weld = Some(welded.target);
+/// How the files of a capture are read.
+pub(super) fn unnamed_files(args: &CheckArgs) -> CaptureFiles {
+    CaptureFiles {
+        allow_gaps: args.allow_gaps,
+        selection: FrameSelection {
+            join_sequences: args.all_files,
+            prim: args.prim.clone(),
+            rate: args.sample_rate,
+            animation: args.animation.clone(),
+            ..FrameSelection::default()
+        },
+        hints: Hints { mismatch: FORCE, gaps: ", or pass --allow-gaps to go on without them" },
+        ..CaptureFiles::default()
     }
-    files
 }
 
-/// Compares some frames of a capture with its rest pose, and has the others compared as they are read; `turns` where the command has --up and --weld.
-pub(super) fn check_capture(
-    files: &mut CaptureFiles,
-    rest: (&Path, &Model),
-    args: &CheckArgs,
-    turns: bool,
-) -> Result<()> {
-    let opened = files.open().map_err(EncodeError::from);
-    let frames = opened.and_then(|mut reader| {
-        warn(&reader.notes());
-        sample_frames(reader.as_mut(), mismatch::FRAMES, false)
-    });
-    let frames = frames.map_err(|error| explained(error, files, rest, turns))?;
-    warn(single_far_away(files, rest.1, &frames).as_slice());
-    let found = mismatches(rest.1, &frames);
-    if found.is_empty() {
-        files.belonging = Belonging::new(rest, args.force);
-        if files.belonging.as_ref().is_some_and(|belonging| belonging.suspects(&frames)) {
-            // Told before the work, and of the first one.
-            read_files(files)?;
-        }
-        return Ok(());
-    }
-    let advice = match found[0] {
-        // It turns the capture to the rest pose's axes, which may be its own.
-        Mismatch::Axes(Some(up)) if turns && files.up.is_some() => {
-            format!("leave out --up, or pass --up {}", up.name())
-        }
-        Mismatch::Axes(Some(up)) if turns => format!("pass --up {}", up.name()),
-        Mismatch::Order(_) => "export both from one program with the order of the points kept".to_owned(),
-        Mismatch::Axes(_) => "export both with the same axes".to_owned(),
-        Mismatch::Units(_) if turns => {
-            "give --unit and --up for files that do not say theirs, or scale one of them".to_owned()
-        }
-        Mismatch::Units(_) => "scale one of them".to_owned(),
-        Mismatch::Mirrored(mirroring) => Mismatch::mirrored_advice(mirroring),
-    };
-    let words: Vec<String> = found.iter().map(ToString::to_string).collect();
-    let what = format!(
-        "{}: does not look like a capture of {}: {}",
-        files.path.display(),
-        rest.0.display(),
-        words.join(", and ")
-    );
-    refuse_or_warn(what, &format!("; {advice}"), args.force)
+const FORCE: &str = ", or pass --force to go on";
+
+/// Compares the frames of a capture with its rest pose, for a command without --up and --weld.
+pub(super) fn check_capture(files: &mut CaptureFiles, rest: (&Path, &Model), args: &CheckArgs) -> Result<()> {
+    warning(|warnings| checks::check_frames(files, rest, args.force, warnings))
+        .map_err(|error| explained(error, &files.path, false))
 }
 
-/// Checks a cage that leaves most points outside, or is far larger than the model, for other units or axes and for belonging to another model.
+/// Checks whether a cage is one of this model.
 pub(super) fn check_cage(cage: (&Path, &TriMesh), rest: &Model, args: &CheckArgs) -> Result<()> {
-    let Some(what) = cage_mismatch(cage.1, rest) else { return Ok(()) };
-    refuse_or_warn(format!("{}: {what}", cage.0.display()), "", args.force)
+    warning(|warnings| checks::check_cage(cage, rest, args.force, warnings))
+        .map_err(|error| explained_cage(error, false))
 }
 
-/// What is to be said of frames that lost digits before they came here: in single precision, as far away as their rest pose.
-fn single_far_away(files: &CaptureFiles, rest: &Model, frames: &[Vec<f64>]) -> Option<String> {
-    const MAX_ROUNDING_ERROR: f64 = 1e-5;
-    let origin = files.origin?;
-    let farthest = origin.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
-    let lost = farthest * f64::from(f32::EPSILON) / 2.0 / diagonal(&rest.points);
-    let is_single = |(x, o): (&f64, &f64)| f64::from((x + o) as f32) == x + o;
-    let singles = frames.iter().all(|frame| frame.iter().zip(origin.iter().cycle()).all(is_single));
-    (lost > MAX_ROUNDING_ERROR && singles).then(|| {
-        format!(
-            "{}: its frames are in single precision, which so far from the origin has lost what is smaller than {lost:.1e} of the rest pose's diagonal; export them in double precision (float64)",
-            files.path.display()
-        )
-    })
+/// What to do about a capture, in the options of a command that has --up, --unit and --weld, whose --up is given.
+pub(super) fn explained_with_options(
+    error: EncodeError,
+    frames: &Path,
+    up: Option<Up>,
+    is_flipped: bool,
+) -> anyhow::Error {
+    match error {
+        EncodeError::Mismatch { what, found } => match found.first() {
+            // It turns the capture to the rest pose's axes, which may be its own.
+            Some(Mismatch::Axes(Some(found))) if up.is_some() => {
+                anyhow::anyhow!("{what}; leave out --up, or pass --up {}{FORCE}", found.name())
+            }
+            Some(Mismatch::Axes(Some(found))) => anyhow::anyhow!("{what}; pass --up {}{FORCE}", found.name()),
+            Some(Mismatch::Units(_)) => {
+                anyhow::anyhow!(
+                    "{what}; give --unit and --up for files that do not say theirs, or scale one of them{FORCE}"
+                )
+            }
+            _ => explained(EncodeError::Mismatch { what, found }, frames, is_flipped),
+        },
+        EncodeError::Seams { rest, cause: PointCount { path: capture, expected, found, .. } } => anyhow::anyhow!(
+            "{}: has {found} points where {} has {expected}, {} of them doubles along seams that flat shading or UVs split; pass --weld",
+            capture.display(),
+            rest.display(),
+            expected as u64 - found
+        ),
+        error => explained(error, frames, is_flipped),
+    }
+}
+
+/// What to do about a capture, in the options of any command that reads one.
+pub(super) fn explained(error: EncodeError, frames: &Path, is_flipped: bool) -> anyhow::Error {
+    match error {
+        error @ EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", frames.display()),
+        EncodeError::Seams { cause, .. } => cause.into(),
+        EncodeError::Formats(error @ SeveralSequences { .. }) => {
+            anyhow::anyhow!("{error}; or pass --all-files to take them all, in natural order")
+        }
+        error => explained_cage(error, is_flipped),
+    }
+}
+
+/// What to do about a cage, which --flip-cage has turned around.
+pub(super) fn explained_cage(error: EncodeError, is_flipped: bool) -> anyhow::Error {
+    match error {
+        EncodeError::Cage { path, cause: CageError::Inward { .. } } if is_flipped => anyhow::anyhow!(
+            "{}: turned around, the faces of the cage point inwards; leave out --flip-cage",
+            path.display()
+        ),
+        error @ EncodeError::Cage { cause: CageError::Inward { .. }, .. } => {
+            anyhow::anyhow!("{error}, or pass --flip-cage")
+        }
+        error @ EncodeError::Mismatch { .. } => anyhow::anyhow!("{error}{FORCE}"),
+        other => other.into(),
+    }
 }
 
 /// Warns of frames that were read although they do not look like those before.
 pub(super) fn warn_of_departures(files: &CaptureFiles) {
     let noted = files.belonging.as_ref().and_then(|belonging| belonging.noted());
     warn(noted.map(str::to_owned).as_slice());
-}
-
-fn refuse_or_warn(what: String, advice: &str, force: bool) -> Result<()> {
-    if !force {
-        bail!("{what}{advice}, or pass --force to go on");
-    }
-    warn(&[what]);
-    Ok(())
-}
-
-/// Explains a wrong number of points where welding seams would make it right.
-fn explained(error: EncodeError, files: &CaptureFiles, (path, rest): (&Path, &Model), welds: bool) -> anyhow::Error {
-    use cager_formats::Error::{PointCount, SeveralSequences};
-    match error {
-        EncodeError::Formats(PointCount { path: ref capture, expected, found, .. })
-            if welds && weld(rest).is_some_and(|welded| welded.model.points.len() as u64 == found) =>
-        {
-            anyhow::anyhow!(
-                "{}: has {found} points where {} has {expected}, {} of them doubles along seams that flat shading or UVs split; pass --weld",
-                capture.display(),
-                path.display(),
-                expected as u64 - found
-            )
-        }
-        error @ EncodeError::EndsEarly { .. } => anyhow::anyhow!("{}: {error}", files.path.display()),
-        EncodeError::Formats(error @ SeveralSequences { .. }) => {
-            anyhow::anyhow!("{error}; or pass --all-files to take them all, in natural order")
-        }
-        other => other.into(),
-    }
 }

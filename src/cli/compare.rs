@@ -1,15 +1,15 @@
 //! `cager compare`.
 
 use super::args::CompareArgs;
-use super::cage_file::read_cage;
-use super::checks::{check_cage, check_capture, checked_files, warn_of_departures};
+use super::checks::{explained, unnamed_files, warn_of_departures};
 use super::dry_run::{read_all, tell_dry_run};
 use super::outputs::Outputs;
 use super::solver_options::with_input_name;
-use super::{human_bytes, plain, progress, read_with_units};
-use anyhow::Result;
+use super::{human_bytes, plain, progress, warning};
+use anyhow::{Result, bail};
+use cager_capture::{OpenOptions, Opened};
 use cager_compare::report_page::{Contents, NO_PAGE, ReportKind, ReportPage};
-use cager_compare::{CompareError, Figures, Job, Progress, compare, seconds};
+use cager_compare::{CompareError, Figures, Job, compare, seconds};
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_formats::{AtomicFile, commit_together};
@@ -34,13 +34,16 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         (Some(_), json) => (outputs.text(&args.output)?, json.as_ref().map(|path| outputs.text(path)).transpose()?),
         (None, _) => (outputs.text(&figures)?, None),
     };
-    let (mut rest, units) = read_with_units(&args.rest, args.checks.prim.as_deref())?;
-    let mut files = checked_files(&args.checks, &args.frames, rest.points.len(), [&args.rest, &args.cage]);
-    files.rest_units = units;
-    files.take_origin(&mut rest);
-    let cage = read_cage(&args.cage, args.flip_cage, (files.origin, units))?;
-    check_capture(&mut files, (&args.rest, &rest), &args.checks, false)?;
-    check_cage((&args.cage, cage.mesh()), &rest, &args.checks)?;
+    let options = OpenOptions {
+        files: unnamed_files(&args.checks),
+        flip_cage: args.flip_cage,
+        allow_mismatch: args.checks.force,
+        ..OpenOptions::default()
+    };
+    let Opened { rest, cage, files, .. } =
+        warning(|warnings| options.read(&args.rest, Some(&args.cage), &args.frames, warnings))
+            .map_err(|error| explained(error, &args.frames, args.flip_cage))?;
+    let Some(cage) = cage else { bail!("--cage: give one") };
     let open = || files.open();
     let frames = open()?.frames();
     let systems = systems(&args.coordinates);
@@ -67,7 +70,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let bar = progress::timed_steps();
     let plural = if systems.len() == 1 { "" } else { "s" };
     bar.println(format!("about {} for {} coordinate system{plural}", progress::duration(expected), systems.len()));
-    let result = compare(&job, &mut Progress { tell: &mut |step, done| show(&bar, step, done, expected) });
+    let result = compare(&job, &mut |step, done| show(&bar, step, done, expected));
     bar.finish_and_clear();
     let (figures, geometry) = result.map_err(|error| match error {
         CompareError::Prepare(error) => with_input_name(&error, &args.rest, &args.cage),

@@ -1,15 +1,14 @@
 //! `cager encode`.
 
 use super::args::{EncodeArgs, SpectrumArg};
-use super::cage_file::read_cage;
-use super::checks::{capture_files, check_cage, check_capture, warn_of_departures};
+use super::checks::{CaptureArgs, explained_with_options, unnamed_files, warn_of_departures};
 use super::coding_args::{Unit, goal};
 use super::dry_run::{read_files, size, tell_dry_run};
 use super::encode_shared::{
     Targets, checked_options, design_options, finish, name_file, name_files, sized_design, solver_options,
 };
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
-use super::{design, encode_remote, grouped, human_bytes, progress, read_whole, tell, warn};
+use super::{design, encode_remote, grouped, human_bytes, progress, tell, warn, warning};
 use anyhow::{Context, Result};
 use cager_capture::coding::Goal;
 use cager_capture::design::{read_frames, report as design_report};
@@ -17,10 +16,11 @@ use cager_capture::encode::{ChooseSpectrum, Encode, EncodeError, EncodeProgress,
 use cager_capture::frames::CaptureFiles;
 use cager_capture::memory::{Memory, free_bytes};
 use cager_capture::speed::seconds_to_prepare;
+use cager_capture::{OpenOptions, Opened};
 use cager_core::cage::Cage;
 use cager_core::inversion::check_options;
 use cager_core::regularize::Regularizer;
-use cager_formats::{FrameReader, ReadModel};
+use cager_formats::FrameReader;
 use cager_geometry::mesh::Model;
 use cager_proto::report::DesignReport;
 use std::time::Instant;
@@ -28,27 +28,12 @@ use std::time::Instant;
 pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     let clock = Instant::now();
     let mut targets = Targets::new(&args)?;
-    let ReadModel { model: mut rest, units: said, dropped, .. } =
-        read_whole(&args.rest, args.capture.checks.prim.as_deref())?;
-    args.coding.said = said;
+    let Opened { rest, cage, files, dropped } = opened(&args)?;
+    args.coding.said = files.rest_units;
     let args = &args;
-    let no_frames = [&args.rest].into_iter().chain(&args.cage);
-    let mut files = capture_files(&args.capture, &args.frames, &mut rest, no_frames);
-    files.selection.range = args.frames_range;
-    (files.rest_units, files.metres_per_unit) = (said, args.coding.unit.map(Unit::metres));
-    files.take_origin(&mut rest);
     // What is wrong with it is told before anything is computed.
     let is_coded = goal(&args.coding, args.coding.units(), args.cage.is_some(), &rest, 1)?.is_some();
     targets.warnings.extend(dropped.sentence(&args.rest, is_coded && !args.coding.exact_rest));
-    let cage = args
-        .cage
-        .as_ref()
-        .map(|path| read_cage(path, args.flip_cage, (files.origin, args.coding.units())))
-        .transpose()?;
-    check_capture(&mut files, (&args.rest, &rest), &args.capture.checks, true)?;
-    if let (Some(path), Some(cage)) = (&args.cage, &cage) {
-        check_cage((path, cage.mesh()), &rest, &args.capture.checks)?;
-    }
     if args.outputs.dry_run {
         dry_run(args, &targets, &files, &rest, cage.as_ref())?;
         warn(&targets.warnings);
@@ -71,6 +56,21 @@ pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     };
     warn_of_departures(&files);
     done
+}
+
+/// The rest pose, the frames, and the cage where one is given, all checked.
+fn opened(args: &EncodeArgs) -> Result<Opened> {
+    let CaptureArgs { checks, up, weld, timing } = &args.capture;
+    let mut files = CaptureFiles {
+        up: *up,
+        timing: timing.into(),
+        metres_per_unit: args.coding.unit.map(Unit::metres),
+        ..unnamed_files(checks)
+    };
+    files.selection.range = args.frames_range;
+    let options = OpenOptions { files, weld: *weld, flip_cage: args.flip_cage, allow_mismatch: checks.force };
+    warning(|warnings| options.read(&args.rest, args.cage.as_deref(), &args.frames, warnings))
+        .map_err(|error| explained_with_options(error, &args.frames, *up, args.flip_cage))
 }
 
 /// What can be known without designing a cage and solving, and without a service.

@@ -144,7 +144,7 @@ fn refuse_one_mesh(output: &Path, count: usize) -> Result<()> {
 /// The cage that is given, or that comes with the first pose; its model lies about in it.
 fn given_cage(args: &ExploreArgs, poses: &Poses) -> Result<Option<Cage>> {
     let Some(path) = &args.cage else { return poses.cage() };
-    let cage = read_cage(path, false, (None, poses.units))?;
+    let cage = read_cage(path, (None, poses.units))?;
     let far = reject_far_points(&cage, &poses.model.points);
     far.map_err(|error| with_input_name(&error, poses.file(0).path(), path))?;
     Ok(Some(cage))

@@ -185,6 +185,14 @@ fn warn(warnings: &[String]) {
     }
 }
 
+/// Does what may warn, and tells the warnings also where it fails.
+fn warning<T, E>(work: impl FnOnce(&mut Vec<String>) -> Result<T, E>) -> Result<T, E> {
+    let mut warnings = Vec::new();
+    let done = work(&mut warnings);
+    warn(&warnings);
+    done
+}
+
 /// Untrusted text with control characters replaced, so that it cannot control the terminal.
 fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()

@@ -176,7 +176,7 @@ fn refuse_other_order((file, points): (&PoseFile, &[Point]), (first, model): (&P
     let found = mismatches(model, &[points.as_flattened().to_vec()]);
     if let Some(Mismatch::Mirrored(mirroring)) = found.last() {
         let how = mirroring.map_or("left is right in it".to_owned(), |found| found.to_string());
-        let advice = Mismatch::mirrored_advice(*mirroring);
+        let advice = Mismatch::Mirrored(*mirroring).advice();
         bail!("{file}: does not look like a pose of {first}: it is mirrored ({how}); {advice}");
     }
     let Some(Mismatch::Order(longer)) = found.first() else { return Ok(()) };

@@ -76,7 +76,7 @@ impl Stretching<'_> {
     /// The cage that is given, or one around the template.
     fn cage(&self, template: &Model) -> Result<Cage> {
         if let Some(path) = self.cage {
-            return read_cage(path, false, (self.origin, Units::UNKNOWN));
+            return read_cage(path, (self.origin, Units::UNKNOWN));
         }
         let bar = progress::ticking("making a cage");
         let made = cage_around(template);

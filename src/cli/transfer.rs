@@ -105,7 +105,7 @@ fn cage(
     let Some(path) = &args.cage else { return Ok(None) };
     let around_source = (source, (None, Units::UNKNOWN));
     let (inside, place) = if method == MethodChoice::Fitted { around_source } else { (target, (origin, units)) };
-    let cage = read_cage(path, false, place)?;
+    let cage = read_cage(path, place)?;
     check_cage((path, cage.mesh()), inside, &args.checks)?;
     Ok(Some(cage))
 }

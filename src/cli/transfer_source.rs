@@ -42,7 +42,7 @@ impl MotionSource {
         let mut files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
         files.timing = timing;
         files.rest_units = units;
-        check_capture(&mut files, (rest_path, &rest), &args.checks, false)?;
+        check_capture(&mut files, (rest_path, &rest), &args.checks)?;
         Ok(Self { rest, cage: None, frames: Frames::Files(Box::new(files)) })
     }
 

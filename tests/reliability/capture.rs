@@ -74,7 +74,7 @@ impl Reference {
             origin: None,
             units: cager_formats::Units::UNKNOWN,
         };
-        let mut writer = CaptureWriter::new(Vec::new(), &encoding).expect("a container");
+        let mut writer = CaptureWriter::new(Vec::new(), &encoding, None).expect("a container");
         let (mut cages, mut errors) = (Vec::new(), Vec::new());
         for frame in &frames {
             // One by one: what is solved together must not matter.

@@ -21,8 +21,9 @@ pub struct CagesWritten {
     pub normals: u64,
 }
 
-/// Writes the cages of a container, or a range of them, in the container's units or others, to `output`, and the rest cage with its faces to [`rest_cage_path`]. Each file is
-/// created atomically, the frames first. A dry run reads and validates without writing.
+/// Writes the cages of a container, or a range of them, in the container's units or others, to
+/// `output`, and the rest cage with its faces to [`rest_cage_path`]. Each file is created
+/// atomically, the frames first. A dry run reads and validates without writing.
 ///
 /// # Errors
 /// Damage; an output that refuses; another file in the place of the rest cage.
@@ -76,7 +77,8 @@ pub fn write_cages(
     })
 }
 
-/// The file beside `output` that holds the rest cage: `walk.cage.obj` beside `walk.npy`, `walk/`, `walk/*.ply` and `walk.####.obj`.
+/// The file beside `output` that holds the rest cage: `walk.cage.obj` beside `walk.npy`, `walk/`,
+/// `walk/*.ply` and `walk.####.obj`.
 pub fn rest_cage_path(output: &Path) -> PathBuf {
     let name = output.file_name().and_then(|name| name.to_str());
     let before = name.and_then(|name| name.find(['*', '#', '%']).map(|at| &name[..at]));

@@ -1,4 +1,4 @@
-//! Writes solved frames to a container and computes the report; shared by `encode` and the service, so that both produce the same bytes.
+//! Writes solved frames to a container with their report, for `encode` and the service alike.
 
 use crate::preparation_warnings::preparation_warnings;
 use cager_codec::{CodedMesh, rounded_error};
@@ -84,19 +84,11 @@ pub struct CaptureWriter<W: Write> {
 }
 
 impl<W: Write> CaptureWriter<W> {
-    /// Writes the header, the rest pose and the cage.
+    /// Writes the header, the rest pose and the cage, these as they are or in the bytes of a codec.
     ///
     /// # Errors
     /// An output that refuses; sizes beyond the format.
-    pub fn new(out: W, encoding: &Encoding<'_>) -> Result<Self, container::Error> {
-        Self::with_meshes(out, encoding, None)
-    }
-
-    /// The same with the rest pose and the cage in the bytes of a codec.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn with_meshes(
+    pub fn new(
         out: W,
         encoding: &Encoding<'_>,
         coded: Option<(&CodedMesh, &CodedMesh)>,
@@ -133,7 +125,7 @@ impl<W: Write> CaptureWriter<W> {
         self.writer.write_frame(cage, error.l2, error.linf)
     }
 
-    /// Adds the next frames as coded bytes, their errors, and which of their cages lies farthest from the origin, and how far.
+    /// Adds coded frames, their errors, and which cage lies farthest from the origin, and how far.
     ///
     /// # Errors
     /// An output that refuses.
@@ -174,7 +166,7 @@ impl<W: Write> CaptureWriter<W> {
         self.report.coding = Some(coding);
     }
 
-    /// Writes what comes after the frames. Sizes, times and the worst point of the report are left to the caller.
+    /// Writes what comes after the frames; the caller adds sizes, times and the worst point.
     ///
     /// # Errors
     /// An output that refuses.
@@ -224,7 +216,7 @@ fn far_away(frame: usize, diagonals: f64, stays_near: bool) -> Option<String> {
         let cure = if stays_near {
             "move the capture closer to the origin"
         } else {
-            "unless the capture itself is there, the cage ran away, since with these options nothing keeps it near its frames: leave out --regularizer, --spectrum and --lambda, whose usual values do"
+            "unless the capture itself is there, the cage ran away, since with these options nothing keeps it near its frames: leave out regularizer, spectrum and lambda, whose usual values do"
         };
         format!(
             "the cage of frame {frame} lies {diagonals:.0} diagonals from the origin, where single precision resolves {:.1e} of the diagonal; {cure}",

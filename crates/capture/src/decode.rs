@@ -39,13 +39,13 @@ pub struct Decoding<'a> {
     pub memory: Option<Memory>,
     /// How much of the file is decoded.
     pub layer: Layer,
-    /// Whether frames that are damaged, or missing from the end of a file that was cut, are left out instead of refused.
+    /// Whether damaged and missing frames are left out instead of refused.
     pub salvage: bool,
     /// How a `.glb` holds the frames.
     pub morphs: MorphOptions,
     /// Whether the cage is kept beside the model, which USD alone does.
     pub with_cage: bool,
-    /// Unit and upward axis that positions are brought to; as the container has them where nothing is said.
+    /// Unit and upward axis that positions are brought to; else the container's.
     pub units: Units,
 }
 
@@ -61,7 +61,7 @@ pub enum Layer {
 }
 
 impl Decoding<'_> {
-    /// Whether it is the file's own model in its own frames, edited or not, which alone the residual is of.
+    /// Whether it is the file's own model in its own frames, which alone the residual is of.
     fn own(&self) -> bool {
         self.model.is_none() && self.has_own_frames()
     }
@@ -81,7 +81,7 @@ pub struct Decoded {
     pub frames: usize,
     /// Points of another model that lie outside the rest cage.
     pub outside: usize,
-    /// Points of another model that lie beside poles of the coordinates, and are bound to the file's own model.
+    /// Points of another model beside poles of the coordinates, bound to the file's own model.
     pub bound: usize,
     /// Frames of the file that were left out because they are damaged, from 0.
     pub damaged: Vec<usize>,
@@ -91,11 +91,8 @@ pub struct Decoded {
     pub notes: Vec<String>,
 }
 
-/// Frame rate and frame numbers of the output; `timing` overrides the container's, whose frames are counted from 0 where their numbers are damaged and
-/// may be lost.
-///
-/// # Errors
-/// Damage.
+/// Frame rate and numbers of the output; `timing` overrides the container's, which are counted from
+/// 0 where they are damaged and may be lost.
 pub(crate) fn frame_options(
     container: &mut Container,
     there: usize,
@@ -119,19 +116,20 @@ pub(crate) fn frame_options(
     Ok(FrameOptions { fps, numbers, origin, rounding, units, ..FrameOptions::default() })
 }
 
-/// What a format may lose where it adds the origin in single precision: what a guaranteed error leaves, and what is not seen where there is none.
+/// What a format may lose where it adds the origin in single precision: what a guaranteed error
+/// leaves.
 fn may_lose(container: &mut Container) -> Result<f64, container::Error> {
     Ok(diagonal(&container.rest()?.points) * left_by_bound(container)?.unwrap_or(MAX_ROUNDING_ERROR))
 }
 
-/// What a guaranteed error leaves, as a share of the diagonal; `None` where nothing is guaranteed, or known of a file that was cut.
+/// What a guaranteed error leaves, as a share of the diagonal; `None` where none is known.
 fn left_by_bound(container: &mut Container) -> Result<Option<f64>, container::Error> {
     let report = match container.report() {
         Err(container::Error::Corrupt { .. }) => return Ok(None),
         found => found?,
     };
     let Some(bound) = report.coding.and_then(|coding| coding.max_error) else { return Ok(None) };
-    // Those of edited frames are as large, from what was captured and edited; of flattened ones they are not known.
+    // Errors of flattened frames are not known.
     let known = |error: f64| if error.is_nan() { bound } else { error };
     let largest = container.errors()?.iter().fold(0.0, |largest: f64, error| largest.max(known(error.linf)));
     Ok(Some((bound - largest).max(0.0)))
@@ -197,7 +195,7 @@ impl<'a> Chosen<'a> {
         Ok(Self { container, path, what, wanted, options, change, damaged, numbers_lost })
     }
 
-    /// How a `.glb` holds the frames, where the user has not said what it may lose: to what a guaranteed error leaves.
+    /// How a `.glb` holds the frames: where nothing is asked, to what a guaranteed error leaves.
     fn morphs(&mut self, asked: MorphOptions, rest: &Model) -> Result<MorphOptions, DecodeError> {
         /// The rounding of a sum of targets, which encoders leave room for.
         const LEAST: f64 = 5e-7;
@@ -281,7 +279,7 @@ impl<'a> Chosen<'a> {
     }
 }
 
-/// Decodes frames into `output`, which appears whole or not at all. `progress` is told the number of frames done.
+/// Decodes frames into `output`, which appears complete or not at all; `progress` counts them.
 ///
 /// # Errors
 /// See [`DecodeError`].

@@ -6,15 +6,15 @@ use cager_cages::{Design, DesignOptions, Parts, Style};
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
 use cager_proto::report::{DesignReport, StageReport};
 
-/// Frames of a capture that a design looks at, at most: some to design by, others to choose by, and stretches of time to judge by.
+/// Most frames that a design looks at: to design by, to choose by, and stretches to judge by.
 pub const FRAMES: usize = 160;
 
-/// Vertices of a cage where no number is given: fewer for a model whose points could not determine so many.
+/// Vertices of a cage where no number is given: fewer where the points are few.
 pub fn default_vertices(points: usize) -> usize {
     350.min(points / 2).max(4)
 }
 
-/// The usual options of a design for these coordinates: mean value coordinates do without a tidy cage; the others want all points inside.
+/// The usual options of a design: mean value coordinates do without all points inside.
 pub fn usual_options(system: &dyn CoordinateSystem) -> DesignOptions {
     let style = if system.name() == MeanValue.name() { Style::Free } else { Style::Editable };
     DesignOptions { style, ..DesignOptions::default() }
@@ -49,7 +49,7 @@ pub fn report(design: &Design, options: &DesignOptions, frames: usize) -> Design
     of_stages(stages.collect(), unseen, options, frames, design.timed_out)
 }
 
-/// What is worth telling of a design whose stages these are, with this error on frames that it did not see, from so many frames.
+/// The report of a design with these stages and this error on frames that it did not see.
 pub fn of_stages(
     stages: Vec<StageReport>,
     unseen_error: Option<f64>,

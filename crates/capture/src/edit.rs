@@ -3,6 +3,7 @@
 use crate::capture::GENERATOR;
 use crate::decode::{Container, DecodeError};
 use crate::edited::EditedCages;
+use crate::encode::unwritable;
 use cager_formats::{Action, AtomicFile, FrameRange, Target};
 use cager_geometry::units::Units;
 use cager_proto::container::{self, ContainerWriter, EditLayer, LayerBuilder, LayerSource};
@@ -21,7 +22,7 @@ type Output = BufWriter<AtomicFile>;
 pub struct Editing<'a> {
     /// What the layer is called; may be empty.
     pub name: &'a str,
-    /// The frames of the container that are edited; the edited cages are those of all its frames, or of these.
+    /// The frames that are edited; the edited cages are those of all frames, or of these.
     pub range: Option<FrameRange>,
 }
 
@@ -29,18 +30,20 @@ pub struct Editing<'a> {
 pub struct Edited {
     /// Number of frames.
     pub frames: usize,
-    /// Frames whose cage is another than in the container it came from, or has no counterpart there.
+    /// Frames whose cage differs from the container's, or has none there.
     pub changed: usize,
     /// Vertices of the cage that the layer moves; none where there is no layer.
     pub vertices: usize,
-    /// Whether the container had corrections of points beside the cages, which are left out, as of another number of frames.
+    /// Whether a residual was left out, as it is of another number of frames.
     pub loses_detail: bool,
     /// The container, complete but for its name.
     pub container: AtomicFile,
 }
 
-/// Writes the container at `input` again with one more layer: edited cages less those that it has. All else keeps its bytes, and positions are what they were plus
-/// what the layer moves them by. Where no frame is changed, the container is copied. Cages of another number of frames take the place of all that are there.
+/// Writes the container at `input` again with one more layer: edited cages less those that it has.
+/// All else keeps its bytes, and positions are what they were plus what the layer moves them by.
+/// Where no frame is changed, the container is copied. Cages of another number of frames take the
+/// place of all that are there.
 ///
 /// # Errors
 /// Damage; edited cages that cannot be read; an output that refuses.
@@ -69,7 +72,8 @@ pub fn edit(
     Ok(Edited { frames, changed, vertices, loses_detail: false, container: file })
 }
 
-/// The layer that makes edited cages of a container's own, nothing where they are the same; and how many frames it changes.
+/// The layer that makes the edited cages of a container's own, if they differ, and in how many
+/// frames.
 ///
 /// # Errors
 /// Damage; edited cages that cannot be read.
@@ -104,7 +108,7 @@ pub fn with_layers(
     written(input, output, |file| ContainerWriter::copy_with_layers(container, layers, file))
 }
 
-/// Writes the container at `input` again, which then says that its positions mean this; all else keeps its bytes.
+/// Writes the container at `input` again with these units; all else keeps its bytes.
 ///
 /// # Errors
 /// Damage; a container that says something else; an output that refuses.
@@ -123,8 +127,8 @@ pub fn with_units(
     written(input, output, |file| ContainerWriter::copy_placed(container, (origin, own.or(units)), &[], file))
 }
 
-/// Writes the container at `input` again with cages that have its layers in them, and `more`. What is added to positions beside the cages is kept; those that are
-/// switched off are not.
+/// Writes the container at `input` again with cages that have its layers in them, and `more`. What
+/// is added to positions beside the cages is kept; those that are switched off are not.
 ///
 /// # Errors
 /// Damage; an output that refuses.
@@ -145,8 +149,8 @@ pub fn flattened(
     written(input, output, |file| ContainerWriter::copy_flattened(&mut container, Some(&report), file))
 }
 
-/// The container with edited cages alone, in place of all that it has. Unchanged frames keep their errors; those of changed frames are not measured, since the
-/// capture is not available.
+/// The container with edited cages alone, in place of all that it has. Unchanged frames keep their
+/// errors; those of changed frames are not measured, since the capture is not available.
 fn rewritten(
     mut container: Container,
     input: &Path,
@@ -227,11 +231,7 @@ fn after_editing(report: Report) -> Report {
 
 fn refused(path: &Path, cause: container::Error) -> DecodeError {
     match cause {
-        // Errors of `AtomicFile` that pass through `io::Write` contain the path already.
-        container::Error::Io(io) => match io.downcast() {
-            Ok(named) => DecodeError::Formats(named),
-            Err(cause) => cager_formats::Error::Io { path: path.to_owned(), action: Action::Write, cause }.into(),
-        },
+        container::Error::Io(cause) => unwritable(path, cause).into(),
         cause => DecodeError::container(path, cause),
     }
 }

@@ -30,17 +30,17 @@ pub struct EditedCages {
     /// The frame that the reader gives next.
     next: usize,
     wide: Vec<f64>,
-    /// By how much coordinates of the frame read last may be others than they were before they were stored in this file.
+    /// What this file may have rounded coordinates of the last frame by.
     slack: Vec<f64>,
 }
 
 impl EditedCages {
-    /// Opens frames of the cage in `container`, in any format that captures come in; there may be more or fewer of them than
-    /// the container has.
+    /// Opens frames of the cage in `container`, in any format that captures come in; there may be
+    /// more or fewer of them than the container has.
     ///
     /// # Errors
-    /// Frames that cannot be read or have another number of vertices; cages with normals of their own, which no file of
-    /// positions holds.
+    /// Frames that cannot be read or have another number of vertices; cages with normals of their
+    /// own, which no file of positions holds.
     pub fn open(path: &Path, container: &Container) -> Result<Self, DecodeError> {
         let (file, vertices) = (path.to_owned(), container.header().cage_vertices as usize);
         Self::of_frames(path, container, Box::new(move || open_frames(&file, vertices)))
@@ -54,7 +54,7 @@ impl EditedCages {
         let header = container.header();
         let incomplete = (u64::from(header.rows_per_frame) != header.cage_vertices).then(|| {
             format!(
-                "edited cages have no normals, which {} coordinates keep for every face beside the vertices, so there must be one for each of the {} frames; add or leave out none, or encode the capture with --coordinates green or mvc",
+                "edited cages have no normals, which {} coordinates keep for every face beside the vertices, so there must be one for each of the {} frames; add or leave out none, or encode the capture with green or mvc coordinates",
                 header.coordinates,
                 container.frames()
             )
@@ -79,7 +79,8 @@ impl EditedCages {
         })
     }
 
-    /// Lets positions mean this where the file does not say it; they are changed to what those of the container at `input` mean.
+    /// Lets positions be in these units where the file does not say it, and changes them to the
+    /// container's.
     ///
     /// # Errors
     /// A unit or an axis is given, and the container does not know its own.
@@ -95,15 +96,13 @@ impl EditedCages {
         self.reader.frames()
     }
 
-    /// Whether they take the place of all frames of the container, since there is not one for each of these, or of a range of them.
+    /// Whether they take the place of all frames, since there is not one for each of them or of a
+    /// range.
     pub fn replaces_frames(&self, range: Option<FrameRange>) -> bool {
         range.is_none() && self.frames() != self.own_frames
     }
 
     /// Which edited cage is of which frame of the container.
-    ///
-    /// # Errors
-    /// Cages that are neither of all frames nor of `range`, and frames that are not there.
     pub(crate) fn places(&self, range: Option<FrameRange>) -> Result<Vec<(usize, usize)>, DecodeError> {
         let Some(range) = range else { return Ok((0..self.own_frames).map(|frame| (frame, frame)).collect()) };
         range.check(self.own_frames, |frame| frame as f64, &self.path)?;
@@ -119,11 +118,8 @@ impl EditedCages {
         }
     }
 
-    /// Reads the cage of a frame beside the one that it was made from: coordinates are those of `old`, which may have more rows, where they differ by no more
-    /// than this file rounds them by.
-    ///
-    /// # Errors
-    /// As [`Self::read_frame`].
+    /// Reads the cage of a frame beside the one that it was made from: coordinates are those of
+    /// `old`, which may have more rows, where they differ by no more than this file rounds them by.
     pub(crate) fn read_beside(&mut self, frame: usize, old: &[f32], out: &mut Vec<f32>) -> Result<(), DecodeError> {
         self.read(frame, out)?;
         for ((new, &old), slack) in out.iter_mut().zip(old).zip(&self.slack) {
@@ -135,9 +131,6 @@ impl EditedCages {
     }
 
     /// Makes the edited cage of a frame of the container's own, as a layer does.
-    ///
-    /// # Errors
-    /// As [`Self::read_frame`].
     pub(crate) fn move_frame(&mut self, frame: usize, cage: &mut [f32]) -> Result<(), DecodeError> {
         let mut new = Vec::with_capacity(3 * self.vertices);
         self.read_beside(frame, cage, &mut new)?;
@@ -149,7 +142,8 @@ impl EditedCages {
         Ok(())
     }
 
-    /// Reads the cage of a frame as it takes the place of one of the container, vertices × 3. Reading in ascending order is fastest.
+    /// Reads the cage of a frame in place of the container's, vertices × 3; fastest in ascending
+    /// order.
     ///
     /// # Errors
     /// Damage, another number of vertices, and coordinates beyond single precision.

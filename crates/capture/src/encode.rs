@@ -1,6 +1,7 @@
 //! Encoding: solves one cage per frame and measures the errors that a decoder will produce.
 //!
-//! [`encode()`] takes a [`Capture`](crate::Capture) of files, [`Encode`] any rest pose, cage and frames, and [`Encoder`] frames one by one.
+//! [`encode()`] takes a [`Capture`](crate::Capture) of files, [`Encode`] any rest pose, cage and
+//! frames, and [`Encoder`] frames one by one.
 
 mod batches;
 mod encoder;
@@ -11,6 +12,8 @@ pub use encoder::Encoder;
 pub use options::{Encode, encode};
 
 use crate::coding::CodingError;
+use crate::decode::DecodeError;
+use crate::mismatch::Mismatch;
 use cager_cages::DesignError;
 use cager_core::cage::CageError;
 use cager_core::inversion::PrepareError;
@@ -19,7 +22,7 @@ use cager_proto::container;
 use cager_proto::report::Report;
 use std::path::{Path, PathBuf};
 
-/// Largest memory of sampled frames, in bytes; constant, because the choice that depends on them must be reproducible.
+/// Largest memory of sampled frames, in bytes; constant, so that choices are reproducible.
 const SAMPLE_BYTES: usize = 640 << 20;
 
 /// Why encoding stopped; nothing was written.
@@ -32,6 +35,25 @@ pub enum EncodeError {
         path: PathBuf,
         /// What is wrong with it; part of the message, so not a source as well.
         cause: CageError,
+    },
+    /// The `.cager` file of a cage cannot be read.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// Rest pose, cage and frames look as if they did not belong together.
+    #[error("{what}{}", found.first().map_or_else(String::new, |found| format!("; {}", found.advice())))]
+    Mismatch {
+        /// Which file does not look like what.
+        what: String,
+        /// How the frames differ from the rest pose; nothing where it is the cage that does.
+        found: Vec<Mismatch>,
+    },
+    /// Frames have as many points as the rest pose would where points that seams split are one.
+    #[error("{cause}; seams split points of {} that are one in the frames: merge them", .rest.display())]
+    Seams {
+        /// The file of the rest pose.
+        rest: PathBuf,
+        /// The numbers of points.
+        cause: cager_formats::Error,
     },
     /// No cage can be designed for the capture.
     #[error(transparent)]
@@ -73,6 +95,12 @@ pub enum EncodeError {
         /// The point, from 0.
         point: usize,
     },
+    /// An earlier call failed, so that frames would be missing from the file.
+    #[error("frame {frame} or one after it could not be encoded before; begin again with a new encoder")]
+    Stopped {
+        /// The first frame that is not in the file, from 0.
+        frame: usize,
+    },
     /// A size was asked for, and how many frames share it is not known.
     #[error("a size is shared by the frames; say how many are pushed with Encode::expect_frames")]
     UnknownLength,
@@ -88,16 +116,17 @@ pub enum EncodeError {
 
 impl EncodeError {
     fn container(path: &Path, cause: container::Error) -> Self {
-        let path = path.to_owned();
         match cause {
-            // What `AtomicFile` passes through `io::Write` has the path in it already.
-            container::Error::Io(io) => match io.downcast() {
-                Ok(named) => Self::Formats(named),
-                Err(io) => Self::Formats(cager_formats::Error::Io { path, action: Action::Write, cause: io }),
-            },
-            cause => Self::Container { path, cause },
+            container::Error::Io(io) => Self::Formats(unwritable(path, io)),
+            cause => Self::Container { path: path.to_owned(), cause },
         }
     }
+}
+
+/// Why an output cannot be written; errors of `AtomicFile` name the path already.
+pub(crate) fn unwritable(path: &Path, cause: std::io::Error) -> cager_formats::Error {
+    let named = |cause| cager_formats::Error::Io { path: path.to_owned(), action: Action::Write, cause };
+    cause.downcast().unwrap_or_else(named)
 }
 
 /// How to select a spectrum threshold.
@@ -145,8 +174,8 @@ pub fn sample_frames(
 pub struct Encoded {
     /// Report of the encoding.
     pub report: Report,
-    /// The container, complete but for its name, so that a report can take its name together with it: see
-    /// [`cager_formats::commit_together`].
+    /// The container, complete but for its name, so that a report can take its name together with
+    /// it: see [`cager_formats::commit_together`].
     pub container: AtomicFile,
 }
 

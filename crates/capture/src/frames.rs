@@ -1,9 +1,10 @@
-//! Opening a capture's files: checks for gaps and for frames that depart from those before, and adapts axes, welded points, frame rate and
-//! frame numbers.
+//! Opening a capture's files: checks for gaps and for frames that depart from those before, and
+//! adapts axes, welded points, frame rate and frame numbers.
 
 use crate::belonging::{Belonging, Pass};
 use crate::origin::{move_to, own_origin};
 use crate::timing::Timing;
+use cager_cages::diagnosis::weld;
 use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
 use cager_geometry::mesh::Model;
 use cager_geometry::units::{Change, Units, Up};
@@ -23,7 +24,8 @@ pub struct CaptureFiles {
     pub allow_gaps: bool,
     /// The up axis of the frames, if it differs from that of the rest pose and files do not say it.
     pub up: Option<Up>,
-    /// What the file of the rest pose says of its positions: frames that say something else are changed to it.
+    /// What the file of the rest pose says of its positions: frames that say something else are
+    /// changed to it.
     pub rest_units: Units,
     /// Metres of one unit, for those of both that do not say it.
     pub metres_per_unit: Option<f64>,
@@ -35,6 +37,18 @@ pub struct CaptureFiles {
     pub origin: Option<[f64; 3]>,
     /// What every frame is compared with as it is read, if anything.
     pub belonging: Option<Arc<Belonging>>,
+    /// What messages add for the user of a program.
+    pub hints: Hints,
+}
+
+/// Ends of messages that say in the words of a program how its user goes on all the same, such as
+/// ", or pass --force to go on".
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Hints {
+    /// Where a frame does not look like those before.
+    pub mismatch: &'static str,
+    /// Where numbers are missing from the names of the files.
+    pub gaps: &'static str,
 }
 
 impl CaptureFiles {
@@ -43,10 +57,26 @@ impl CaptureFiles {
         Self { path: path.into(), points, ..Self::default() }
     }
 
-    /// Takes the rest pose and the frames to an origin of their own where the rest pose lies far away.
+    /// Takes the rest pose and the frames to an origin of their own where the rest pose lies far
+    /// away.
     pub fn take_origin(&mut self, rest: &mut Model) {
         self.origin = own_origin(&rest.points);
         move_to(self.origin, &mut rest.points);
+    }
+
+    /// Merges the points of the rest pose that seams split, and those of frames that have them
+    /// split too.
+    pub fn weld(&mut self, rest: &mut Model) {
+        if let Some(welded) = weld(rest) {
+            *rest = welded.model;
+            self.points = rest.points.len();
+            self.weld = Some(welded.target);
+        }
+    }
+
+    /// What positions of the rest pose mean, as its file says or else [`Self::metres_per_unit`].
+    pub fn meaning(&self) -> Units {
+        self.rest_units.or(Units { metres_per_unit: self.metres_per_unit, up: None })
     }
 
     /// Opens the frames from the first.
@@ -59,8 +89,7 @@ impl CaptureFiles {
         if let Some(missing) = missing_frames(&found).filter(|_| !self.allow_gaps && !inner.numbers_are_times()) {
             let many = missing.contains([',', ' ']);
             let (frames, are) = if many { ("frames", "are") } else { ("frame", "is") };
-            let what =
-                format!("{frames} {missing} {are} missing; add the files, or pass --allow-gaps to go on without them");
+            let what = format!("{frames} {missing} {are} missing; add the files{}", self.hints.gaps);
             return Err(Error::Invalid { path: self.path.clone(), what });
         }
         let numbers = self.timing.numbers(found);
@@ -80,10 +109,11 @@ impl CaptureFiles {
         }))
     }
 
-    /// What makes positions of frames that say this those of the rest pose, and what both mean then.
+    /// What makes positions of frames that say this those of the rest pose, and what both mean
+    /// then.
     fn placed(&self, said: Units) -> (Change, Units) {
         let unit = Units { metres_per_unit: self.metres_per_unit, up: None };
-        let (frames, rest) = (said.or(unit), self.rest_units.or(unit));
+        let (frames, rest) = (said.or(unit), self.meaning());
         // Whoever tells the axis knows better than files that contradict it.
         let told = self.up.map(Up::other);
         let mut change = frames.change_to(rest);
@@ -92,7 +122,8 @@ impl CaptureFiles {
         (change, units)
     }
 
-    /// The reader; and if the frames have unwelded points, for each welded point its first original point.
+    /// The reader; and if the frames have unwelded points, for each welded point its first original
+    /// point.
     fn open_welded(&self) -> Result<Welded, Error> {
         let Some(weld) = &self.weld else { return Ok((self.open_with(self.points)?, None)) };
         // The number of points in a file sequence is known only after reading a file.
@@ -121,7 +152,8 @@ impl CaptureFiles {
 /// As returned by `open_welded`.
 type Welded = (Box<dyn FrameReader>, Option<Vec<u32>>);
 
-/// Converts frames to the points and axes of the rest pose, and checks that they fit single precision.
+/// Converts frames to the points and axes of the rest pose, and checks that they fit single
+/// precision.
 struct Adapted {
     inner: Box<dyn FrameReader>,
     files: CaptureFiles,
@@ -203,7 +235,8 @@ impl FrameReader for Adapted {
 }
 
 impl Adapted {
-    /// What is to be said where the files say other units or axes than the rest pose, and positions are changed for it.
+    /// What is to be said where the files say other units or axes than the rest pose, and positions
+    /// are changed for it.
     fn brought_together(&self) -> Option<String> {
         let own = Change { turn_to: self.change.turn_to.filter(|_| self.files.up.is_none()), ..self.change };
         let path = self.files.path.display();
@@ -220,11 +253,11 @@ impl Adapted {
         let faces = welded.as_ref().or(mesh.map(|(_, faces)| faces));
         let path = mesh.map_or(self.files.path.as_path(), |(path, _)| path);
         let number = self.inner.number(self.frame - 1);
-        let Some(found) = pass.compare(frame.as_chunks().0, faces, path, number) else { return Ok(()) };
-        if !pass.has_skipped() {
-            return found.refuse_or_note();
+        if !pass.compare(frame.as_chunks().0, faces, path, number)? {
+            return Ok(());
         }
-        // What was skipped is read now, so that the first frame is named that departs; or growth turns out to be one.
+        // What was skipped is read now, so that the first frame is named that departs; or growth
+        // turns out to be one.
         self.pass = None;
         let mut all = self.files.open()?;
         while all.read_next(&mut self.values)? {}
@@ -241,7 +274,8 @@ mod tests {
     const CENTIMETRES: Units = Units::new(Up::Z, 0.01);
     const INCHES: Units = Units { up: None, metres_per_unit: Some(0.0254) };
 
-    /// The first point of a capture whose only one is (100, 200, 300), what it means, and what is said of it.
+    /// The first point of a capture whose only one is (100, 200, 300), what it means, and what is
+    /// said of it.
     fn read(name: &str, adapt: impl FnOnce(&mut CaptureFiles)) -> ([f64; 3], Units, Vec<String>) {
         let folder = ScratchDir::create(std::env::temp_dir()).expect("a folder");
         let path = folder.path().join(name);

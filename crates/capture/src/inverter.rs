@@ -1,21 +1,35 @@
-//! Cages of frames in memory, one by one.
+//! Cages of frames in memory, without a file.
 
+use crate::positions::{decoded, not_single, points};
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Rows, Solver, SolverOptions};
 use cager_geometry::mesh::Point;
 
-/// Points or vertices of another number than those that an [`Inverter`] was prepared for.
+/// Positions that an [`Inverter`] cannot take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{found} positions where there are {expected}; give all of them, in their order")]
-pub struct LengthError {
-    /// Positions that were given.
-    pub found: usize,
-    /// Positions that there are.
-    pub expected: usize,
+pub enum InvertError {
+    /// Points or vertices of another number than it was prepared for.
+    #[error("frame {frame} has {found} positions where there are {expected}; give all of them, in their order")]
+    Length {
+        /// Which of the frames that were given, from 0.
+        frame: usize,
+        /// Positions that were given.
+        found: usize,
+        /// Positions that there are.
+        expected: usize,
+    },
+    /// A coordinate that single precision does not hold.
+    #[error("frame {frame}: position {position} is not finite, or too large for single precision")]
+    NotFinite {
+        /// Which of the frames that were given, from 0.
+        frame: usize,
+        /// Which of its positions, from 0.
+        position: usize,
+    },
 }
 
-/// Finds the cage of any pose of a model, prepared once for its rest pose and cage.
+/// Finds the cages of any poses of a model, prepared once for its rest pose and cage.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -39,40 +53,58 @@ impl Inverter {
     /// # Errors
     /// A rest pose and a cage that cannot be used together.
     pub fn new(rest: &[Point], cage: &Cage) -> Result<Self, PrepareError> {
-        let unknowns = MeanValue.values(cage).unknowns();
-        let solver = Solver::prepare(&MeanValue, cage, rest, SolverOptions::for_unknowns(unknowns))?;
-        Ok(Self { solver })
+        Self::with_coordinates(rest, cage, &MeanValue)
+    }
+
+    /// With other coordinates, as [`Encode::coordinates`](crate::Encode::coordinates) takes them,
+    /// and the usual solver. Cages of [`Green::Free`](crate::Green::Free) have the normals of the
+    /// faces after the vertices.
+    ///
+    /// # Errors
+    /// A rest pose and a cage that cannot be used together, or not with these coordinates.
+    pub fn with_coordinates(rest: &[Point], cage: &Cage, system: &dyn CoordinateSystem) -> Result<Self, PrepareError> {
+        let options = SolverOptions::for_unknowns(system.values(cage).unknowns());
+        Ok(Self { solver: Solver::prepare(system, cage, rest, options)? })
     }
 
     /// The vertices of the cage that follows these positions of the model's points most closely.
     ///
     /// # Errors
-    /// Another number of points.
-    pub fn cage(&self, positions: &[Point]) -> Result<Vec<Point>, LengthError> {
-        check(positions, self.solver.decoder().points())?;
-        let inverted = self.solver.invert(Rows::All, None, &[positions.as_flattened()]);
-        Ok(points(&inverted[0].cage))
+    /// See [`InvertError`].
+    pub fn cage(&self, positions: &[Point]) -> Result<Vec<Point>, InvertError> {
+        Ok(self.cages(&[positions])?.swap_remove(0))
+    }
+
+    /// The cages of any number of frames; those of many at once take less time than one by one.
+    ///
+    /// # Errors
+    /// See [`InvertError`].
+    pub fn cages<F: AsRef<[Point]>>(&self, frames: &[F]) -> Result<Vec<Vec<Point>>, InvertError> {
+        for (frame, positions) in frames.iter().enumerate() {
+            check(frame, positions.as_ref(), self.solver.decoder().points())?;
+        }
+        let flat: Vec<&[f64]> = frames.iter().map(|frame| frame.as_ref().as_flattened()).collect();
+        let inverted = self.solver.invert(Rows::All, None, &flat);
+        Ok(inverted.iter().map(|inverted| points(&inverted.cage)).collect())
     }
 
     /// Where a cage takes the points of the model.
     ///
     /// # Errors
-    /// Another number of vertices.
-    pub fn positions(&self, cage: &[Point]) -> Result<Vec<Point>, LengthError> {
-        check(cage, self.solver.decoder().unknowns())?;
+    /// See [`InvertError`].
+    pub fn positions(&self, cage: &[Point]) -> Result<Vec<Point>, InvertError> {
+        check(0, cage, self.solver.decoder().unknowns())?;
         let single: Vec<f32> = cage.as_flattened().iter().map(|&x| x as f32).collect();
-        let mut positions = [Vec::new()];
-        self.solver.decoder().decode(&[&single], &mut positions);
-        Ok(points(&positions[0]))
+        Ok(points(&decoded(self.solver.decoder(), &[&single])[0]))
     }
 }
 
-fn check(given: &[Point], expected: usize) -> Result<(), LengthError> {
-    let found = given.len();
-    if found == expected { Ok(()) } else { Err(LengthError { found, expected }) }
-}
-
-/// Positions in single precision, three coordinates each, as points.
-pub(crate) fn points(single: &[f32]) -> Vec<Point> {
-    single.as_chunks().0.iter().map(|point: &[f32; 3]| point.map(f64::from)).collect()
+fn check(frame: usize, given: &[Point], expected: usize) -> Result<(), InvertError> {
+    if given.len() != expected {
+        return Err(InvertError::Length { frame, found: given.len(), expected });
+    }
+    match not_single(given) {
+        Some(position) => Err(InvertError::NotFinite { frame, position }),
+        None => Ok(()),
+    }
 }

@@ -1,6 +1,7 @@
 //! Memory limits for encoding and decoding.
 
-/// Limit of the memory used in addition to the model. What does not fit is computed in parts, with the same result; groups of coded frames are shorter where a whole one does not fit.
+/// Limit of the memory used beside the model. What does not fit is computed in parts; groups of
+/// coded frames are shorter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     bytes: u64,
@@ -34,8 +35,8 @@ impl Memory {
     }
 }
 
-/// The free memory, also within the limits of a cgroup: what coordinates may take that cannot be computed in parts. Asking for it tells nothing, as
-/// systems promise more than they have.
+/// The free memory, also within the limits of a cgroup: what coordinates may take that cannot be
+/// computed in parts. Asking for it tells nothing, as systems promise more than they have.
 pub fn free_bytes() -> u64 {
     let read = |path: &str| std::fs::read_to_string(path).ok();
     let number = |path: &str| read(path)?.trim().parse::<u64>().ok();
@@ -54,7 +55,7 @@ fn available(meminfo: &str) -> Option<u64> {
     line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// What a cgroup's `memory.stat` counts of files that were read or written, in bytes: the system gives it up where memory is needed.
+/// Bytes of files that a cgroup's `memory.stat` counts, and that the system gives up.
 fn kept_of_files(stat: &str) -> u64 {
     let names = ["active_file ", "inactive_file "];
     let of = |name| stat.lines().find_map(|line: &str| line.strip_prefix(name)?.trim().parse::<u64>().ok());

@@ -1,5 +1,6 @@
-//! Detects whether the frames of a capture belong to a rest pose: units, axes, handedness and order of points, by edge lengths, extents, the
-//! correlation of positions and the maps of regions. Deformation changes these far less than a mix-up does.
+//! Detects whether the frames of a capture belong to a rest pose: units, axes, handedness and order
+//! of points, by edge lengths, extents, the correlation of positions and the maps of regions.
+//! Deformation changes these far less than a mix-up does.
 
 mod cage;
 mod faces;
@@ -31,21 +32,28 @@ pub enum Mismatch {
     Order(f64),
     /// All frames are scaled by about this factor.
     Units(f64),
-    /// The axes y and z are exchanged: the one that points up in the capture, unless neither of the two usual conversions leads from one to the other.
+    /// The axes y and z are exchanged: which points up in the capture, if a usual conversion leads
+    /// there.
     Axes(Option<Up>),
     /// Left and right are exchanged in all frames: how the axes are, where that can be told.
     Mirrored(Option<Mirroring>),
 }
 
 impl Mismatch {
-    /// What to do about frames that are mirrored.
-    pub fn mirrored_advice(mirroring: Option<Mirroring>) -> String {
-        mirroring.map_or(SAME_AXES.to_owned(), |found| found.advice())
+    /// What to do about it.
+    pub fn advice(&self) -> String {
+        match self {
+            Self::Order(_) => "export both from one program with the order of the points kept".to_owned(),
+            Self::Axes(_) => "export both with the same axes".to_owned(),
+            Self::Units(_) => "scale one of them".to_owned(),
+            Self::Mirrored(mirroring) => mirroring.map_or(SAME_AXES.to_owned(), |found| found.advice()),
+        }
     }
 }
 
-/// Detects mismatches from some frames, including the first, points × 3 each; empty if the capture plausibly belongs to the rest pose. All
-/// frames must agree, so that strong deformation is not mistaken for a mismatch.
+/// Detects mismatches from some frames, including the first, points × 3 each; empty if the capture
+/// plausibly belongs to the rest pose. All frames must agree, so that strong deformation is not
+/// mistaken for a mismatch.
 pub fn mismatches(rest: &Model, frames: &[Vec<f64>]) -> Vec<Mismatch> {
     let Some(rest_shape) = Shape::of(&rest.points) else { return Vec::new() };
     let pairs = neighbours(rest);
@@ -80,7 +88,7 @@ fn mirrored(rest: &Model, frames: &[Vec<f64>]) -> Option<Mismatch> {
     Some(Mismatch::Mirrored(first.mirroring()))
 }
 
-/// A scale that varies between frames is motion; the same scale in all frames and on all edges is a unit.
+/// A scale that varies is motion; one of all frames and edges is a unit.
 fn in_other_units(compared: &[FrameComparison]) -> bool {
     let ratios = || compared.iter().map(|frame| frame.edges);
     let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
@@ -129,8 +137,8 @@ struct FrameComparison {
     log_quartile_ratio: f64,
     /// Ratio of the diagonals of the bounding boxes.
     extent: f64,
-    /// Median edge length over the median distance of two random points, in the rest pose and in the frame; about 1 if edges are as long as
-    /// random pairs.
+    /// Median edge length over the median distance of two random points, in the rest pose and in
+    /// the frame; about 1 if edges are as long as random pairs.
     edge_in_rest: f64,
     edge_in_frame: f64,
     turn: AxisScores,
@@ -163,7 +171,7 @@ impl FrameComparison {
     }
 }
 
-/// Edges of a mesh, or nearest neighbours in a point cloud, of non-zero length; subsampled if there are many.
+/// Edges of a mesh, or nearest neighbours in a cloud, of non-zero length; some of many.
 fn neighbours(rest: &Model) -> Vec<[u32; 2]> {
     let points = &rest.points;
     let apart = |&[a, b]: &[u32; 2]| distance(points[a as usize], points[b as usize]) > 0.0;
@@ -182,8 +190,8 @@ fn neighbours(rest: &Model) -> Vec<[u32; 2]> {
     sides.step_by(stride).filter(apart).collect()
 }
 
-/// `Σ p qᵀ` of corresponding points about their centres, divided by both radii and the number of points; one third of the identity for an
-/// unmoved ball.
+/// `Σ p qᵀ` of corresponding points about their centres, divided by both radii and the number of
+/// points; one third of the identity for an unmoved ball.
 fn correlation((rest, of_rest): (&[Point], &Shape), (frame, of_frame): (&[Point], &Shape)) -> [Point; 3] {
     let mut sum = [[0.0; 3]; 3];
     let scale = 1.0 / (of_rest.radius * of_frame.radius * rest.len() as f64);
@@ -197,8 +205,8 @@ fn correlation((rest, of_rest): (&[Point], &Shape), (frame, of_frame): (&[Point]
     sum
 }
 
-/// How well signed permutations of the axes map the rest pose to a frame; 1 is a perfect match. A rotation about the up axis does not
-/// exchange axes.
+/// How well signed permutations of the axes map the rest pose to a frame; 1 is a perfect match. A
+/// rotation about the up axis does not exchange axes.
 struct AxisScores {
     /// Best score of permutations that do not exchange y and z, reflections included.
     without: f64,
@@ -264,33 +272,34 @@ impl fmt::Display for Mismatch {
                 "its points come in another order: edges of the rest pose are {ratio:.0} times longer in frame 0"
             ),
             Self::Units(ratio) => {
-                let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
-                let times = factor(times);
-                write!(
-                    f,
-                    "frame 0 is {times} times {how} than the rest pose, and so are the others, as with other units"
-                )
+                let size = relative_size(ratio);
+                write!(f, "frame 0 is {size} than the rest pose, and so are the others, as with other units")
             }
-            Self::Axes(Some(Up::Y)) => {
-                f.write_str("its axes y and z look exchanged: y is up where z is in the rest pose")
-            }
-            Self::Axes(Some(Up::Z)) => {
-                f.write_str("its axes y and z look exchanged: z is up where y is in the rest pose")
+            Self::Axes(Some(up)) => {
+                let (up, other) = (up.name(), up.other().name());
+                write!(f, "its axes y and z look exchanged: {up} is up where {other} is in the rest pose")
             }
             Self::Axes(None) => f.write_str("its axes look exchanged"),
-            Self::Mirrored(Some(mirroring)) => write!(f, "its frames are mirrored ({mirroring} in all of them)"),
-            Self::Mirrored(None) => f.write_str("its frames are mirrored (left is right in all of them)"),
+            Self::Mirrored(mirroring) => {
+                write!(f, "its frames are mirrored ({} in all of them)", described(mirroring))
+            }
         }
     }
 }
 
-/// Formats a ratio, rounded to that of two common units if it is within 5 % of one.
-fn factor(ratio: f64) -> String {
+/// `about 100 times larger`: a ratio, or that of two common units within 5 %.
+fn relative_size(ratio: f64) -> String {
     const UNITS: [f64; 11] = [2.54, 3.28, 10.0, 12.0, 25.4, 30.48, 39.37, 100.0, 304.8, 1000.0, 1e6];
-    match UNITS.into_iter().find(|unit| (ratio / unit - 1.0).abs() < 0.05) {
-        Some(unit) => format!("about {unit}"),
-        None => format!("{ratio:.1}"),
+    let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
+    match UNITS.into_iter().find(|unit| (times / unit - 1.0).abs() < 0.05) {
+        Some(unit) => format!("about {unit} times {how}"),
+        None => format!("{times:.1} times {how}"),
     }
+}
+
+/// What is mirrored, as far as that is known.
+fn described(mirroring: Option<Mirroring>) -> String {
+    mirroring.map_or("left is right".to_owned(), |found| found.to_string())
 }
 
 #[cfg(test)]

@@ -1,12 +1,14 @@
 //! Captures of files: a rest pose, its cage, and the frames.
 
+use crate::cage_file::read_cage;
+use crate::checks::{check_cage, check_frames};
 use crate::design::{default_vertices, read_frames};
 use crate::encode::EncodeError;
 use crate::frames::CaptureFiles;
 use cager_cages::{DesignOptions, Goal, design};
 use cager_core::cage::Cage;
-use cager_formats::{ReadModel, read_mesh};
-use cager_geometry::mesh::{Model, TriMesh};
+use cager_formats::{Dropped, ReadModel, read_mesh};
+use cager_geometry::mesh::Model;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -19,49 +21,161 @@ pub struct Capture {
     pub cage: Cage,
     /// Where the frames are, and how they are adapted to the rest pose.
     pub files: CaptureFiles,
+    warnings: Vec<String>,
 }
 
 impl Capture {
-    /// Opens a rest pose and a cage, each a mesh, and names the frames: a folder or pattern of mesh files, or a point cache.
+    /// Opens a rest pose and a cage, each a mesh, and frames: a folder or pattern of mesh files, or
+    /// a point cache. See [`OpenOptions`] for files that need more to be said.
     ///
     /// # Errors
-    /// Files that cannot be read; an invalid cage.
+    /// Files that cannot be read or do not belong together; an invalid cage.
     pub fn open(rest: impl AsRef<Path>, cage: impl AsRef<Path>, frames: impl AsRef<Path>) -> Result<Self, EncodeError> {
-        let (rest, files) = opened(rest.as_ref(), &[cage.as_ref()], frames.as_ref())?;
-        let path = cage.as_ref();
-        let ReadModel { model: mut mesh, units, .. } = read_mesh(path, None)?;
-        units.change_to(files.rest_units).apply_to(&mut mesh.points);
-        crate::origin::move_to(files.origin, &mut mesh.points);
-        let cage =
-            Cage::new(TriMesh::from(&mesh)).map_err(|cause| EncodeError::Cage { path: path.to_owned(), cause })?;
-        Ok(Self { rest, cage, files })
+        OpenOptions::default().open(rest, cage, frames)
     }
 
-    /// Opens a rest pose and frames, and designs a cage from their motion, which takes minutes; `vertices` is its size, a usual one without it.
+    /// Opens a rest pose and frames, and designs a cage from their motion, which takes minutes;
+    /// `vertices` is its size, a usual one without it.
     ///
     /// # Errors
-    /// Files that cannot be read; no frames.
+    /// Files that cannot be read or do not belong together; no frames.
     pub fn design(
         rest: impl AsRef<Path>,
         frames: impl AsRef<Path>,
         vertices: Option<usize>,
     ) -> Result<Self, EncodeError> {
-        let path = rest.as_ref();
-        let (rest, files) = opened(path, &[], frames.as_ref())?;
-        let goal = Goal::Vertices(vertices.unwrap_or_else(|| default_vertices(rest.points.len())));
-        let options = DesignOptions { goal, ..DesignOptions::default() };
-        let designed = design(&rest, &read_frames(&files)?, None, &options, &mut |_| ControlFlow::Continue(()))?;
-        let cage = Cage::new(designed.cage).map_err(|cause| EncodeError::Cage { path: path.to_owned(), cause })?;
-        Ok(Self { rest, cage, files })
+        OpenOptions::default().design(rest, frames, vertices)
+    }
+
+    /// What should be known of the files: what of them is not kept, vertices that were merged,
+    /// changes of units and axes, and mismatches that were allowed, after an encoding also those
+    /// found by it.
+    pub fn warnings(&self) -> Vec<String> {
+        let noted = self.files.belonging.as_ref().and_then(|belonging| belonging.noted());
+        self.warnings.iter().map(String::as_str).chain(noted).map(str::to_owned).collect()
     }
 }
 
-/// The rest pose and the files of its frames, which are neither the rest pose's nor `others`.
-fn opened(path: &Path, others: &[&Path], frames: &Path) -> Result<(Model, CaptureFiles), EncodeError> {
-    let ReadModel { model: mut rest, units, .. } = read_mesh(path, None)?;
-    let mut files = CaptureFiles::new(frames, rest.points.len());
-    files.rest_units = units;
-    files.selection.no_frames = [&path].into_iter().chain(others).map(|path| path.to_path_buf()).collect();
-    files.take_origin(&mut rest);
-    Ok((rest, files))
+/// How a capture is opened, where the defaults do not suit its files.
+///
+/// ```no_run
+/// use cager_capture::{CaptureFiles, OpenOptions, Up};
+///
+/// # fn main() -> Result<(), cager_capture::EncodeError> {
+/// let files = CaptureFiles { up: Some(Up::Z), ..CaptureFiles::default() };
+/// let options = OpenOptions { files, flip_cage: true, ..OpenOptions::default() };
+/// let capture = options.open("rest.obj", "cage.obj", "frames/*.ply")?;
+/// for warning in capture.warnings() {
+///     eprintln!("{warning}");
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct OpenOptions {
+    /// Which frames are taken and how they are read; where they are and how many points they have
+    /// is filled in.
+    pub files: CaptureFiles,
+    /// Merges the points of the rest pose that seams split; frames are read split or merged.
+    pub weld: bool,
+    /// Turns the faces of the cage around, which point inwards.
+    pub flip_cage: bool,
+    /// Goes on, with warnings, where rest pose, cage and frames look as if they did not belong
+    /// together.
+    pub allow_mismatch: bool,
+}
+
+/// A capture that may be without a cage.
+pub struct Opened {
+    /// Model in its rest pose, about the origin of [`Self::files`].
+    pub rest: Model,
+    /// The cage, where one was named.
+    pub cage: Option<Cage>,
+    /// Where the frames are, and how they are adapted to the rest pose.
+    pub files: CaptureFiles,
+    /// What the file of the rest pose holds that is not read.
+    pub dropped: Dropped,
+}
+
+impl OpenOptions {
+    /// As [`Capture::open`].
+    ///
+    /// # Errors
+    /// As [`Capture::open`].
+    pub fn open(
+        self,
+        rest: impl AsRef<Path>,
+        cage: impl AsRef<Path>,
+        frames: impl AsRef<Path>,
+    ) -> Result<Capture, EncodeError> {
+        self.finish(rest.as_ref(), Some(cage.as_ref()), frames.as_ref(), None)
+    }
+
+    /// As [`Capture::design`].
+    ///
+    /// # Errors
+    /// As [`Capture::design`].
+    pub fn design(
+        self,
+        rest: impl AsRef<Path>,
+        frames: impl AsRef<Path>,
+        vertices: Option<usize>,
+    ) -> Result<Capture, EncodeError> {
+        self.finish(rest.as_ref(), None, frames.as_ref(), vertices)
+    }
+
+    fn finish(
+        self,
+        path: &Path,
+        cage: Option<&Path>,
+        frames: &Path,
+        vertices: Option<usize>,
+    ) -> Result<Capture, EncodeError> {
+        let mut warnings = Vec::new();
+        let Opened { rest, cage, files, dropped } = self.read(path, cage, frames, &mut warnings)?;
+        warnings.extend(dropped.sentence(path, false));
+        let cage = match cage {
+            Some(cage) => cage,
+            None => {
+                let goal = Goal::Vertices(vertices.unwrap_or_else(|| default_vertices(rest.points.len())));
+                let options = DesignOptions { goal, ..DesignOptions::default() };
+                let on = &mut |_: cager_cages::Progress<'_>| ControlFlow::Continue(());
+                let designed = design(&rest, &read_frames(&files)?, None, &options, on)?;
+                warnings.extend(designed.warnings);
+                Cage::new(designed.cage).map_err(|cause| EncodeError::Cage { path: path.to_owned(), cause })?
+            }
+        };
+        Ok(Capture { rest, cage, files, warnings })
+    }
+
+    /// Opens and checks all there is; adds to the warnings also where it fails.
+    ///
+    /// # Errors
+    /// As [`Capture::open`].
+    pub fn read(
+        self,
+        path: &Path,
+        cage_path: Option<&Path>,
+        frames: &Path,
+        warnings: &mut Vec<String>,
+    ) -> Result<Opened, EncodeError> {
+        let Self { mut files, weld, flip_cage, allow_mismatch } = self;
+        let ReadModel { model: mut rest, units, note, dropped } = read_mesh(path, files.selection.prim.as_deref())?;
+        warnings.extend(note);
+        (files.path, files.points, files.rest_units) = (frames.to_owned(), rest.points.len(), units);
+        files.selection.no_frames = [path].into_iter().chain(cage_path).map(Path::to_path_buf).collect();
+        if weld {
+            files.weld(&mut rest);
+        }
+        files.take_origin(&mut rest);
+        let cage = match cage_path {
+            Some(cage) => Some(read_cage(cage, flip_cage, (files.origin, files.meaning()), warnings)?),
+            None => None,
+        };
+        check_frames(&mut files, (path, &rest), allow_mismatch, warnings)?;
+        if let (Some(path), Some(cage)) = (cage_path, &cage) {
+            check_cage((path, cage.mesh()), &rest, allow_mismatch, warnings)?;
+        }
+        Ok(Opened { rest, cage, files, dropped })
+    }
 }

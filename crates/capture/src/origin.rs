@@ -1,17 +1,18 @@
-//! Captures far from the origin of their coordinates, as in UTM metres: cages in single precision would lose them, so they are encoded about an origin of
-//! their own, which the container keeps.
+//! Captures far from the origin of their coordinates, as in UTM metres: cages in single precision
+//! would lose them, so they are encoded about an origin of their own, which the container keeps.
 
 use cager_geometry::mesh::{Point, bounds};
 use cager_geometry::vector::{add, distance, middle, sub};
 
-/// Diagonals of the rest pose from which on an origin is taken: there single precision resolves less than 1e-5 of the diagonal.
+/// Diagonals from which on an origin is taken: single precision resolves less than 1e-5 there.
 pub const FAR: f64 = 100.0;
 
 /// What single precision may lose of a diagonal without being seen.
 pub const MAX_ROUNDING_ERROR: f64 = 1e-4;
 
-/// An origin near the middle of a rest pose that lies far away; `None` for all others. In whole units, or the largest power of two that is not above
-/// the diagonal where that is less than one, so that subtracting it from doubles loses nothing.
+/// An origin near the middle of a rest pose that lies far away; `None` for all others. In whole
+/// units, or the largest power of two that is not above the diagonal where that is less than one,
+/// so that subtracting it from doubles loses nothing.
 pub fn own_origin(rest: &[Point]) -> Option<Point> {
     let (low, high) = bounds(rest);
     let (diagonal, centre) = (distance(low, high), middle(low, high));

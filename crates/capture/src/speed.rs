@@ -1,4 +1,4 @@
-//! How long preparations take: measured step by step, and estimated from the speed of matrix products.
+//! How long preparations take: measured by step, and estimated by a matrix product.
 
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;

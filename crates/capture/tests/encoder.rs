@@ -1,7 +1,8 @@
 //! Frames that are pushed one by one.
 
 use cager_capture::encode::Encode;
-use cager_capture::{Animation, Cage, EncodeError, Encoder, Goal, Inverter, LengthError};
+use cager_capture::memory::Memory;
+use cager_capture::{Animation, Cage, EncodeError, Goal, InvertError, Inverter};
 use cager_demo::{Capture, Options};
 use cager_formats::{ScratchDir, Target};
 
@@ -56,7 +57,7 @@ fn what_does_not_fit_is_refused_and_leaves_no_file() {
     let points = rest.points.len();
     let folder = ScratchDir::create(std::env::temp_dir()).expect("a folder");
     let output = folder.path().join("out.cager");
-    let mut encoder = Encoder::new(&rest, &cage, &output).expect("an encoder");
+    let mut encoder = Encode::new(&rest, &cage).start(&output).expect("an encoder");
     encoder.push(&frames[0]).expect("a frame");
     let short = encoder.push(&frames[1][1..]);
     let told = short.expect_err("a point is missing").to_string();
@@ -70,6 +71,52 @@ fn what_does_not_fit_is_refused_and_leaves_no_file() {
     let unknown = Encode::new(&rest, &cage).goal(Goal::Size(60_000)).start(&output);
     assert!(matches!(unknown.err(), Some(EncodeError::UnknownLength)));
     let inverter = Inverter::new(&rest.points, &cage).expect("an inverter");
-    assert_eq!(inverter.cage(&rest.points[..3]), Err(LengthError { found: 3, expected: points }));
-    assert_eq!(inverter.positions(&[]), Err(LengthError { found: 0, expected: cage.vertices().len() }));
+    assert_eq!(inverter.cage(&rest.points[..3]), Err(InvertError::Length { frame: 0, found: 3, expected: points }));
+    let vertices = cage.vertices().len();
+    assert_eq!(inverter.positions(&[]), Err(InvertError::Length { frame: 0, found: 0, expected: vertices }));
+    let refused = inverter.cages(&[&frames[0], &broken]);
+    assert_eq!(refused, Err(InvertError::NotFinite { frame: 1, position: 7 }));
+}
+
+#[test]
+fn cages_of_any_number_of_frames_bring_the_frames_back_in_any_coordinates() {
+    let (rest, cage, frames) = demo();
+    let largest = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+        a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    for system in cager_core::coordinates::SYSTEMS {
+        let inverter = Inverter::with_coordinates(&rest.points, &cage, system).expect("an inverter");
+        let cages = inverter.cages(&frames).expect("cages");
+        assert_eq!(cages.len(), frames.len(), "{}", system.name());
+        for (frame, found) in frames.iter().zip(&cages) {
+            assert_eq!(Ok(found), inverter.cage(frame).as_ref(), "{}", system.name());
+            let positions = inverter.positions(found).expect("positions");
+            assert!(largest(&positions, frame) < 0.1, "{}: {}", system.name(), largest(&positions, frame));
+        }
+        assert_eq!(inverter.cages::<&[[f64; 3]]>(&[]), Ok(Vec::new()));
+        let far: Vec<[f64; 3]> = rest.points.iter().map(|p| p.map(|x| 1e38 * x.signum())).collect();
+        assert!(inverter.cage(&far).is_ok(), "{}", system.name());
+    }
+}
+
+#[test]
+fn an_encoder_that_lost_frames_refuses_to_go_on_and_leaves_no_file() {
+    let (rest, cage, frames) = demo();
+    let folder = ScratchDir::create(std::env::temp_dir()).expect("a folder");
+    let output = folder.path().join("out.cager");
+    // So little memory that every frame is a group of its own.
+    let mut encoder =
+        Encode::new(&rest, &cage).max_error(1e-3).memory(Memory::at_most(1)).start(&output).expect("an encoder");
+    let mut far = frames[0].clone();
+    far[7][2] = 1e35;
+    let mut pushed = frames[..16].iter().enumerate().map(|(k, frame)| encoder.push(if k == 3 { &far } else { frame }));
+    assert!(pushed.by_ref().take(15).all(|pushed| pushed.is_ok()));
+    let error = pushed.next().expect("a last frame").expect_err("a point too far away");
+    assert!(matches!(error, EncodeError::Coding(_)), "{error}");
+    drop(pushed);
+    let refused = encoder.push(&frames[16]);
+    assert!(matches!(refused, Err(EncodeError::Stopped { frame: 3 })), "{refused:?}");
+    let refused = encoder.finish();
+    assert!(matches!(refused, Err(EncodeError::Stopped { frame: 3 })), "{refused:?}");
+    assert!(!output.exists());
 }

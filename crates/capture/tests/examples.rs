@@ -1,4 +1,5 @@
-//! The examples run as a newcomer runs them: a folder of frames in, a frame out, and frames from memory.
+//! The examples run as a newcomer runs them: a folder of frames in, a frame out, and frames from
+//! memory.
 
 use cager_capture::{Animation, read_model, write_model};
 use cager_demo::{Capture, Options};

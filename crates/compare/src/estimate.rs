@@ -10,7 +10,7 @@ use cager_core::coordinates::CoordinateSystem;
 const METHODS: f64 = 50.0;
 const DRAWN: f64 = 2.0 * (DRAWS + 1) as f64;
 
-/// Multiplications of a comparison, in those of the product; the factors were fitted to measured times.
+/// Multiplications of a comparison; the factors were fitted to measured times.
 pub(super) fn work(job: &Job<'_>, system: &dyn CoordinateSystem) -> f64 {
     let frames = Sample::new(job.frames, job.frames_at_most).measured().len() as f64;
     let (points, faces) = (job.rest.points.len() as f64, job.cage.faces().len() as f64);

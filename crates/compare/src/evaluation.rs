@@ -1,4 +1,4 @@
-//! Evaluation of one method over the frames of a capture: errors of the model, and spikes of the cage.
+//! One method over the frames of a capture: errors of the model, spikes of the cage.
 
 use super::sample::{Frame, Sample};
 use cager_core::cage::Cage;
@@ -46,20 +46,18 @@ fn vertex(cage: &[f32], index: u32) -> Point {
     [0, 1, 2].map(|k| f64::from(cage[3 * index as usize + k]))
 }
 
-/// Results for every measured frame; lengths are fractions of the rest diagonal, and NaN is what does not exist.
+/// Results for every measured frame, as fractions of the rest diagonal; NaN where there is none.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(crate) struct PerFrame {
     /// `sqrt(mean |e|²)` over the points.
     pub(crate) l2: Vec<f64>,
     /// `max |e|`.
     pub(crate) linf: Vec<f64>,
-    /// Mean over the cage's vertices of the second temporal difference `|C_{t+1} − 2 C_t + C_{t−1}|`.
+    /// Mean second temporal difference `|C_{t+1} − 2 C_t + C_{t−1}|` of a cage vertex.
     pub(crate) spike_mean: Vec<f64>,
-    /// The largest of these.
     pub(crate) spike_max: Vec<f64>,
-    /// Mean change of an edge's length against the rest cage, over the mean length of the rest cage's edges.
+    /// Mean change of an edge's length, over the mean length of the rest cage's edges.
     pub(crate) edges_mean: Vec<f64>,
-    /// The largest of these.
     pub(crate) edges_max: Vec<f64>,
 }
 
@@ -73,26 +71,18 @@ impl PerFrame {
 /// Means and maxima over the frames.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct Totals {
-    /// Mean of L2.
     pub(crate) l2_mean: f64,
-    /// Largest L2.
     pub(crate) l2_max: f64,
-    /// Mean of L∞.
     pub(crate) linf_mean: f64,
-    /// Largest L∞.
     pub(crate) linf_max: f64,
-    /// Mean second temporal difference of a cage vertex; null where there are fewer than three frames.
+    /// Mean second temporal difference of a cage vertex; null for fewer than three frames.
     pub(crate) spike_mean: f64,
-    /// The largest one.
     pub(crate) spike_max: f64,
-    /// Mean change of an edge's length.
     pub(crate) edges_mean: f64,
-    /// The largest one.
     pub(crate) edges_max: f64,
 }
 
 impl PerFrame {
-    /// Means and maxima.
     pub(crate) fn totals(&self) -> Totals {
         Totals {
             l2_mean: mean(&self.l2),
@@ -120,31 +110,27 @@ fn max(values: &[f64]) -> f64 {
 
 /// The evaluation of a method over the capture.
 pub(crate) struct MethodEvaluation {
-    /// The method, prepared.
     pub(crate) solver: Arc<Solver>,
     /// Whether it reads the frames with noise.
     pub(crate) noisy: bool,
-    /// Results so far.
     pub(crate) found: PerFrame,
     /// L2 and L∞ against the frames without noise, of one that reads them with it.
     pub(crate) clean: PerFrame,
     /// Seconds of one inversion, on one thread; NaN before the first batch.
     pub(crate) frame_seconds: f64,
-    /// The last two cages with the numbers of their frames.
-    before: VecDeque<(usize, Vec<f32>)>,
+    window: Window<f32>,
 }
 
 impl MethodEvaluation {
-    /// At the beginning.
     pub(crate) fn new(solver: Arc<Solver>, noisy: bool, sample: &Sample) -> Self {
         let empty = || PerFrame::empty(sample.measured().len());
-        Self { solver, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, before: VecDeque::new() }
+        Self { solver, noisy, found: empty(), clean: empty(), frame_seconds: f64::NAN, window: Window::default() }
     }
 
     /// Inverts and measures the frames that follow; `clean` are the same without noise.
     pub(crate) fn take(&mut self, frames: &[Frame], clean: &[Frame], sample: &Sample, shape: &Shape) {
         let views: Vec<&[f64]> = frames.iter().map(|frame| frame.points.as_slice()).collect();
-        let previous = self.before.back().map(|(_, cage)| cage.as_slice());
+        let previous = self.window.0.back().map(|(_, cage)| cage.as_slice());
         let clock = Instant::now();
         let cages = cages(&self.solver, previous, &views);
         self.frame_seconds = self.frame_seconds.min(clock.elapsed().as_secs_f64() / frames.len() as f64);
@@ -167,23 +153,38 @@ impl MethodEvaluation {
         }
         let positions = decoder.positions();
         for (frame, cage) in frames.iter().zip(cages) {
-            self.follow(frame.number, cage, positions, sample, shape.diagonal);
+            if let Some((at, [mean, max])) = self.window.push(frame.number, cage, positions, sample) {
+                self.found.spike_mean[at] = mean / shape.diagonal;
+                self.found.spike_max[at] = max / shape.diagonal;
+            }
         }
     }
+}
 
-    fn follow(&mut self, number: usize, cage: Vec<f32>, positions: usize, sample: &Sample, diagonal: f64) {
-        if let [(first, a), (middle, b)] = self.before.make_contiguous()
-            && *first + 2 == number
-            && *middle + 1 == number
-            && let Some(at) = sample.position(*middle)
-        {
-            [self.found.spike_mean[at], self.found.spike_max[at]] =
-                second_difference([a, b, &cage], positions).map(|x| x / diagonal);
+/// The last two poses with the numbers of their frames.
+#[derive(Clone, Debug, Default)]
+struct Window<T>(VecDeque<(usize, Vec<T>)>);
+
+impl<T: Copy + Into<f64>> Window<T> {
+    /// Adds the next pose; where it and both before are of successive frames, the place of the
+    /// middle one in the sample, and mean and largest `|C_{t+1} − 2 C_t + C_{t−1}|` of the first
+    /// `count` rows.
+    fn push(&mut self, number: usize, pose: Vec<T>, count: usize, sample: &Sample) -> Option<(usize, [f64; 2])> {
+        let found = match self.0.make_contiguous() {
+            [(first, a), (middle, b)] if *first + 2 == number && *middle + 1 == number => {
+                sample.position(*middle).map(|at| {
+                    let lengths = second_differences([a, b, &pose], count);
+                    let mean = lengths.iter().sum::<f64>() / count as f64;
+                    (at, [mean, lengths.iter().copied().fold(0.0, f64::max)])
+                })
+            }
+            _ => None,
+        };
+        if self.0.len() == 2 {
+            self.0.pop_front();
         }
-        if self.before.len() == 2 {
-            self.before.pop_front();
-        }
-        self.before.push_back((number, cage));
+        self.0.push_back((number, pose));
+        found
     }
 }
 
@@ -192,14 +193,7 @@ pub(crate) fn cages(solver: &Solver, previous: Option<&[f32]>, frames: &[&[f64]]
     solver.invert(Rows::All, previous, frames).into_iter().map(|inverted| inverted.cage).collect()
 }
 
-/// Mean and largest `|C_{t+1} − 2 C_t + C_{t−1}|` of the first `count` rows.
-fn second_difference<T: Copy + Into<f64>>(three: [&[T]; 3], count: usize) -> [f64; 2] {
-    let lengths = second_differences(three, count);
-    [lengths.iter().sum::<f64>() / count as f64, lengths.iter().copied().fold(0.0, f64::max)]
-}
-
-/// `|C_{t+1} − 2 C_t + C_{t−1}|` of each of the first `count` rows.
-pub(crate) fn second_differences<T: Copy + Into<f64>>([a, b, c]: [&[T]; 3], count: usize) -> Vec<f64> {
+fn second_differences<T: Copy + Into<f64>>([a, b, c]: [&[T]; 3], count: usize) -> Vec<f64> {
     let bend = |i: usize| -> f64 { a[i].into() - 2.0 * b[i].into() + c[i].into() };
     (0..count).map(|i| (0..3).map(|k| bend(3 * i + k).powi(2)).sum::<f64>().sqrt()).collect()
 }
@@ -207,33 +201,24 @@ pub(crate) fn second_differences<T: Copy + Into<f64>>([a, b, c]: [&[T]; 3], coun
 /// Second temporal differences of the model's own points, as a reference for those of cages.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
-    before: VecDeque<(usize, Vec<f64>)>,
+    window: Window<f64>,
     mean: Vec<f64>,
     max: Vec<f64>,
 }
 
 impl Motion {
-    /// At the beginning.
     pub(crate) fn new(sample: &Sample) -> Self {
         let none = vec![f64::NAN; sample.measured().len()];
-        Self { before: VecDeque::new(), mean: none.clone(), max: none }
+        Self { window: Window::default(), mean: none.clone(), max: none }
     }
 
     /// Takes the frames that follow.
     pub(crate) fn take(&mut self, frames: &[Frame], sample: &Sample, diagonal: f64) {
         for frame in frames {
-            if let [(first, a), (middle, b)] = self.before.make_contiguous()
-                && *first + 2 == frame.number
-                && *middle + 1 == frame.number
-                && let Some(at) = sample.position(*middle)
-            {
-                [self.mean[at], self.max[at]] =
-                    second_difference([a, b, &frame.points], frame.points.len() / 3).map(|x| x / diagonal);
+            let (points, count) = (frame.points.clone(), frame.points.len() / 3);
+            if let Some((at, [mean, max])) = self.window.push(frame.number, points, count, sample) {
+                (self.mean[at], self.max[at]) = (mean / diagonal, max / diagonal);
             }
-            if self.before.len() == 2 {
-                self.before.pop_front();
-            }
-            self.before.push_back((frame.number, frame.points.clone()));
         }
     }
 

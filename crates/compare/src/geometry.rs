@@ -1,4 +1,5 @@
-//! What the report of a comparison draws: the rest pose in its cage, some frames, and of every system the cages and models of the methods.
+//! What the report of a comparison draws: rest pose, cage, frames, and cages and models of the
+//! methods.
 
 use super::evaluation::cages;
 use super::figures::SystemFigures;
@@ -139,12 +140,10 @@ impl<'a> GeometryBuilder<'a> {
         self.shown
     }
 
-    /// All of it.
     pub(super) fn finish(self) -> Geometry {
         self.geometry
     }
 
-    /// Adds a system.
     pub(super) fn add(&mut self, study: &SystemStudy<'_>) -> Result<(), CompareError> {
         let rows = study.analysis.handles().map_or(&[][..], |handles| &handles.rows);
         let (v, count) = (study.analysis.handle_vectors(), self.cage.vertices().len());
@@ -154,7 +153,7 @@ impl<'a> GeometryBuilder<'a> {
             methods: self.methods(study),
             draw: self.draw(study)?,
             row: match study.figures.method(|m| m.is_cager() && m.curve) {
-                Some(usual) => self.row(study, usual.method.options()),
+                Some(usual) => self.row(study, usual.method.options),
                 None => Vec::new(),
             },
             vectors: painted.iter().map(|&k| floats((0..count).map(|j| v[(j, k)]))).collect(),
@@ -172,7 +171,7 @@ impl<'a> GeometryBuilder<'a> {
         let frames: Option<Vec<&[f64]>> = clip.iter().map(|&n| Some(self.frame(n)?.points.as_slice())).collect();
         let (Some(frames), Some(at)) = (frames, clip.iter().position(|&n| n == self.shown)) else { return Vec::new() };
         let found = study.figures.methods.iter().enumerate().filter(|(_, m)| is_shown(&m.method, &study.figures));
-        let found: Vec<(usize, SolverOptions)> = found.map(|(place, m)| (place, m.method.options())).collect();
+        let found: Vec<(usize, SolverOptions)> = found.map(|(place, m)| (place, m.method.options)).collect();
         let geometry = |(method, options): (usize, SolverOptions)| {
             let cages = study.invert(options, &frames)?;
             let offsets = self.offsets(study, &cages[at], frames[at]).0;
@@ -184,7 +183,7 @@ impl<'a> GeometryBuilder<'a> {
     fn draw(&self, study: &SystemStudy<'_>) -> Result<Option<DrawGeometry>, CompareError> {
         let (Some(frame), Some((name, rows))) = (self.frame(self.shown), &study.median_draw) else { return Ok(None) };
         let frames = [frame.points.as_slice()];
-        let usual = study.figures.method(|m| m.is_cager() && m.curve).map(|m| m.method.options());
+        let usual = study.figures.method(|m| m.is_cager() && m.curve).map(|m| m.method.options);
         let handle_system = study.analysis.handle_system_of(rows)?;
         let cages = cages(&solver(&handle_system, usual.unwrap_or_else(data_alone))?, None, &frames);
         Ok(cages.first().map(|cage| {
@@ -209,7 +208,7 @@ impl<'a> GeometryBuilder<'a> {
         Quantised::new(&vertices.map(|p| p.map(f64::from)).collect::<Vec<Point>>(), 16, self.reach)
     }
 
-    /// Where the points of the model are that a cage gives, relative to the capture's; and L2 and L∞ of all points.
+    /// Where a cage takes the points, relative to the capture's; and L2 and L∞ of all points.
     fn offsets(&self, study: &SystemStudy<'_>, cage: &[f32], truth: &[f64]) -> (Quantised, [f64; 2]) {
         let mut out = [Vec::new()];
         study.analysis.decoder().decode(&[cage], &mut out);
@@ -218,14 +217,14 @@ impl<'a> GeometryBuilder<'a> {
         let squares = moved.as_chunks::<3>().0.iter().map(|p| p.iter().map(|x| x * x).sum::<f64>());
         let (sum, most) = squares.fold((0.0, 0.0), |(sum, most): (f64, f64), x| (sum + x, most.max(x)));
         let [l2, linf] = [sum / (moved.len() / 3) as f64, most].map(|x| x.sqrt() / self.diagonal);
-        // With 8 bits a step is 1/128 of the largest offset, which is to stay below most of the others.
+        // With 8 bits a step is 1/128 of the largest offset, to stay below most others.
         let bits = if linf > LARGE_OFFSET || linf > LARGEST_OVER_MEAN * l2 { 16 } else { 8 };
         let shown = self.geometry.mesh.pick(&moved);
         (Quantised::new(&shown, bits, Box3::around_zero(OFFSET_REACH * self.diagonal)), [l2, linf])
     }
 }
 
-/// Position of the frame where full least squares spikes most; where nothing spikes, of its largest error.
+/// The frame where full least squares spikes most, or else of its largest error.
 fn frame_of_largest_spike(figures: &SystemFigures) -> usize {
     let Some(full) = figures.method(Method::is_full_least_squares) else { return 0 };
     let largest = |values: &[f64]| {
@@ -243,8 +242,8 @@ fn clip(shown: usize, frames: usize, most: usize) -> Vec<usize> {
 }
 
 fn is_shown(method: &Method, figures: &SystemFigures) -> bool {
-    let strongest = figures.methods.iter().filter(|m| m.method.is_cager()).map(|m| m.method.spectrum).max();
-    method.curve || method.is_cager() && Some(method.spectrum) == strongest
+    let strongest = figures.methods.iter().filter(|m| m.method.is_cager()).map(|m| m.method.options.spectrum).max();
+    method.curve || method.is_cager() && Some(method.options.spectrum) == strongest
 }
 
 #[cfg(test)]

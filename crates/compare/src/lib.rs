@@ -1,7 +1,8 @@
-//! `cager compare`: the paper's comparisons on one capture, as figures and as what the report draws.
+//! `cager compare`: the paper's comparisons on one capture, as figures and drawings.
 //!
-//! The analysis of a coordinate system is computed once, and each choice of rows is decomposed once. Frames are processed in batches, each projected
-//! once for all methods that read the same rows.
+//! The analysis of a coordinate system is computed once, and each choice of rows is decomposed
+//! once. Frames are processed in batches, each projected once for all methods that read the same
+//! rows.
 
 mod estimate;
 mod evaluation;
@@ -65,17 +66,11 @@ pub struct Job<'a> {
     pub names: [String; 3],
 }
 
-/// Receiver of progress reports.
-pub struct Progress<'a> {
-    /// Called with the name of the step and the fraction of all work that is done.
-    pub tell: &'a mut dyn FnMut(&str, f64),
-}
-
-/// Compares.
+/// Compares; `progress` is told the name of each step and the fraction of all work that is done.
 ///
 /// # Errors
-/// See [`CompareError`]. A system that cannot be computed for this cage is part of the result, unless none can.
-pub fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Figures, Geometry), CompareError> {
+/// See [`CompareError`]; a system that cannot be computed is part of the result, unless none can.
+pub fn compare(job: &Job<'_>, progress: &mut dyn FnMut(&str, f64)) -> Result<(Figures, Geometry), CompareError> {
     let frames = job.frames;
     let sample = Sample::new(frames, job.frames_at_most);
     let shape = Shape::new(job.cage, &job.rest.points);
@@ -89,7 +84,7 @@ pub fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Figures, G
     for (k, &system) in job.systems.iter().enumerate() {
         let name = system.name();
         let before: f64 = works[..k].iter().sum();
-        let mut tell = |step: &str, part: f64| (progress.tell)(step, (before + part * works[k]) / all_work);
+        let mut tell = |step: &str, part: f64| progress(step, (before + part * works[k]) / all_work);
         let mut refuse = |error: PrepareError| {
             systems.push(System { name: name.to_owned(), refused: Some(error.to_string()), figures: None });
             refused.get_or_insert(error);
@@ -109,8 +104,7 @@ pub fn compare(job: &Job<'_>, progress: &mut Progress<'_>) -> Result<(Figures, G
             }
         };
         let seconds = clock.seconds();
-        let mut progress = Progress { tell: &mut tell };
-        let study = match system::study(job, name, (&analysis, seconds), &sample, &shape, &mut progress) {
+        let study = match system::study(job, name, (&analysis, seconds), &sample, &shape, &mut tell) {
             Ok(study) => study,
             Err(CompareError::Prepare(error)) => {
                 refuse(error);
@@ -232,7 +226,7 @@ mod tests {
             up: None,
             names: ["rest", "cage", "frames"].map(str::to_owned),
         };
-        compare(&job, &mut Progress { tell: &mut |_, _| {} })
+        compare(&job, &mut |_, _| {})
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub(super) enum SeriesKind {
 impl SeriesKind {
     fn options(&self) -> SolverOptions {
         match self {
-            Self::Method(_, method) | Self::Noise(_, method) => method.options(),
+            Self::Method(_, method) | Self::Noise(_, method) => method.options,
             Self::Draw(_, _, options) => *options,
         }
     }
@@ -32,7 +32,7 @@ pub(super) struct GroupPlan {
     pub(super) series: Vec<SeriesKind>,
 }
 
-/// All choices of rows: those of the methods, random ones, and the named ones that maxvol starts from.
+/// All choices of rows: of the methods, at random, and those that maxvol starts from.
 pub(super) fn plans(
     points: usize,
     unknowns: usize,
@@ -68,9 +68,13 @@ pub(super) fn data_alone() -> SolverOptions {
 
 /// Unregularised least squares, and methods that read fewer points.
 fn is_tried_with_noise(method: &Method) -> bool {
-    let plain = method.regularizer == Regularizer::None && matches!(method.handles, Handles::All | Handles::MaxVol);
-    let proposed = method.regularizer == Regularizer::Laplacian && method.handles != Handles::All;
-    method.curve && (plain || proposed || method.regularizer == Regularizer::Global)
+    let SolverOptions { handles, regularizer, .. } = method.options;
+    let is_tried = match regularizer {
+        Regularizer::None => matches!(handles, Handles::All | Handles::MaxVol),
+        Regularizer::Laplacian => handles != Handles::All,
+        other => other == Regularizer::Global,
+    };
+    method.curve && is_tried
 }
 
 impl GroupPlan {
@@ -93,7 +97,6 @@ pub(super) struct MethodGroup {
     methods: Vec<(SolverOptions, Arc<Solver>)>,
     pub(super) evaluations: Vec<(SeriesKind, MethodEvaluation)>,
     is_draw: bool,
-    /// The frames measured.
     sample: Sample,
 }
 
@@ -103,7 +106,7 @@ impl MethodGroup {
         let handle_system = match plan.series.first() {
             Some(SeriesKind::Draw(_, rows, _)) => analysis.handle_system_of(rows)?,
             Some(SeriesKind::Method(_, method) | SeriesKind::Noise(_, method)) => {
-                analysis.handle_system(method.handles)?
+                analysis.handle_system(method.options.handles)?
             }
             None => return Err(PrepareError::NoSolution { what: "choice of rows" }),
         };
@@ -138,7 +141,7 @@ impl MethodGroup {
         self.evaluations.iter().any(|(_, evaluation)| evaluation.noisy)
     }
 
-    /// Inverts and measures those of the frames that follow which are needed; `with_noise` are all of them with noise, for methods.
+    /// Inverts and measures the frames that are needed; `with_noise` are all of them with noise.
     pub(super) fn take(&mut self, batch: &[Frame], with_noise: &[Frame], shape: &Shape) {
         let needed = batch.iter().filter(|frame| self.sample.needed(frame.number));
         let measured = |frame: &Frame| self.sample.position(frame.number).is_some();
@@ -165,7 +168,8 @@ impl MethodGroup {
     }
 }
 
-/// A method as the paper has it: where its cages run away from a frame, nothing brings them back, unless iterations start from them.
+/// A method as the paper has it: nothing keeps cages near their frames, unless iterations start
+/// there.
 pub(super) fn solver(handle_system: &HandleSystem<'_>, options: SolverOptions) -> Result<Solver, PrepareError> {
     let solver = handle_system.solver(options, None)?;
     let iterates = solver.decoder().dependent_normals().is_some();

@@ -8,7 +8,6 @@ pub(crate) const RADIUS: f64 = 0.3e-2;
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// The sequence of a seed.
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
     }
@@ -52,7 +51,7 @@ impl Random {
     }
 }
 
-/// The frame with every point displaced at random within `radius`; the same for the same number of the frame.
+/// The frame with every point displaced at random within `radius`, by the frame's number.
 pub(crate) fn noisy(points: &[f64], number: usize, radius: f64) -> Vec<f64> {
     let mut random = Random::new(number as u64);
     let mut out = points.to_vec();

@@ -2,8 +2,8 @@
 
 use cager_formats::{Error, FrameReader};
 
-/// Frames to measure: all of a short capture, evenly spaced ones of a long one, each with its neighbours for differences in
-/// time.
+/// Frames to measure: all of a short capture, evenly spaced ones of a long one, each with its
+/// neighbours for differences in time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sample {
     /// Ascending.
@@ -39,7 +39,6 @@ impl Sample {
         Self { measured: places.into_iter().map(|place| self.measured[place]).collect(), frames: self.frames }
     }
 
-    /// The frames whose errors are measured.
     pub(crate) fn measured(&self) -> &[usize] {
         &self.measured
     }
@@ -64,8 +63,8 @@ impl Sample {
         self.measured.last().map_or(0, |last| (last + 2).min(self.frames))
     }
 
-    /// Fills `batch` with up to `size` of the next needed frames; it stays empty at the end. `next` is the number of
-    /// the reader's next frame.
+    /// Fills `batch` with up to `size` of the next needed frames; it stays empty at the end. `next`
+    /// is the number of the reader's next frame.
     pub(crate) fn fill(
         &self,
         reader: &mut dyn FrameReader,

@@ -5,17 +5,16 @@ use super::figures::{Draw, MethodFigures, NoiseFigures, Seconds, Spectra, Swaps,
 use super::method_groups::{GroupPlan, MethodGroup, SeriesKind, plans};
 use super::noise::{RADIUS, noisy};
 use super::sample::{Frame, Sample};
-use super::{CompareError, Job, Progress};
+use super::{CompareError, Job};
 use cager_core::inversion::{BATCH, SolverOptions, default_spectrum};
 use cager_core::spectral::Analysis;
 use rayon::prelude::*;
 
 /// Memory for groups of methods that are evaluated together, beside the coordinates they share.
 const CHOICE_BYTES: usize = 640 << 20;
-/// The same for a batch of frames.
 const BATCH_BYTES: usize = 256 << 20;
 
-/// Rows whose singular values are below this fraction of the largest are dependent to the working precision.
+/// Rows with singular values below this fraction of the largest count as dependent.
 const DEPENDENT: f64 = 1e-11;
 
 /// A system with its figures, and what its geometry is made of.
@@ -37,19 +36,16 @@ impl SystemStudy<'_> {
     }
 }
 
-/// Studies a system, analysed in so many seconds of [`StepClock`](cager_capture::speed::StepClock), on the sample.
-///
-/// # Errors
-/// [`CompareError::Prepare`] where it cannot be inverted for this cage.
+/// Studies a system, analysed in so many seconds, on the sample.
 pub(super) fn study<'a>(
     job: &Job<'_>,
     name: &str,
     (analysis, [coordinates, maxvol, svd]): (&'a Analysis, [f64; 3]),
     sample: &Sample,
     shape: &Shape,
-    progress: &mut Progress<'_>,
+    progress: &mut dyn FnMut(&str, f64),
 ) -> Result<SystemStudy<'a>, CompareError> {
-    (progress.tell)(&format!("{name}: swaps"), 0.1);
+    progress(&format!("{name}: swaps"), 0.1);
     let (spectra, swaps, vectors) = (Spectra::of(analysis), Swaps::of(analysis), Vectors::of(analysis));
     let unknowns = analysis.coordinates().ncols();
     let usual = default_spectrum(unknowns);
@@ -73,7 +69,7 @@ pub(super) fn study<'a>(
         let (group, later) = waiting.split_at(waiting.iter().take_while(fits).count());
         waiting = later;
         let fraction = |part: f64, here: usize| 0.2 + 0.7 * (through as f64 + part * here as f64) / total as f64;
-        (progress.tell)(&format!("{name}: inversions"), fraction(0.0, 0));
+        progress(&format!("{name}: inversions"), fraction(0.0, 0));
         let prepared: Vec<_> = group.par_iter().map(|plan| MethodGroup::prepare(analysis, plan, sample)).collect();
         // Rows drawn at random may determine nothing.
         let useful = prepared.into_iter().zip(group).filter(|(choice, plan)| choice.is_ok() || !plan.is_draw());
@@ -82,19 +78,20 @@ pub(super) fn study<'a>(
         let motion = (through == 0).then_some(&mut motion);
         follow(job, &mut method_groups, motion, sample, shape, &mut |done| {
             let part = done as f64 / sample.to_read().max(1) as f64;
-            (progress.tell)(&format!("{name}: frame {done} of {}", sample.to_read()), fraction(part, here));
+            progress(&format!("{name}: frame {done} of {}", sample.to_read()), fraction(part, here));
         })?;
         through += here;
-        for choice in method_groups {
-            let is_draw = choice.is_draw();
-            let kept_choice = found.collect(choice);
-            kept.extend((!is_draw).then_some(kept_choice));
+        for mut choice in method_groups {
+            for (series, evaluation) in std::mem::take(&mut choice.evaluations) {
+                found.collect(series, evaluation);
+            }
+            kept.extend((!choice.is_draw()).then_some(choice));
         }
     }
     found.methods.sort_by_key(|(order, _)| *order);
     found.noise.sort_by_key(|(order, _)| *order);
     let prepared = analysis.preparation();
-    let usual_seconds = |(_, m): &&(usize, MethodFigures)| m.method.is_cager() && m.method.spectrum == usual;
+    let usual_seconds = |(_, m): &&(usize, MethodFigures)| m.method.is_cager() && m.method.options.spectrum == usual;
     let figures = SystemFigures {
         unknowns,
         rank: prepared.rank,
@@ -158,15 +155,7 @@ struct Results {
 }
 
 impl Results {
-    /// Moves the results of a group of methods here; returns the group without its series.
-    fn collect(&mut self, mut choice: MethodGroup) -> MethodGroup {
-        for (series, evaluation) in std::mem::take(&mut choice.evaluations) {
-            self.collect_series(series, evaluation);
-        }
-        choice
-    }
-
-    fn collect_series(&mut self, series: SeriesKind, evaluation: MethodEvaluation) {
+    fn collect(&mut self, series: SeriesKind, evaluation: MethodEvaluation) {
         let totals = evaluation.found.totals();
         match series {
             SeriesKind::Method(order, method) => {

@@ -1,7 +1,8 @@
 //! A procedural capture: a dancer in a pleated dress, with a cage that fits.
 //!
-//! Every horizontal slice of the body is star-shaped about a spine, and the cage is a grid over height and angle about that
-//! same spine. That makes "inside" a comparison of two radii, and rules out self-intersections of the cage for any radii.
+//! Every horizontal slice of the body is star-shaped about a spine, and the cage is a grid over
+//! height and angle about that same spine. That makes "inside" a comparison of two radii, and rules
+//! out self-intersections of the cage for any radii.
 
 use std::f64::consts::TAU;
 
@@ -53,7 +54,7 @@ impl Capture {
         self.frames
     }
 
-    /// Replaces `out` with the positions of frame `t` as x y z x y z …; `t` wraps around, since the motion loops.
+    /// Replaces `out` with the positions of frame `t` as x y z x y z …; `t` wraps around.
     pub fn frame(&self, t: usize, out: &mut Vec<f64>) {
         let motion = Motion::at(t, self.frames);
         out.clear();
@@ -63,7 +64,7 @@ impl Capture {
         }
     }
 
-    /// The cage moved as the figure moves in frame `t`, but for the ripples of the cloth, which are too fine for a cage.
+    /// The cage moved as the figure moves in frame `t`, but for the ripples of the cloth.
     pub fn deformed_cage(&self, t: usize) -> Vec<Point> {
         let motion = Motion::at(t, self.frames);
         self.cage.vertices.iter().map(|&vertex| motion.posed(vertex)).collect()
@@ -101,7 +102,7 @@ impl Motion {
         let fade = (1.0 - h).max(0.0).powi(2);
         let wave = (13.0 * angle - 3.0 * self.phase + 9.0 * h).sin()
             + 0.6 * (19.0 * angle + 2.0 * self.phase - 31.0 * h).sin();
-        // Relative to the radius, so that the waves fade to nothing at the pole instead of tearing it.
+        // Relative to the radius, so that the waves fade at the pole instead of tearing it.
         let scale = 1.0 + 0.02 * fade * wave;
         [cx + scale * dx, cy + scale * dy, z]
     }

@@ -68,7 +68,7 @@ struct Shell {
 impl Shell {
     /// The figure's own radii, moved out by the margin along the normal of the silhouette.
     ///
-    /// The poles move further, or the cones beneath them would need wide rings to hold the figure's round ends.
+    /// The poles move further, so that the cones beneath them hold the figure's round ends.
     fn around_silhouette(grid: Grid) -> Self {
         let inner = heights(grid.rings);
         let mut shell = Self { grid, heights: vec![-MARGIN - 0.3 * inner[0]], radii: vec![0.0; grid.len()] };
@@ -91,7 +91,8 @@ impl Shell {
             for &point in points {
                 let (own, shell, corners) = self.radii_at(pushed_out(point, 0.5 * MARGIN));
                 if shell < own {
-                    // The smallest change of the corners that moves the shell here, and well past where the loop stops.
+                    // The smallest change of the corners that moves the shell well past where the
+                    // loop stops.
                     let squares: f64 = corners.iter().map(|(_, weight)| weight * weight).sum();
                     for (vertex, weight) in corners {
                         growth[vertex] = growth[vertex].max(weight / squares * (own + 0.5 * MARGIN - shell));
@@ -110,11 +111,12 @@ impl Shell {
         }
     }
 
-    /// Distance from the spine of a point and of the shell in the same direction, and the shell's triangle there with weights.
+    /// Distance from the spine of a point and of the shell there, and the shell's triangle with
+    /// weights.
     fn radii_at(&self, [x, y, z]: Point) -> (f64, f64, [(usize, f64); 3]) {
         let k = self.heights.partition_point(|&ring| ring <= z).clamp(1, self.heights.len() - 1) - 1;
         let s = (z - self.heights[k]) / (self.heights[k + 1] - self.heights[k]);
-        // The shell's spine is straight between rings; only then are its slices those of flat triangles.
+        // The shell's spine is straight between rings, as its triangles are flat.
         let (low, high) = (spine(self.heights[k]), spine(self.heights[k + 1]));
         let (dx, dy) = (x - low[0] - s * (high[0] - low[0]), y - low[1] - s * (high[1] - low[1]));
         let angle = dy.atan2(dx).rem_euclid(TAU);

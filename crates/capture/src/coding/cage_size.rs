@@ -1,4 +1,4 @@
-//! How many vertices a cage needs for what a coded file is to meet: some frames are coded with cages of several sizes, made around the rest pose.
+//! How many vertices a cage needs for a goal: some frames are coded with cages of several sizes.
 
 use super::error::CodingError;
 use super::goal::{BYTES_PER_POSITION, Carried, Goal, group_frames};
@@ -36,8 +36,9 @@ pub struct CageSizes<'a> {
 }
 
 impl CageSizes<'_> {
-    /// The number of vertices that gives the smallest file, or the smallest error where a size is the goal. `None` where the goal does not say which is
-    /// better, or no cage can be coded. `prepare` makes a solver for a cage and a rest pose.
+    /// The number of vertices that gives the smallest file, or the smallest error where a size is
+    /// the goal. `None` where the goal does not say which is better, or no cage can be coded.
+    /// `prepare` makes a solver for a cage and a rest pose.
     pub fn best(&self, prepare: impl Fn(&Cage, &Model) -> Result<Solver, PrepareError>) -> Option<usize> {
         if !matches!(self.goal, Goal::MaxError(_) | Goal::Size(_)) || self.frames.is_empty() {
             return None;

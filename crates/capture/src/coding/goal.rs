@@ -24,7 +24,7 @@ impl Goal {
     /// The quality for what is to be worked on later.
     pub const MASTER: Self = Self::MaxError(1e-4);
 
-    /// Refuses an error that positions in single precision cannot hold where [machines differ](slack) by so much.
+    /// Refuses an error below what [machines differ](slack) by in single precision.
     ///
     /// # Errors
     /// [`CodingError::BelowPrecision`].
@@ -36,7 +36,7 @@ impl Goal {
         };
         let least = times * slack / diagonal;
         if asked < least {
-            // As it is printed, and with room for what another error changes in other groups, so that who asks for that is not refused.
+            // As it is printed, with room for other groups, so that asking for it is not refused.
             let least = 1.5 * least;
             let unit = 10f64.powf(least.log10().floor() - 1.0);
             return Err(CodingError::BelowPrecision { asked, least: (least / unit).ceil() * unit, farthest: None });
@@ -44,7 +44,7 @@ impl Goal {
         Ok(())
     }
 
-    /// The steps for a step of the residual and that of the cage over it, for a model of so many points.
+    /// The steps for a residual's step and the cage's over it, for so many points.
     pub(super) fn steps(self, (residual, ratio): (f64, f64), points: usize) -> Steps {
         let cage = ratio * residual / (points as f64).sqrt();
         Steps { cage, residual: (self != Self::Preview).then_some(residual) }
@@ -105,7 +105,7 @@ pub struct Room {
     pub other: u64,
 }
 
-/// What one group leaves to the next: a coder with it goes on as the one that closed the group would.
+/// What one group leaves to the next, for a coder that goes on.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Carried {
     /// Frames in the groups so far.
@@ -117,22 +117,25 @@ pub struct Carried {
 }
 
 /// What positions may differ by from machine to machine, where for a coordinate so many `terms` are
-/// [added up](cager_core::decode::Decoder::largest_sum) whose sizes are at most `sum` together, and coordinates are at most `farthest`.
+/// [added up](cager_core::decode::Decoder::largest_sum) whose sizes are at most `sum` together, and
+/// coordinates are at most `farthest`.
 ///
-/// In single precision both factors of a term are rounded, and each partial sum is, by at most u of it: together at most n·u·`sum`, and as the
-/// signs of roundings are as good as random, 2·√n·u·`sum` is six standard deviations or more (Higham and Mary 2019). The
-/// coordinates are rounded by a unit in the last place of each of three.
+/// In single precision both factors of a term are rounded, and each partial sum is, by at most u of
+/// it: together at most n·u·`sum`, and as the signs of roundings are as good as random,
+/// 2·√n·u·`sum` is six standard deviations or more (Higham and Mary 2019). The coordinates are
+/// rounded by a unit in the last place of each of three.
 pub fn slack(diagonal: f64, terms: usize, sum: f64, farthest: f64) -> f64 {
     let unit = f64::from(f32::EPSILON) / 2.0;
     let rounding = (2.0 + 2.0 * (terms as f64).sqrt()) * unit * sum;
     rounding.max(1e-6 * diagonal.max(sum)) + 4.0 * unit * farthest
 }
 
-/// Bytes that coding a group holds, and of these for each position of a frame: as captured, of its cage, as a residual, decoded.
+/// Most bytes that coding a group holds, and bytes for each position: captured, of its cage, as
+/// residual, decoded.
 const MAX_HELD_BYTES: usize = 512 << 20;
 pub(crate) const BYTES_PER_POSITION: usize = 112;
 
-/// Most frames of a group. The same on every machine, so that files are wherever a group fits into memory.
+/// Most frames of a group, the same on every machine, so that files are the same.
 pub fn group_frames(points: usize, rows: usize) -> usize {
     container::group_frames(points, rows).min(MAX_HELD_BYTES / (BYTES_PER_POSITION * points.max(1))).max(1)
 }
@@ -142,7 +145,8 @@ fn around(frames: usize) -> u64 {
     AROUND + 4 * frames as u64
 }
 
-/// A size that is met with meshes of so many bytes and others: of a larger size the rest pose may take a third, and the cage takes about a sixth of the meshes.
+/// A size that is met with meshes of so many bytes: the rest pose may take a third of it, and the
+/// cage is about a sixth of the meshes.
 fn least_size(meshes: u64, others: u64) -> u64 {
     (meshes + others).max(3 * others / 2 + meshes / 4)
 }
@@ -150,7 +154,7 @@ fn least_size(meshes: u64, others: u64) -> u64 {
 /// Bytes of a group in which nothing moves, about.
 const LEAST_GROUP: u64 = 100;
 
-/// Bytes of a file after its frames but for four of each: the report and the table of contents, about.
+/// Bytes of report and table of contents, about, but for four a frame.
 const AROUND: u64 = 1200;
 
 #[cfg(test)]

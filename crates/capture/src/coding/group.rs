@@ -23,45 +23,23 @@ pub struct CodedGroup {
     pub farthest: (usize, f64),
 }
 
-/// A group's bytes and what they say.
+impl CodedGroup {
+    pub(super) fn bytes(&self) -> u64 {
+        (self.cages.len() + SECTION + self.residual.as_ref().map_or(0, |residual| residual.len() + SECTION)) as u64
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.errors.iter().map(|error| error.l2).sum::<f64>() / self.errors.len().max(1) as f64
+    }
+}
+
+/// A group's bytes, whose residual may be only estimated, and what they say.
 pub(super) struct Encoded {
-    cages: Vec<u8>,
-    /// The coded residual, where it is not only estimated, and what it says.
-    coded: Option<Vec<u8>>,
+    /// Errors are empty until they are measured.
+    pub(super) group: CodedGroup,
     residual: Option<Residual>,
     /// Where the cages take the points; when these are measured, with the residual.
     positions: Vec<Vec<f32>>,
-    /// Empty until they are measured.
-    errors: Vec<FrameError>,
-    farthest: (usize, f64),
-}
-
-impl Encoded {
-    pub(super) fn bytes(&self) -> u64 {
-        bytes_of(&self.cages, self.coded.as_ref())
-    }
-
-    pub(super) fn mean(&self) -> f64 {
-        mean(&self.errors)
-    }
-}
-
-fn bytes_of(cages: &[u8], residual: Option<&Vec<u8>>) -> u64 {
-    (cages.len() + SECTION + residual.map_or(0, |residual| residual.len() + SECTION)) as u64
-}
-
-fn mean(errors: &[FrameError]) -> f64 {
-    errors.iter().map(|error| error.l2).sum::<f64>() / errors.len().max(1) as f64
-}
-
-impl CodedGroup {
-    pub(super) fn bytes(&self) -> u64 {
-        bytes_of(&self.cages, self.residual.as_ref())
-    }
-
-    pub(super) fn mean(&self) -> f64 {
-        mean(&self.errors)
-    }
 }
 
 /// Bytes of a section beside its payload: its header, and its entry in the table of contents.
@@ -183,12 +161,12 @@ impl GroupCoder {
         let mut encoded = self.encode_cages(count, steps.cage)?;
         if let Some(step) = steps.residual {
             let (coded, residual) = self.residual_of(&encoded.positions, step, encode_residual)?;
-            (encoded.coded, encoded.residual) = (Some(coded), Some(residual));
+            (encoded.group.residual, encoded.residual) = (Some(coded), Some(residual));
         }
         Ok(encoded)
     }
 
-    /// About the bytes of the first frames with all points, where this has a `part` of them; and what they would say.
+    /// About the bytes of the first frames if this `part` of the points were all.
     pub(super) fn estimate(
         &self,
         count: usize,
@@ -198,7 +176,7 @@ impl GroupCoder {
     ) -> Result<(f64, Encoded), CodingError> {
         let steps = self.goal.steps((residual, ratio), self.model.points());
         let mut encoded = self.encode_cages(count, steps.cage)?;
-        let mut bytes = encoded.cages.len() as f64;
+        let mut bytes = encoded.group.cages.len() as f64;
         if let Some(step) = steps.residual {
             let (of_residual, residual) = self.residual_of(&encoded.positions, step, estimate_residual)?;
             bytes += of_residual / part;
@@ -220,7 +198,8 @@ impl GroupCoder {
         let positions = self.model.positions(&decoded);
         let extents = decoded.iter().map(|cage| f64::from(cage.iter().fold(0.0f32, |far, x| far.max(x.abs()))));
         let farthest = extents.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-        Ok(Encoded { cages: coded, coded: None, residual: None, positions, errors: Vec::new(), farthest })
+        let group = CodedGroup { cages: coded, residual: None, errors: Vec::new(), farthest };
+        Ok(Encoded { group, residual: None, positions })
     }
 
     /// What `code` makes of that which the positions of cages leave of the first frames.
@@ -244,16 +223,18 @@ impl GroupCoder {
         // They are needed no more, and another step may be tried beside.
         let positions = std::mem::take(&mut encoded.positions);
         let measured = positions.par_iter().zip(&self.frames);
-        encoded.errors = measured.map(|(decoded, captured)| FrameError::of_positions(decoded, captured)).collect();
+        encoded.group.errors =
+            measured.map(|(decoded, captured)| FrameError::of_positions(decoded, captured)).collect();
     }
 
     /// Reads the bytes of a group back, and checks that they say what was measured.
     pub(super) fn finish(&self, mut encoded: Encoded) -> Result<CodedGroup, CodingError> {
-        let (count, coded) = (encoded.positions.len().max(encoded.errors.len()), encoded.coded.take());
+        let count = encoded.positions.len().max(encoded.group.errors.len());
+        let coded = encoded.group.residual.take();
         let read = |bytes: &Vec<u8>| Residual::decode(&self.model.hierarchy, count, bytes, usize::MAX);
         let read = || coded.as_ref().map(read).transpose().map_err(|_| self.uncountable());
         let measure = || {
-            if encoded.errors.is_empty() {
+            if encoded.group.errors.is_empty() {
                 self.measure(&mut encoded);
             }
         };
@@ -261,9 +242,8 @@ impl GroupCoder {
         if read? != encoded.residual {
             return Err(self.uncountable());
         }
-        let Encoded { cages, residual, errors, farthest, .. } = encoded;
-        let residual = coded.filter(|_| residual.is_some_and(|residual| residual.is_needed()));
-        let group = CodedGroup { cages, residual, errors, farthest };
+        let Encoded { mut group, residual, .. } = encoded;
+        group.residual = coded.filter(|_| residual.is_some_and(|residual| residual.is_needed()));
         if let Goal::MaxError(error) = self.goal
             && group.errors.iter().any(|found| found.linf.is_nan() || found.linf > error * self.diagonal)
         {

@@ -4,8 +4,8 @@ use cager_core::coordinates::{CoordinateSystem, Green};
 use cager_core::inversion::{Handles, SolverOptions, default_spectrum};
 use cager_core::regularize::Regularizer;
 
-/// Weight λ where frames are coded. Over the whole spectrum it keeps still what hardly moves the model and would be coded as noise: files are up to half as large
-/// for cages with more unknowns than the points determine.
+/// Weight λ where frames are coded. Over the whole spectrum it keeps still what would be coded as
+/// noise: files are up to half as large for cages with more unknowns than the points determine.
 const CODED_LAMBDA: f64 = 1e-3;
 
 /// Options of the inversion as far as they were given.
@@ -43,7 +43,7 @@ impl InversionChoices {
         }
     }
 
-    /// The points read: all where frames are coded, since the closer cages are to all points, the less is left to code.
+    /// The points read: all where frames are coded, since closer cages leave less to code.
     pub fn handles(self) -> Handles {
         self.handles.unwrap_or(if self.is_coded_linearly() { Handles::All } else { Handles::default() })
     }
@@ -53,13 +53,13 @@ impl InversionChoices {
         self.lambda.unwrap_or(if self.is_light() { CODED_LAMBDA } else { SolverOptions::default().lambda })
     }
 
-    /// Whether the whole spectrum is regularised lightly. Only where both are open: a weight is for the spectrum that it comes with.
+    /// Whether the whole spectrum is regularised lightly: only where weight and spectrum are open.
     fn is_light(self) -> bool {
         let is_open = self.spectrum.is_none() && self.lambda.is_none();
         self.is_coded_linearly() && is_open && self.regularizer == Regularizer::default()
     }
 
-    /// Where normals follow from the vertices, cages that are held less turn out larger, not smaller.
+    /// Where normals follow from the vertices, lighter weights give larger files.
     fn is_coded_linearly(self) -> bool {
         self.is_coded && self.system.name() != Green::Consistent.name()
     }

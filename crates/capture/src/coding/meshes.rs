@@ -22,7 +22,8 @@ pub struct RestMeshes {
 }
 
 impl RestMeshes {
-    /// On a grid fine enough for the goal. `None` where the cage or the points would not be valid there: the meshes are then stored as they are.
+    /// On a grid fine enough for the goal. `None` where they would not be valid there and are
+    /// stored as they are.
     pub fn new(goal: Goal, rest: &Model, cage: &Cage, system: &dyn CoordinateSystem) -> Option<Self> {
         let diagonal = diagonal(&rest.points);
         let (step, rest) = coded_rest(goal, rest, diagonal)?;
@@ -35,7 +36,7 @@ impl RestMeshes {
 fn coded_rest(goal: Goal, rest: &Model, diagonal: f64) -> Option<(f64, CodedMesh)> {
     let coded = |step: f64| Some((step, CodedMesh::new(rest, step * diagonal).ok()?));
     match goal {
-        // What it adds to the error is paid for by finer steps of the frames, or by the residual: measured, this is where both together are smallest.
+        // Measured: rest pose and frames together are smallest here.
         Goal::MaxError(error) => coded((0.4 * error).min(1e-3)),
         Goal::MeanError(error) => coded((0.8 * error).min(1e-3)),
         Goal::Preview => coded(5e-4),
@@ -58,7 +59,7 @@ fn coded_rest(goal: Goal, rest: &Model, diagonal: f64) -> Option<(f64, CodedMesh
     }
 }
 
-/// The cage on a grid. Frames have cages of their own, so the one at rest need not be where it was more exactly than the rest pose is, if it is as sound there: no more
+/// The cage on a grid as coarse as the rest pose's, if it is as sound there: no more
 /// faces cut each other, and no more points lie outside.
 fn coded_cage(
     cage: &Cage,

@@ -1,7 +1,9 @@
-//! Coded frames: how large the steps of cages and residual are for what was asked for, and groups of frames as a container holds them.
+//! Coded frames: the steps of cages and residual for a goal, and groups as a container holds them.
 //!
-//! One number, the step of the residual, decides a file's size and error. A step of the cage that moves all points by as much in the root mean square
-//! costs as much per binary digit; how far apart the two are best is measured on frames of the first group, and so is the step that meets an error or a size.
+//! One number, the step of the residual, decides a file's size and error. A step of the cage that
+//! moves all points by as much in the root mean square costs as much per binary digit; how far
+//! apart the two are best is measured on frames of the first group, and so is the step that meets
+//! an error or a size.
 
 mod cage_size;
 mod error;

@@ -1,13 +1,14 @@
 //! What groups of one model are coded and decoded with.
 
 use super::error::CodingError;
+use crate::positions::decoded;
 use cager_codec::{
     BasisRecord, CageBasis, Error, Hierarchy, MAX_POSITIONS, MAX_ROWS, Residual, basis_record, decode_cages,
 };
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, ElementPlan};
 use cager_core::decode::Decoder;
-use cager_core::inversion::{BATCH, Solver};
+use cager_core::inversion::Solver;
 use cager_geometry::mesh::Model;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -18,10 +19,8 @@ pub(crate) struct GroupSpace {
 }
 
 impl GroupSpace {
-    /// For a rest pose and cage as a decoder reads them, and the elements that their coordinates are solved on, where these are a numerical solution.
-    ///
-    /// # Errors
-    /// More rows than can be coded; coordinates that cannot be computed.
+    /// For a rest pose and cage as a decoder reads them, and the elements of coordinates that are
+    /// solved for.
     pub(crate) fn new(
         system: &dyn CoordinateSystem,
         cage: &Cage,
@@ -86,7 +85,7 @@ impl GroupDecoder {
         decode_cages(&self.basis, frames, bytes)
     }
 
-    /// The same of groups that earlier programs, or other machines, may have coded in another basis, which `other` computes.
+    /// The same of groups that may be coded in another basis, which `other` computes.
     ///
     /// # Errors
     /// Damaged bytes; a basis that cannot be computed.
@@ -111,12 +110,7 @@ impl GroupDecoder {
 
     /// The positions that cages say.
     pub fn positions(&self, cages: &[Vec<f32>]) -> Vec<Vec<f32>> {
-        let mut positions: Vec<Vec<f32>> = vec![Vec::new(); cages.len()];
-        for (cages, positions) in cages.chunks(BATCH).zip(positions.chunks_mut(BATCH)) {
-            let cages: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-            self.decoder.decode(&cages, positions);
-        }
-        positions
+        decoded(&self.decoder, &cages.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
     /// Products that are added up for a coordinate.

@@ -1,4 +1,5 @@
-//! How large steps are: for a bound by what some frames of the first group cost, for a mean error and a size held in every group.
+//! How large steps are: for a bound by some frames of the first group, for a mean error and a size
+//! in every group.
 
 use super::error::CodingError;
 use super::goal::{Goal, Room};
@@ -6,17 +7,18 @@ use super::group::{CodedGroup, GroupCoder};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Frames that steps are chosen by, at most, and points of them where there are more than twice as many: fewer points had larger files in the end.
+/// Most frames that steps are chosen by, and points of large models: fewer gave larger files.
 const TRIAL_FRAMES: usize = 32;
 const TRIAL_POINTS: usize = 10_000;
 /// Points of all frames that the first steps for a mean error are found by.
 const MEAN_POINTS: usize = 1_500;
-/// Step of the cage over that of the residual, both as what they move the points, where nothing was measured.
+/// Step of the cage over that of the residual, both in the points, where nothing was measured.
 const USUAL_RATIO: f64 = 1.6;
-/// The other ratio that is tried for a mean error where the residual's bytes are fewer than so many times the cages': cages cost more beside little residual.
+/// The other ratio tried for a mean error where the residual has fewer than so many times the
+/// cages' bytes.
 const FINER_CAGES: f64 = 1.1;
 const LITTLE_RESIDUAL: f64 = 0.1;
-/// Power of the step that a mean error is about: less than 1, since larger steps leave more of the residual out.
+/// Power of the step that a mean error is about: larger steps leave more of the residual out.
 const USUAL_POWER: f64 = 0.7;
 /// Step of the residual over the largest error allowed, likewise.
 const USUAL_STEP: f64 = 1.8;
@@ -37,7 +39,7 @@ fn next_step(step: f64, figure: f64, power: f64) -> f64 {
     step * (NEAR.sqrt() * figure).powf(-1.0 / power).clamp(0.125, 8.0)
 }
 
-/// Of so many frames those that steps are chosen by: a run in either half, since a capture may begin more calmly than it goes on.
+/// The frames that steps are chosen by: a run in either half, as captures may begin calmly.
 fn trial_frames(count: usize) -> [Range<usize>; 2] {
     let middle_of = |half: Range<usize>| {
         let run = half.len().min(TRIAL_FRAMES / 2);
@@ -79,7 +81,7 @@ impl GroupCoder {
         }
     }
 
-    /// A coder of some frames, with about so many points in patches where the model has at least twice as many.
+    /// A coder of some frames, of a large model with about so many points in patches.
     fn part(&self, points: usize, frames: impl IntoIterator<Item = usize>) -> Self {
         let every = self.model.points() / points;
         let (model, points) = if every < 2 {
@@ -100,20 +102,21 @@ impl GroupCoder {
         part
     }
 
-    /// Root of points over rows of a cage: a step of this times the unit moves the points by about the unit.
+    /// Root of points over rows: a cage's step of this moves the points by about one.
     fn per_row(&self) -> f64 {
         (self.model.points() as f64 / self.model.basis.rows() as f64).sqrt()
     }
 
-    /// About the bytes of the frames that wait, in the steps where [`Self::choose`] begins for a bound.
+    /// About the bytes of the waiting frames in the steps where [`Self::choose`] begins.
     pub(super) fn usual_bytes(&self) -> Result<f64, CodingError> {
         let Goal::MaxError(error) = self.goal else { return Ok(0.0) };
         let estimated = self.estimate(self.frames.len(), USUAL_STEP * error * self.diagonal, USUAL_RATIO, 1.0);
         estimated.map(|(bytes, _)| bytes)
     }
 
-    /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not above; the figure is about the power `usual` of the step.
-    /// Begins at the step of the group before. `None` where no step does it.
+    /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not
+    /// above; the figure is about the power `usual` of the step. Begins at the step of the group
+    /// before. `None` where no step does it.
     fn for_step<T>(
         &mut self,
         usual: f64,
@@ -169,7 +172,8 @@ impl GroupCoder {
         }))
     }
 
-    /// In the largest steps that meet a mean error. Where the first group has little residual, two ratios of the steps are tried, and the one of fewer bytes stays.
+    /// In the largest steps that meet a mean error; of two ratios where the first group has little
+    /// residual.
     pub(super) fn code_to_mean(&mut self, goal: f64) -> Result<CodedGroup, CodingError> {
         let usual = self.code_in_ratio(goal)?;
         let Some((step, ratio)) = self.carried.chosen else { return Ok(usual) };
@@ -199,7 +203,7 @@ impl GroupCoder {
                 let tried = part.estimate(part.frames.len(), step, ratio * share.sqrt(), share);
                 let Ok((_, mut group)) = tried else { break };
                 part.measure(&mut group);
-                let figure = (group.mean() / goal).max(1e-6);
+                let figure = (group.group.mean() / goal).max(1e-6);
                 power = power_between(before, (step, figure), USUAL_POWER);
                 before = Some((step, figure));
                 step = next_step(step, figure, power);
@@ -209,7 +213,7 @@ impl GroupCoder {
         let found = self.for_step(power, |coder, step, ratio| {
             let mut group = coder.encode(coder.frames.len(), step, ratio)?;
             coder.measure(&mut group);
-            let mean = group.mean();
+            let mean = group.group.mean();
             Ok((group, mean / goal))
         })?;
         let asked = goal / self.diagonal;
@@ -224,7 +228,7 @@ impl GroupCoder {
         let share = (room.bytes as f64 * part) as u64;
         let found = self.for_step(-1.0, |coder, step, ratio| {
             let group = coder.encode(coder.frames.len(), step, ratio)?;
-            let bytes = group.bytes();
+            let bytes = group.group.bytes();
             Ok((group, bytes as f64 / share.max(1) as f64))
         })?;
         let found = match found {
@@ -232,16 +236,17 @@ impl GroupCoder {
             None => {
                 let steps = (2.0 * self.diagonal, USUAL_RATIO);
                 let coarsest = self.encode(self.frames.len(), steps.0, steps.1)?;
-                if coarsest.bytes() > share {
-                    let bytes = (coarsest.bytes() as f64 / part).ceil() as u64;
+                if coarsest.group.bytes() > share {
+                    let bytes = (coarsest.group.bytes() as f64 / part).ceil() as u64;
                     return Err(CodingError::TooSmall { asked, least: room.least(self.carried.frames, bytes) });
                 }
                 self.carried.chosen = Some(steps);
                 coarsest
             }
         };
-        let (bytes, frames) = (room.bytes.saturating_sub(found.bytes()), room.frames.saturating_sub(self.frames.len()));
-        self.carried.room = Some(Room { bytes, frames, other: room.other + found.bytes() });
+        let (bytes, frames) =
+            (room.bytes.saturating_sub(found.group.bytes()), room.frames.saturating_sub(self.frames.len()));
+        self.carried.room = Some(Room { bytes, frames, other: room.other + found.group.bytes() });
         self.finish(found)
     }
 }

@@ -3,10 +3,9 @@
 use super::bind::{BoundModel, bind};
 use super::opened::{Container, DecodeError, open};
 use super::{Decoded, Decoding, may_lose};
-use crate::inverter::points;
 use crate::memory::{Memory, free_bytes};
 use crate::origin::move_from;
-use cager_core::inversion::BATCH;
+use crate::positions::{decoded, points};
 use cager_formats::Target;
 use cager_geometry::mesh::{Model, Point};
 use std::path::{Path, PathBuf};
@@ -19,7 +18,8 @@ pub struct Animation {
 }
 
 impl Animation {
-    /// Of a container. Coordinates are kept, unless there are more of them than a quarter of the free memory holds: those are computed for each reading.
+    /// Of a container. Coordinates that a quarter of the free memory does not hold are computed for
+    /// each reading.
     ///
     /// # Errors
     /// As [`decode`](super::decode).
@@ -57,7 +57,8 @@ impl Animation {
         Ok(points)
     }
 
-    /// Writes all frames to `output` in the format of its name, such as `walk.abc`, `walk.usdc` or `walk/*.ply`; it appears complete or not at all.
+    /// Writes all frames to `output` in the format of its name, such as `walk.abc`, `walk.usdc` or
+    /// `walk/*.ply`; it appears complete or not at all.
     ///
     /// # Errors
     /// As [`decode`](super::decode).
@@ -65,20 +66,18 @@ impl Animation {
         super::decode(&self.path, output, Decoding::default(), &mut |_| ())
     }
 
-    /// Positions of these frames, three coordinates a point, from which the container's origin is subtracted.
+    /// Positions of these frames, three coordinates a point, less the container's origin.
     ///
     /// # Errors
     /// Damage, or a frame that is not there.
     pub fn read(&mut self, frames: &[usize]) -> Result<Vec<Vec<f32>>, DecodeError> {
         let fail = |cause| DecodeError::container(&self.path, cause);
-        let (mut cages, mut positions) = (vec![Vec::new(); frames.len()], vec![Vec::new(); frames.len()]);
+        let mut cages = vec![Vec::new(); frames.len()];
         for (&frame, cage) in frames.iter().zip(&mut cages) {
             self.container.read_frame(frame, cage).map_err(fail)?;
         }
         let views: Vec<&[f32]> = cages.iter().map(Vec::as_slice).collect();
-        for (cages, positions) in views.chunks(BATCH).zip(positions.chunks_mut(BATCH)) {
-            self.model.decoder.decode(cages, positions);
-        }
+        let mut positions = decoded(&self.model.decoder, &views);
         self.container.add_residual(frames, &mut positions).map_err(fail)?;
         Ok(positions)
     }
@@ -91,14 +90,12 @@ impl Animation {
         may_lose(&mut self.container).map_err(|cause| DecodeError::container(&self.path, cause))
     }
 
-    /// What a cage of vertices × 3 makes of the model, without the residual; the container's origin is subtracted from both.
+    /// Where a cage of vertices × 3 takes the model, without residual and less the container's
+    /// origin.
     ///
     /// # Panics
     /// Where the cage has not one row for each unknown.
     pub fn of_cage(&self, cage: &[f32]) -> Vec<f32> {
-        let mut positions = [Vec::new()];
-        self.model.decoder.decode(&[cage], &mut positions);
-        let [positions] = positions;
-        positions
+        decoded(&self.model.decoder, &[cage]).swap_remove(0)
     }
 }

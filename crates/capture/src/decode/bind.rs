@@ -12,7 +12,7 @@ use cager_geometry::mesh::{Model, TriMesh};
 use cager_proto::container;
 use std::path::Path;
 
-/// A model in its rest pose with its decoder, and the numbers of its points outside the rest cage and beside poles.
+/// A model at rest, its decoder, and how many points lie outside the rest cage and beside poles.
 pub(super) struct BoundModel {
     pub(super) rest: Model,
     pub(super) decoder: Decoder,
@@ -20,11 +20,8 @@ pub(super) struct BoundModel {
     pub(super) bound: usize,
 }
 
-/// Computes the coordinates of the container's model, if they are not `known`, or of another, in the container's cage; `keeps(points, columns)` decides whether
-/// to keep them in memory.
-///
-/// # Errors
-/// Damage, or coordinates that this program does not compute.
+/// Computes the coordinates of the container's model, if they are not `known`, or of another, in
+/// the container's cage; `keeps(points, columns)` decides whether to keep them in memory.
 pub(super) fn bind(
     container: &mut Container,
     path: &Path,

@@ -6,9 +6,11 @@ use cager_formats::{FrameOptions, FrameRange, Target, create_frames};
 use cager_geometry::mesh::Model;
 use std::path::PathBuf;
 
-/// Decodes ranges of frames of containers, at least one, into one `output`, whose files have the mesh of their container each. Formats of one mesh are refused
-/// before anything is decoded, unless all have the same. `progress` is told the number of frames done, which is returned with
-/// what the user should know of the output. `shift` is added to the numbers of all frames; model, cages, range and first frame of `what` are not for several files.
+/// Decodes ranges of frames of containers, at least one, into one `output`, whose files have the
+/// mesh of their container each. Formats of one mesh are refused before anything is decoded, unless
+/// all have the same. `progress` is told the number of frames done, which is returned with what the
+/// user should know of the output. `shift` is added to the numbers of all frames; model, cages,
+/// range and first frame of `what` are not for several files.
 ///
 /// # Errors
 /// See [`DecodeError`].

@@ -5,10 +5,7 @@ use cager_formats::{CacheFormat, FrameOptions};
 use cager_geometry::units::{Change, Units, Up};
 use std::path::Path;
 
-/// Lets an output be in these units, and returns what makes positions those; what is not asked for stays as the container has it.
-///
-/// # Errors
-/// A unit or an axis is asked for, and the container does not know its own.
+/// Lets an output be in these units where they are asked for, and returns the change of positions.
 pub(crate) fn convert(options: &mut FrameOptions, asked: Units, path: &Path) -> Result<Change, DecodeError> {
     check(options.units, asked, path)?;
     let change = options.units.change_to(asked);
@@ -19,9 +16,6 @@ pub(crate) fn convert(options: &mut FrameOptions, asked: Units, path: &Path) -> 
 }
 
 /// Refuses what a container at `path` cannot be brought to, or from, as it does not know its own.
-///
-/// # Errors
-/// [`DecodeError::Meaning`].
 pub(crate) fn check(own: Units, asked: Units, path: &Path) -> Result<(), DecodeError> {
     let what = match (asked.up.and(own.up), asked.metres_per_unit.and(own.metres_per_unit)) {
         (None, _) if asked.up.is_some() => "which axis points up in it, so that --up cannot turn anything",

@@ -10,7 +10,7 @@ use std::time::Instant;
 /// Some frames, n × 3 each.
 pub(super) type Batch = Vec<Vec<f64>>;
 
-/// Batch size and number of batches solved concurrently. As many again are queued, and one is being read.
+/// Batch size and batches solved concurrently; as many are queued, and one is being read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BatchPlan {
     pub(super) size: usize,
@@ -18,7 +18,8 @@ pub(super) struct BatchPlan {
 }
 
 impl BatchPlan {
-    /// With coordinates in memory, one batch per thread; otherwise one batch, since computing coordinates uses all threads.
+    /// With coordinates in memory one batch per thread, otherwise one, as computing them uses all
+    /// threads.
     pub(super) fn new(memory: Memory, points: usize, keeps: bool) -> Self {
         let most = if keeps { rayon::current_num_threads() } else { 1 };
         let frames = memory.frames(24 * points, BATCH * (2 * most + 1));
@@ -68,7 +69,7 @@ pub(super) struct SolvedBatch {
     pub(super) measure_seconds: f64,
 }
 
-/// Solves a batch; `previous` is the cage of the frame before its first, `measures` whether errors are measured on these cages.
+/// Solves a batch after the cage `previous`; `measures` whether errors are those of these cages.
 pub(super) fn solve(solver: &Solver, batch: &Batch, previous: Option<&[f32]>, measures: bool) -> SolvedBatch {
     let frames: Vec<&[f64]> = batch.iter().map(Vec::as_slice).collect();
     let clock = Instant::now();

@@ -2,7 +2,7 @@
 
 use super::batches::{Batch, BatchPlan, SolvedBatch, read_batches, solve};
 use super::options::Encode;
-use super::sink::{FrameSink, SinkError};
+use super::sink::FrameSink;
 use super::{ChooseSpectrum, EncodeError, EncodeProgress, Encoded};
 use crate::capture::{CaptureWriter, Encoding};
 use crate::coding::{
@@ -10,6 +10,7 @@ use crate::coding::{
 };
 use crate::frames::CaptureFiles;
 use crate::memory::{Memory, free_bytes};
+use crate::positions::not_single;
 use crate::preparation_warnings::held_frames;
 use crate::speed::StepClock;
 use cager_core::cage::Cage;
@@ -22,7 +23,6 @@ use cager_proto::report::{Consistency, Report, Seconds, SpectrumChoice};
 use rayon::prelude::*;
 use std::io::BufWriter;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
@@ -35,12 +35,13 @@ pub struct Encoder {
     goal: Option<Goal>,
     group_frames: usize,
     sink: FrameSink<BufWriter<AtomicFile>>,
-    path: PathBuf,
     clock: Instant,
     /// Frames that were pushed and are not solved yet.
     waiting: Batch,
     /// Cage of the frame solved last.
     previous: Option<Vec<f32>>,
+    /// Whether frames that were taken could not be encoded, so that the file would lack them.
+    has_failed: bool,
 }
 
 impl<Files> Encode<'_, Files> {
@@ -72,7 +73,7 @@ impl Encode<'_> {
 }
 
 impl Encode<'_, &CaptureFiles> {
-    /// Encodes all frames of the capture into a container at `output`, which appears complete or not at all.
+    /// Encodes all frames into a container at `output`, which appears complete or not at all.
     ///
     /// # Errors
     /// See [`EncodeError`].
@@ -84,14 +85,6 @@ impl Encode<'_, &CaptureFiles> {
 }
 
 impl Encoder {
-    /// Of frames of this rest pose in this cage, with the defaults of [`Encode`].
-    ///
-    /// # Errors
-    /// See [`EncodeError`].
-    pub fn new(rest: &Model, cage: &Cage, output: impl Into<Target>) -> Result<Self, EncodeError> {
-        Encode::new(rest, cage).start(output)
-    }
-
     /// Prepares for frames of this rate and these numbers, 0, 1, 2, … where there are none.
     pub(super) fn begin<F>(
         job: &Encode<'_, F>,
@@ -110,10 +103,11 @@ impl Encoder {
         let mut code_seconds = clock_code.elapsed().as_secs_f64();
         let (given, stored) =
             (diagonal(&job.rest.points), meshes.as_ref().map(|meshes| diagonal(&meshes.rest.mesh.points)));
-        // A bound holds in the unit of the rest pose that was given, and in that of the one that is stored.
+        // A bound holds by the diagonals of the given rest pose and of the stored one.
         let unit = stored.map_or(given, |stored| stored.min(given));
         let (rest, cage) = meshes.as_ref().map_or((job.rest, job.cage), |meshes| (&meshes.rest.mesh, &meshes.checked));
-        // What groups are coded in needs nothing of the solver, unless the coordinates are a numerical solution.
+        // What groups are coded in needs nothing of the solver, unless the coordinates are a
+        // numerical solution.
         let begins_early = goal.is_some() && system.pointwise().is_some();
         let clock_prepare = Instant::now();
         let (prepared, space) = std::thread::scope(|scope| {
@@ -140,7 +134,7 @@ impl Encoder {
         let encoding = Encoding { rest, cage, system, options, solver: &solver, frame_rate, origin, units };
         let coded = meshes.as_ref().map(|meshes| (&meshes.rest, &meshes.cage));
         let out = BufWriter::with_capacity(1 << 20, file);
-        let mut writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(fail)?;
+        let mut writer = CaptureWriter::new(out, &encoding, coded).map_err(fail)?;
         let points = rest.points.len();
         let group_frames = group_frames(points, solver.decoder().unknowns());
         let group_frames = job.memory_limit().frames(BYTES_PER_POSITION * points, group_frames);
@@ -159,22 +153,25 @@ impl Encoder {
             worst: None,
             frames: 0,
             diagonal,
+            path,
         };
-        let (waiting, previous) = (Vec::new(), None);
-        Ok(Self { solver, options, choice, goal, group_frames, sink, path, clock, waiting, previous })
+        let (waiting, previous, has_failed) = (Vec::new(), None, false);
+        Ok(Self { solver, options, choice, goal, group_frames, sink, clock, waiting, previous, has_failed })
     }
 
     /// Takes the next frame: every point of the rest pose, in its order.
     ///
     /// # Errors
-    /// Other points than those of the rest pose, and those of the coding and the output.
+    /// [`EncodeError::PointCount`] and [`EncodeError::NotFinite`], after which another frame may be
+    /// given in place of this one; those of the coding and the output, after which every call
+    /// returns [`EncodeError::Stopped`].
     pub fn push(&mut self, frame: &[Point]) -> Result<(), EncodeError> {
+        self.check_complete()?;
         let (number, expected) = (self.sink.frames + self.waiting.len(), self.solver.decoder().points());
         if frame.len() != expected {
             return Err(EncodeError::PointCount { frame: number, found: frame.len(), expected });
         }
-        let is_far = |point: &Point| !point.iter().all(|x| x.abs() <= f64::from(f32::MAX));
-        if let Some(point) = frame.iter().position(is_far) {
+        if let Some(point) = not_single(frame) {
             return Err(EncodeError::NotFinite { frame: number, point });
         }
         self.waiting.push(frame.as_flattened().to_vec());
@@ -184,7 +181,7 @@ impl Encoder {
     /// Solves what waits, gives the container its name, and returns the report.
     ///
     /// # Errors
-    /// Those of the coding and the output.
+    /// Those of the coding and the output; [`EncodeError::Stopped`] after such an error.
     pub fn finish(self) -> Result<Report, EncodeError> {
         self.complete()?.commit()
     }
@@ -192,13 +189,14 @@ impl Encoder {
     /// As [`Self::finish`], but for the container's name.
     ///
     /// # Errors
-    /// Those of the coding and the output.
+    /// As [`Self::finish`].
     pub fn complete(mut self) -> Result<Encoded, EncodeError> {
+        self.check_complete()?;
         self.solve_waiting()?;
-        self.sink.close_group().map_err(|error| self.explain(error))?;
-        let Self { solver, options, choice, goal, group_frames, sink, path, clock, .. } = self;
+        self.sink.close_group()?;
+        let Self { solver, options, choice, goal, group_frames, sink, clock, .. } = self;
+        let FrameSink { mut writer, coder, mut seconds, convergence, held, worst, path, .. } = sink;
         let fail = |cause| EncodeError::container(&path, cause);
-        let FrameSink { mut writer, coder, mut seconds, convergence, held, worst, .. } = sink;
         let coding = goal.zip(coder.as_ref()).and_then(|(goal, coder)| {
             goal.coding(&coder.carried(), solver.decoder().points(), solver.diagonal(), group_frames)
         });
@@ -230,14 +228,14 @@ impl Encoder {
         let batch = std::mem::take(&mut self.waiting);
         let solved = solve(&self.solver, &batch, self.previous.as_deref(), self.sink.coder.is_none());
         self.previous = solved.cages.last().filter(|_| self.solver.follows_previous()).cloned();
-        self.sink.take(batch, solved).map(drop).map_err(|error| self.explain(error))
+        let taken = self.sink.take(batch, solved).map(drop);
+        self.has_failed = taken.is_err();
+        taken
     }
 
-    fn explain(&self, error: SinkError) -> EncodeError {
-        match error {
-            SinkError::Coding(error) => EncodeError::Coding(error),
-            SinkError::Container(cause) => EncodeError::container(&self.path, cause),
-        }
+    /// Refuses to go on where frames would be missing.
+    fn check_complete(&self) -> Result<(), EncodeError> {
+        if self.has_failed { Err(EncodeError::Stopped { frame: self.sink.writer.frames() }) } else { Ok(()) }
     }
 
     /// Reads and solves all frames of a reader, several batches at a time.
@@ -270,8 +268,7 @@ impl Encoder {
                     waiting.par_iter().map(|batch| solve(solver, batch, None, measures)).collect()
                 };
                 for (batch, solved) in waiting.into_iter().zip(solved) {
-                    let taken = self.sink.take(batch, solved);
-                    if let Some(unused) = taken.map_err(|error| self.explain(error))? {
+                    if let Some(unused) = self.sink.take(batch, solved)? {
                         // The reader may have stopped already.
                         let _ = empty.send(unused);
                     }
@@ -285,7 +282,8 @@ impl Encoder {
     }
 }
 
-/// The solver, its options, how the spectrum threshold was selected, and the seconds of [`StepClock`].
+/// The solver, its options, how the spectrum threshold was selected, and the seconds of
+/// [`StepClock`].
 fn prepare<F>(
     job: &Encode<'_, F>,
     rest: &Model,

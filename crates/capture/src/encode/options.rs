@@ -61,7 +61,8 @@ impl<'a, Files> Encode<'a, Files> {
         self.goal(Goal::MaxError(error))
     }
 
-    /// Bounds the root mean square error of the points, averaged over the frames, in diagonals of the rest pose.
+    /// Bounds the root mean square error of the points, averaged over the frames, in diagonals of
+    /// the rest pose.
     pub fn mean_error(self, error: f64) -> Self {
         self.goal(Goal::MeanError(error))
     }
@@ -96,7 +97,8 @@ impl<'a, Files> Encode<'a, Files> {
         Self { memory: Some(memory), ..self }
     }
 
-    /// What was subtracted from rest pose, cage and frames, and is added to them when the file is decoded.
+    /// What was subtracted from rest pose, cage and frames, and is added to them when the file is
+    /// decoded.
     pub fn origin(self, origin: Option<Point>) -> Self {
         Self { origin, ..self }
     }
@@ -132,7 +134,8 @@ impl<'a, Files> Encode<'a, Files> {
 }
 
 impl<'a> Encode<'a> {
-    /// Of frames of this rest pose, in memory or from any reader: see [`Self::start`] and [`Self::run`].
+    /// Of frames of this rest pose, in memory or from any reader: see [`Self::start`] and
+    /// [`Self::run`].
     pub fn new(rest: &'a Model, cage: &'a Cage) -> Self {
         Self::of(rest, cage, ())
     }

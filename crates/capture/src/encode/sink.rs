@@ -1,13 +1,14 @@
 //! Where solved frames go: into a container, as they are or coded group by group.
 
+use super::EncodeError;
 use super::batches::{Batch, SolvedBatch};
 use crate::capture::{CaptureWriter, StoredError};
-use crate::coding::{CodedGroup, CodingError, GroupCoder};
+use crate::coding::{CodedGroup, GroupCoder};
 use cager_core::decode::FrameError;
 use cager_core::inversion::Convergence;
-use cager_proto::container;
 use cager_proto::report::{Seconds, WorstError};
 use std::io::Write;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// A container that is being written, and what is found out on the way.
@@ -24,20 +25,13 @@ pub(super) struct FrameSink<W: Write> {
     pub(super) frames: usize,
     /// Of the rest pose: the unit of stored errors.
     pub(super) diagonal: f64,
-}
-
-/// Why frames are not in the file.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum SinkError {
-    #[error(transparent)]
-    Coding(#[from] CodingError),
-    #[error(transparent)]
-    Container(#[from] container::Error),
+    /// The container's.
+    pub(super) path: PathBuf,
 }
 
 impl<W: Write> FrameSink<W> {
     /// Takes the next batch; gives it back where its frames are not kept.
-    pub(super) fn take(&mut self, batch: Batch, solved: SolvedBatch) -> Result<Option<Batch>, SinkError> {
+    pub(super) fn take(&mut self, batch: Batch, solved: SolvedBatch) -> Result<Option<Batch>, EncodeError> {
         self.seconds.invert += solved.invert_seconds;
         self.seconds.measure += solved.measure_seconds;
         self.convergence.extend(solved.convergence);
@@ -54,7 +48,8 @@ impl<W: Write> FrameSink<W> {
             let clock = Instant::now();
             for (k, (cage, error)) in solved.cages.iter().zip(&solved.errors).enumerate() {
                 self.look_at(self.frames + k, error);
-                self.writer.write_frame(cage, &StoredError::new(error, self.diagonal))?;
+                let stored = StoredError::new(error, self.diagonal);
+                self.writer.write_frame(cage, &stored).map_err(|cause| EncodeError::container(&self.path, cause))?;
             }
             self.seconds.write += clock.elapsed().as_secs_f64();
             Some(batch)
@@ -64,7 +59,7 @@ impl<W: Write> FrameSink<W> {
     }
 
     /// Codes the frames that wait for a group, where there are any, and writes it.
-    pub(super) fn close_group(&mut self) -> Result<(), SinkError> {
+    pub(super) fn close_group(&mut self) -> Result<(), EncodeError> {
         let Some(coder) = self.coder.as_mut().filter(|coder| !coder.is_empty()) else { return Ok(()) };
         let clock = Instant::now();
         let CodedGroup { cages, residual, errors, farthest } = coder.close()?;
@@ -76,7 +71,8 @@ impl<W: Write> FrameSink<W> {
         }
         self.seconds.code += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        self.writer.write_group(&cages, residual.as_deref(), &stored, farthest)?;
+        let written = self.writer.write_group(&cages, residual.as_deref(), &stored, farthest);
+        written.map_err(|cause| EncodeError::container(&self.path, cause))?;
         self.seconds.write += clock.elapsed().as_secs_f64();
         Ok(())
     }

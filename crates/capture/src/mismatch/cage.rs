@@ -1,5 +1,5 @@
-//! Whether a cage belongs to a rest pose: one that leaves most points outside, or is far larger, may have other units or axes, or be
-//! that of another model.
+//! Whether a cage belongs to a rest pose: one that leaves most points outside, or is far larger,
+//! may have other units or axes, or be that of another model.
 
 use cager_cages::diagnosis::alignment;
 use cager_geometry::mesh::{Model, TriMesh, diagonal};
@@ -8,7 +8,7 @@ use cager_geometry::spatial::outside;
 /// A cage larger than its model by this factor is checked for other units.
 const ROOMY: f64 = 5.0;
 
-/// What is wrong with a cage that does not look like one of this rest pose, in words that follow its name; `None` if it plausibly is.
+/// How a cage does not look like one of this rest pose, in words that follow its name.
 pub fn cage_mismatch(cage: &TriMesh, rest: &Model) -> Option<String> {
     let missed = outside(cage, &rest.points).len();
     let most_outside = 2 * missed > rest.points.len();

@@ -1,4 +1,4 @@
-//! Whether the faces of a frame's own file name the points of the rest pose: exporters that renumber points renumber the faces with them.
+//! Whether a frame's faces name the points of the rest pose: exporters renumber both together.
 
 use super::quartiles;
 use cager_geometry::mesh::{Point, Polygons};
@@ -29,8 +29,9 @@ impl FaceComparison {
         Self { renumbered: is_renumbered(rest, frame, points), missing, foreign }
     }
 
-    /// Whether the points of the frame come in another order than those of the rest pose. Faces split otherwise, left out or listed in
-    /// another order do not show that: then edges that the frame lacks are about as long in it as those that it has instead.
+    /// Whether the points of the frame come in another order than those of the rest pose. Faces
+    /// split otherwise, left out or listed in another order do not show that: then edges that the
+    /// frame lacks are about as long in it as those that it has instead.
     pub(super) fn shows_another_order(&self, rest: &[Point], frame: &[Point], scale: f64) -> bool {
         if self.missing.is_empty() || self.foreign.is_empty() {
             return false;

@@ -1,5 +1,7 @@
-//! Whether a frame is mirrored: whether the best affine maps of the rest pose's regions onto it have a negative determinant. Regions of a moving model, large
-//! or small, stay nearly rigid; those that do not tell nothing, and neither do flat ones and sheets, whose waves are mirrored as they pass.
+//! Whether a frame is mirrored: whether the best affine maps of the rest pose's regions onto it
+//! have a negative determinant. Regions of a moving model, large or small, stay nearly rigid; those
+//! that do not tell nothing, and neither do flat ones and sheets, whose waves are mirrored as they
+//! pass.
 
 use cager_geometry::linalg::symmetric_eigen;
 use cager_geometry::mesh::Point;
@@ -7,7 +9,7 @@ use cager_geometry::vector::{cross, dot, mean, sub};
 use std::fmt;
 use std::ops::Range;
 
-/// Points looked at, the smallest regions they are cut into at the most, and points looked at in a region.
+/// Points looked at, smallest regions at the most, and points looked at in a region.
 const POINTS: usize = 4096;
 const REGIONS: usize = 32;
 const REGION_POINTS: usize = 256;
@@ -15,14 +17,15 @@ const REGION_POINTS: usize = 256;
 const LEAST_POINTS: usize = 8;
 /// A region is flat whose thickness is less than this share of its length.
 const FLAT: f64 = 0.03;
-/// A region has two sides where so large a share of its points lie behind one another: this many times as far apart along its thickness as across it.
+/// A region has two sides where this share of its points lie behind one another: so many times as
+/// far apart along its thickness as across.
 const TWO_SIDED: f64 = 0.35;
 const BEHIND: f64 = 2.0;
-/// It moves nearly rigidly where what the map leaves is less than this share of the distance of its sides, and no direction is scaled by more beside the
-/// others.
+/// It moves nearly rigidly where the map's residual is below this share of its thickness, and no
+/// direction is scaled by more beside the others.
 const RESIDUAL: f64 = 0.3;
 const STRETCH: f64 = 3.0;
-/// Share of the regions that must agree, of those that tell, and of the smallest ones that these must cover.
+/// Shares of the regions that must agree, and of the smallest that must tell.
 const AGREEING: f64 = 0.9;
 const TELLING: f64 = 0.1;
 /// A permutation of the axes is told where it is this near to the maps; 1 is equal.
@@ -78,7 +81,7 @@ impl Regions {
         regions
     }
 
-    /// Adds a region and those that it is cut into, across its longest extent, down to `most` points.
+    /// Adds a region and its parts, cut across the longest extent, down to `most` points.
     fn cut(&mut self, most: usize, mut points: Vec<u32>, rest: &[Point]) {
         let first = self.smallest;
         let some = points.iter().step_by(points.len().div_ceil(REGION_POINTS).max(1)).copied().collect();
@@ -148,7 +151,8 @@ impl Region {
         Some(Self { points, arms, inverse, thickness, parts })
     }
 
-    /// The best affine map onto a frame, scaled to one, and whether it mirrors; `None` where the region does not move nearly rigidly.
+    /// The best affine map onto a frame, scaled to one, and whether it mirrors; `None` where it is
+    /// not nearly rigid.
     fn map_to(&self, frame: &[Point]) -> Option<([Point; 3], bool)> {
         let at: Vec<Point> = self.points.iter().map(|&v| frame[v as usize]).collect();
         let centre = mean(&at);

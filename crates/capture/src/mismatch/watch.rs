@@ -1,9 +1,10 @@
-//! Watches the frames of a capture as they are read: from some frame on, points may come in another order, in another unit or mirrored. A few
-//! hundred edges of each frame are compared with those of the rest pose and of the frame before, and regions with those at rest.
+//! Watches the frames of a capture as they are read: from some frame on, points may come in another
+//! order, in another unit or mirrored. A few hundred edges of each frame are compared with those of
+//! the rest pose and of the frame before, and regions with those at rest.
 
 use super::faces::FaceComparison;
 use super::hand::{Mirroring, Regions};
-use super::{factor, neighbours, quartiles};
+use super::{described, neighbours, quartiles, relative_size};
 use cager_geometry::mesh::{Model, Point, Polygons};
 use cager_geometry::vector::{distance, sub};
 use std::fmt;
@@ -12,7 +13,7 @@ use std::fmt;
 const EDGES: usize = 256;
 const POINTS: usize = 1 << 16;
 
-/// Ratios of units that no model grows or shrinks by from one frame to the next, which it may by smaller ones.
+/// Ratios of units that no model grows or shrinks by from one frame to the next.
 const UNITS: [f64; 7] = [25.4, 30.48, 39.37, 100.0, 304.8, 1000.0, 1e6];
 
 /// An edge is torn where it is this many times longer than before, for the size of its model.
@@ -27,7 +28,7 @@ pub enum Departure {
     Faces,
     /// It is this many times as large as the frame before it.
     Units(f64),
-    /// Left and right are exchanged: how the axes are beside those of the rest pose, where that can be told.
+    /// Left and right are exchanged: how the axes are, where that can be told.
     Mirrored(Option<Mirroring>),
 }
 
@@ -41,14 +42,10 @@ impl fmt::Display for Departure {
                 f.write_str("its points come in another order: its faces have other numbers for the same points")
             }
             Self::Units(ratio) => {
-                let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
-                write!(f, "it is {} times {how} than what comes before it, as with other units", factor(times))
+                write!(f, "it is {} than what comes before it, as with other units", relative_size(ratio))
             }
-            Self::Mirrored(Some(mirroring)) => {
-                write!(f, "it is mirrored ({mirroring} in it), and what comes before it is not")
-            }
-            Self::Mirrored(None) => {
-                f.write_str("it is mirrored (left is right in it), and what comes before it is not")
+            Self::Mirrored(mirroring) => {
+                write!(f, "it is mirrored ({} in it), and what comes before it is not", described(mirroring))
             }
         }
     }
@@ -78,7 +75,7 @@ impl Watch {
 #[derive(Default)]
 pub struct Progress {
     previous: Option<Sketch>,
-    /// Faces of a frame that differ from those of the rest pose; most captures have the same ones throughout.
+    /// Faces of a frame that differ from those of the rest pose.
     other_faces: Option<(Polygons, FaceComparison)>,
     /// Whether the last frame that tells was mirrored.
     is_mirrored: bool,
@@ -157,8 +154,8 @@ impl Sketch {
         (self.radius / other.radius).ln().abs() < 2_f64.ln()
     }
 
-    /// A jump of all edges and of the extent alike by the ratio of two units, away from the rest pose's size. Growth takes several
-    /// frames or other ratios.
+    /// A jump of all edges and of the extent alike by the ratio of two units, away from the rest
+    /// pose's size. Growth takes several frames or other ratios.
     fn in_other_units(&self, previous: &Self, rest: &Self) -> Option<Departure> {
         if !previous.is_as_large_as(rest) || self.is_as_large_as(previous) {
             return None;
@@ -171,7 +168,8 @@ impl Sketch {
         (even && UNITS.iter().any(|unit| (away / unit).ln().abs() < 0.05)).then_some(Departure::Units(edges))
     }
 
-    /// Edges are torn although their ends lie where other points of the model were: where points fly apart, they lie where none was.
+    /// Edges are torn although their ends lie where other points were; of points that fly apart
+    /// they do not.
     fn in_another_order(&self, previous: &Self, rest: &Self) -> Option<Departure> {
         let torn = self.torn(previous, rest);
         let least = 8.max(self.lengths.len() / 20);
@@ -179,21 +177,21 @@ impl Sketch {
             return None;
         }
         let [_, times, _] = quartiles(torn.iter().map(|(_, ratio)| *ratio).collect())?;
-        // From one frame to the next points go less far than from the rest pose; but one that is torn itself says nothing.
+        // Points go less far from one frame to the next; but a torn frame says nothing.
         let is_whole = previous.torn(rest, rest).len() < least;
         let exchanged =
             is_whole && self.exchanges_points(previous, &torn, 0.03) || self.exchanges_points(rest, &torn, 0.2);
         exchanged.then_some(Departure::Order(times))
     }
 
-    /// The edges that are torn in comparison with two other poses, and how many times longer they are.
+    /// The edges that are torn beside two other poses, and how many times longer they are.
     fn torn(&self, one: &Self, other: &Self) -> Vec<(usize, f64)> {
         let relative = |sketch: &Self, k: usize| sketch.lengths[k] / sketch.radius;
         let ratio = |k: usize| relative(self, k) / relative(one, k).max(relative(other, k));
         (0..self.lengths.len()).map(|k| (k, ratio(k))).filter(|(_, ratio)| *ratio > TORN).collect()
     }
 
-    /// Whether the ends of torn edges, at least so far from where they were, are where other points were.
+    /// Whether ends of torn edges, at least so far from their place, are where others were.
     fn exchanges_points(&self, before: &Self, torn: &[(usize, f64)], least: f64) -> bool {
         let place = |sketch: &Self, p: Point| sub(p, sketch.centre).map(|x| x / sketch.radius);
         let set: Vec<Point> = before.points.iter().map(|&p| place(before, p)).collect();

@@ -1,22 +1,21 @@
-//! The results of a comparison as plain data: the content of `--json`, and of the tables and charts of the report.
+//! The results of a comparison as plain data, for `--json` and the report.
 
 mod random;
 mod spectra;
 mod summary;
 mod swaps;
-mod vectors;
 
 pub(crate) use random::{DRAW_FRAMES, DRAWS, Draw, draws};
-pub(crate) use spectra::Spectra;
+pub(crate) use spectra::{Spectra, Vectors};
 pub(crate) use summary::{Claim, Recommendation, claims, recommend};
 pub(crate) use swaps::Swaps;
-pub(crate) use vectors::Vectors;
 
 use super::evaluation::{PerFrame, Totals};
 use super::methods::Method;
 use serde::Serialize;
 
-/// Everything a comparison finds out. Lengths are fractions of the rest pose's bounding-box diagonal.
+/// Everything a comparison finds out. Lengths are fractions of the rest pose's bounding-box
+/// diagonal.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figures {
     /// Version of the program.
@@ -34,35 +33,25 @@ pub struct Figures {
 /// The capture and its cage.
 #[derive(Clone, Debug, Serialize)]
 pub struct Capture {
-    /// Rest pose, as given.
     pub(crate) rest: String,
-    /// Cage, as given.
     pub(crate) cage: String,
     /// Whether the cage's faces pointed inwards and were turned.
     pub(crate) flip_cage: bool,
-    /// Frames, as given.
     pub(crate) source: String,
-    /// Points of the model, n.
     pub(crate) points: usize,
-    /// Triangles of the model; 0 for a point cloud.
     pub(crate) triangles: usize,
-    /// Vertices of the cage.
     pub(crate) cage_vertices: usize,
-    /// Triangles of the cage.
     pub(crate) cage_faces: usize,
-    /// Frames of the capture.
     pub(crate) frames: usize,
     /// Frames whose errors and spikes are measured, from 0; each with its neighbours.
     pub measured: Vec<usize>,
     /// Diagonal of the rest pose's bounding box, in the capture's unit.
     pub(crate) diagonal: f64,
-    /// Mean second temporal difference of the model's own points; null where there are fewer than three frames.
+    /// Mean second temporal difference of the model's points; null for fewer than three frames.
     pub(crate) motion_mean: f64,
-    /// The largest one.
     pub(crate) motion_max: f64,
-    /// The frame whose cages and models the report draws: that of the largest spike of full least squares.
+    /// The frame that the report draws: that of the largest spike of full least squares.
     pub(crate) shown: usize,
-    /// Radius of the noise of the noise test.
     pub(crate) noise_radius: f64,
 }
 
@@ -77,7 +66,6 @@ pub struct System {
     pub(crate) figures: Option<Box<SystemFigures>>,
 }
 
-/// What was found about a coordinate system.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct SystemFigures {
     /// Unknowns per frame, m.
@@ -86,13 +74,11 @@ pub(crate) struct SystemFigures {
     pub(crate) rank: usize,
     /// `max_i |Φ C_R − P_R|_i`.
     pub(crate) affine_reproduction_error: f64,
-    /// Points outside the cage.
     pub(crate) outside: usize,
     /// Singular values and condition numbers (Figs. 6, 9).
     pub(crate) spectra: Spectra,
     /// Volume and condition number after every swap (Fig. 4).
     pub(crate) swaps: Swaps,
-    /// Handles drawn at random (Fig. 3).
     pub(crate) random: Vec<Draw>,
     /// Every method (Figs. 8, 12–14, 18–20).
     pub(crate) methods: Vec<MethodFigures>,
@@ -104,15 +90,11 @@ pub(crate) struct SystemFigures {
     pub(crate) seconds: Seconds,
 }
 
-/// What was found about a method.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct MethodFigures {
-    /// What it is.
     #[serde(flatten)]
     pub(crate) method: Method,
-    /// Means and maxima.
     pub(crate) totals: Totals,
-    /// Every measured frame.
     pub(crate) per_frame: PerFrame,
     /// Seconds of one inversion, on one thread, in a batch: the least of all batches.
     pub(crate) frame_seconds: f64,
@@ -121,12 +103,10 @@ pub(crate) struct MethodFigures {
 /// A method on frames with noise.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct NoiseFigures {
-    /// What it is.
     #[serde(flatten)]
     pub(crate) method: Method,
     /// Means and maxima, errors against the frames with noise, as the paper has them.
     pub(crate) totals: Totals,
-    /// Every measured frame.
     pub(crate) per_frame: PerFrame,
     /// Mean L2 against the frames without noise.
     pub(crate) clean_l2_mean: f64,
@@ -134,14 +114,11 @@ pub(crate) struct NoiseFigures {
     pub(crate) clean_linf_max: f64,
 }
 
-/// Times of the preparation.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct Seconds {
-    /// Computing `Φ`.
     pub(crate) coordinates: f64,
-    /// Choosing the handles.
     pub(crate) maxvol: f64,
-    /// Decompositions of the handles and of all points, and the operator of the method in [`Self::per_frame`].
+    /// Decompositions of the handles and of all points, and the operator of `per_frame`.
     pub(crate) svd: f64,
     /// Inverting one frame by the paper's method at the usual threshold.
     pub(crate) per_frame: f64,

@@ -4,24 +4,21 @@ use crate::evaluation::Totals;
 use crate::noise::Random;
 use serde::Serialize;
 
-/// Draws at random.
 pub(crate) const DRAWS: u64 = 10;
 
-/// Frames at which draws are measured where every inversion iterates, each with its neighbours: there they would take most of the time.
+/// Frames at which draws are measured where inversions iterate, which would take most of the time.
 pub(crate) const DRAW_FRAMES: usize = 6;
 
 /// One choice of as many points as unknowns.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Draw {
-    /// How the points were chosen.
     pub(crate) choice: String,
-    /// Numerical rank of their rows.
     pub(crate) rank: usize,
-    /// Condition number of their rows; of rows that are dependent to the working precision, what rounding makes of it.
+    /// Condition number of their rows; of dependent ones, what rounding makes of it.
     pub(crate) condition: f64,
     /// Errors and spikes of the data alone.
     pub(crate) data_alone: Totals,
-    /// The same with sub-spectral regularisation at the usual threshold, which also takes whatever is all but dependent.
+    /// The same with sub-spectral regularisation at the usual threshold.
     pub(crate) totals: Totals,
 }
 

@@ -8,7 +8,7 @@ use cager_core::inversion::Handles;
 use cager_core::regularize::Regularizer;
 use serde::Serialize;
 
-/// A method is accurate enough to be recommended where its mean L2 is at most this many times the lowest of its system.
+/// A method is accurate where its mean L2 is at most this many times the lowest of its system.
 const ACCURATE: f64 = 1.4;
 /// Relative differences below this do not count.
 const CLEAR: f64 = 0.02;
@@ -20,25 +20,22 @@ pub struct Recommendation {
     pub editing: Option<Choice>,
     /// The method of the lowest error.
     pub accuracy: Option<Choice>,
-    /// Bound on the mean L2 of the accurate ones, as a multiple of the lowest of their system: systems that follow the capture more
-    /// closely by cages full of spikes do not rule out the others.
+    /// Bound on the mean L2 of the accurate ones, as a multiple of the lowest of their system:
+    /// systems that follow the capture more closely by cages full of spikes do not rule out the
+    /// others.
     pub(crate) accurate: f64,
 }
 
 /// A method of a system.
 #[derive(Clone, Debug, Serialize)]
 pub struct Choice {
-    /// Coordinate system.
     pub(crate) system: String,
-    /// In words.
     pub(crate) method: String,
     /// Options of `cager encode`.
     pub flags: String,
     /// Mean L2.
     pub l2_mean: f64,
-    /// Mean of the measure of smoothness.
     pub(crate) smoothness: f64,
-    /// What that measure is.
     pub(crate) smoothness_of: Smoothness,
 }
 
@@ -48,7 +45,7 @@ pub struct Choice {
 pub(crate) enum Smoothness {
     /// The second temporal difference of a cage vertex, over the rest diagonal.
     SecondDifference,
-    /// The change of an edge's length, over the mean length of the rest cage's edges: where no three frames follow each other.
+    /// The change of an edge's length over the mean one, where no three frames follow each other.
     Edges,
 }
 
@@ -92,11 +89,9 @@ fn choices(system: &System) -> Vec<Choice> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Verdict {
-    /// The figures agree.
     Holds,
     /// The figures do not differ clearly, or agree in part.
     InPart,
-    /// The figures say otherwise.
     Fails,
 }
 
@@ -105,17 +100,13 @@ pub(crate) enum Verdict {
 pub(crate) struct Claim {
     /// Coordinate system it was measured with.
     pub(crate) system: String,
-    /// What the paper says.
     pub(crate) statement: &'static str,
-    /// Where it says so.
     pub(crate) source: &'static str,
-    /// What was measured.
     pub(crate) measured: String,
-    /// What became of it.
     pub(crate) verdict: Verdict,
 }
 
-/// The paper's claims, held against every system that could be computed; `usual` is the usual threshold.
+/// The paper's claims, held against every system that could be computed.
 pub(crate) fn claims(systems: &[System]) -> Vec<Claim> {
     let mut all = Vec::new();
     for system in systems {
@@ -205,7 +196,7 @@ fn random(figures: &SystemFigures) -> Option<Claim> {
 
 fn maxvol_spikes(figures: &SystemFigures) -> Option<Claim> {
     let full = figures.method(Method::is_full_least_squares)?;
-    let maxvol = figures.method(|m| m.handles == Handles::MaxVol && m.regularizer == Regularizer::None)?;
+    let maxvol = figures.method(|m| m.is(Handles::MaxVol, Regularizer::None))?;
     spikes_known(&[full, maxvol])?;
     claim(
         "Maxvol alone removes many of the cage's instabilities, at a slightly higher error.",
@@ -236,9 +227,8 @@ fn usual(figures: &SystemFigures) -> Option<&MethodFigures> {
 }
 
 fn sub_spectral(figures: &SystemFigures) -> Option<Claim> {
-    let (cager, plain) =
-        (usual(figures)?, figures.method(|m| m.handles == Handles::MaxVol && m.regularizer == Regularizer::None)?);
-    let global = figures.method(|m| m.handles == Handles::MaxVol && m.regularizer == Regularizer::Global)?;
+    let (cager, plain) = (usual(figures)?, figures.method(|m| m.is(Handles::MaxVol, Regularizer::None))?);
+    let global = figures.method(|m| m.is(Handles::MaxVol, Regularizer::Global))?;
     spikes_known(&[cager, plain])?;
     claim(
         "Regularising the end of the spectrum lowers spikes, and costs less accuracy than regularising all of it at the same λ.",
@@ -260,7 +250,7 @@ fn sub_spectral(figures: &SystemFigures) -> Option<Claim> {
 
 fn rival(figures: &SystemFigures) -> Option<Claim> {
     let cager = usual(figures)?;
-    let rival = figures.method(|m| m.handles == Handles::All && m.regularizer == Regularizer::Global)?;
+    let rival = figures.method(|m| m.is(Handles::All, Regularizer::Global))?;
     claim(
         "The method is more accurate than globally regularised least squares over all points.",
         "§6.3, Fig. 18",

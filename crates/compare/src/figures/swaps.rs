@@ -9,22 +9,20 @@ use serde::Serialize;
 
 /// Condition numbers are computed after at most this many swaps, evenly spaced.
 const CONDITIONS: usize = 24;
-/// From more coordinates than this, the search with a random start takes evenly spaced points: it needs many swaps.
+/// Of more coordinates than this, the search with a random start takes evenly spaced points.
 const MAX_ENTRIES: usize = 6_000_000;
-/// Points drawn for a random start, as multiples of the unknowns: among few there may be no independent ones, and all of them
-/// would be no draw.
+/// Points drawn for a random start, as multiples of the unknowns: among few there may be no
+/// independent ones, and all of them would be no draw.
 const DRAWN: [usize; 7] = [2, 3, 4, 5, 6, 8, 16];
 
-/// Both searches.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Swaps {
     /// From the rows that LU with partial pivoting picks, as every encoding does it.
     pub(crate) from_lu: Option<SwapTrace>,
-    /// From rows that LU picks among a few points drawn at random; null where no independent ones were found.
+    /// From rows that LU picks among points drawn at random; null where none are independent.
     pub(crate) from_random: Option<SwapTrace>,
 }
 
-/// One search.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct SwapTrace {
     /// Points it chose from.
@@ -38,7 +36,6 @@ pub(crate) struct SwapTrace {
 }
 
 impl Swaps {
-    /// Of an analysis.
     pub(crate) fn of(analysis: &Analysis) -> Self {
         let phi = analysis.coordinates();
         let all: Vec<u32> = (0..phi.nrows() as u32).collect();
@@ -91,7 +88,6 @@ impl SwapTrace {
         Self { points: rows.len(), log_volume, after, condition }
     }
 
-    /// Number of swaps.
     pub(crate) fn swaps(&self) -> usize {
         self.log_volume.len() - 1
     }

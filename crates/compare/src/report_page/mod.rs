@@ -1,5 +1,5 @@
-//! Reports to look at in a browser, of one HTML file each: the page of `web/src/report`, which the program holds, with figures and geometry as
-//! JSON in it.
+//! Reports to look at in a browser, of one HTML file each: the page of `web/src/report`, which the
+//! program holds, with figures and geometry as JSON in it.
 
 mod numbers;
 mod shown_mesh;
@@ -20,7 +20,7 @@ const BEFORE: &str = "<script type=\"application/json\" id=\"report\">";
 /// Why there is no page, and how to get one.
 pub const NO_PAGE: &str = "this program was built without the page of its reports; to get it, install Node 20.19 or later, run make web where the program is built, and build the program again";
 
-/// What a page holds. Lengths in `figures` are fractions of the rest pose's diagonal, those in `geometry` in the unit of the files.
+/// What a page holds: `figures` in diagonals of the rest pose, `geometry` in the unit of the files.
 #[derive(Serialize)]
 pub struct Contents<'a, F: Serialize, G: Serialize> {
     /// Which report it is.
@@ -72,7 +72,7 @@ impl ReportPage {
     }
 }
 
-/// Writes numbers in single precision, which is finer than any chart, and no character that would end a script element.
+/// Writes numbers in single precision, and no character that would end a script element.
 struct ForPages;
 
 impl Formatter for ForPages {

@@ -22,9 +22,7 @@ pub(super) fn indices(values: impl IntoIterator<Item = u32>, vertices: usize) ->
 /// A box along the axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Box3 {
-    /// Its lowest corner.
     pub(crate) low: Point,
-    /// Its highest corner.
     pub(crate) high: Point,
 }
 
@@ -51,7 +49,8 @@ pub struct Quantised {
 }
 
 impl Quantised {
-    /// With 8 or 16 bits over the points' bounding box, as far as it lies within `most`; what lies beyond is moved to its border.
+    /// With 8 or 16 bits over the points' bounding box within `most`; points beyond are moved to
+    /// its border.
     pub fn new(points: &[Point], bits: u32, most: Box3) -> Self {
         let finite: Vec<Point> = points.iter().filter(|p| p.iter().all(|x| x.is_finite())).copied().collect();
         let (low, high) = if finite.is_empty() { ([0.0; 3], [0.0; 3]) } else { bounds(&finite) };

@@ -1,4 +1,4 @@
-//! Model and cage as a page draws them. Large models are thinned: a page is to stay small, and a picture of some hundred pixels shows no more.
+//! Model and cage as a page draws them; large models are thinned.
 
 use super::Up;
 use super::numbers::{Box3, Quantised, floats, indices};
@@ -25,8 +25,9 @@ pub struct ShownMesh {
 }
 
 impl ShownMesh {
-    /// Shows at most about `most` points: of a larger model one for each cell of a grid, that nearest to the cell's middle, and the triangles between
-    /// different cells (vertex clustering, Rossignac and Borrel 1993).
+    /// Shows at most about `most` points: of a larger model one for each cell of a grid, that
+    /// nearest to the cell's middle, and the triangles between different cells (vertex clustering,
+    /// Rossignac and Borrel 1993).
     pub fn new(mesh: &TriMesh, up: Option<Up>, most: usize) -> Self {
         let (shown, triangles) = match mesh.vertices.len() {
             all if all <= most => ((0..all as u32).collect(), mesh.triangles.clone()),

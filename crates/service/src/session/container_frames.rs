@@ -41,7 +41,7 @@ impl<W: Write> ContainerFrames<W> {
             units: geometry.units,
         };
         let coded = geometry.coded.as_ref().map(|(rest, cage)| (rest, cage));
-        let writer = CaptureWriter::with_meshes(out, &encoding, coded).map_err(plain)?;
+        let writer = CaptureWriter::new(out, &encoding, coded).map_err(plain)?;
         let points = geometry.rest.points.len();
         Ok(Self { writer, diagonal: prepared.solver.diagonal(), points, carried: Carried::default(), completes: false })
     }
