@@ -2,49 +2,42 @@
 
 pub use crate::messages::JobState as CageState;
 use crate::messages::Problem;
+use crate::options::options;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
-/// What a cage is designed to be, the JSON part `options` of `POST /v1/cages`. What is left out has its default.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct CageOptions {
-    /// A name for people, at most 200 characters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(max_length = 200))]
-    pub name: Option<String>,
-    /// Most vertices of the cage; 350 where neither this nor `mean_error` is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 4, maximum = 20000))]
-    pub vertices: Option<u32>,
-    /// Instead of `vertices`: as few as keep the mean L2 error on frames that the design does not see at or below this fraction of
-    /// the rest pose's diagonal.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
-    pub mean_error: Option<f64>,
-    /// Coordinate system that the cage is designed for: `mvc`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^mvc$"))]
-    pub coordinates: Option<String>,
-    /// `free` (the default): whatever reproduces the motion best; or `editable`: enclosing, without self-intersection, and smooth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub style: Option<CageStyle>,
-    /// Seed of what is drawn at random; 0 where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub seed: Option<u64>,
-    /// Seconds after which the best cage so far is the result; at most what the service allows, which is also the default.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
-    pub time_limit_s: Option<f64>,
-    /// Number of frames in the part `frames`; needed where those are raw numbers.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub frames: Option<u32>,
+options! {
+    /// The JSON part `options` of `POST /v1/cages`. What is left out has its default.
+    pub struct CageOptions {
+        /// A name for people, at most 200 characters.
+        #[schema(max_length = 200)]
+        name: Option<String>,
+        /// Most vertices of the cage; 350 where neither this nor `mean_error` is given.
+        #[schema(minimum = 4, maximum = 20000)]
+        vertices: Option<u32>,
+        /// Instead of `vertices`: as few as keep the mean L2 error on frames that the design does
+        /// not see at or below this fraction of the rest pose's diagonal.
+        #[schema(exclusive_minimum = 0)]
+        mean_error: Option<f64>,
+        /// Coordinate system that the cage is designed for: `mvc`.
+        #[schema(pattern = "^mvc$")]
+        coordinates: Option<String>,
+        /// `free` (the default): whatever reproduces the motion best; or `editable`: enclosing,
+        /// without self-intersection, and smooth.
+        style: Option<CageStyle>,
+        /// Seed of what is drawn at random; 0 where it is left out.
+        seed: Option<u64>,
+        /// Seconds after which the best cage is the result; by default what the service allows.
+        #[schema(exclusive_minimum = 0)]
+        time_limit_s: Option<f64>,
+        /// Number of frames in the part `frames`; needed where those are raw numbers.
+        #[schema(minimum = 1)]
+        frames: Option<u32>,
+    }
 }
 
 /// What a cage is designed for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CageStyle {
     /// Compression and viewing.
@@ -55,21 +48,19 @@ pub enum CageStyle {
 }
 
 /// Mean L2 errors of a cage as fractions of the rest pose's diagonal.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 #[serde(default)]
 pub struct CageError {
     /// On the frames that the design is made from; null until a stage is done.
     pub designed: Option<f64>,
     /// On the frames between them, by which the best cage is chosen.
     pub held_back: Option<f64>,
-    /// Of the final cage on stretches of time that neither saw; null before it is there, and where there are too few frames.
+    /// Of the final cage on stretches of time that neither saw; null where frames are few.
     pub unseen: Option<f64>,
 }
 
 /// What one stage of a design brought.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct CageStage {
     /// What was done.
     pub name: String,
@@ -77,7 +68,7 @@ pub struct CageStage {
     pub vertices: u32,
     /// Errors after it.
     pub error: CageError,
-    /// Condition number of the coordinates after it; null where they are singular, and where it was not computed.
+    /// Condition number of the coordinates after it; null where singular or not computed.
     pub condition_number: Option<f64>,
     /// Whether the coordinates were singular after it.
     #[serde(default)]
@@ -87,8 +78,7 @@ pub struct CageStage {
 }
 
 /// The design of a cage.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct CageJob {
     /// Identifier, part of every address below it.
     pub id: String,
@@ -111,7 +101,7 @@ pub struct CageJob {
     /// What is being done, in a few words; null while it waits and when it is over.
     pub stage: Option<String>,
     /// How much of the work is done, from 0 to 1.
-    #[cfg_attr(feature = "schema", schema(minimum = 0, maximum = 1))]
+    #[schema(minimum = 0, maximum = 1)]
     pub fraction: f64,
     /// Errors of the best cage so far.
     pub error: CageError,
@@ -129,8 +119,7 @@ pub struct CageJob {
 }
 
 /// A page of designs, newest first.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct CageJobList {
     /// The designs.
     pub cages: Vec<CageJob>,
@@ -139,18 +128,17 @@ pub struct CageJobList {
 }
 
 /// Progress of a design, the data of a server-sent event.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct CageProgress {
     /// What it is doing.
     pub state: CageState,
     /// What is being done, in a few words.
     pub stage: Option<String>,
     /// How much of the work is done, from 0 to 1.
-    #[cfg_attr(feature = "schema", schema(minimum = 0, maximum = 1))]
+    #[schema(minimum = 0, maximum = 1)]
     pub fraction: f64,
     /// Vertices of the best cage so far; null before the first.
     pub vertices: Option<u32>,
-    /// Mean L2 error of the best cage so far on the frames that it is chosen by, as a fraction of the rest pose's diagonal.
+    /// Mean L2 error of the best cage so far, on the frames that it is chosen by.
     pub error: Option<f64>,
 }

@@ -16,20 +16,14 @@ pub fn f32_bytes(values: &[f32]) -> Vec<u8> {
     bytes
 }
 
-/// Replaces `out` by the `f32` values in `bytes`; a remainder of fewer than four bytes is left out.
-pub fn read_f32(bytes: &[u8], out: &mut Vec<f32>) {
-    out.clear();
-    out.extend(f32_values(bytes));
-}
-
 /// The `f32` values in `bytes`; a remainder of fewer than four bytes is left out.
 pub fn f32s(bytes: &[u8]) -> Vec<f32> {
-    f32_values(bytes).collect()
+    values(bytes, f32::from_le_bytes).collect()
 }
 
 /// The first of the `f32` values in `bytes` that is not finite.
 pub fn first_not_finite(bytes: &[u8]) -> Option<usize> {
-    // NaN and infinity have an exponent of all ones; a branch-free fold finds them at memory bandwidth.
+    // NaN and infinity have an exponent of all ones; a branch-free fold finds them fast.
     let suspicious = |b: &[u8]| u8::from(b[3] & 0x7f == 0x7f && b[2] & 0x80 == 0x80);
     if bytes.chunks_exact(4).fold(0, |any, b| any | suspicious(b)) == 0 {
         return None;
@@ -37,34 +31,14 @@ pub fn first_not_finite(bytes: &[u8]) -> Option<usize> {
     bytes.chunks_exact(4).position(|b| suspicious(b) == 1)
 }
 
-/// The `f32` values in `bytes`; a remainder of fewer than four bytes is left out.
-pub(crate) fn f32_values(bytes: &[u8]) -> impl ExactSizeIterator<Item = f32> {
-    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+/// The numbers of `N` bytes in `bytes`; a remainder of fewer bytes is left out.
+pub fn values<const N: usize, T>(bytes: &[u8], read: fn([u8; N]) -> T) -> impl ExactSizeIterator<Item = T> {
+    bytes.as_chunks().0.iter().map(move |&number| read(number))
 }
 
-/// The `u32` values in `bytes`; a remainder of fewer than four bytes is left out.
-pub(crate) fn u32_values(bytes: &[u8]) -> impl ExactSizeIterator<Item = u32> {
-    bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-}
-
-/// The `u16` at `at`. The caller knows that `bytes` is long enough.
-pub(crate) fn u16_at(bytes: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes([bytes[at], bytes[at + 1]])
-}
-
-/// The `u32` at `at`. The caller knows that `bytes` is long enough.
-pub(crate) fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
-}
-
-/// The `f32` at `at`. The caller knows that `bytes` is long enough.
-pub(crate) fn f32_at(bytes: &[u8], at: usize) -> f32 {
-    f32::from_bits(u32_at(bytes, at))
-}
-
-/// The `u64` at `at`. The caller knows that `bytes` is long enough.
-pub(crate) fn u64_at(bytes: &[u8], at: usize) -> u64 {
-    u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
+/// The number at `at`. The caller knows that `bytes` is long enough.
+pub(crate) fn value_at<const N: usize, T>(bytes: &[u8], at: usize, read: fn([u8; N]) -> T) -> T {
+    read(std::array::from_fn(|k| bytes[at + k]))
 }
 
 #[cfg(test)]

@@ -2,18 +2,18 @@
 //!
 //! Lengths are fractions of the rest pose's bounding-box diagonal, times are seconds.
 
-use crate::object::Object;
 pub use crate::report::ConditionNumber;
+pub use crate::session_options::{CageSource, SessionOptions};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// What a session is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SessionState {
     /// Coordinates, handles and operator are being computed.
     Preparing,
-    /// Frames are accepted. Where there is a `problem`, the session was completed, and is to be completed again.
+    /// Frames are accepted. With a `problem`, the session is to be completed again.
     Ready,
     /// All frames are there and the container is written; nothing changes any more.
     Completed,
@@ -22,8 +22,7 @@ pub enum SessionState {
 }
 
 /// What a job is doing that is created as a whole.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum JobState {
     /// It waits for its turn.
@@ -43,137 +42,8 @@ impl JobState {
     }
 }
 
-/// Choices for a session, the JSON part `options` of its creation. What is left out has its default.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct SessionOptions {
-    /// A name for people, at most 200 characters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(max_length = 200))]
-    pub name: Option<String>,
-    /// Coordinate system: `mvc`, `harmonic`, `green` (normals follow from the vertices) or `green-free` (normals are unknowns).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|harmonic|green|green-free)$"))]
-    pub coordinates: Option<String>,
-    /// Points the inversion reads: `spread`, `maxvol`, `rectangular` or `all`. Where it is left out `spread`, or `all` where frames are coded
-    /// (except with `green`).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(maxvol|rectangular|spread|all)$"))]
-    pub handles: Option<String>,
-    /// How many points `rectangular` and `spread` read, from the number of unknowns to that of points; twice the unknowns where it
-    /// is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub handle_count: Option<u32>,
-    /// Treatment of the unstable end of the spectrum: `differential` (where it is left out: keeps the shape of the rest cage),
-    /// `laplacian`, `temporal` (frames have to come in order), `matrix` (with a part `regularizer_matrix`), `none`, `truncated-svd`,
-    /// `tikhonov` or `global`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(
-        feature = "schema",
-        schema(pattern = "^(laplacian|differential|temporal|matrix|none|truncated-svd|tikhonov|global)$")
-    )]
-    pub regularizer: Option<String>,
-    /// Spectrum threshold: how many of the last singular directions are regularised; 20, or a sixteenth of the unknowns where that
-    /// is less, where it is left out. Where frames are coded (except with `green`) and neither it, `lambda` nor another regularizer than `differential` is
-    /// given, all are, with a `lambda` of 0.001.
-    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "threshold")]
-    pub spectrum: Option<u32>,
-    /// Weight of the regularisation; 1 where it is left out, but see `spectrum`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 0))]
-    pub lambda: Option<f64>,
-    /// Where the cage comes from if none is sent as a part; made from the rest pose where this is left out as well.
-    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "cage_source")]
-    pub cage: Option<CageSource>,
-    /// Turn a cage inside out whose faces all point inwards.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub flip_cage: bool,
-    /// Frames per second, written into the container.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
-    pub frame_rate: Option<f64>,
-    /// Number of frames of the capture, where it is known: a frame with this number or a higher one is then refused at once, instead of when
-    /// the session is completed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub frames: Option<u32>,
-    /// Code the frames in groups so that no point of any frame is farther from where it was posted than this fraction of the diagonal. At
-    /// most one of `max_error`, `mean_error`, `target_size` and `quality` is given; frames are then posted whole.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
-    pub max_error: Option<f64>,
-    /// As `max_error`, but for the root mean square error of a frame's points, averaged over the frames.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
-    pub mean_error: Option<f64>,
-    /// Most bytes of the container; `frames` is needed with it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub target_size: Option<u64>,
-    /// `preview` (cages alone), `standard` (errors that are not seen) or `master` (as `max_error` 1e-4).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(preview|standard|master)$"))]
-    pub quality: Option<String>,
-    /// Keep rest pose and cage exactly as they were sent, where one of these four allows less.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub exact_rest: bool,
-}
-
-/// A cage that is not sent. At most one of its fields is given.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct CageSource {
-    /// The cage is made around the rest pose, with at most so many vertices; 350 where it is left out, or half as many as the model has
-    /// points.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 4, maximum = 20000))]
-    pub vertices: Option<u32>,
-    /// The cage is that of this completed design, see `POST /v1/cages`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub id: Option<String>,
-}
-
-fn cage_source<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<CageSource>, D::Error> {
-    Ok(Option::<Object<CageSource>>::deserialize(deserializer)?.map(|Object(source)| source))
-}
-
-/// A threshold; the command line's `auto` needs frames to measure.
-fn threshold<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<u32>, D::Error> {
-    struct Threshold;
-
-    impl<'de> serde::de::Visitor<'de> for Threshold {
-        type Value = Option<u32>;
-
-        fn expecting(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-            out.write_str("a number of singular directions as spectrum")
-        }
-
-        fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Self::Value, E> {
-            u32::try_from(value).map(Some).map_err(|_| E::invalid_value(serde::de::Unexpected::Unsigned(value), &self))
-        }
-
-        fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<Self::Value, E> {
-            if value == "auto" {
-                let text = "spectrum auto is chosen by frames, and a service prepares before it sees any; give a number, or encode with the command line, without --server";
-                return Err(E::custom(text));
-            }
-            Err(E::invalid_value(serde::de::Unexpected::Str(value), &self))
-        }
-
-        fn visit_unit<E: serde::de::Error>(self) -> Result<Self::Value, E> {
-            Ok(None)
-        }
-    }
-
-    deserializer.deserialize_any(Threshold)
-}
-
 /// A session. Numbers that preparing finds are null until it is done.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct Session {
     /// Identifier, part of every address below it.
     pub id: String,
@@ -211,7 +81,7 @@ pub struct Session {
     pub affine_reproduction_error: Option<f64>,
     /// How far the frames are.
     pub frames: FrameCounts,
-    /// How far the coding of the frames is; only where the session was made with `max_error`, `mean_error`, `target_size` or `quality`.
+    /// How far the coding of the frames is, if they are coded.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub coding: Option<CodedFrames>,
     /// Whether the prepared solver was there already.
@@ -220,14 +90,13 @@ pub struct Session {
     pub seconds: PreparationSeconds,
     /// What a user should know but that did not stop the work.
     pub warnings: Vec<String>,
-    /// Why the session failed. While it is `ready`: its container is damaged, and is written again when the session is completed again.
+    /// Why the session failed or, while `ready`, is to be completed again.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub problem: Option<Problem>,
 }
 
 /// A cage in its rest pose.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct RestCage {
     /// Its vertices.
     pub vertices: Vec<[f64; 3]>,
@@ -236,8 +105,7 @@ pub struct RestCage {
 }
 
 /// Where the solver of a session came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CacheUse {
     /// An earlier session of the same tenant had prepared it.
@@ -247,15 +115,13 @@ pub enum CacheUse {
 }
 
 /// Progress of a session's frames.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct FrameCounts {
     /// Frames that arrived whole, solved or waiting.
     pub received: u64,
     /// Frames that are solved and on disk.
     pub solved: u64,
-    /// Ranges `[a, b)` that are not solved, below the highest frame, or below the number declared at completion; the first ones, where
-    /// there are many.
+    /// Ranges `[a, b)` that are not solved, below the highest or declared frame; the first ones.
     pub missing: Vec<[u32; 2]>,
     /// Where the ranges that follow begin, if `missing` has not all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -263,8 +129,7 @@ pub struct FrameCounts {
 }
 
 /// Frames of a session that are coded in groups.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct CodedFrames {
     /// Most frames of a group; null until the session is prepared.
     pub group_frames: Option<u32>,
@@ -278,8 +143,7 @@ pub struct CodedFrames {
 }
 
 /// Times of a preparation; all zero where the solver was there already.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 #[serde(default)]
 pub struct PreparationSeconds {
     /// Waiting for a free place.
@@ -297,8 +161,7 @@ pub struct PreparationSeconds {
 }
 
 /// A page of sessions, newest first.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct SessionList {
     /// The sessions.
     pub sessions: Vec<Session>,
@@ -307,8 +170,7 @@ pub struct SessionList {
 }
 
 /// A solved frame: one line of the answer to posted frames.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct FrameResult {
     /// Number of the frame, from 0.
     pub frame: u32,
@@ -319,16 +181,14 @@ pub struct FrameResult {
 }
 
 /// Errors of all solved frames, ascending.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct FrameErrors {
     /// The frames.
     pub frames: Vec<FrameResult>,
 }
 
 /// What a session was sent, so that who goes on with it can tell whether it is of the same capture.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct Sent {
     /// The options.
     pub options: SessionOptions,
@@ -345,8 +205,7 @@ pub struct Sent {
 }
 
 /// A file that was sent.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 pub struct SentFile {
     /// Its name.
     pub name: String,
@@ -357,21 +216,19 @@ pub struct SentFile {
 }
 
 /// A frame that was sent.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 pub struct SentFrame {
     /// Its number.
     pub frame: u32,
     /// Whether only its handle rows came.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub handles_only: bool,
-    /// First half of the BLAKE3 digest of its rows as little-endian f32, hexadecimal: of all points, or of the handles in their order.
+    /// First half of the BLAKE3 digest of its rows as little-endian f32, hexadecimal.
     pub blake3: String,
 }
 
 /// Gives a session another name.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rename {
     /// Its name from now on, at most 200 characters; empty for none.
@@ -379,21 +236,19 @@ pub struct Rename {
 }
 
 /// Says that no more frames are coming.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Complete {
     /// Number of frames of the capture, at least 1.
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
+    #[schema(minimum = 1)]
     pub frames: u32,
-    /// Leave out frames with this number and above, which were posted by mistake. Without it, such frames are an error.
+    /// Leave out frames with this number and above; without it, such frames are an error.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub discard_beyond: bool,
 }
 
 /// Progress, the data of a server-sent event.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct Progress {
     /// What the session is doing.
     pub state: SessionState,
@@ -407,8 +262,7 @@ pub struct Progress {
 }
 
 /// An error as problem details (RFC 9457), `application/problem+json`.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct Problem {
     /// Stable name of the kind of error: `urn:cager:problem:` and a word.
     #[serde(rename = "type")]

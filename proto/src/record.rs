@@ -1,12 +1,10 @@
-//! The frame record, `application/vnd.cager.frames`: one frame's rows with its number and its error.
+//! The frame record, `application/vnd.cager.frames`: a frame's rows with its number and its error.
 //!
-//! A record is a header of 28 bytes and `rows` × 3 `f32`, little-endian without padding; records follow each other without
-//! anything between them. `README.md` of this crate has the table and an example in hex.
-//!
-//! The checksum covers the rows only. Whoever stores records, rather than sending them, guards frame number and errors
-//! with a checksum of their own.
+//! A record is a header of 28 bytes and `rows` × 3 `f32`, little-endian, one right after another;
+//! `README.md` of this crate has the table. The checksum covers the rows only: whoever stores
+//! records guards the header with one of their own.
 
-use crate::le;
+use crate::le::{self, value_at};
 
 /// The media type of a stream of records.
 pub const MEDIA_TYPE: &str = "application/vnd.cager.frames";
@@ -53,7 +51,7 @@ pub enum RecordError {
     /// More bytes have to arrive before the record can be read.
     #[error("the frame record is cut short: {needed} bytes are needed and {have} are there; send the rest")]
     Incomplete {
-        /// Bytes needed, counted from the start of the record (or of the rows, for [`decode_rows`]).
+        /// Bytes needed, from the start of the record, or of the rows for [`decode_rows`].
         needed: usize,
         /// Bytes there.
         have: usize,
@@ -101,17 +99,18 @@ pub enum RecordError {
 
 impl FrameHeader {
     /// The header as it is written.
-    pub fn to_bytes(&self) -> [u8; HEADER_BYTES] {
-        let mut bytes = [0; HEADER_BYTES];
-        bytes[0..4].copy_from_slice(&MAGIC);
-        bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
-        bytes[6..8].copy_from_slice(&(self.kind as u16).to_le_bytes());
-        bytes[8..12].copy_from_slice(&self.frame.to_le_bytes());
-        bytes[12..16].copy_from_slice(&self.rows.to_le_bytes());
-        bytes[16..20].copy_from_slice(&self.l2.to_le_bytes());
-        bytes[20..24].copy_from_slice(&self.linf.to_le_bytes());
-        bytes[24..28].copy_from_slice(&self.crc.to_le_bytes());
-        bytes
+    pub fn to_bytes(&self) -> Vec<u8> {
+        [
+            &MAGIC[..],
+            &VERSION.to_le_bytes(),
+            &(self.kind as u16).to_le_bytes(),
+            &self.frame.to_le_bytes(),
+            &self.rows.to_le_bytes(),
+            &self.l2.to_le_bytes(),
+            &self.linf.to_le_bytes(),
+            &self.crc.to_le_bytes(),
+        ]
+        .concat()
     }
 
     /// Bytes of the rows.
@@ -120,8 +119,7 @@ impl FrameHeader {
     }
 }
 
-/// Appends the record of one frame to `out`. `values` are the rows, three values each; `l2` and `linf` are NaN if they
-/// were not measured.
+/// Appends the record of a frame with these rows, three values each; errors are NaN if unknown.
 ///
 /// # Errors
 /// [`RecordError::Shape`] if `values` is not made of rows of three; `out` is then left as it was.
@@ -147,12 +145,11 @@ pub fn encode(
     Ok(header)
 }
 
-/// Reads the header at the start of `bytes` and checks it against what the session expects, so that the caller can
-/// allocate for the rows without trusting the sender.
+/// Reads and checks the header at the start of `bytes`, so that callers can allocate for the rows.
 ///
 /// # Errors
-/// [`RecordError::Incomplete`] for fewer than [`HEADER_BYTES`] bytes that could still become a record; otherwise
-/// [`RecordError::NotARecord`], [`RecordError::Version`], [`RecordError::Kind`] or [`RecordError::Rows`].
+/// [`RecordError::Incomplete`] for fewer than [`HEADER_BYTES`] that could become a record; all
+/// others but [`RecordError::Checksum`].
 pub fn decode_header(bytes: &[u8], kind: Kind, rows: u32) -> Result<FrameHeader, RecordError> {
     let start = bytes.len().min(MAGIC.len());
     if bytes[..start] != MAGIC[..start] {
@@ -161,21 +158,21 @@ pub fn decode_header(bytes: &[u8], kind: Kind, rows: u32) -> Result<FrameHeader,
     if bytes.len() < HEADER_BYTES {
         return Err(RecordError::Incomplete { needed: HEADER_BYTES, have: bytes.len() });
     }
-    let version = le::u16_at(bytes, 4);
+    let version = value_at(bytes, 4, u16::from_le_bytes);
     if version != VERSION {
         return Err(RecordError::Version { found: version });
     }
-    let found = le::u16_at(bytes, 6);
+    let found = value_at(bytes, 6, u16::from_le_bytes);
     if found != kind as u16 {
         return Err(RecordError::Kind { expected: kind, found });
     }
     let header = FrameHeader {
         kind,
-        frame: le::u32_at(bytes, 8),
-        rows: le::u32_at(bytes, 12),
-        l2: le::f32_at(bytes, 16),
-        linf: le::f32_at(bytes, 20),
-        crc: le::u32_at(bytes, 24),
+        frame: value_at(bytes, 8, u32::from_le_bytes),
+        rows: value_at(bytes, 12, u32::from_le_bytes),
+        l2: value_at(bytes, 16, f32::from_le_bytes),
+        linf: value_at(bytes, 20, f32::from_le_bytes),
+        crc: value_at(bytes, 24, u32::from_le_bytes),
     };
     if header.rows != rows {
         return Err(RecordError::Rows { frame: header.frame, expected: rows, found: header.rows });
@@ -183,12 +180,10 @@ pub fn decode_header(bytes: &[u8], kind: Kind, rows: u32) -> Result<FrameHeader,
     Ok(header)
 }
 
-/// Reads the rows that follow a header from the start of `bytes` into `out`, replacing what it held: `rows` × 3 values.
-/// They may be NaN or infinite; that is for the caller to judge.
+/// Reads the rows that follow a header into `out`: `rows` × 3 values, which may be NaN or infinite.
 ///
 /// # Errors
-/// [`RecordError::Incomplete`] if `bytes` is shorter than the rows, [`RecordError::Checksum`] if they are damaged. `out` is
-/// then empty.
+/// [`RecordError::Incomplete`] or [`RecordError::Checksum`]; `out` is then empty.
 pub fn decode_rows(header: &FrameHeader, bytes: &[u8], out: &mut Vec<f32>) -> Result<(), RecordError> {
     out.clear();
     let needed = usize::try_from(header.row_bytes()).unwrap_or(usize::MAX);
@@ -196,14 +191,14 @@ pub fn decode_rows(header: &FrameHeader, bytes: &[u8], out: &mut Vec<f32>) -> Re
     if crc32c::crc32c(rows) != header.crc {
         return Err(RecordError::Checksum { frame: header.frame });
     }
-    out.extend(le::f32_values(rows));
+    out.extend(le::values(rows, f32::from_le_bytes));
     Ok(())
 }
 
-/// Reads the record at the start of `bytes`, its rows into `out`; returns its header and the number of bytes it took.
+/// Reads a record, its rows into `out`; returns its header and the bytes that it took.
 ///
 /// # Errors
-/// Those of [`decode_header`] and [`decode_rows`], with [`RecordError::Incomplete`] counted from the start of the record.
+/// Those of [`decode_header`] and [`decode_rows`].
 pub fn decode(bytes: &[u8], kind: Kind, rows: u32, out: &mut Vec<f32>) -> Result<(FrameHeader, usize), RecordError> {
     out.clear();
     let header = decode_header(bytes, kind, rows)?;

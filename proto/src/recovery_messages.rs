@@ -1,78 +1,47 @@
-//! The JSON bodies of recoveries: what is asked for at `POST /v1/recoveries`, and what becomes of it.
+//! The JSON bodies of recoveries: what `POST /v1/recoveries` asks for, and what becomes of it.
 
 use crate::messages::Problem;
+use crate::options::options;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
-/// How a template is followed, the JSON part `options` of `POST /v1/recoveries`: the options of `cager recover`. What is left out has its default.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct RecoveryOptions {
-    /// A name for people, at most 200 characters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(max_length = 200))]
-    pub name: Option<String>,
-    /// `auto`: turn and move the template onto the first surface before it is followed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub align: Option<Placing>,
-    /// `auto`: scale the template to the first surface, and turn and move it as with `align`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub scale: Option<Placing>,
-    /// Axis that points up in the frames, where the other one does in the template: `y` or `z`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^[yz]$"))]
-    pub up: Option<String>,
-    /// Let points of the template leave the cage to meet the surfaces, smoothly; give an error to store where they are.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub offsets: bool,
-    /// Go on past frames that hold no surface, and where the template seems turned or of another size.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub force: bool,
-    /// Points of each surface that are looked at; 15,000 where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 100, maximum = 1000000))]
-    pub points: Option<u32>,
-    /// How a person is followed, with a rig: `robust` (the default) or `paper`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(robust|paper)$"))]
-    pub method: Option<String>,
-    /// Frames per second, written into the container and the joints.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
-    pub frame_rate: Option<f64>,
-    /// Number of the first frame in the container; what the names of the files tell where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = -1e9, exclusive_maximum = 1e9))]
-    pub start: Option<f64>,
-    /// Number of frames, where it is known: a frame with this number or a higher one is then refused.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub frames: Option<u32>,
-    /// Code the frames in groups so that no point is farther from where it was recovered than this fraction of the diagonal. At most one of
-    /// `max_error`, `mean_error`, `target_size` and `quality` is given; without any, cages alone are stored.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
-    pub max_error: Option<f64>,
-    /// As `max_error`, but for the root mean square error of a frame's points, averaged over the frames.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
-    pub mean_error: Option<f64>,
-    /// Most bytes of the container; `frames` is needed with it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub target_size: Option<u64>,
-    /// `preview` (cages alone), `standard` (errors that are not seen) or `master` (as `max_error` 1e-4).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(preview|standard|master)$"))]
-    pub quality: Option<String>,
-    /// Keep the template and its cage exactly as they are, where one of these four allows less.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub exact_rest: bool,
+options! {
+    /// The JSON part `options` of `POST /v1/recoveries`. What is left out has its default.
+    pub coded struct RecoveryOptions {
+        /// A name for people, at most 200 characters.
+        #[schema(max_length = 200)]
+        name: Option<String>,
+        /// `auto`: turn and move the template onto the first surface before it is followed.
+        align: Option<Placing>,
+        /// `auto`: scale the template to the first surface, and turn and move it as with `align`.
+        scale: Option<Placing>,
+        /// Axis that points up in the frames, where the other one does in the template: `y` or `z`.
+        #[schema(pattern = "^[yz]$")]
+        up: Option<String>,
+        /// Let points of the template leave the cage to meet the surfaces; needs an error.
+        offsets: bool,
+        /// Go on past frames without a surface, and where the template seems turned.
+        force: bool,
+        /// Points of each surface that are looked at; 15,000 where it is left out.
+        #[schema(minimum = 100, maximum = 1000000)]
+        points: Option<u32>,
+        /// How a person is followed, with a rig: `robust` (the default) or `paper`.
+        #[schema(pattern = "^(robust|paper)$")]
+        method: Option<String>,
+        /// Frames per second, written into the container and the joints.
+        #[schema(exclusive_minimum = 0)]
+        frame_rate: Option<f64>,
+        /// Number of the first frame in the container; by default from the names of the files.
+        #[schema(exclusive_minimum = -1e9, exclusive_maximum = 1e9)]
+        start: Option<f64>,
+        /// Number of frames, where it is known: higher ones are then refused.
+        #[schema(minimum = 1)]
+        frames: Option<u32>,
+    }
 }
 
 /// Whether something is found automatically.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Placing {
     /// As it is.
@@ -83,15 +52,14 @@ pub enum Placing {
 }
 
 /// What a recovery is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RecoveryState {
     /// All frames that came are followed; it waits for more.
     Ready,
     /// Frames are being followed, or wait for their turn.
     Following,
-    /// No more frames are coming: the last ones are followed, the second pass runs, the container is written.
+    /// No more frames are coming: the last are followed, and the container is written.
     Finishing,
     /// The container is there; nothing changes any more.
     Completed,
@@ -107,8 +75,7 @@ impl RecoveryState {
 }
 
 /// How far the frames of a recovery are.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct RecoveryFrames {
     /// Frames that are on disk.
     pub received: u32,
@@ -120,13 +87,12 @@ pub struct RecoveryFrames {
     pub lost: u32,
     /// Number of frames in all, once it was said.
     pub declared: Option<u32>,
-    /// Ranges `[a, b)` that are missing below the highest frame; the first ones, where there are many.
+    /// Ranges `[a, b)` that are missing below the highest frame; the first ones.
     pub missing: Vec<[u32; 2]>,
 }
 
 /// A recovery.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct Recovery {
     /// Identifier, part of every address below it.
     pub id: String,
@@ -156,18 +122,16 @@ pub struct Recovery {
 }
 
 /// No more frames are coming.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompleteRecovery {
     /// How many there are, counted from 0 without a gap: all that were posted.
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
+    #[schema(minimum = 1)]
     pub frames: u32,
 }
 
 /// A page of recoveries, newest first.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct RecoveryList {
     /// The recoveries.
     pub recoveries: Vec<Recovery>,
@@ -176,8 +140,7 @@ pub struct RecoveryList {
 }
 
 /// A frame that is on disk.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 pub struct PostedFrame {
     /// Its number.
     pub frame: u32,
@@ -188,8 +151,7 @@ pub struct PostedFrame {
 }
 
 /// Frames of a request, all on disk.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 pub struct PostedFrames {
     /// The frames, in their order.
     pub frames: Vec<PostedFrame>,
@@ -198,8 +160,7 @@ pub struct PostedFrames {
 }
 
 /// How a frame was found in the first pass.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct FollowedFrame {
     /// Its number.
     pub frame: u32,
@@ -213,8 +174,7 @@ pub struct FollowedFrame {
 }
 
 /// Progress of a recovery, the data of a server-sent event.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct RecoveryProgress {
     /// What it is doing.
     pub state: RecoveryState,

@@ -1,30 +1,26 @@
 //! The JSON bodies of shape spaces: poses of one model, and the shapes between them.
 
+use crate::options::options;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
-/// What a shape space is made from, the JSON part `options` of `POST /v1/shapespaces`. What is left out has its default.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct ShapeSpaceOptions {
-    /// A name for people, at most 200 characters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(max_length = 200))]
-    pub name: Option<String>,
-    /// Where shapes are found.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub on: Option<ShapesOn>,
-    /// Completed session whose frames are the poses, in place of files.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub source_session: Option<String>,
-    /// The frames that are the poses, of a session or of the part `source`, from 0; two or more.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub frames: Vec<u32>,
+options! {
+    /// The JSON part `options` of `POST /v1/shapespaces`. What is left out has its default.
+    pub struct ShapeSpaceOptions {
+        /// A name for people, at most 200 characters.
+        #[schema(max_length = 200)]
+        name: Option<String>,
+        /// Where shapes are found.
+        on: Option<ShapesOn>,
+        /// Completed session whose frames are the poses, in place of files.
+        source_session: Option<String>,
+        /// The frames that are the poses, of a session or the part `source`, from 0.
+        frames: Vec<u32>,
+    }
 }
 
 /// Where shapes between poses are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ShapesOn {
     /// On a cage: a few milliseconds a shape.
@@ -34,9 +30,8 @@ pub enum ShapesOn {
     Mesh,
 }
 
-/// Poses of one model, and the shapes between them. It is in memory alone: a restart forgets it, and so does a while without a request.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+/// Poses of one model in memory, which a restart or a while without a request forgets.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct ShapeSpace {
     /// Identifier, part of every address below it.
     pub id: String,
@@ -57,8 +52,7 @@ pub struct ShapeSpace {
 }
 
 /// The shape spaces of a tenant, newest first.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct ShapeSpaceList {
     /// The shape spaces.
     pub shapespaces: Vec<ShapeSpace>,

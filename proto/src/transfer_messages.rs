@@ -1,91 +1,55 @@
 //! The JSON bodies of transfers: what is asked for at `POST /v1/transfers`, and what becomes of it.
 
 use crate::messages::{JobState, Problem};
+use crate::options::options;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
-/// How a motion is moved onto another model, the JSON part `options` of `POST /v1/transfers`: the options of `cager transfer`. What is left out has its
-/// default.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-#[serde(default, deny_unknown_fields)]
-pub struct TransferOptions {
-    /// A name for people, at most 200 characters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(max_length = 200))]
-    pub name: Option<String>,
-    /// Completed session whose motion is moved, in place of files of the source.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub source_session: Option<String>,
-    /// Number of frames, where the part `source_frames` is raw numbers.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub frames: Option<u32>,
-    /// How the motion is moved.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub method: Option<TransferMethod>,
-    /// The cage around both, with `public` and `rigid` and without the part `cage`; `sphere` where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub public: Option<PublicShape>,
-    /// Coordinates in the cage around both: `mvc` (the default), `harmonic`, `green` or `green-free`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(mvc|harmonic|green|green-free)$"))]
-    pub coordinates: Option<String>,
-    /// Weight of the target's rigidity, with `rigid`; 0.01 where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 0))]
-    pub rigidity: Option<f64>,
-    /// Bring the detail of the target at rest, which a cage around both loses, back to every frame, with `public` and `rigid`.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub detail: bool,
-    /// Which pose the target has at rest.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pose: Option<RestPose>,
-    /// How the source is laid onto the target at first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub align: Option<SourceAlignment>,
-    /// The matrix that turns, scales and moves the source onto the target, row by row, in place of `align`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub matrix: Option<[f64; 16]>,
-    /// Axis that points up in both: the source is turned about it alone, feet stand on the floor and do not slide.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub up: Option<UpAxis>,
-    /// Most vertices of the target's cage, which is designed from its new motion; 350 where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 4, maximum = 1500))]
-    pub cage_vertices: Option<u32>,
-    /// Frames per second, written into the container; what the source tells where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0))]
-    pub frame_rate: Option<f64>,
-    /// Number of the first frame in the container; what the source tells where it is left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = -1e9, exclusive_maximum = 1e9))]
-    pub start: Option<f64>,
-    /// Code the frames in groups so that no point is farther from where it was moved than this fraction of the diagonal. At most one of `max_error`,
-    /// `mean_error`, `target_size` and `quality` is given; without any, cages alone are stored.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
-    pub max_error: Option<f64>,
-    /// As `max_error`, but for the root mean square error of a frame's points, averaged over the frames; the cage is designed for it too.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(exclusive_minimum = 0, exclusive_maximum = 1))]
-    pub mean_error: Option<f64>,
-    /// Most bytes of the container.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(minimum = 1))]
-    pub target_size: Option<u64>,
-    /// `preview` (cages alone), `standard` (errors that are not seen) or `master` (as `max_error` 1e-4).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schema(pattern = "^(preview|standard|master)$"))]
-    pub quality: Option<String>,
-    /// Keep the target and its cage exactly as they are, where one of these four allows less.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub exact_rest: bool,
+options! {
+    /// The JSON part `options` of `POST /v1/transfers`. What is left out has its default.
+    pub coded struct TransferOptions {
+        /// A name for people, at most 200 characters.
+        #[schema(max_length = 200)]
+        name: Option<String>,
+        /// Completed session whose motion is moved, in place of files of the source.
+        source_session: Option<String>,
+        /// Number of frames, where the part `source_frames` is raw numbers.
+        #[schema(minimum = 1)]
+        frames: Option<u32>,
+        /// How the motion is moved.
+        method: Option<TransferMethod>,
+        /// The cage around both, with `public` and `rigid`; `sphere` by default.
+        public: Option<PublicShape>,
+        /// Coordinates in that cage: `mvc` (the default), `harmonic`, `green` or `green-free`.
+        #[schema(pattern = "^(mvc|harmonic|green|green-free)$")]
+        coordinates: Option<String>,
+        /// Weight of the target's rigidity, with `rigid`; 0.01 where it is left out.
+        #[schema(minimum = 0)]
+        rigidity: Option<f64>,
+        /// Bring back the detail that a cage around both loses, with `public` and `rigid`.
+        detail: bool,
+        /// Which pose the target has at rest.
+        pose: Option<RestPose>,
+        /// How the source is laid onto the target at first.
+        align: Option<SourceAlignment>,
+        /// The matrix that moves the source onto the target, row by row, in place of `align`.
+        matrix: Option<[f64; 16]>,
+        /// Axis that points up in both: the source is turned about it alone, and feet do not slide.
+        up: Option<UpAxis>,
+        /// Most vertices of the target's cage, designed from its new motion; 350 by default.
+        #[schema(minimum = 4, maximum = 1500)]
+        cage_vertices: Option<u32>,
+        /// Frames per second, written into the container; by default those of the source.
+        #[schema(exclusive_minimum = 0)]
+        frame_rate: Option<f64>,
+        /// Number of the first frame in the container; what the source tells where it is left out.
+        #[schema(exclusive_minimum = -1e9, exclusive_maximum = 1e9)]
+        start: Option<f64>,
+    }
 }
 
 /// How a motion is moved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum TransferMethod {
     /// By the source's cage, which is laid onto the target.
@@ -98,8 +62,7 @@ pub enum TransferMethod {
 }
 
 /// A cage around source and target.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum PublicShape {
     /// 8 vertices.
@@ -115,8 +78,7 @@ pub enum PublicShape {
 }
 
 /// Which pose the target has at rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RestPose {
     /// Told by how alike the shapes are.
@@ -124,13 +86,12 @@ pub enum RestPose {
     Auto,
     /// Its own: what the source does to its rest pose, the target does to its own.
     Relative,
-    /// The source's: limbs take the source's directions, for like bodies that stand differently at rest.
+    /// The source's: limbs take its directions, for like bodies that stand differently at rest.
     Absolute,
 }
 
 /// How the source is laid onto the target at first.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SourceAlignment {
     /// By their surfaces.
@@ -141,8 +102,7 @@ pub enum SourceAlignment {
 }
 
 /// An axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum UpAxis {
     /// The first.
@@ -154,8 +114,7 @@ pub enum UpAxis {
 }
 
 /// What a running transfer is at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum TransferStage {
     /// The source is laid onto the target.
@@ -169,8 +128,7 @@ pub enum TransferStage {
 }
 
 /// A transfer.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct Transfer {
     /// Identifier, part of every address below it.
     pub id: String,
@@ -188,7 +146,7 @@ pub struct Transfer {
     pub frames: u32,
     /// Frames that are moved.
     pub moved: u32,
-    /// What is subtracted from the positions that are streamed, where the target lies far from the origin.
+    /// What is subtracted from streamed positions, where the target lies far from the origin.
     pub origin: Option<[f64; 3]>,
     /// Vertices of the target's cage, once it is completed.
     pub cage_vertices: Option<u32>,
@@ -202,8 +160,7 @@ pub struct Transfer {
 }
 
 /// A page of transfers, newest first.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, ToSchema)]
 pub struct TransferList {
     /// The transfers.
     pub transfers: Vec<Transfer>,
@@ -212,8 +169,7 @@ pub struct TransferList {
 }
 
 /// Progress of a transfer, the data of a server-sent event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 pub struct TransferProgress {
     /// What it is doing.
     pub state: JobState,

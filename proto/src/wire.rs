@@ -1,18 +1,18 @@
 //! Small structured values to and from bytes. The only module that knows bincode.
 //!
-//! The layout is bincode's "legacy" one, the same as bincode 1 wrote by default: little-endian, integers at their full
-//! width, `bool` one byte, enums a `u32` variant number, `Option` one byte 0 or 1 before the value, strings and
-//! sequences a `u64` length before their elements, structs and tuples their fields back to back, no padding. Matrices and
-//! positions do not go through here: they travel as raw little-endian numbers.
+//! The layout is bincode's "legacy" one: little-endian, integers at their full width, `bool` one
+//! byte, enums a `u32` variant number, `Option` one byte before the value, strings and sequences a
+//! `u64` length before their elements, structs and tuples their fields back to back. Matrices and
+//! positions travel as raw little-endian numbers instead.
 //!
 //! # Why the version is pinned, and how to leave
 //!
-//! bincode is unmaintained (RUSTSEC-2025-0141) and its 3.0.0 is an empty release that does not compile, so the workspace
-//! pins `=2.0.1`. The advisory reports no vulnerability; what bincode is known to do badly with hostile bytes is avoided
-//! here: every call has a limit, which keeps a forged length from being allocated, and bytes left over are an error.
+//! bincode is unmaintained (RUSTSEC-2025-0141) and its 3.0.0 does not compile, so the workspace
+//! pins `=2.0.1`. The advisory reports no vulnerability; against hostile bytes every call has a
+//! limit, which keeps a forged length from being allocated, and bytes left over are an error.
 //!
-//! To leave, rewrite the bodies of [`encode`] and [`decode`] on another library of the same layout. `serde-wincode` is
-//! one: the tests of this crate read these bytes with it and compare them with a golden copy.
+//! To leave, rewrite [`encode`] and [`decode`] on another library of this layout, such as
+//! `serde-wincode`, with which the tests compare.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -46,8 +46,7 @@ pub enum WireError {
 /// Encodes `value` in at most `LIMIT` bytes.
 ///
 /// # Errors
-/// [`WireError::TooLarge`] past the limit, so that nothing is written that [`decode`] would refuse;
-/// [`WireError::Unsupported`] for a value that serde cannot put in this layout.
+/// [`WireError::TooLarge`] past the limit; [`WireError::Unsupported`] values.
 pub fn encode<T: Serialize + ?Sized, const LIMIT: usize>(value: &T) -> Result<Vec<u8>, WireError> {
     let bytes = bincode::serde::encode_to_vec(value, bincode::config::legacy())
         .map_err(|error| WireError::Unsupported(error.to_string()))?;
@@ -57,12 +56,11 @@ pub fn encode<T: Serialize + ?Sized, const LIMIT: usize>(value: &T) -> Result<Ve
     Ok(bytes)
 }
 
-/// Decodes a value from exactly `bytes`, allocating no more than a small multiple of `LIMIT`, and for a sequence up to the
-/// 1 MiB that serde reserves ahead.
+/// Decodes a value from exactly `bytes`, allocating a small multiple of `LIMIT`.
 ///
 /// # Errors
-/// [`WireError::TooLarge`] if `bytes` or a length inside them passes the limit, [`WireError::Trailing`] if bytes are left
-/// over, [`WireError::Malformed`] otherwise.
+/// [`WireError::TooLarge`] if `bytes` or a length inside them passes the limit,
+/// [`WireError::Trailing`] if bytes are left over, [`WireError::Malformed`] otherwise.
 pub fn decode<T: DeserializeOwned, const LIMIT: usize>(bytes: &[u8]) -> Result<T, WireError> {
     if bytes.len() > LIMIT {
         return Err(WireError::TooLarge { limit: LIMIT });

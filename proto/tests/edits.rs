@@ -3,7 +3,7 @@
 mod support;
 
 use cager_proto::container::{
-    ContainerReader, ContainerWriter, EditLayer, Error, LayerSource, MAX_LAYERS, SectionInfo,
+    ContainerReader, ContainerWriter, EditLayer, Error, LayerBuilder, LayerSource, MAX_LAYERS, SectionInfo,
 };
 use cager_proto::report::Report;
 use serde::Deserialize;
@@ -68,7 +68,11 @@ fn the_same_cages_give_the_same_layer_as_in_the_golden_file() {
     let golden: Golden = serde_json::from_str(include_str!("../../tests/golden/edit-layer.json")).unwrap();
     assert!(golden.cases.len() > 5);
     for Case { what, name, old, new, first, count, raw } in golden.cases {
-        let made = EditLayer::between(&old, &new, &name);
+        let mut builder = LayerBuilder::default();
+        for (frame, (old, new)) in old.iter().zip(&new).enumerate() {
+            builder.add(frame, old, new);
+        }
+        let made = builder.finish(&name);
         let hex = |layer: &EditLayer| layer.to_bytes().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
         assert_eq!(made.as_ref().map(hex), raw, "{what}");
         assert_eq!(made.as_ref().map(|made| made.first), first, "{what}");

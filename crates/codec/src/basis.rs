@@ -1,10 +1,9 @@
 //! The coordinates in which cages are coded: what a cage's rows do to the model.
 //!
-//! With Gram matrix `G = ΦᵀΦ/n + εI = L Lᵀ`, the rows of `Y = Lᵀ(C − C₀)` have the length of what they move the model, in the root mean square over
-//! its points; so a uniform step in Y is optimal at a given mean square error of the positions (reverse water-filling). A rotation of Y to the
-//! eigenvectors of `LᵀL` gathers what moves much: `Y = S Vᵀ(C − C₀)`, with the singular values S and vectors V of Φ.
-//!
-//! G is rounded first, by steps that the bytes say, so that every machine computes the basis from the same numbers, however it rounds Φ.
+//! With Gram matrix `G = ΦᵀΦ/n + εI = L Lᵀ`, rows of `Y = Lᵀ(C − C₀)` have the length of what they
+//! move the model (root mean square over its points), so that a uniform step in Y is optimal for a
+//! mean square error. A rotation to the eigenvectors of `LᵀL` gathers what moves much. G is rounded
+//! first, by steps that the bytes say, so that every machine computes the same basis.
 
 use crate::gram_rounding::GramRounding;
 use cager_core::cage::Cage;
@@ -13,13 +12,13 @@ use cager_geometry::linalg;
 use cager_geometry::mesh::Point;
 use faer::{Mat, MatRef, Par};
 
-/// ε over the mean of the diagonal of the Gram matrix: a vertex that hardly moves the model still is coded to a hundred steps.
+/// ε over the mean of the diagonal: vertices that hardly move the model are coded too.
 const FLOOR: f64 = 1e-2;
-/// Equal eigenvalues would leave their vectors open; scaling the rows by up to this much, each otherwise, parts them.
+/// Equal eigenvalues leave their vectors open; scaling each row by up to this much parts them.
 const SPLIT: f64 = 1e-3;
-/// Largest change of a coefficient, relative to the largest, by rounding of the factorisations on another machine.
+/// Largest relative change of a coefficient by the rounding of factorisations on another machine.
 const STABLE: f64 = 1e-7;
-/// What those are disturbed by to see that, over the largest diagonal entry of G: rounding many times over.
+/// Disturbance that shows that change, over the largest diagonal entry of G: many times rounding.
 const DISTURBANCE: f64 = 1e-14;
 
 /// What two machines' entries of `ΦᵀΦ/n` may differ by, over the mean of its diagonal.
@@ -49,10 +48,11 @@ impl CageBasis {
     /// Most points whose coordinates are read.
     pub const SAMPLE: usize = 1 << 14;
 
-    /// For a model in its cage: from every k-th point, with the smallest k that leaves 16,384 of them; and the coordinates of these, where they are those of
-    /// the system. `record` is what the encoder found; an encoder leaves it out. `None` where numbers are not finite.
+    /// For a model in its cage, from every k-th point, 16,384 at the most; and the coordinates of
+    /// these, where they are those of the system. `record` is what the encoder found. `None` where
+    /// numbers are not finite.
     ///
-    /// Coordinates that are solved for depend on the machine by far more than rounding: the basis is that of mean value coordinates then.
+    /// Solved coordinates differ between machines: their basis is that of mean value coordinates.
     ///
     /// # Errors
     /// As [`CoordinateSystem::coordinates`].
@@ -79,7 +79,7 @@ impl CageBasis {
         Ok(basis.map(|basis| (basis, is_own.then_some(found))))
     }
 
-    /// From rows of `Φ`, any number of them × m, and the rest pose's rows, m × 3, as the bytes say. `None` where numbers are not finite.
+    /// From rows of `Φ` and the rest pose's rows; `None` where numbers are not finite.
     pub fn new(phi: MatRef<'_, f64>, rest: &[Point], record: &BasisRecord) -> Option<Self> {
         let products = products(phi);
         let rounded = match &record.rounding {
@@ -89,7 +89,7 @@ impl CageBasis {
         Self::of_gram(with_floor(rounded).as_ref(), rest, record.clone())
     }
 
-    /// The basis for encoding, of coordinates in closed form. It is rotated where the factorisations are stable.
+    /// The basis for encoding, rotated where the factorisations are stable.
     pub fn for_encoding(phi: MatRef<'_, f64>, rest: &[Point]) -> Option<Self> {
         let products = products(phi);
         let rounding = GramRounding::of(products.as_ref(), TOLERANCE)?;

@@ -1,21 +1,20 @@
 //! Cages of a group of frames: `Y = E A` in the coordinates of [`CageBasis`], A in whole steps.
 
 use crate::basis::{BasisRecord, CageBasis};
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, MAX_SIZE, SIZES, size_class};
-use crate::error::{Error, Result};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, MAX_SIZE, Models, SIZES, size_class};
+use crate::error::{Error, Result, take};
 use crate::gram_rounding::GramRounding;
 use crate::trajectories::{PULSE_FRAMES, Trajectories, fit};
 use crate::{MAX_FRAMES, trajectories};
 use cager_geometry::linalg;
 use faer::Mat;
 
-/// Bytes after the basis and before the coded numbers: the step as f64 and the number of components as u16.
-pub(crate) const STEP_AND_COUNT: usize = 10;
+const CUT: &str = "a group of cages is cut";
 
-/// Part of a step from which a number is rounded away from 0: small ones cost less than they are worth.
+/// Part of a step from which numbers are rounded away from 0: small ones cost more than they gain.
 const ROUND_UP: f64 = 0.44;
 
-/// Whether groups come before and after a group. The frame next to one is coded more exactly, so that the model does not jump from group to group.
+/// Whether groups come before and after a group: frames beside one are coded more exactly.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AdjacentGroups {
     /// A group ends right before this one.
@@ -27,8 +26,9 @@ pub struct AdjacentGroups {
 /// Error of a frame beside another group over what it would be.
 const JOINT_ERROR: f64 = 0.1;
 
-/// Encodes cages, each rows × 3, in steps of `step`: the root mean square over the points of what one coefficient moves the model. `None` where
-/// numbers are not finite, or too far apart to be counted in these steps.
+/// Encodes cages, each rows × 3, in steps of `step`: the root mean square over the points of what
+/// one coefficient moves the model. `None` where numbers are not finite, or too far apart to be
+/// counted in these steps.
 ///
 /// # Panics
 /// Where a cage has another number of rows, or there are more than [`MAX_FRAMES`].
@@ -54,7 +54,7 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, adjacent: Ad
         if !is_joined || frames < 4 * PULSE_FRAMES || chosen.count() == most {
             continue;
         }
-        // What the trajectories so far leave of this frame, and of it alone: few frames away it is another.
+        // What the trajectories leave of this frame alone.
         let e = chosen.values();
         let of = |k: usize, value: usize| e[(frame, k)] * step * f64::from(whole[k * width + value]);
         let decoded = |value: usize| (0..chosen.count()).map(|k| of(k, value)).sum::<f64>();
@@ -75,14 +75,11 @@ pub fn encode_cages(basis: &CageBasis, cages: &[&[f32]], step: f64, adjacent: Ad
 }
 
 /// The cages that [`encode_cages`] wrote, of as many frames.
-///
-/// # Errors
-/// Bytes that the encoder did not write.
 pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Vec<Vec<f32>>> {
     let rows = basis.rows();
-    let (record, bytes) = read_record(bytes)?;
-    let (head, coded) = bytes.split_first_chunk().ok_or(Error::Damaged("a group of cages is cut"))?;
-    let (step, count) = step_and_count(head);
+    let (record, mut coded) = read_record(bytes)?;
+    let step = f64::from_le_bytes(take(&mut coded, CUT)?);
+    let count = usize::from(u16::from_le_bytes(take(&mut coded, CUT)?));
     if frames > MAX_FRAMES || count > frames.min(3 * rows) || !(step.is_finite() && step > 0.0) {
         return Err(Error::Damaged("a group of cages has impossible counts"));
     }
@@ -104,22 +101,19 @@ pub fn decode_cages(basis: &CageBasis, frames: usize, bytes: &[u8]) -> Result<Ve
 }
 
 /// The basis that bytes of [`encode_cages`] are in.
-///
-/// # Errors
-/// Bytes that the encoder did not write.
 pub fn basis_record(bytes: &[u8]) -> Result<BasisRecord> {
     read_record(bytes).map(|(record, _)| record)
 }
 
 /// A first byte of 2 or 3 says that the Gram matrix is rounded, odd ones that the basis is rotated.
-fn read_record(bytes: &[u8]) -> Result<(BasisRecord, &[u8])> {
-    let (&kind, mut rest) = bytes.split_first().ok_or(Error::Damaged("a group of cages is cut"))?;
+fn read_record(mut bytes: &[u8]) -> Result<(BasisRecord, &[u8])> {
+    let [kind] = take(&mut bytes, CUT)?;
     let rounding = match kind {
         0 | 1 => None,
-        2 | 3 => Some(GramRounding::read(&mut rest)?),
+        2 | 3 => Some(GramRounding::read(&mut bytes)?),
         _ => return Err(Error::Damaged("a group of cages has an unknown basis")),
     };
-    Ok((BasisRecord { rotated: kind % 2 == 1, rounding }, rest))
+    Ok((BasisRecord { rotated: kind % 2 == 1, rounding }, bytes))
 }
 
 fn write_record(record: &BasisRecord) -> Vec<u8> {
@@ -130,12 +124,7 @@ fn write_record(record: &BasisRecord) -> Vec<u8> {
     bytes
 }
 
-pub(crate) fn step_and_count(head: &[u8; STEP_AND_COUNT]) -> (f64, usize) {
-    let [a, b, c, d, e, f, g, h, low, high] = *head;
-    (f64::from_le_bytes([a, b, c, d, e, f, g, h]), usize::from(u16::from_le_bytes([low, high])))
-}
-
-/// Codes components × rows × 3 numbers. What surrounds one in the rows, in the components and in its point says how large it will be.
+/// Codes components × rows × 3 numbers, each in the context of the sizes of those around it.
 fn code_values(coder: &mut impl Coder, rows: usize, count: usize, given: &[i32]) -> Vec<i32> {
     let mut models = Integers::new(3 * SIZES);
     let width = 3 * rows;

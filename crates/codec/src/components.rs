@@ -1,39 +1,20 @@
-//! The numbers of a residual's components: in whole steps, predicted from coarse to fine on the mesh ([`Hierarchy`]), each in the context of how large those
-//! around it are. Vertices may be coded in two parts, coarse and fine, each by a range coder of its own, so that two threads code them: the fine part of a component
-//! while the coarse part of a later one is under way.
+//! A residual's components in whole steps, predicted from coarse to fine on the mesh
+//! ([`Hierarchy`]), each in the context of the sizes around it. Vertices may be in two parts,
+//! coarse and fine, with a range coder each, so that two threads code them.
 
-use crate::entropy::{BinaryModel, Coder, Integers, MAX_CONTEXT_SIZE, MAX_RESIDUAL_SIZE, MAX_SIZE, SIZES, size_class};
+use crate::entropy::{BinaryModel, Coder, MAX_CONTEXT_SIZE, MAX_RESIDUAL_SIZE, MAX_SIZE, Models, SIZES, size_class};
 use crate::hierarchy::Hierarchy;
 use std::ops::Range;
 use std::sync::LazyLock;
 
 /// Parts of a step in which predictions are counted.
 pub(crate) const PARTS: i64 = 16;
-/// What is added before numbers are rounded down: small ones cost more than they are worth, measured at the same error of the whole file.
+/// Added before rounding down: small numbers cost more than they are worth.
 const ROUND_UP: i64 = 5;
 /// Components that one part of the vertices is ahead of the other, at most.
 const AT_A_TIME: usize = 4;
 /// Points that these have together, unless one component has more.
 const POINTS_AT_A_TIME: usize = 1 << 17;
-
-/// What whole numbers are coded by, in some contexts.
-pub(crate) trait Models: Send {
-    fn new(contexts: usize) -> Self;
-
-    /// Codes a number between −[`MAX_SIZE`] and [`MAX_SIZE`], and gives it back.
-    fn code(&mut self, coder: &mut impl Coder, context: usize, value: i32) -> i32;
-}
-
-impl Models for Integers {
-    fn new(contexts: usize) -> Self {
-        Self::new(contexts)
-    }
-
-    #[inline(always)]
-    fn code(&mut self, coder: &mut impl Coder, context: usize, value: i32) -> i32 {
-        self.code(coder, context, value)
-    }
-}
 
 /// The numbers of one component, in the order of the hierarchy's vertices.
 #[derive(Default)]
@@ -114,8 +95,8 @@ impl<'a, M: Models> Components<'a, M> {
         Self { hierarchy, flag: BinaryModel::default(), parts: [Part::new(0..middle), Part::new(middle..points)] }
     }
 
-    /// Codes what `next` gives, called until it gives nothing, with one coder for each part; `done` takes each component when it is coded. `None` where `next` says so
-    /// or what is read cannot have been written.
+    /// Codes what `next` gives until it gives nothing, with one coder for each part; `done` takes
+    /// each coded component. `None` where `next` says so or what is read cannot have been written.
     pub(crate) fn code<C: Coder + Send>(
         &mut self,
         coders: &mut [C; 2],
@@ -156,14 +137,13 @@ impl<'a, M: Models> Components<'a, M> {
     }
 }
 
-/// The numbers of so many components of so many points in pieces that [`Components::code`] takes at a time.
+/// So many components in the pieces that [`Components::code`] takes at a time.
 pub(crate) fn pieces(points: usize, count: usize) -> impl Iterator<Item = Range<usize>> {
     let some = (POINTS_AT_A_TIME / points.max(1)).clamp(1, AT_A_TIME);
     (0..count).step_by(some).map(move |first| first..count.min(first + some))
 }
 
-/// Whether the numbers of a component take fewer binary digits, about, as differences to their predictions: by every fourth of them, predicted from what they are to
-/// be near.
+/// Whether differences to predictions take fewer binary digits, by every fourth number.
 fn is_predictable(hierarchy: &Hierarchy, target: &[[i64; 3]]) -> bool {
     static DIGITS: LazyLock<[f64; 256]> =
         LazyLock::new(|| std::array::from_fn(|size| (1.0 + 2.0 * size as f64).log2()));
@@ -198,8 +178,8 @@ fn mean(found: &[[i64; 3]], parents: &[u32]) -> [i64; 3] {
     divided(sums, parents.len())
 }
 
-/// Numbers over a count, or as they are where that is 0, rounded down. In floating point, which is faster than dividing whole numbers: below 2²⁸ times the
-/// count, as encoders have them, a quotient that is no whole number is farther from the next one than it is rounded by.
+/// Numbers over a count, rounded down. In floating point, which is faster, and exact below 2²⁸
+/// times the count, as encoders have them.
 #[inline(always)]
 fn divided(numbers: [i64; 3], count: usize) -> [i64; 3] {
     let count = count.max(1) as f64;

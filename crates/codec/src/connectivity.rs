@@ -1,6 +1,6 @@
-//! Polygons by a walk over the mesh, from a face across an edge to the next: most corners are then vertices whose edges still wait for a face, or
-//! are met for the first time. The walk counts vertices as it meets them; the numbers that the mesh gives them follow ([`crate::vertex_order`]). Any list of polygons
-//! can be coded; vertices keep their numbers, faces come in the order of the walk.
+//! Polygons by a walk over the mesh, across an edge from face to face. The walk counts vertices as
+//! it meets them; the numbers that the mesh gives them follow ([`crate::vertex_order`]). Any list
+//! of polygons can be coded; faces come back in the order of the walk.
 
 use crate::entropy::{Coder, Decoder, Encoder};
 use crate::error::{Error, Result};
@@ -26,7 +26,7 @@ fn encode_faces(faces: &Polygons, points: usize) -> Vec<u8> {
     WalkedFaces::new(faces, points).into_bytes()
 }
 
-/// A directed edge, its face, and at which corner of it it begins; the last corners of a face come first.
+/// A directed edge, its face, and the corner where it begins, the last corners of a face first.
 type Edge = ([u32; 2], usize, Reverse<usize>);
 
 impl WalkedFaces {
@@ -93,9 +93,6 @@ impl WalkedFaces {
 }
 
 /// The polygons of coded bytes: `count` faces with `corners` corners in all.
-///
-/// # Errors
-/// Bytes that the encoder did not write.
 pub fn decode_faces(bytes: &[u8], points: usize, count: usize, corners: usize) -> Result<Polygons> {
     let mut coder = Decoder::new(bytes)?;
     let mut walk = Walk::new(points, corners, VertexLabels::TraversalOrder);

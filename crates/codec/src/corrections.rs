@@ -1,6 +1,6 @@
 //! Single vertices in single frames that are moved to where they were captured, to within a bound.
 
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, Models};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Corrections {
     step: f64,
-    frames: Vec<Vec<(u32, [i32; 3])>>,
+    frames: Vec<Vec<Correction>>,
 }
 
 impl Corrections {
@@ -17,8 +17,8 @@ impl Corrections {
         Self { step, frames: vec![Vec::new(); frames] }
     }
 
-    /// Those that take every decoded position, points × 3, to within `bound` of the captured one. `None` where steps of this bound cannot be told
-    /// apart in single precision, or do not count the distance.
+    /// Those that take every decoded position to within `bound` of the captured one. `None` where
+    /// single precision does not tell such steps apart, or they do not count the distance.
     pub(crate) fn find(captured: &[&[f64]], decoded: &[Vec<f32>], bound: f64) -> Option<Self> {
         let farthest = captured.iter().flat_map(|frame| frame.iter()).fold(0.0f64, |far, x| far.max(x.abs()));
         // Half a step along each axis, and rounding, are less than the bound.
@@ -72,20 +72,12 @@ impl Corrections {
 
     /// Nothing where nothing is corrected.
     pub(crate) fn encode(&self) -> Vec<u8> {
-        if self.count() == 0 {
-            return Vec::new();
-        }
         let mut coder = Encoder::default();
-        let mut models = Models::new();
-        for frame in &self.frames {
-            models.count(&mut coder, frame.len() as u32);
-            let mut next = 0;
-            for &(vertex, steps) in frame {
-                models.correction(&mut coder, vertex - next, steps);
-                next = vertex + 1;
-            }
+        // What is given has as many as it may have.
+        if self.count() > 0 && code(&mut coder, &self.frames, self.frames.len(), usize::MAX, usize::MAX).is_ok() {
+            return coder.into_bytes();
         }
-        coder.into_bytes()
+        Vec::new()
     }
 
     pub(crate) fn decode(bytes: &[u8], frames: usize, points: usize, step: f64) -> Result<Self> {
@@ -93,65 +85,55 @@ impl Corrections {
             return Ok(Self::none(frames, step));
         }
         let mut coder = Decoder::new(bytes)?;
-        let mut models = Models::new();
-        let mut found = Vec::with_capacity(frames);
         // Past its end a decoder reads zeros, which could stand for any number of them.
-        let mut left = (1 << 20) + 64 * bytes.len();
-        for _ in 0..frames {
-            let count = models.count(&mut coder, 0) as usize;
-            coder.check()?;
-            left = left.checked_sub(count).ok_or(Error::Damaged("more corrections than their bytes can say"))?;
-            if count > points {
-                return Err(Error::Damaged("more corrections than points"));
-            }
-            let mut frame = Vec::with_capacity(count);
-            let mut next = 0usize;
-            for _ in 0..count {
-                let (gap, steps) = models.correction(&mut coder, 0, [0; 3]);
-                let vertex = next + gap as usize;
-                if vertex >= points {
-                    return Err(Error::Damaged("a correction of no point"));
-                }
-                frame.push((vertex as u32, steps));
-                next = vertex + 1;
-            }
-            found.push(frame);
-        }
+        let most = (1 << 20) + 64 * bytes.len();
+        let frames = code(&mut coder, &[], frames, points, most)?;
         coder.check()?;
-        Ok(Self { step, frames: found })
+        Ok(Self { step, frames })
     }
+}
+
+/// A vertex, and the steps that it is moved.
+type Correction = (u32, [i32; 3]);
+
+/// Codes corrections, at most `most`: their number in each frame, vertices passed over, and steps.
+fn code(
+    coder: &mut impl Coder,
+    given: &[Vec<Correction>],
+    frames: usize,
+    points: usize,
+    most: usize,
+) -> Result<Vec<Vec<Correction>>> {
+    let (mut counts, mut gaps, mut sizes) = (Integers::new(1), Integers::new(1), Integers::new(3));
+    let (mut count, mut left) = (0i32, most);
+    let mut found = Vec::with_capacity(frames);
+    for frame in 0..frames {
+        let given = given.get(frame).map_or(&[][..], Vec::as_slice);
+        let difference = counts.code(coder, 0, (given.len() as i32).wrapping_sub(count));
+        count = count.wrapping_add(difference).max(0);
+        coder.check()?;
+        let of_frame = count as usize;
+        left = left.checked_sub(of_frame).ok_or(Error::Damaged("more corrections than their bytes can say"))?;
+        if of_frame > points {
+            return Err(Error::Damaged("more corrections than points"));
+        }
+        let (mut list, mut next) = (Vec::with_capacity(of_frame), 0);
+        for k in 0..of_frame {
+            let (vertex, steps) = given.get(k).copied().unwrap_or((next as u32, [0; 3]));
+            let vertex = next + gaps.natural(coder, 0, vertex - next as u32) as usize;
+            if vertex >= points {
+                return Err(Error::Damaged("a correction of no point"));
+            }
+            list.push((vertex as u32, [0, 1, 2].map(|k| sizes.code(coder, k, steps[k]))));
+            next = vertex + 1;
+        }
+        found.push(list);
+    }
+    Ok(found)
 }
 
 fn correct(position: &mut [f32], steps: [i32; 3], step: f64) {
     for k in 0..3 {
         position[k] = (f64::from(position[k]) + f64::from(steps[k]) * step) as f32;
-    }
-}
-
-struct Models {
-    counts: Integers,
-    gaps: Integers,
-    steps: Integers,
-    last_count: u32,
-}
-
-impl Models {
-    fn new() -> Self {
-        Self { counts: Integers::new(1), gaps: Integers::new(2), steps: Integers::new(3), last_count: 0 }
-    }
-
-    fn count(&mut self, coder: &mut impl Coder, value: u32) -> u32 {
-        let difference = self.counts.code(coder, 0, (value as i32).wrapping_sub(self.last_count as i32));
-        self.last_count = (self.last_count as i32).wrapping_add(difference).max(0) as u32;
-        self.last_count
-    }
-
-    fn correction(&mut self, coder: &mut impl Coder, gap: u32, steps: [i32; 3]) -> (u32, [i32; 3]) {
-        let gap = self.gaps.natural(coder, 0, gap);
-        let mut found = [0; 3];
-        for k in 0..3 {
-            found[k] = self.steps.code(coder, k, steps[k]);
-        }
-        (gap, found)
     }
 }

@@ -1,7 +1,7 @@
-//! Whole numbers to bytes: adaptive binary models of their digits, and a range coder (Martin 1979) of the `constriction` crate.
+//! Whole numbers to bytes: adaptive binary models and a range coder (Martin 1979).
 //!
-//! One piece of code describes a stream for both directions: it hands each number to a [`Coder`], which writes it, or returns the one that was read
-//! and ignores the argument.
+//! One piece of code describes a stream for both directions: a [`Coder`] writes each number that it
+//! is given, or returns the one that it reads and ignores the argument.
 
 use crate::error::{Error, Result};
 use constriction::stream::Encode;
@@ -26,7 +26,7 @@ const RECIPROCALS: [u64; (1 << SLOW) + 1] = {
     reciprocals
 };
 
-/// The probability that a binary digit is 0: the mean of two estimates that follow what they meet fast and slowly.
+/// The probability that a digit is 0: the mean of two estimates that follow fast and slowly.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BinaryModel {
     fast: u16,
@@ -53,7 +53,7 @@ impl BinaryModel {
         let (fast, slow) = if self.met >= (1 << SLOW) - 2 {
             (left(self.fast) >> FAST, left(self.slow) >> SLOW)
         } else {
-            // At first a plain average of what was met. 16 digits times a reciprocal of 32, rounded up, is the quotient for divisors this small.
+            // At first a plain average: for these divisors the reciprocal gives the quotient.
             let rate = u32::from(self.met) + 2;
             self.met += 1;
             let part = |p: u16, rate: u32| ((u64::from(p) * RECIPROCALS[rate as usize]) >> 32) as u16;
@@ -77,6 +77,11 @@ pub(crate) trait Coder {
     /// Whether what was read cannot be what an encoder wrote.
     fn is_damaged(&self) -> bool {
         false
+    }
+
+    /// Refuses what cannot be what an encoder wrote.
+    fn check(&self) -> Result<()> {
+        if self.is_damaged() { Err(Error::Damaged("coded numbers are damaged")) } else { Ok(()) }
     }
 
     /// Codes a binary digit of probability 1/2.
@@ -127,8 +132,8 @@ impl Coder for Encoder {
 /// Words that a decoder reads past the end of what an encoder wrote, at the most.
 const PAST: u32 = 2;
 
-/// Reads what the encoder of `constriction` wrote. A digit is 0 or 1, so that one comparison says which, where that crate's decoder for any alphabet divides by
-/// the range. Past the end it goes on with zeros until it is checked; what reads checks that numbers are possible.
+/// Reads what the encoder of `constriction` wrote, without the division of that crate's decoder for
+/// any alphabet. Past the end it goes on with zeros until it is checked.
 pub(crate) struct Decoder<'a> {
     words: std::slice::Iter<'a, [u8; 4]>,
     /// Words read past the end.
@@ -160,11 +165,6 @@ impl<'a> Decoder<'a> {
             }
         }
     }
-
-    /// Whether all that was read can be what an encoder wrote.
-    pub(crate) fn check(&self) -> Result<()> {
-        if self.is_damaged() { Err(Error::Damaged("coded numbers are damaged")) } else { Ok(()) }
-    }
 }
 
 impl Coder for Decoder<'_> {
@@ -194,8 +194,7 @@ impl Coder for Decoder<'_> {
     }
 }
 
-/// Models of whole numbers with either sign, in some contexts: whether it is 0, its sign, then the size, small ones in unary, large ones by their
-/// number of binary digits.
+/// A number by whether it is 0, its sign, and its size, small ones in unary.
 pub(crate) struct Integers {
     contexts: Vec<Context>,
     exponent: [BinaryModel; 32],
@@ -218,62 +217,66 @@ pub(crate) const MAX_CONTEXT_SIZE: u32 = 1 << 20;
 /// Sizes of residuals are kept up to this.
 pub(crate) const MAX_RESIDUAL_SIZE: u32 = 1 << 16;
 
-impl Integers {
-    pub(crate) fn new(contexts: usize) -> Self {
+/// Models of whole numbers with either sign, in some contexts.
+pub(crate) trait Models: Send {
+    fn new(contexts: usize) -> Self;
+
+    /// Codes a number between −[`MAX_SIZE`] and [`MAX_SIZE`], and gives it back.
+    fn code(&mut self, coder: &mut impl Coder, context: usize, value: i32) -> i32;
+}
+
+impl Models for Integers {
+    fn new(contexts: usize) -> Self {
         Self { contexts: vec![Context::default(); contexts], exponent: Default::default(), leading: Default::default() }
     }
 
-    /// Codes a number between −[`MAX_SIZE`] and [`MAX_SIZE`].
-    pub(crate) fn code(&mut self, coder: &mut impl Coder, context: usize, value: i32) -> i32 {
+    fn code(&mut self, coder: &mut impl Coder, context: usize, value: i32) -> i32 {
         let models = &mut self.contexts[context];
         if !coder.bit(&mut models.zero, value != 0) {
             return 0;
         }
         let negative = coder.bit(&mut models.sign, value < 0);
+        let with_sign = |size: u32| if negative { -(size as i32) } else { size as i32 };
         let size = value.unsigned_abs();
-        let mut found = 1;
-        while found <= UNARY {
-            if !coder.bit(&mut models.unary[found as usize - 1], size > found) {
-                return if negative { -(found as i32) } else { found as i32 };
-            }
-            found += 1;
+        let small = unary(coder, &mut models.unary, size.saturating_sub(1));
+        if small < UNARY {
+            return with_sign(small + 1);
         }
         // Beyond: size − UNARY − 1 plus one, by its digits.
         let rest = size.saturating_sub(UNARY);
-        let digits = rest.checked_ilog2().unwrap_or(0);
-        let mut count = 0;
-        while count < 28 && coder.bit(&mut self.exponent[count as usize], digits > count) {
-            count += 1;
-        }
+        let count = unary(coder, &mut self.exponent[..28], rest.checked_ilog2().unwrap_or(0));
         let mut number = 1;
         if count > 0 {
             number = 2 | u32::from(coder.bit(&mut self.leading[count as usize], rest >> (count - 1) & 1 == 1));
             number = number << (count - 1) | coder.bits(count - 1, rest & ((1 << (count - 1)) - 1));
         }
-        let size = (number + UNARY).min(MAX_SIZE) as i32;
-        if negative { -size } else { size }
+        with_sign((number + UNARY).min(MAX_SIZE))
     }
+}
 
+impl Integers {
     /// Codes a number that is not negative.
     pub(crate) fn natural(&mut self, coder: &mut impl Coder, context: usize, value: u32) -> u32 {
         // Small ones of both signs are used, so that the sign costs nothing.
-        let models = &mut self.contexts[context];
-        let mut found = 0;
-        while found < UNARY {
-            if !coder.bit(&mut models.unary[found as usize], value > found) {
-                return found;
-            }
-            found += 1;
+        let small = unary(coder, &mut self.contexts[context].unary, value);
+        if small < UNARY {
+            return small;
         }
         let rest = value.saturating_sub(UNARY) + 1;
-        let digits = rest.ilog2();
-        let mut count = 0;
-        while count < 31 && coder.bit(&mut self.exponent[count as usize], digits > count) {
-            count += 1;
-        }
+        let count = unary(coder, &mut self.exponent[..31], rest.ilog2());
         let number = 1u32 << count | coder.bits(count, rest & ((1 << count) - 1));
         (number - 1).saturating_add(UNARY)
     }
+}
+
+/// Codes a number that is at most that of the models: as many times 1, then 0.
+#[inline(always)]
+pub(crate) fn unary(coder: &mut impl Coder, models: &mut [BinaryModel], value: u32) -> u32 {
+    let mut found = 0;
+    while (found as usize) < models.len() && coder.bit(&mut models[found as usize], value > found) {
+        found += 1;
+    }
+    found
 }
 
 /// The context of a number from the sizes around it, in sixteenths: 0 to [`SIZES`] − 1.

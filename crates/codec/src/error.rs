@@ -10,3 +10,10 @@ pub enum Error {
 }
 
 pub(crate) type Result<T> = std::result::Result<T, Error>;
+
+/// The number of bytes at the front, which is taken from them.
+pub(crate) fn take<const N: usize>(bytes: &mut &[u8], cut: &'static str) -> Result<[u8; N]> {
+    let (head, rest) = bytes.split_first_chunk().ok_or(Error::Damaged(cut))?;
+    *bytes = rest;
+    Ok(*head)
+}

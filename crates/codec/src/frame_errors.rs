@@ -1,6 +1,6 @@
 //! The errors of frames, each to twelve binary digits, as differences to those of the frame before.
 
-use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, SIZES, size_class};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, Models, SIZES, size_class};
 use crate::error::{Error, Result};
 
 /// Digits of a single-precision number that are left out.
@@ -14,7 +14,7 @@ pub fn rounded_error(error: f32) -> f32 {
     f32::from_bits(error.to_bits().next_multiple_of(1 << LEFT_OUT)).min(f32::MAX)
 }
 
-/// Codes the errors of frames, two numbers each, rounded up to twelve binary digits; NaN stays what it is.
+/// Codes the errors of frames, rounded up to twelve binary digits; NaN stays.
 pub fn encode_errors(errors: &[[f32; 2]]) -> Vec<u8> {
     let mut coder = Encoder::default();
     code(&mut coder, errors.len(), errors);
@@ -22,9 +22,6 @@ pub fn encode_errors(errors: &[[f32; 2]]) -> Vec<u8> {
 }
 
 /// What [`encode_errors`] wrote for so many frames.
-///
-/// # Errors
-/// Bytes that the encoder did not write.
 pub fn decode_errors(bytes: &[u8], frames: usize) -> Result<Vec<[f32; 2]>> {
     let mut coder = Decoder::new(bytes)?;
     let errors = code(&mut coder, frames, &[]);

@@ -5,8 +5,7 @@ use std::collections::VecDeque;
 /// Open edges are told apart by the faces to come at their ends up to this number.
 pub(crate) const MAX_TO_COME: u32 = 15;
 
-/// Edges at which the walk may go on; some wait no longer. By how few faces are to come at one of their ends, which is then complete soon; those that were opened or
-/// came nearer first before others.
+/// Edges at which the walk may go on, by how few faces are to come at an end, then by age.
 #[derive(Default)]
 pub(crate) struct Gates([VecDeque<(u32, u32)>; MAX_TO_COME as usize + 1]);
 

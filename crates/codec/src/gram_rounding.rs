@@ -1,30 +1,32 @@
 //! Rounding of a Gram matrix to whole steps, the same on every machine.
 //!
-//! Machines compute coordinates that differ by their rounding, and eigenvectors of nearly equal eigenvalues turn with it. So the basis of cages is
-//! computed from whole numbers: each entry is the nearest number of steps. Where an entry lies so close to the middle between two numbers
-//! that another machine might round it the other way, the bytes say whether the number is odd.
+//! Eigenvectors of nearly equal eigenvalues turn with the rounding of coordinates, so the basis of
+//! cages is computed from whole numbers of steps. Where an entry lies so close to the middle that
+//! another machine might round it the other way, the bytes say whether the number is odd.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, take};
 use faer::{Mat, MatRef};
 
-/// Steps in the mean of the diagonal, at least: what rounding adds to the matrix is small beside the floor of its eigenvalues.
+/// Steps in the mean of the diagonal, at least: rounding is small beside the floor of eigenvalues.
 const STEPS: f64 = 16_384.0;
 /// Steps are from two to the power of less this to two to the power of this.
 const MAX_EXPONENT: f64 = 1000.0;
 /// Entries are counted in so many steps at the most, so that they are exact in double precision.
 const MAX_STEPS: f64 = 9.0e15;
 
+const DAMAGED: &str = "the rounding of a basis is damaged";
+
 /// How a Gram matrix is rounded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GramRounding {
     /// A step is two to the power of this.
     exponent: i16,
-    /// Entries of the lower triangle, row by row, that lie between two whole numbers, ascending, and whether the one to take is odd.
+    /// Entries of the lower triangle between two whole numbers, and whether the one to take is odd.
     between: Vec<(u32, bool)>,
 }
 
 impl GramRounding {
-    /// For a symmetric matrix whose entries another machine computes to `tolerance` of the mean of its diagonal; `None` where numbers are not finite.
+    /// For a matrix that other machines compute to `tolerance` of its mean diagonal, if finite.
     pub(crate) fn of(products: MatRef<'_, f64>, tolerance: f64) -> Option<Self> {
         let m = products.nrows();
         let mean = (0..m).map(|k| products[(k, k)]).sum::<f64>() / m.max(1) as f64;
@@ -70,8 +72,7 @@ impl GramRounding {
         between.peek().is_none().then_some(products)
     }
 
-    /// The exponent, the number of entries between two numbers, and for each how many entries were passed over since the last, twice, and one more for odd
-    /// numbers, seven bits a byte.
+    /// The exponent, the count, and of each entry twice those passed over, plus one if odd.
     pub(crate) fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.exponent.to_le_bytes());
         write_number(out, self.between.len() as u64);
@@ -83,25 +84,20 @@ impl GramRounding {
     }
 
     /// Reads what [`Self::write`] wrote from the front of bytes.
-    ///
-    /// # Errors
-    /// Bytes that it did not write.
     pub(crate) fn read(bytes: &mut &[u8]) -> Result<Self> {
-        let damaged = || Error::Damaged("the rounding of a basis is damaged");
-        let (exponent, rest) = bytes.split_first_chunk().ok_or_else(damaged)?;
-        *bytes = rest;
-        let exponent = i16::from_le_bytes(*exponent);
+        let damaged = || Error::Damaged(DAMAGED);
+        let exponent = i16::from_le_bytes(take(bytes, DAMAGED)?);
         if f64::from(exponent).abs() > MAX_EXPONENT {
             return Err(damaged());
         }
-        let count = read_number(bytes).ok_or_else(damaged)?;
+        let count = read_number(bytes)?;
         // Each takes a byte at least.
         if count > bytes.len() as u64 {
             return Err(damaged());
         }
         let (mut between, mut next) = (Vec::with_capacity(count as usize), 0u64);
         for _ in 0..count {
-            let number = read_number(bytes).ok_or_else(damaged)?;
+            let number = read_number(bytes)?;
             let place = u32::try_from(next.saturating_add(number / 2)).map_err(|_| damaged())?;
             between.push((place, number % 2 == 1));
             next = u64::from(place) + 1;
@@ -123,17 +119,16 @@ fn write_number(out: &mut Vec<u8>, mut number: u64) {
     out.push(number as u8);
 }
 
-fn read_number(bytes: &mut &[u8]) -> Option<u64> {
+fn read_number(bytes: &mut &[u8]) -> Result<u64> {
     let mut number = 0;
     for shift in (0..63).step_by(7) {
-        let (&byte, rest) = bytes.split_first()?;
-        *bytes = rest;
+        let [byte] = take(bytes, DAMAGED)?;
         number |= u64::from(byte & 127) << shift;
         if byte < 128 {
-            return Some(number);
+            return Ok(number);
         }
     }
-    None
+    Err(Error::Damaged(DAMAGED))
 }
 
 #[cfg(test)]

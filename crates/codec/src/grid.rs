@@ -1,16 +1,13 @@
 //! Positions of a mesh at rest, on a grid.
 
 use crate::entropy::{
-    Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, MAX_RESIDUAL_SIZE, MAX_SIZE, SIZES, size_class,
+    Coder, Decoder, Encoder, Integers, MAX_CONTEXT_SIZE, MAX_RESIDUAL_SIZE, MAX_SIZE, Models, SIZES, size_class,
 };
-use crate::error::{Error, Result};
+use crate::error::{Result, take};
 use crate::parallelograms::Predictions;
-use crate::prediction_weights::{PredictionWeights, WEIGHTS_BYTES};
+use crate::prediction_weights::PredictionWeights;
 use cager_geometry::mesh::{Point, Polygons, bounds};
 use cager_geometry::topology::Adjacency;
-
-/// Bytes before the coded numbers: origin and step as f64.
-const HEAD: usize = 32;
 
 /// A grid of positions, each rounded to single precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +17,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Over these points, with this step between positions. `None` for an empty list, and where the points span too many steps.
+    /// Over these points; `None` where there are none or they span too many steps.
     pub fn new(points: &[Point], step: f64) -> Option<Self> {
         let (low, high) = bounds(points);
         let steps = (0..3).map(|k| (high[k] - low[k]) / step).fold(0.0, f64::max);
@@ -58,24 +55,20 @@ pub fn encode_positions(grid: Grid, faces: &Polygons, points: &[Point]) -> Vec<u
 }
 
 /// The positions that [`encode_positions`] wrote, for the same faces in the same order.
-///
-/// # Errors
-/// Bytes that the encoder did not write.
 pub fn decode_positions(bytes: &[u8], faces: &Polygons, points: usize) -> Result<Vec<Point>> {
-    const CUT: Error = Error::Damaged("positions are cut");
-    let (head, coded) = bytes.split_first_chunk::<HEAD>().ok_or(CUT)?;
-    let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[8 * k + byte]));
-    let grid = Grid { origin: [number(0), number(1), number(2)], step: number(3) };
+    const CUT: &str = "positions are cut";
+    let mut coded = bytes;
+    let mut number = || take(&mut coded, CUT).map(f64::from_le_bytes);
+    let grid = Grid { origin: [number()?, number()?, number()?], step: number()? };
+    let weights = PredictionWeights::from_bytes(take(&mut coded, CUT)?);
     let predictions = Predictions::new(faces, points);
-    let (weights, coded) = coded.split_first_chunk::<WEIGHTS_BYTES>().ok_or(CUT)?;
     let mut coder = Decoder::new(coded)?;
-    let weights = PredictionWeights::from_bytes(*weights);
     let steps = code(&mut coder, &predictions, &Adjacency::new(faces, points), weights, &[]);
     coder.check()?;
     Ok(steps.into_iter().map(|steps| grid.position(steps)).collect())
 }
 
-/// Codes steps by weighted predictions. How far those of neighbours were off says how large a number will be.
+/// Codes steps by weighted predictions, in the context of the errors of neighbours.
 fn code(
     coder: &mut impl Coder,
     predictions: &Predictions,

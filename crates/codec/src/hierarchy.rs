@@ -1,7 +1,7 @@
-//! An order of a mesh's vertices from coarse to fine, in which each is predicted from neighbours on the mesh that come before it.
+//! An order of a mesh's vertices from coarse to fine, each predicted from neighbours before it.
 //!
-//! Independent vertices are taken away round by round, those of few neighbours first; the neighbours of one that is gone are joined to the one of
-//! them that has the fewest. It depends on the faces alone, in whole numbers.
+//! Independent vertices are taken away round by round, those of few neighbours first, and the
+//! neighbours of each are joined to the one of them that has the fewest.
 
 use cager_geometry::mesh::Polygons;
 use cager_geometry::topology::Adjacency;
@@ -17,7 +17,7 @@ const PATCH: usize = 512;
 pub struct Hierarchy {
     /// The vertex at each place.
     order: Vec<u32>,
-    /// The places of those that predict the vertex at place k are `parents[starts[k]..starts[k + 1]]`.
+    /// `parents[starts[k]..starts[k + 1]]` are the places of what predicts the vertex at place k.
     parents: Vec<u32>,
     starts: Vec<u32>,
 }
@@ -79,11 +79,9 @@ impl Hierarchy {
         self.order.len()
     }
 
-    /// About one in `every` of the vertices, in whole patches of the mesh, with the numbers that they have here, ascending: what costs as much to code,
-    /// for its size.
+    /// About one in `every` vertices, in whole patches of the mesh, with their numbers here.
     pub fn part(&self, every: usize) -> (Self, Vec<u32>) {
-        // A patch is what follows by the first parents from one of the coarsest vertices. Those that are not predicted come first; there may be one for each of
-        // many parts, so that others have to be begun with besides.
+        // A patch is what follows by the first parents from one of the first places.
         let all = 0..self.points();
         let roots = all.clone().filter(|&place| self.parents(place).is_empty()).count();
         let patches = roots + self.points() / PATCH;
@@ -131,7 +129,7 @@ impl Hierarchy {
     }
 }
 
-/// The neighbours of a vertex, ascending. Of a hub there may be as many as the mesh has vertices, so that taking one from a plain list would take as long.
+/// The neighbours of a vertex, ascending; hubs have too many for a plain list.
 enum Near {
     Few(Vec<u32>),
     Many(BTreeSet<u32>),

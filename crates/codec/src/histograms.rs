@@ -1,7 +1,6 @@
-//! The empirical entropy of whole numbers in contexts: about the bits that [`Integers`](crate::entropy::Integers) spends on them, without coding.
+//! Empirical entropy of whole numbers: about the bits that adaptive models take.
 
-use crate::components::Models;
-use crate::entropy::{Coder, UNARY};
+use crate::entropy::{Coder, Models, UNARY};
 
 /// Numbers that a context tells apart: those up to [`UNARY`] of either sign, and all beyond.
 const PLACES: usize = 2 * UNARY as usize + 3;
@@ -12,7 +11,7 @@ const ADAPTATION: f64 = 0.008;
 /// Counts of numbers in some contexts.
 pub(crate) struct Histograms {
     contexts: Vec<[u32; PLACES]>,
-    /// What lies beyond, in all contexts: by the number of its binary digits, and the first one after the leading 1.
+    /// Numbers beyond: by the number of their binary digits, and the first after the leading 1.
     beyond: [u32; 2 * 32],
     /// Binary digits that follow.
     digits: f64,
@@ -21,7 +20,7 @@ pub(crate) struct Histograms {
 }
 
 impl Histograms {
-    /// Binary digits that the numbers take, half of log₂ of the count for each number that is to be learned included.
+    /// Binary digits of the numbers, with half of log₂ of the count for each one to be learned.
     pub(crate) fn bits(&self) -> f64 {
         self.digits
             + ADAPTATION * self.modelled
@@ -67,13 +66,12 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(7);
         let mut over = Vec::new();
         for spread in [0.2, 2.0, 20.0, 60.0, 220.0, 900.0] {
-            let (mut coder, mut models, mut estimate) =
-                (Encoder::default(), <Integers as Models>::new(2), Histograms::new(2));
+            let (mut coder, mut models, mut estimate) = (Encoder::default(), Integers::new(2), Histograms::new(2));
             for k in 0..40_000 {
                 // About normal, wider in the second context.
                 let normal = (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
                 let value = (normal * spread * (1.0 + f64::from(k % 2))).round() as i32;
-                Models::code(&mut models, &mut coder, k as usize % 2, value);
+                models.code(&mut coder, k as usize % 2, value);
                 assert_eq!(estimate.code(&mut Encoder::default(), k as usize % 2, value), value);
             }
             over.push((estimate.bits() - 8.0 * coder.into_bytes().len() as f64) / 40_000.0);

@@ -1,8 +1,7 @@
-//! Animated meshes and their cages to bytes and back, with a bound on the error of every vertex in every frame: plain data in, plain data out; no
-//! I/O.
+//! Animated meshes and their cages to bytes and back, with a bound on the error of every vertex.
 //!
-//! Every number is decoded by an entropy decoder of whole numbers, whose predictions and models are whole numbers too. Floating point comes
-//! after it, so machines that round differently decode the same numbers and positions that differ by rounding alone.
+//! Entropy decoding and its predictions are of whole numbers alone, so that machines decode the
+//! same numbers, and positions that differ by rounding alone.
 
 mod basis;
 mod cage;
@@ -38,7 +37,7 @@ pub use hierarchy::Hierarchy;
 pub use mesh::CodedMesh;
 pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
 
-/// Most positions of one group of frames, points times frames: what decoding one holds in memory follows from it.
+/// Most positions, points times frames, of a group: memory of decoding follows from it.
 pub const MAX_POSITIONS: usize = 1 << 26;
 /// Most frames of a group.
 pub const MAX_FRAMES: usize = 1024;

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::grid::{Grid, decode_positions, encode_positions};
 use cager_geometry::mesh::{Model, Point, Polygons};
 
-/// A mesh as bytes, and what they decode to: the same vertices and polygons, the polygons in another order.
+/// A mesh as bytes, and what they decode to: the same polygons in another order.
 #[derive(Clone, Debug)]
 pub struct CodedMesh {
     /// What the bytes decode to.
@@ -30,9 +30,6 @@ impl CodedMesh {
     }
 
     /// The same mesh with positions in other steps.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
     pub fn in_steps(&self, mesh: &Model, step: f64) -> Result<Self> {
         let grid = Self::grid(mesh, step)?;
         let positions = encode_positions(grid, &self.mesh.faces, &mesh.points);

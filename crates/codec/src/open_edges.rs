@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-/// Most ends in a plain list; around a hub there may be as many as the mesh has edges, so that finding one there would take as long.
+/// Most ends in a plain list: a hub may have as many as the mesh has edges.
 const FEW: usize = 128;
 /// Ends that are looked at where the walk asks what lies near.
 pub(crate) const NEWEST: usize = 16;
@@ -55,7 +55,7 @@ impl OpenEdges {
         }
     }
 
-    /// The last ones, the oldest of them first; `scratch` holds them where they do not lie side by side.
+    /// The last ones, the oldest first; `scratch` holds them where they are not side by side.
     pub(crate) fn newest<'a>(&'a self, scratch: &'a mut [u32; NEWEST]) -> &'a [u32] {
         match self {
             Self::Few(list) => &list[list.len().saturating_sub(NEWEST)..],

@@ -1,5 +1,5 @@
-//! An order of a mesh's vertices in which as many as possible are predicted by parallelograms of vertices before them, over each edge of the mesh: of two
-//! triangles with a common edge the two far corners are predicted from each other.
+//! An order of a mesh's vertices in which as many as possible are predicted by parallelograms: of
+//! two triangles with a common edge the far corners are predicted from each other.
 
 use cager_geometry::mesh::Polygons;
 use std::cmp::Reverse;

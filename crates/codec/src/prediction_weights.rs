@@ -1,5 +1,5 @@
-//! What predicts the position of a vertex at rest from those known before it: parallelograms, and the mean of its neighbours, each by a weight that the encoder
-//! fits to the mesh. Meshes of scanners need the mean, those of modellers the parallelograms.
+//! Predicts the position of a vertex at rest by parallelograms and the mean of its neighbours, with
+//! weights fitted to the mesh: scans need the mean, modelled meshes the parallelograms.
 
 use crate::entropy::MAX_SIZE;
 use crate::parallelograms::Predictions;
@@ -9,29 +9,27 @@ use cager_geometry::topology::Adjacency;
 const PARTS: i64 = 32;
 /// By how many parallelograms predict a vertex, these and more alike.
 const CLASSES: usize = 3;
-/// Bytes of the weights.
-pub(crate) const WEIGHTS_BYTES: usize = 2 * CLASSES;
 /// About the most vertices that weights are fitted to.
 const SAMPLE: usize = 1 << 16;
 /// Rounds of fitting by reweighted least squares, which comes near the least sum of sizes.
 const ROUNDS: usize = 8;
 
-/// Of each class the weight of the parallelograms and that of the neighbours, as differences to the middle of the edges that the parallelograms lean on.
+/// Weights of parallelograms and neighbours for each class, from the middle of the edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PredictionWeights([[i8; 2]; CLASSES]);
 
-/// A coordinate of a vertex, in parts of a step: the middle of the edges, and the differences of the parallelograms and of the neighbours to it.
+/// In parts of a step: the middle of the edges, and what parallelograms and neighbours differ by.
 struct Terms {
     middle: i64,
     differences: [i64; 2],
 }
 
 impl PredictionWeights {
-    pub(crate) fn from_bytes(bytes: [u8; WEIGHTS_BYTES]) -> Self {
+    pub(crate) fn from_bytes(bytes: [u8; 2 * CLASSES]) -> Self {
         Self(std::array::from_fn(|class| [bytes[2 * class] as i8, bytes[2 * class + 1] as i8]))
     }
 
-    pub(crate) fn to_bytes(self) -> [u8; WEIGHTS_BYTES] {
+    pub(crate) fn to_bytes(self) -> [u8; 2 * CLASSES] {
         std::array::from_fn(|k| self.0[k / 2][k % 2] as u8)
     }
 
@@ -57,7 +55,7 @@ impl PredictionWeights {
         Self(rows.map(|rows| fitted(&rows)))
     }
 
-    /// Where a vertex is expected, in steps: by the triples that predict it and its known neighbours; without triples where `near` is.
+    /// Where a vertex is expected, in steps; without triples where `near` is.
     pub(crate) fn expected(
         self,
         found: &[[i32; 3]],
@@ -97,7 +95,7 @@ fn terms(found: &[[i32; 3]], triples: &[[u32; 3]], known: &[u32], k: usize) -> T
     Terms { middle, differences: [parallelograms - middle, neighbours - middle] }
 }
 
-/// Weights that make the sum of what is left small: by least squares, each row weighed by how much the round before left of it.
+/// Reweighted least squares: rows count less the more the round before left of them.
 fn fitted(rows: &[[f64; 3]]) -> [i8; 2] {
     let mut weights = [1.0, 0.0];
     for _ in 0..ROUNDS {

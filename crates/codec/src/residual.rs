@@ -1,13 +1,12 @@
 //! What the cage cannot say: the difference of a group's positions to those of its cages.
 //!
-//! `R ≈ E A` as for cages ([`crate::trajectories`]), A in whole steps ([`Components`]); then single vertices are corrected, so that with a bound none is farther
-//! from where it was captured.
+//! `R ≈ E A` as for cages ([`crate::trajectories`]), A in whole steps ([`Components`]); then single
+//! vertices are corrected, so that with a bound none is farther from where it was captured.
 
-use crate::cage::step_and_count;
-use crate::components::{Component, Components, Models, PARTS, pieces};
+use crate::components::{Component, Components, PARTS, pieces};
 use crate::corrections::Corrections;
-use crate::entropy::{Decoder, Encoder, Integers, MAX_SIZE};
-use crate::error::{Error, Result};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, MAX_SIZE, Models};
+use crate::error::{Error, Result, take};
 use crate::hierarchy::Hierarchy;
 use crate::histograms::Histograms;
 use crate::trajectories::{Trajectories, fit};
@@ -16,11 +15,11 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
 
-/// Bytes before the coded numbers: the step as f64, the number of components as u16, the step of corrections as f64, the bytes of the components as u32.
+/// Bytes of the step, the number of components, the step of corrections and bytes of components.
 const HEAD: usize = 22;
-/// Added to the number of components where the vertices are in two parts. The bytes of the second part as u32 follow the head.
+/// Added to the number of components of vertices in two parts; the bytes of the second follow.
 const PARTED: u16 = 1 << 15;
-/// Fewest numbers in two parts: of fewer, models of their own take more than is gained by coding both at once.
+/// Fewest numbers in two parts: of fewer, models of their own take more than is gained.
 const PARTED_NUMBERS: usize = 1 << 18;
 /// Sums and corrections beyond this have no positions in single precision.
 const LARGEST: f64 = 1e38;
@@ -29,7 +28,7 @@ const LARGEST_CORRECTION: f64 = LARGEST / (1u64 << 31) as f64;
 /// Points that one task adds up.
 const BLOCK: usize = 2048;
 
-/// A group to encode: for each frame, where its points are and where its cage takes them, points × 3.
+/// A group to encode: of each frame the captured points and those of its cage, points × 3.
 pub struct ResidualGroup<'a> {
     /// Positions as captured.
     pub captured: &'a [&'a [f64]],
@@ -43,7 +42,8 @@ pub struct ResidualGroup<'a> {
     pub most_numbers: usize,
 }
 
-/// Encodes what is left of a group; and what the bytes say. `None` where numbers are not finite, or too far apart to be counted in these steps.
+/// Encodes the residual of a group; returns the bytes and the decoded residual. `None` where
+/// numbers are not finite, or too far apart to be counted in these steps.
 ///
 /// # Panics
 /// Where frames have another number of points, or there are too many of them.
@@ -103,9 +103,6 @@ impl<'a, M: Models> Contents<'a, M> {
         drop(motion);
         let per_unit = PARTS as f64 / group.step;
         let most = f64::from(MAX_SIZE) / per_unit;
-        let mut coders: [Encoder; 2] = Default::default();
-        chosen.code(&mut coders[0], frames, count);
-        let mut decoded = Residual::new(&chosen, points);
         let component_of = |k: usize| {
             let parts = |x: f64| (x.abs() < most).then_some((per_unit * x + 0.5f64.copysign(x)) as i64);
             let (vertices, _) = values.col_as_slice(k).as_chunks::<3>();
@@ -115,14 +112,9 @@ impl<'a, M: Models> Contents<'a, M> {
             Some(Component::near(hierarchy, target))
         };
         let is_parted = 3 * points * count >= PARTED_NUMBERS;
-        let mut components = Components::<M>::new(hierarchy, is_parted);
-        // While some components are coded, what does not depend on them is found for the next.
-        let mut pieces = pieces(points, count);
-        let next = || pieces.next().unwrap_or(0..0).into_par_iter().map(component_of).collect();
-        let mut done = 0..;
-        components.code(&mut coders, next, |component| {
-            done.next().into_iter().for_each(|k| decoded.set(k, hierarchy, &component.found, group.step));
-        })?;
+        let mut coders: [Encoder; 2] = Default::default();
+        let (components, mut decoded) =
+            Residual::code(&mut coders, hierarchy, (&chosen, frames, count), is_parted, group.step, component_of)?;
         decoded.corrections = match group.bound {
             None => Corrections::none(frames, 0.0),
             Some(bound) => {
@@ -145,13 +137,30 @@ pub struct Residual {
 }
 
 impl Residual {
-    fn new(trajectories: &Trajectories, points: usize) -> Self {
-        let e = trajectories.values();
-        Self {
-            trajectories: Mat::from_fn(e.nrows(), e.ncols(), |t, k| e[(t, k)] as f32),
-            values: Mat::zeros(3 * points, e.ncols()),
+    /// Codes so many trajectories of so many frames, and one component after another.
+    fn code<'a, M: Models, C: Coder + Send>(
+        coders: &mut [C; 2],
+        hierarchy: &'a Hierarchy,
+        (trajectories, frames, count): (&Trajectories, usize, usize),
+        is_parted: bool,
+        step: f64,
+        component: impl Fn(usize) -> Option<Component> + Send + Sync,
+    ) -> Option<(Components<'a, M>, Self)> {
+        let e = trajectories.code(&mut coders[0], frames, count).values();
+        let mut residual = Self {
+            trajectories: Mat::from_fn(frames, count, |t, k| e[(t, k)] as f32),
+            values: Mat::zeros(3 * hierarchy.points(), count),
             corrections: Corrections::default(),
-        }
+        };
+        // While some components are coded, what does not depend on them is found for the next.
+        let mut pieces = pieces(hierarchy.points(), count);
+        let next = || pieces.next().unwrap_or(0..0).into_par_iter().map(&component).collect();
+        let mut components = Components::<M>::new(hierarchy, is_parted);
+        let mut done = 0..;
+        components.code(coders, next, |component| {
+            done.next().into_iter().for_each(|k| residual.set(k, hierarchy, &component.found, step));
+        })?;
+        Some((components, residual))
     }
 
     /// Takes the numbers of a component, in parts of a step, in the order of the hierarchy.
@@ -163,26 +172,20 @@ impl Residual {
         }
     }
 
-    /// What [`encode_residual`] wrote, for a group of as many frames, where that are at most so many numbers of components.
-    ///
-    /// # Errors
-    /// Bytes that the encoder did not write.
+    /// What [`encode_residual`] wrote for so many frames, of at most so many numbers.
     pub fn decode(hierarchy: &Hierarchy, frames: usize, bytes: &[u8], most: usize) -> Result<Self> {
         let points = hierarchy.points();
         if frames > MAX_FRAMES || points.saturating_mul(frames) > MAX_POSITIONS {
             return Err(Error::Damaged("a group has too many positions"));
         }
-        let (head, rest) = bytes.split_first_chunk::<HEAD>().ok_or(Error::Damaged("a residual is cut"))?;
-        let (step, count) = step_and_count(&std::array::from_fn(|k| head[k]));
-        let (count, is_parted) = (count & !usize::from(PARTED), count & usize::from(PARTED) != 0);
-        let correction = f64::from_le_bytes(std::array::from_fn(|k| head[10 + k]));
-        let coarse = u32::from_le_bytes(std::array::from_fn(|k| head[18 + k])) as usize;
-        let (fine, rest) = if is_parted {
-            let (bytes, rest) = rest.split_first_chunk::<4>().ok_or(Error::Damaged("a residual is cut"))?;
-            (u32::from_le_bytes(*bytes) as usize, rest)
-        } else {
-            (0, rest)
-        };
+        const CUT: &str = "a residual is cut";
+        let mut rest = bytes;
+        let step = f64::from_le_bytes(take(&mut rest, CUT)?);
+        let count = u16::from_le_bytes(take(&mut rest, CUT)?);
+        let (count, is_parted) = (usize::from(count & !PARTED), count & PARTED != 0);
+        let correction = f64::from_le_bytes(take(&mut rest, CUT)?);
+        let coarse = u32::from_le_bytes(take(&mut rest, CUT)?) as usize;
+        let fine = if is_parted { u32::from_le_bytes(take(&mut rest, CUT)?) as usize } else { 0 };
         let too_many = count > frames.min(3 * points) || (3 * points).saturating_mul(count) > most;
         let impossible = too_many || !step.is_finite() || correction.is_nan() || correction.abs() > LARGEST_CORRECTION;
         let parts =
@@ -191,16 +194,11 @@ impl Residual {
             return Err(Error::Damaged("a residual has impossible counts"));
         };
         let mut coders = [Decoder::new(coarse)?, Decoder::new(fine)?];
-        let trajectories = Trajectories::default().code(&mut coders[0], frames, count);
-        let mut residual = Self::new(&trajectories, points);
-        let mut pieces = pieces(points, count);
-        let next = || Some(pieces.next().unwrap_or(0..0).map(|_| Component::default()).collect());
-        let mut done = 0..;
-        let mut components = Components::<Integers>::new(hierarchy, is_parted);
-        components.code(&mut coders, next, |component| {
-            done.next().into_iter().for_each(|k| residual.set(k, hierarchy, &component.found, step));
-        });
+        let trajectories = (&Trajectories::default(), frames, count);
+        let component = |_| Some(Component::default());
+        let coded = Self::code::<Integers, _>(&mut coders, hierarchy, trajectories, is_parted, step, component);
         coders.iter().try_for_each(Decoder::check)?;
+        let (_, mut residual) = coded.ok_or(Error::Damaged("a residual is damaged"))?;
         // Written so that NaN is an error.
         if residual.largest_sum().is_nan() || residual.largest_sum() > LARGEST {
             return Err(Error::Damaged("a residual is too large for numbers of single precision"));
@@ -241,18 +239,15 @@ impl Residual {
         }
     }
 
-    /// How far two machines that add in single precision can be apart, about: two units in the last place of the largest sum of sizes.
+    /// How far single precision may differ: two units in the last place of the largest sum.
     fn rounding(&self) -> f64 {
         2.0 * f64::from(f32::EPSILON) * self.largest_sum()
     }
 
     /// The largest sum of sizes, or more.
     fn largest_sum(&self) -> f64 {
-        let sizes = Mat::from_fn(self.trajectories.ncols(), 2, |k, which| {
-            let largest = |column: faer::ColRef<'_, f32>| column.iter().fold(0.0f32, |most, x| most.max(x.abs()));
-            if which == 0 { largest(self.trajectories.col(k)) } else { largest(self.values.col(k)) }
-        });
-        (0..sizes.nrows()).map(|k| f64::from(sizes[(k, 0)]) * f64::from(sizes[(k, 1)])).sum()
+        let largest = |of: &Mat<f32>, k: usize| f64::from(of.col(k).iter().fold(0.0f32, |most, x| most.max(x.abs())));
+        (0..self.values.ncols()).map(|k| largest(&self.trajectories, k) * largest(&self.values, k)).sum()
     }
 
     /// Number of positions that are corrected one by one.

@@ -1,11 +1,11 @@
-//! Motion of a group of frames as few trajectories, each shared by all points: `M ≈ E A`, with M frames × values, E frames × components of
-//! nearly orthonormal columns, the eigenvectors of `M Mᵀ` (Karhunen–Loève transform in time), and A what each value takes of them.
+//! Motion of a group as few trajectories that all points share: `M ≈ E A`, with frames × components
+//! E of nearly orthonormal columns, eigenvectors of `M Mᵀ` (Karhunen–Loève transform in time).
 
-use crate::entropy::{Coder, Integers, MAX_CONTEXT_SIZE, SIZES, size_class};
+use crate::entropy::{Coder, Integers, MAX_CONTEXT_SIZE, Models, SIZES, size_class};
 use cager_geometry::linalg;
 use faer::{Mat, MatRef};
 
-/// Components whose energy per value is below this fraction of that of rounding to whole steps are left out.
+/// Least energy per value of a component, over that of rounding to whole steps.
 const MIN_ENERGY: f64 = 0.3 / 12.0;
 /// Added to a size before rounding down: below 0.5, since small entries cost more than they gain.
 const ROUND_UP: f64 = 0.35;
@@ -26,7 +26,7 @@ pub(crate) const PULSE_FRAMES: usize = 8;
 /// Binary digits of the largest entry of a pulse.
 const PULSE_DIGITS: f64 = 7.0;
 
-/// The trajectories of a group as whole numbers: of each, its digits, and its cosine transform in time in units of 2^−digits.
+/// The digits of each trajectory, and its cosine transform in time in units of 2^−digits.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Trajectories {
     frames: usize,
@@ -36,14 +36,14 @@ pub(crate) struct Trajectories {
 }
 
 impl Trajectories {
-    /// Those worth keeping of motion with this `M Mᵀ`, `width` values a frame, coded in steps of `step`; at most `most` of them.
+    /// At most `most` of motion with this `M Mᵀ`, `width` values a frame, in steps of `step`.
     pub(crate) fn choose(gram: MatRef<'_, f64>, width: usize, step: f64, most: usize) -> Option<Self> {
         let frames = gram.nrows();
         let (energies, vectors) = linalg::eigen(gram)?;
         let least = MIN_ENERGY * width as f64 * step * step;
         let count = energies.iter().take_while(|&&energy| energy > least).count().min(most);
         let waves = linalg::product(cosines(frames).as_ref(), vectors.subcols(0, count));
-        // An entry's error times the component's length is an error of the values: coded to the same step.
+        // An error times the component's length is an error of the values: coded to the same step.
         let digits: Vec<u32> = energies[..count]
             .iter()
             .map(|energy| ((energy.sqrt() / step).log2().ceil().max(2.0) as u32).min(MAX_DIGITS))
@@ -57,8 +57,8 @@ impl Trajectories {
         Some(Self { frames, waves: (0..count).flat_map(whole).collect(), digits })
     }
 
-    /// Adds a trajectory that is about `height` at `frame`, the first or last one, and falls to 0 from there; its value at that frame. `None` where it is too low or
-    /// too high to be counted.
+    /// Adds a trajectory of about `height` at `frame`, the first or last, that falls to 0; its
+    /// value there. `None` where it is too low or too high to be counted.
     pub(crate) fn push_pulse(&mut self, frame: usize, height: f64) -> Option<f64> {
         let digits = PULSE_DIGITS - height.log2().floor();
         if !(2.0..=f64::from(MAX_DIGITS)).contains(&digits) {

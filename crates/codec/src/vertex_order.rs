@@ -1,9 +1,9 @@
-//! The numbers that a mesh gives its vertices, told beside faces that name them in turn: move to front (Bentley, Sleator, Tarjan and Wei 1986) over the mesh.
+//! Numbers of vertices by move to front (Bentley, Sleator, Tarjan and Wei 1986) over the mesh.
 //!
-//! Whatever made a mesh numbered neighbours soon after each other. So all vertices stand in a list, those near the ones numbered last in front, and each vertex
-//! is told by its place in the list.
+//! Neighbours are usually numbered soon after each other. So all vertices stand in a list, those
+//! near the last numbered in front, and each is coded by its place in the list.
 
-use crate::entropy::{BinaryModel, Coder, SIZES, size_class};
+use crate::entropy::{BinaryModel, Coder, SIZES, size_class, unary};
 use crate::fenwick::Counted;
 use cager_geometry::topology::Adjacency;
 
@@ -12,8 +12,8 @@ const MAX_PASSED_ON: usize = 16;
 /// Most points for which neighbours of neighbours are moved too: that takes several times as long.
 pub(crate) const MAX_FAR_POINTS: usize = 1 << 17;
 
-/// Codes the numbers of vertices: `given` and the result are the vertex of each number, as the faces name it. `is_far` says that neighbours of neighbours
-/// are moved to the front too. `None` where what is read is no vertex.
+/// Codes the vertex of each number; `is_far` moves neighbours of neighbours to the front too.
+/// `None` where what is read is no vertex.
 pub(crate) fn code_order(
     coder: &mut impl Coder,
     adjacency: &Adjacency,
@@ -41,7 +41,7 @@ pub(crate) fn code_order(
     Some(found)
 }
 
-/// Vertices without a number, the one moved to the front last first. Each has the time at which it was moved.
+/// Vertices without a number, the last moved to the front first, each with the time of its move.
 struct RecencyList {
     times: Vec<u32>,
     /// Vertices by these times.
@@ -84,7 +84,7 @@ impl RecencyList {
         Some(vertex)
     }
 
-    /// Moves those of these vertices that wait to the front, where they keep their order, and empties the list of them.
+    /// Moves those that wait to the front in their order, and empties the list.
     fn move_to_front(&mut self, vertices: &mut Vec<u32>) {
         vertices.retain(|&vertex| self.times[vertex as usize] != GONE);
         vertices.sort_unstable_by_key(|&vertex| self.times[vertex as usize]);
@@ -109,27 +109,23 @@ impl RecencyList {
     }
 }
 
-/// Models of places: the number of binary digits of the place plus one, in the context of the place before; then the digits.
+/// Models of places plus one: the number of binary digits by the place before, then the digits.
 struct Places {
-    digits: Vec<[BinaryModel; 32]>,
+    digits: Vec<[BinaryModel; 31]>,
     leading: [[BinaryModel; 4]; 32],
     before: u32,
 }
 
 impl Default for Places {
     fn default() -> Self {
-        Self { digits: vec![[BinaryModel::default(); 32]; SIZES], leading: Default::default(), before: 0 }
+        Self { digits: vec![[BinaryModel::default(); 31]; SIZES], leading: Default::default(), before: 0 }
     }
 }
 
 impl Places {
     fn code(&mut self, coder: &mut impl Coder, place: u32) -> u32 {
-        let digits = &mut self.digits[size_class(self.before)];
         let number = place + 1;
-        let mut count = 0;
-        while count < 31 && coder.bit(&mut digits[count as usize], number.ilog2() > count) {
-            count += 1;
-        }
+        let count = unary(coder, &mut self.digits[size_class(self.before)], number.ilog2());
         // The first two digits after the leading 1 by models.
         let modelled = count.min(2);
         let mut found = 1;

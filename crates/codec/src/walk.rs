@@ -1,6 +1,6 @@
 //! The walk over a mesh, from a face across an edge to the next, as encoder and decoder take it.
 
-use crate::entropy::{BinaryModel, Coder, Integers};
+use crate::entropy::{BinaryModel, Coder, Integers, Models};
 use crate::gates::{Gates, MAX_TO_COME};
 use crate::open_edges::{NEWEST, OpenEdges};
 
@@ -8,7 +8,7 @@ use crate::open_edges::{NEWEST, OpenEdges};
 const MAX_FACES: u32 = 8;
 /// Pairs of such numbers.
 const PAIRS: usize = (MAX_FACES as usize + 1).pow(2);
-/// Open edges of a vertex that are queued anew when it has fewer faces to come, in either direction: ordinary meshes have no more.
+/// Open edges of a vertex that are queued anew, in either direction, as it has fewer faces.
 const MAX_REQUEUED: usize = 4;
 /// Candidates for the next corner: vertices at the far end of open edges.
 const MAX_NEAR: usize = 8;
@@ -26,7 +26,7 @@ pub(crate) enum VertexLabels {
 
 /// What the walk knows of the mesh.
 pub(crate) struct Walk {
-    /// Ends of the directed edges that wait for their opposite, by where these begin, and the other way round.
+    /// Ends of the directed edges that wait for their opposite, by both of their ends.
     leaving: Vec<OpenEdges>,
     arriving: Vec<OpenEdges>,
     /// The vertices that were met, in order, and the place of each in it.
@@ -98,14 +98,11 @@ impl Walk {
             return;
         }
         let mut scratch = [0; NEWEST];
-        for &x in last_few(self.leaving[v as usize].newest(&mut scratch)) {
-            if self.faces_to_come[x as usize] >= faces {
-                self.gates.push((v, x), faces);
-            }
-        }
-        for &x in last_few(self.arriving[v as usize].newest(&mut scratch)) {
-            if self.faces_to_come[x as usize] >= faces {
-                self.gates.push((x, v), faces);
+        for (ends, leaves) in [(&self.leaving, true), (&self.arriving, false)] {
+            for &x in last_few(ends[v as usize].newest(&mut scratch)) {
+                if self.faces_to_come[x as usize] >= faces {
+                    self.gates.push(if leaves { (v, x) } else { (x, v) }, faces);
+                }
             }
         }
     }
@@ -125,8 +122,8 @@ impl Walk {
         was_open
     }
 
-    /// Codes a face, which begins with the opposite of the gate's edge where there is a gate, and takes it into the walk. Damaged bytes may name
-    /// vertices that do not exist or too many corners; the face is then none of this mesh.
+    /// Codes a face, which begins with the opposite of the gate's edge, and takes it into the walk.
+    /// Damaged bytes may name vertices or corners that are not there.
     pub(crate) fn face(&mut self, coder: &mut impl Coder, gate: Option<(u32, u32)>, given: &[u32]) -> Vec<u32> {
         let arity = given.len() as u32;
         if coder.bit(&mut self.same_arity, arity != self.arity) {
@@ -168,39 +165,13 @@ impl Walk {
         face
     }
 
-    /// Codes the vertex after those of `face`; `closes` says that an edge leads from it back to the gate.
+    /// Codes the vertex after those of `face`; `closes`: an edge leads from it back to the gate.
     fn corner(&mut self, coder: &mut impl Coder, face: &[u32], closes: bool, given: u32) -> u32 {
-        let (Some(&previous), Some(&first)) = (face.last(), face.first()) else {
-            return self.first_corner(coder, given);
-        };
-        // Vertices that an open edge leads from to the last corner, or to from the first one.
-        let mut near: Vec<u32> = Vec::with_capacity(4);
-        let mut both = false;
-        let is_corner = |x: u32| self.of_face[x as usize] == self.face;
-        let (mut scratch, mut other) = ([0; NEWEST], [0; NEWEST]);
-        let back = if closes { self.leaving[first as usize].newest(&mut scratch) } else { &[] };
-        for &x in self.arriving[previous as usize].newest(&mut other).iter().rev() {
-            if back.contains(&x) && !is_corner(x) {
-                near.insert(0, x);
-                both = true;
-            } else {
-                near.push(x);
-            }
-        }
-        near.extend(back.iter().rev());
-        near.retain(|&x| !is_corner(x));
-        let mut k = 0;
-        while k < near.len() {
-            if near[..k].contains(&near[k]) {
-                near.remove(k);
-            } else {
-                k += 1;
-            }
-        }
-        near.truncate(MAX_NEAR);
-        let faces = |v: u32| self.faces_to_come[v as usize].min(MAX_FACES);
-        let pair = ((MAX_FACES + 1) * faces(previous) + faces(first)) as usize;
-        let ends = usize::from(faces(previous) == 1) + 2 * usize::from(faces(first) == 1);
+        let (near, both) = self.candidates(face, closes);
+        let faces = |v: Option<&u32>| v.map_or(0, |&v| self.faces_to_come[v as usize].min(MAX_FACES));
+        let (previous, first) = (faces(face.last()), faces(face.first()));
+        let pair = ((MAX_FACES + 1) * previous + first) as usize;
+        let ends = usize::from(previous == 1) + 2 * usize::from(first == 1);
         let new = self.is_unvisited(given);
         if coder.bit(&mut self.first_time[PAIRS * usize::from(both) + pair], new) {
             return self.new_vertex(coder, given);
@@ -214,14 +185,32 @@ impl Walk {
         self.met_vertex(coder, given)
     }
 
-    /// A corner of the first face of a part.
-    fn first_corner(&mut self, coder: &mut impl Coder, given: u32) -> u32 {
-        let new = self.is_unvisited(given);
-        if coder.bit(&mut self.first_time[0], new) {
-            self.new_vertex(coder, given)
-        } else {
-            self.met_vertex(coder, given)
+    /// Vertices that an open edge leads from to the last corner, or to from the first one, those that
+    /// both are true of first; and whether there are such.
+    fn candidates(&self, face: &[u32], closes: bool) -> (Vec<u32>, bool) {
+        let (mut near, mut both) = (Vec::with_capacity(4), false);
+        let (Some(&previous), Some(&first)) = (face.last(), face.first()) else { return (near, both) };
+        let is_corner = |x: u32| self.of_face[x as usize] == self.face;
+        let (mut scratch, mut other) = ([0; NEWEST], [0; NEWEST]);
+        let back = if closes { self.leaving[first as usize].newest(&mut scratch) } else { &[] };
+        for &x in self.arriving[previous as usize].newest(&mut other).iter().rev() {
+            if back.contains(&x) && !is_corner(x) {
+                near.insert(0, x);
+                both = true;
+            } else {
+                near.push(x);
+            }
         }
+        near.extend(back.iter().rev());
+        let mut kept = 0;
+        for k in 0..near.len() {
+            if !is_corner(near[k]) && !near[..kept].contains(&near[k]) {
+                near[kept] = near[k];
+                kept += 1;
+            }
+        }
+        near.truncate(kept.min(MAX_NEAR));
+        (near, both)
     }
 
     fn is_unvisited(&self, vertex: u32) -> bool {

@@ -1,49 +1,30 @@
-//! Lossless codecs for arrays of numbers: byte planes and zstd, with a difference along the array before them.
+//! Lossless codecs for arrays of numbers: differences, byte planes and zstd.
 
 use super::Error;
-use crate::le::u32_at;
+use super::section::{DIFFERENCE, PLANES, RAW, SectionHeader};
+use crate::le::{value_at, values};
 use std::io::Read;
-
-/// The bytes as they are.
-pub(crate) const RAW: u8 = 0;
-/// Byte planes of the elements, then zstd.
-pub(crate) const PLANES: u8 = 1;
-/// Differences of 32-bit words one stride apart, zigzag-coded, then byte planes and zstd.
-pub(crate) const DIFFERENCE: u8 = 2;
-/// Whole numbers of the `cager-codec` crate: cages of a group of frames, or what they leave of the positions.
-pub(crate) const CODED: u8 = 3;
-/// Whole numbers of a mesh at rest or of the errors of frames.
-pub(crate) const CODED_STATIC: u8 = 4;
-
-/// Whether a section is whole numbers.
-pub(crate) fn is_coded(codec: u8) -> bool {
-    [CODED, CODED_STATIC].contains(&codec)
-}
 
 const ZSTD_LEVEL: i32 = 3;
 /// zstd's window at this level is 2 MiB; a file that asks for much more is not ours.
 const MAX_WINDOW_LOG: u32 = 24;
 
-/// Encodes by `codec` where that is smaller than the raw bytes; returns the codec used and the payload.
-pub(crate) fn encode(codec: u8, raw: &[u8], width: usize, stride: usize) -> Result<(u8, Vec<u8>), Error> {
-    let planes = match codec {
-        RAW => return Ok((RAW, raw.to_vec())),
+/// Encodes by the header's codec where that is smaller; returns header and payload.
+pub(crate) fn encode(header: SectionHeader, raw: &[u8], stride: usize) -> Result<(SectionHeader, Vec<u8>), Error> {
+    let header = SectionHeader { raw_bytes: raw.len() as u64, ..header };
+    let planes = match header.codec {
+        RAW => return Ok((header, raw.to_vec())),
         DIFFERENCE => split_planes(&differences(raw, stride), 4),
-        _ => split_planes(raw, width),
+        _ => split_planes(raw, header.width.into()),
     };
     let packed = zstd::bulk::compress(&planes, ZSTD_LEVEL)?;
-    Ok(if packed.len() < raw.len() { (codec, packed) } else { (RAW, raw.to_vec()) })
+    let is_smaller = packed.len() < raw.len();
+    Ok(if is_smaller { (header, packed) } else { (SectionHeader { codec: RAW, ..header }, raw.to_vec()) })
 }
 
-/// Decodes to exactly `raw_bytes` bytes; memory grows with what is really there, not with what is declared.
-pub(crate) fn decode(
-    codec: u8,
-    payload: Vec<u8>,
-    raw_bytes: usize,
-    width: usize,
-    stride: usize,
-    offset: u64,
-) -> Result<Vec<u8>, Error> {
+/// The bytes that a section's header declares. Memory grows with those that are really there.
+pub(crate) fn decode(header: &SectionHeader, payload: Vec<u8>, stride: usize, offset: u64) -> Result<Vec<u8>, Error> {
+    let (codec, raw_bytes) = (header.codec, header.raw_bytes as usize);
     let wrong_size = || Error::corrupt(offset, "a section does not have the size it declares");
     if codec == RAW {
         return if payload.len() == raw_bytes { Ok(payload) } else { Err(wrong_size()) };
@@ -66,7 +47,7 @@ pub(crate) fn decode(
     }
     // Each step lets go of the one before: a reader's memory is a known multiple of a section.
     drop(payload);
-    let mut raw = join_planes(&planes, if codec == DIFFERENCE { 4 } else { width });
+    let mut raw = join_planes(&planes, if codec == DIFFERENCE { 4 } else { usize::from(header.width).max(1) });
     drop(planes);
     if codec == DIFFERENCE {
         undo_differences(&mut raw, stride);
@@ -74,7 +55,7 @@ pub(crate) fn decode(
     Ok(raw)
 }
 
-/// All first bytes of the elements, then all second bytes, and so on; bytes beyond the last whole element stay at the end.
+/// All first bytes of the elements, then all second bytes, …; a remainder stays at the end.
 fn split_planes(raw: &[u8], width: usize) -> Vec<u8> {
     let count = raw.len() / width;
     let mut out = Vec::with_capacity(raw.len());
@@ -97,22 +78,19 @@ fn join_planes(planes: &[u8], width: usize) -> Vec<u8> {
     out
 }
 
-fn words(bytes: &[u8]) -> Vec<u32> {
-    bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
-}
-
 fn differences(raw: &[u8], stride: usize) -> Vec<u8> {
-    let words = words(raw);
+    let words: Vec<u32> = values(raw, u32::from_le_bytes).collect();
     let zigzag = |d: i32| ((d << 1) ^ (d >> 31)) as u32;
     let before = |k: usize| if k < stride { 0 } else { words[k - stride] };
     (0..words.len()).flat_map(|k| zigzag(words[k].wrapping_sub(before(k)) as i32).to_le_bytes()).collect()
 }
 
 fn undo_differences(bytes: &mut [u8], stride: usize) {
+    let word = |bytes: &[u8], k: usize| value_at(bytes, 4 * k, u32::from_le_bytes);
     for k in 0..bytes.len() / 4 {
-        let zigzag = u32_at(bytes, 4 * k);
+        let zigzag = word(bytes, k);
         let difference = (zigzag >> 1) ^ (zigzag & 1).wrapping_neg();
-        let before = if k < stride { 0 } else { u32_at(bytes, 4 * (k - stride)) };
+        let before = if k < stride { 0 } else { word(bytes, k - stride) };
         bytes[4 * k..4 * k + 4].copy_from_slice(&difference.wrapping_add(before).to_le_bytes());
     }
 }
@@ -126,8 +104,9 @@ mod tests {
         let raw: Vec<u8> = (0..4_800u32).map(|k| (k.wrapping_mul(2_654_435_761) >> (k % 24)) as u8).collect();
         for codec in [RAW, PLANES, DIFFERENCE] {
             for (width, stride) in [(4, 1), (4, 300), (8, 7), (8, 2_000)] {
-                let (used, payload) = encode(codec, &raw, width, stride).unwrap();
-                assert_eq!(decode(used, payload, raw.len(), width, stride, 0).unwrap(), raw);
+                let header = SectionHeader { codec, width, ..SectionHeader::new(*b"test", (0, 0)) };
+                let (header, payload) = encode(header, &raw, stride).unwrap();
+                assert_eq!(decode(&header, payload, stride, 0).unwrap(), raw);
             }
         }
     }

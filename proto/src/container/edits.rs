@@ -1,10 +1,6 @@
-//! Layers of edits: what is added to vertices of the cages of some frames, beside frames that stay as they are.
+//! Layers of edits: what is added to the cages of some frames, which stay as they are.
 
-use super::reader::ContainerReader;
-use super::section::{Entry, SectionHeader};
-use super::{Error, tag};
-use crate::le::{self, u32_at};
-use std::io::{Read, Seek};
+use crate::le::{f32s, value_at, values};
 use std::ops::Range;
 
 /// Layers of a file, at the most.
@@ -15,7 +11,7 @@ pub const MAX_LAYER_NAME: usize = 256;
 /// Switched off.
 const OFF: u32 = 1;
 
-/// One change of the cages: what is added to some of their vertices in each of some frames that follow each other.
+/// What is added to some vertices of the cages in consecutive frames.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EditLayer {
     /// What the user calls it; may be empty.
@@ -31,16 +27,6 @@ pub struct EditLayer {
 }
 
 impl EditLayer {
-    /// The layer that makes `new` cages of `old` ones, of as many frames: nothing where they are the same. Only the first rows, as many as `new` has, are
-    /// compared. See [`LayerBuilder`].
-    pub fn between(old: &[Vec<f32>], new: &[Vec<f32>], name: &str) -> Option<Self> {
-        let mut builder = LayerBuilder::default();
-        for (frame, (old, new)) in old.iter().zip(new).enumerate() {
-            builder.add(frame, old, new);
-        }
-        builder.finish(name)
-    }
-
     /// The frames that it concerns.
     pub fn frames(&self) -> Range<usize> {
         let first = self.first as usize;
@@ -49,8 +35,13 @@ impl EditLayer {
 
     /// Moves the cage of a frame, rows × 3, whether or not the layer is on.
     pub fn apply(&self, frame: usize, rows: &mut [f32]) {
+        Self::apply_all([self].into_iter(), frame, rows);
+    }
+
+    /// Moves the cage of a frame, rows × 3, by each of these layers.
+    pub(super) fn apply_all<'a>(layers: impl Iterator<Item = &'a Self>, frame: usize, rows: &mut [f32]) {
         let mut sums: Vec<f64> = rows.iter().map(|&x| x.into()).collect();
-        self.add_to(frame, &mut sums);
+        layers.for_each(|layer| layer.add_to(frame, &mut sums));
         rows.iter_mut().zip(sums).for_each(|(row, sum)| *row = sum as f32);
     }
 
@@ -77,10 +68,10 @@ impl EditLayer {
     }
 
     /// Of what a section of these frames decodes to.
-    fn from_bytes(raw: &[u8], (first, count): (u32, u32), rows: u64) -> Result<Self, &'static str> {
+    pub(super) fn from_bytes(raw: &[u8], (first, count): (u32, u32), rows: u64) -> Result<Self, &'static str> {
         let size = "a layer of edits does not have the size that its counts give it";
         let Some((head, rest)) = raw.split_at_checked(8) else { return Err(size) };
-        let (flags, vertices) = (u32_at(head, 0), u32_at(head, 4) as usize);
+        let (flags, vertices) = (value_at(head, 0, u32::from_le_bytes), value_at(head, 4, u32::from_le_bytes) as usize);
         if flags & !OFF != 0 {
             return Err("a layer of edits has flags that this program does not know");
         }
@@ -96,8 +87,8 @@ impl EditLayer {
             name: name.to_owned(),
             is_on: flags & OFF == 0,
             first,
-            vertices: le::u32_values(list).collect(),
-            changes: le::f32_values(changes).collect(),
+            vertices: values(list, u32::from_le_bytes).collect(),
+            changes: f32s(changes),
         };
         layer.check(rows).map(|()| layer)
     }
@@ -124,8 +115,8 @@ impl EditLayer {
     }
 }
 
-/// Makes a layer of edited cages, frame by frame. A coordinate that is another by at most four units in the last place of the larger of both counts as the
-/// same. The layer reaches from the first frame with another coordinate to the last one, and has the vertices with another one in any of these.
+/// Makes a layer of edited cages: from the first changed frame to the last, of all vertices that
+/// change in any. Coordinates within four units in the last place are the same.
 #[derive(Debug, Default)]
 pub struct LayerBuilder {
     /// Frame, vertex and what is added, in the order of frames and vertices.
@@ -133,7 +124,7 @@ pub struct LayerBuilder {
 }
 
 impl LayerBuilder {
-    /// Compares a frame, which comes after all others; `old` may have more rows. Whether the cage is another.
+    /// Compares a frame after all others; `old` may have more rows. Whether the cage changed.
     pub fn add(&mut self, frame: usize, old: &[f32], new: &[f32]) -> bool {
         let before = self.found.len();
         for (vertex, (old, new)) in old.as_chunks::<3>().0.iter().zip(new.as_chunks::<3>().0).enumerate() {
@@ -171,104 +162,10 @@ fn change(old: f32, new: f32) -> f32 {
 /// The layers of a file, once they were read.
 #[derive(Default)]
 pub(super) struct Layers {
-    all: Option<Vec<EditLayer>>,
-    /// How many could not be read and are passed over, as of a damaged file that is read as far as it goes.
+    pub(super) all: Option<Vec<EditLayer>>,
+    /// How many layers of a damaged file could not be read and are passed over.
     pub(super) lost: usize,
     pub(super) passes_over_damage: bool,
     /// Whether the file ends before its table of contents.
     pub(super) is_cut: bool,
-}
-
-impl<R: Read + Seek> ContainerReader<R> {
-    /// The layers of edits, in the order in which they are applied.
-    ///
-    /// # Errors
-    /// Damage.
-    pub fn layers(&mut self) -> Result<&[EditLayer], Error> {
-        if self.layers.all.is_none() {
-            let entries: Vec<Entry> = self.sections_of(tag::EDIT).collect();
-            let mut all = Vec::with_capacity(entries.len());
-            for entry in entries {
-                match self.layer(entry) {
-                    Ok(layer) => all.push(layer),
-                    Err(Error::Corrupt { .. }) if self.layers.passes_over_damage => self.layers.lost += 1,
-                    Err(error) => return Err(error),
-                }
-            }
-            self.layers.all = Some(all);
-        }
-        Ok(self.layers.all.as_deref().unwrap_or_default())
-    }
-
-    /// Each layer of edits, or what is wrong with it, so that the others can be told from one that is damaged.
-    pub fn each_layer(&mut self) -> Vec<Result<EditLayer, Error>> {
-        let entries: Vec<Entry> = self.sections_of(tag::EDIT).collect();
-        entries.into_iter().map(|entry| self.layer(entry)).collect()
-    }
-
-    /// Lets layers that cannot be read be passed over, and counted, instead of refusing every frame.
-    #[must_use]
-    pub fn passing_over_damaged_layers(mut self) -> Self {
-        self.layers.passes_over_damage = true;
-        self
-    }
-
-    /// How many layers of a damaged file cannot be read and are not applied; known once a frame was read.
-    pub fn lost_layers(&self) -> usize {
-        self.layers.lost
-    }
-
-    /// Applies one more layer to what is read from now on; the file stays as it is.
-    ///
-    /// # Errors
-    /// A layer that does not fit the file, damage.
-    pub fn push_layer(&mut self, layer: EditLayer) -> Result<(), Error> {
-        let fits = layer.check(self.vertex_rows());
-        fits.map_err(|what| Error::Invalid(what.to_owned()))?;
-        self.layers()?;
-        self.layers.all.get_or_insert_default().push(layer);
-        Ok(())
-    }
-
-    /// Rows of a frame that are vertices of the cage.
-    pub(super) fn vertex_rows(&self) -> u64 {
-        self.header.cage_vertices.min(u64::from(self.header.rows_per_frame))
-    }
-
-    fn layer(&mut self, entry: Entry) -> Result<EditLayer, Error> {
-        let SectionHeader { first, count, .. } = entry.header;
-        let raw = self.raw(entry)?;
-        EditLayer::from_bytes(&raw, (first, count), self.vertex_rows())
-            .map_err(|what| Error::corrupt(entry.offset, what))
-    }
-
-    /// Whether each frame is changed by a layer that is on.
-    pub(super) fn edited_frames(&mut self) -> Result<Vec<bool>, Error> {
-        let mut edited = vec![false; self.frames];
-        let frames = self.frames;
-        for layer in self.layers()?.iter().filter(|layer| layer.is_on) {
-            let Range { start, end } = layer.frames();
-            edited[start.min(frames)..end.min(frames)].fill(true);
-        }
-        Ok(edited)
-    }
-
-    /// Applies the layers that are on to the rows of a frame.
-    pub(super) fn apply_layers(&mut self, frame: usize, rows: &mut [f32]) -> Result<(), Error> {
-        let concerns = |layer: &&EditLayer| layer.is_on && layer.frames().contains(&frame);
-        let mut layers = self.layers()?.iter().filter(concerns).peekable();
-        if layers.peek().is_none() {
-            return Ok(());
-        }
-        let mut sums: Vec<f64> = rows.iter().map(|&x| x.into()).collect();
-        layers.for_each(|layer| layer.add_to(frame, &mut sums));
-        for (row, sum) in rows.iter_mut().zip(sums) {
-            *row = sum as f32;
-        }
-        if rows.iter().all(|x| x.is_finite()) {
-            return Ok(());
-        }
-        let offset = self.sections_of(tag::EDIT).next().map_or(0, |entry| entry.offset);
-        Err(Error::corrupt(offset, format!("the edited cage of frame {frame} is not finite")))
-    }
 }

@@ -44,7 +44,7 @@ pub enum Error {
     /// Too large for the format.
     #[error("cannot be stored: {0}")]
     TooLarge(String),
-    /// What readers would refuse of any size: a mesh, frame numbers, groups beside single frames, a report.
+    /// What readers would refuse: a mesh, frame numbers, groups beside single frames, a report.
     #[error("cannot be stored: {0}")]
     Invalid(String),
     /// Coordinates that cages are coded by, and that would take more memory than they may.

@@ -3,7 +3,7 @@
 use super::section::Entry;
 use cager_codec::{BasisRecord, CageBasis, Hierarchy, Residual};
 
-/// Bases that are computed for one file: all groups of a writer have the same, and each takes as long as a cube of the rows.
+/// Bases that are computed for one file; writers have one, and it takes long.
 const MAX_BASES: usize = 8;
 
 /// What decoding groups needs, computed where the first is read.

@@ -1,4 +1,4 @@
-//! The `.cager` container, version 1: rest pose, cage, options, one cage per frame and its errors, in one file.
+//! The `.cager` container, version 1: rest pose, cage, options, one cage per frame and its errors.
 //!
 //! `docs/FORMAT.md` specifies the bytes.
 
@@ -7,7 +7,10 @@ mod coded;
 mod contents;
 mod edits;
 mod error;
+mod frames;
 mod groups;
+mod layers;
+mod model;
 mod reader;
 mod rewrite;
 mod section;
@@ -34,16 +37,16 @@ pub(crate) const MAX_HEADER_BYTES: usize = 64 << 10;
 /// Frames of one chunk: what reading one frame decompresses.
 pub const CHUNK_FRAMES: usize = 16;
 
-/// Frames of a coded group, at the most: longer ones take fewer bytes, and reading one frame decodes its group.
+/// Most frames of a coded group: more take fewer bytes, but reading one decodes them all.
 const MAX_GROUP_FRAMES: usize = 256;
 
-/// Frames of a coded group of so many points and rows a frame, so that readers can decode it in little memory.
+/// Frames of a coded group of so many points and rows, so that readers need little memory.
 pub fn group_frames(points: usize, rows: usize) -> usize {
     let fitting = (cager_codec::MAX_POSITIONS / points.max(1)).min((2 << 20) / (12 * rows.max(1)));
     fitting.clamp(1, MAX_GROUP_FRAMES)
 }
 
-/// What a decoder must know. Stored as bincode of fixed-width integers, see [`crate::wire`], but for the origin and the units.
+/// What a decoder must know, stored by [`crate::wire`] but for the origin and the units.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Header {
     /// Definition of the coordinate systems by which decoders compute `Φ` anew.
@@ -72,7 +75,7 @@ pub struct Header {
     pub rows_per_frame: u32,
     /// Frames per second, where known.
     pub frame_rate: Option<f64>,
-    /// What is to be added to all positions of a capture that lies far away; stored in a section of its own.
+    /// What is added to all positions of a capture that lies far away; in a section of its own.
     #[serde(skip)]
     pub origin: Option<Point>,
     /// What positions mean, as far as the input said; stored in a section of its own.
@@ -81,7 +84,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Bytes of a capture of so many frames in single precision with one connectivity: what the bytes of a container are compared with.
+    /// Bytes of so many frames in single precision with one connectivity, for comparison.
     pub fn capture_bytes(&self, frames: usize) -> u64 {
         let positions = self.points.saturating_mul(12).saturating_mul(frames as u64);
         self.rest_corners.saturating_mul(4).saturating_add(positions)
@@ -100,38 +103,29 @@ pub(crate) fn are_frame_numbers(numbers: &[f64]) -> bool {
 
 /// The sections this program knows.
 pub(crate) mod tag {
-    pub(crate) const HEADER: [u8; 4] = *b"HEAD";
-    pub(crate) const ORIGIN: [u8; 4] = *b"ORIG";
-    pub(crate) const UNITS: [u8; 4] = *b"unit";
-    pub(crate) const REST_POINTS: [u8; 4] = *b"RPTS";
-    pub(crate) const REST_FACES: [u8; 4] = *b"RFAC";
-    pub(crate) const REST_COLORS: [u8; 4] = *b"rcol";
-    pub(crate) const CAGE_VERTICES: [u8; 4] = *b"CVTX";
-    pub(crate) const CAGE_FACES: [u8; 4] = *b"CTRI";
-    pub(crate) const ELEMENTS: [u8; 4] = *b"ELEM";
-    pub(crate) const FRAMES: [u8; 4] = *b"FRAM";
-    pub(crate) const ERRORS: [u8; 4] = *b"ERRS";
-    pub(crate) const CONTENTS: [u8; 4] = *b"TOC_";
-    pub(crate) const NUMBERS: [u8; 4] = *b"fnum";
-    pub(crate) const REPORT: [u8; 4] = *b"summ";
-    pub(crate) const RESIDUAL: [u8; 4] = *b"resi";
-    pub(crate) const EDIT: [u8; 4] = *b"EDIT";
-    pub(crate) const KNOWN: [[u8; 4]; 16] = [
-        HEADER,
-        ORIGIN,
-        UNITS,
-        REST_POINTS,
-        REST_FACES,
-        REST_COLORS,
-        CAGE_VERTICES,
-        CAGE_FACES,
-        ELEMENTS,
-        FRAMES,
-        ERRORS,
-        CONTENTS,
-        NUMBERS,
-        REPORT,
-        RESIDUAL,
-        EDIT,
-    ];
+    macro_rules! tags {
+        ($($name:ident = $tag:literal;)*) => {
+            $(pub(crate) const $name: [u8; 4] = *$tag;)*
+            pub(crate) const KNOWN: &[[u8; 4]] = &[$($name),*];
+        };
+    }
+
+    tags! {
+        HEADER = b"HEAD";
+        ORIGIN = b"ORIG";
+        UNITS = b"unit";
+        REST_POINTS = b"RPTS";
+        REST_FACES = b"RFAC";
+        REST_COLORS = b"rcol";
+        CAGE_VERTICES = b"CVTX";
+        CAGE_FACES = b"CTRI";
+        ELEMENTS = b"ELEM";
+        FRAMES = b"FRAM";
+        ERRORS = b"ERRS";
+        CONTENTS = b"TOC_";
+        NUMBERS = b"fnum";
+        REPORT = b"summ";
+        RESIDUAL = b"resi";
+        EDIT = b"EDIT";
+    }
 }

@@ -1,15 +1,32 @@
-//! Section headers, the prelude and the footer: everything of fixed size.
+//! Everything of fixed size: the prelude, section headers and the footer.
 
-use crate::le::{u32_at, u64_at};
-
-use super::{Error, MAGIC, MAX_HEADER_BYTES, VERSION, codec, tag};
+use super::{Error, MAGIC, MAX_HEADER_BYTES, VERSION, tag};
+use crate::le::value_at;
 
 pub(crate) const PRELUDE_BYTES: usize = 16;
 pub(crate) const HEADER_BYTES: usize = 40;
 pub(crate) const FOOTER_BYTES: usize = 24;
+/// Bytes of one entry of the table of contents: an offset and a header without its checksums.
+pub(crate) const ENTRY_BYTES: usize = 40;
 const FOOTER_MAGIC: [u8; 4] = *b"CGRE";
 
-/// The header before every section's payload.
+/// Codecs: the bytes as they are.
+pub(crate) const RAW: u8 = 0;
+/// Byte planes of the elements, then zstd.
+pub(crate) const PLANES: u8 = 1;
+/// Differences of 32-bit words one stride apart, zigzag-coded, then byte planes and zstd.
+pub(crate) const DIFFERENCE: u8 = 2;
+/// Whole numbers by `cager-codec` of a group of frames: cages or residual.
+pub(crate) const CODED: u8 = 3;
+/// Whole numbers of a mesh at rest or of the errors of frames.
+pub(crate) const CODED_STATIC: u8 = 4;
+
+/// Whether a section is whole numbers.
+pub(crate) fn is_coded(codec: u8) -> bool {
+    [CODED, CODED_STATIC].contains(&codec)
+}
+
+/// The header before every section's payload, without its checksums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SectionHeader {
     pub(crate) tag: [u8; 4],
@@ -21,60 +38,65 @@ pub(crate) struct SectionHeader {
     pub(crate) count: u32,
     pub(crate) payload_bytes: u64,
     pub(crate) raw_bytes: u64,
-    pub(crate) payload_crc: u32,
 }
 
 impl SectionHeader {
-    /// What all layers of edits may decode to together: so much more than so many times the file's length.
+    /// What all layers of edits may decode to, by the length of the file.
     pub(crate) const LAYERS_TIMES: u64 = 16;
     pub(crate) const LAYERS_MORE: u64 = 8 << 20;
 
-    pub(crate) fn to_bytes(self) -> [u8; HEADER_BYTES] {
-        let mut out = [0; HEADER_BYTES];
-        out[0..4].copy_from_slice(&self.tag);
-        out[4] = self.codec;
-        out[5] = self.width;
-        out[8..12].copy_from_slice(&self.first.to_le_bytes());
-        out[12..16].copy_from_slice(&self.count.to_le_bytes());
-        out[16..24].copy_from_slice(&self.payload_bytes.to_le_bytes());
-        out[24..32].copy_from_slice(&self.raw_bytes.to_le_bytes());
-        out[32..36].copy_from_slice(&self.payload_crc.to_le_bytes());
-        let crc = crc32c::crc32c(&out[..36]);
-        out[36..40].copy_from_slice(&crc.to_le_bytes());
-        out
+    /// Of a section as it is usually written, before its bytes are counted.
+    pub(crate) fn new(tag: [u8; 4], (first, count): (u32, u32)) -> Self {
+        let (codec, width) = layout(tag);
+        Self { tag, codec, width, first, count, payload_bytes: 0, raw_bytes: 0 }
     }
 
-    pub(crate) fn from_bytes(b: &[u8; HEADER_BYTES], offset: u64) -> Result<Self, Error> {
-        if crc32c::crc32c(&b[..36]) != u32_at(b, 36) {
+    fn to_bytes(self) -> Vec<u8> {
+        [
+            &self.tag[..],
+            &[self.codec, self.width, 0, 0],
+            &self.first.to_le_bytes(),
+            &self.count.to_le_bytes(),
+            &self.payload_bytes.to_le_bytes(),
+            &self.raw_bytes.to_le_bytes(),
+        ]
+        .concat()
+    }
+
+    fn from_bytes(b: &[u8]) -> Self {
+        Self {
+            tag: [b[0], b[1], b[2], b[3]],
+            codec: b[4],
+            width: b[5],
+            first: value_at(b, 8, u32::from_le_bytes),
+            count: value_at(b, 12, u32::from_le_bytes),
+            payload_bytes: value_at(b, 16, u64::from_le_bytes),
+            raw_bytes: value_at(b, 24, u64::from_le_bytes),
+        }
+    }
+
+    /// The bytes before a payload with this checksum.
+    pub(crate) fn sealed(self, payload_crc: u32) -> Vec<u8> {
+        sealed(&[&self.to_bytes(), &payload_crc.to_le_bytes()])
+    }
+
+    /// The header before a payload, and the payload's checksum.
+    pub(crate) fn unsealed(b: &[u8; HEADER_BYTES], offset: u64) -> Result<(Self, u32), Error> {
+        if !is_sealed(b) {
             return Err(Error::corrupt(offset, "the checksum of a section's header does not match"));
         }
         if b[6..8] != [0, 0] {
             return Err(Error::corrupt(offset + 6, "reserved bytes are not zero"));
         }
-        Ok(Self { payload_crc: u32_at(b, 32), ..Self::without_checksum(b) })
+        Ok((Self::from_bytes(b), value_at(b, 32, u32::from_le_bytes)))
     }
 
-    /// All fields but the checksum of the payload, which is 0: the table of contents repeats these.
-    pub(crate) fn without_checksum(b: &[u8]) -> Self {
-        Self {
-            tag: [b[0], b[1], b[2], b[3]],
-            codec: b[4],
-            width: b[5],
-            first: u32_at(b, 8),
-            count: u32_at(b, 12),
-            payload_bytes: u64_at(b, 16),
-            raw_bytes: u64_at(b, 24),
-            payload_crc: 0,
-        }
-    }
-
-    /// Most bytes that a section may decode to in a file of this length, so that what a reader builds from all of them keeps to the bound of
-    /// `docs/FORMAT.md`.
+    /// Most bytes that a section may decode to in a file of this length, see `docs/FORMAT.md`.
     pub(crate) fn most_raw_bytes(tag: [u8; 4], codec: u8, file_bytes: u64) -> u64 {
         let (times, more) = match tag {
             tag::HEADER => return MAX_HEADER_BYTES as u64,
             // Decoding whole numbers takes several times the memory of the result.
-            _ if codec::is_coded(codec) => (16, 2 << 20),
+            _ if is_coded(codec) => (16, 2 << 20),
             // Two bytes of JSON may become an empty text of 24 bytes.
             tag::REPORT => (16, 4 << 20),
             tag::EDIT => (Self::LAYERS_TIMES, Self::LAYERS_MORE),
@@ -84,25 +106,73 @@ impl SectionHeader {
     }
 
     /// Whether a reader that does not know the section must refuse the file.
-    pub(crate) fn is_required(tag: [u8; 4]) -> bool {
-        !tag[0].is_ascii_lowercase()
+    pub(crate) fn is_required(self) -> bool {
+        !self.tag[0].is_ascii_lowercase()
+    }
+
+    /// The frames of a chunk.
+    pub(crate) fn frames(&self) -> std::ops::Range<usize> {
+        self.first as usize..self.first as usize + self.count as usize
     }
 }
 
-pub(crate) fn prelude() -> [u8; PRELUDE_BYTES] {
-    let mut out = [0; PRELUDE_BYTES];
-    out[0..8].copy_from_slice(&MAGIC);
-    out[8..10].copy_from_slice(&VERSION.to_le_bytes());
-    let crc = crc32c::crc32c(&out[..12]);
-    out[12..16].copy_from_slice(&crc.to_le_bytes());
+/// The codec by which a section is written, and the bytes of one of its numbers.
+fn layout(tag: [u8; 4]) -> (u8, u8) {
+    match tag {
+        tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES => (DIFFERENCE, 4),
+        tag::ERRORS | tag::EDIT => (PLANES, 4),
+        tag::REST_COLORS | tag::ELEMENTS | tag::REPORT => (PLANES, 1),
+        tag::REST_POINTS | tag::CAGE_VERTICES => (PLANES, 4),
+        tag::NUMBERS => (PLANES, 8),
+        tag::ORIGIN => (RAW, 8),
+        _ => (RAW, 1),
+    }
+}
+
+/// A section, and where it begins.
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    pub(super) offset: u64,
+    pub(super) header: SectionHeader,
+}
+
+impl Entry {
+    /// The line of the table of contents.
+    pub(super) fn to_bytes(self) -> Vec<u8> {
+        [&self.offset.to_le_bytes()[..], &self.header.to_bytes()].concat()
+    }
+
+    pub(super) fn from_bytes(b: &[u8]) -> Self {
+        Self { offset: value_at(b, 0, u64::from_le_bytes), header: SectionHeader::from_bytes(&b[8..]) }
+    }
+
+    /// Where the section after it begins.
+    pub(super) fn end(&self) -> Option<u64> {
+        self.offset.checked_add(HEADER_BYTES as u64)?.checked_add(self.header.payload_bytes)
+    }
+}
+
+/// Bytes and their checksum.
+fn sealed(parts: &[&[u8]]) -> Vec<u8> {
+    let mut out = parts.concat();
+    out.extend(crc32c::crc32c(&out).to_le_bytes());
     out
+}
+
+fn is_sealed(bytes: &[u8]) -> bool {
+    let end = bytes.len() - 4;
+    crc32c::crc32c(&bytes[..end]) == value_at(bytes, end, u32::from_le_bytes)
+}
+
+pub(crate) fn prelude() -> Vec<u8> {
+    sealed(&[&MAGIC, &VERSION.to_le_bytes(), &[0; 2]])
 }
 
 pub(crate) fn check_prelude(b: &[u8; PRELUDE_BYTES]) -> Result<(), Error> {
     if b[0..8] != MAGIC {
         return Err(Error::NotAContainer);
     }
-    if crc32c::crc32c(&b[..12]) != u32_at(b, 12) {
+    if !is_sealed(b) {
         return Err(Error::corrupt(0, "the checksum of the first bytes does not match"));
     }
     match u16::from_le_bytes([b[8], b[9]]) {
@@ -113,14 +183,8 @@ pub(crate) fn check_prelude(b: &[u8; PRELUDE_BYTES]) -> Result<(), Error> {
 }
 
 /// The last bytes of a file: where its table of contents is, and its length.
-pub(crate) fn footer(contents_offset: u64, file_bytes: u64) -> [u8; FOOTER_BYTES] {
-    let mut out = [0; FOOTER_BYTES];
-    out[0..8].copy_from_slice(&contents_offset.to_le_bytes());
-    out[8..16].copy_from_slice(&file_bytes.to_le_bytes());
-    out[16..20].copy_from_slice(&FOOTER_MAGIC);
-    let crc = crc32c::crc32c(&out[..20]);
-    out[20..24].copy_from_slice(&crc.to_le_bytes());
-    out
+pub(crate) fn footer(contents_offset: u64, file_bytes: u64) -> Vec<u8> {
+    sealed(&[&contents_offset.to_le_bytes(), &file_bytes.to_le_bytes(), &FOOTER_MAGIC])
 }
 
 /// Checks a footer; returns the offset of the table of contents.
@@ -129,15 +193,8 @@ pub(crate) fn check_footer(b: &[u8; FOOTER_BYTES], file_bytes: u64) -> Result<u6
     if b[16..20] != FOOTER_MAGIC {
         return Err(Error::corrupt(offset, "the end is missing, as of a file that was cut"));
     }
-    if crc32c::crc32c(&b[..20]) != u32_at(b, 20) || u64_at(b, 8) != file_bytes {
+    if !is_sealed(b) || value_at(b, 8, u64::from_le_bytes) != file_bytes {
         return Err(Error::corrupt(offset, "the end does not fit the file"));
     }
-    Ok(u64_at(b, 0))
-}
-
-/// A section, and where it begins.
-#[derive(Clone, Copy)]
-pub(super) struct Entry {
-    pub(super) offset: u64,
-    pub(super) header: SectionHeader,
+    Ok(value_at(b, 0, u64::from_le_bytes))
 }

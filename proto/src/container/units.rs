@@ -1,7 +1,7 @@
 //! The section `unit`: what the positions of a container mean.
 
 use super::Error;
-use crate::le::u64_at;
+use crate::le::value_at;
 use cager_geometry::units::{Units, Up};
 
 /// Metres of one unit as f64, 0 where they are not known; and the upward axis.
@@ -21,7 +21,7 @@ pub(super) fn to_bytes(units: Units) -> Option<[u8; UNITS_BYTES]> {
 
 /// What the content says of a section at this offset.
 pub(super) fn from_bytes(bytes: &[u8], offset: u64) -> Result<Units, Error> {
-    let metres = f64::from_bits(u64_at(bytes, 0));
+    let metres = value_at(bytes, 0, f64::from_le_bytes);
     let metres_per_unit = (metres != 0.0).then_some(metres);
     if metres_per_unit.is_some_and(|metres| !Units::is_length(metres)) {
         return Err(Error::corrupt(offset, format!("a unit of {metres} metres")));

@@ -191,7 +191,8 @@ fn solve_batch(
     let mut buffers = FRAME_BUFFERS.take();
     buffers.resize_with(buffers.len().max(jobs.len()), Vec::new);
     for ((job, _), buffer) in jobs.iter().zip(&mut buffers) {
-        le::read_f32(&job.bytes, buffer);
+        buffer.clear();
+        buffer.extend(le::values(&job.bytes, f32::from_le_bytes));
     }
     let views: Vec<&[f32]> = buffers[..jobs.len()].iter().map(Vec::as_slice).collect();
     let solver = &prepared.solver;
