@@ -120,7 +120,7 @@ fn named(error: TransferFailed, args: &TransferMotionArgs) -> Error {
     let source = args.source.as_ref().or(args.source_rest.as_ref());
     let of = |whose: &str| if whose == "target" { Some(&args.target) } else { source };
     let place = match &error {
-        Transfer(Ambiguous { up }) => {
+        Transfer(Ambiguous(up)) => {
             let options = if *up {
                 "--align none, --align MATRIX, --pairs"
             } else {

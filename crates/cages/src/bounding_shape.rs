@@ -1,4 +1,4 @@
-//! Bounding shapes as cages: a box, a sphere or a convex hull around one model, or around several together as their *public cage*.
+//! Bounding shapes as cages: a box, a sphere or a convex hull around one model or several together.
 
 mod hull;
 
@@ -22,11 +22,11 @@ pub enum BoundingShape {
 /// Least distance of a point from the cage, as a fraction of the diagonal of all models.
 const MARGIN: f64 = 0.01;
 
-/// A cage of this shape, of at most `vertices` vertices around all points of the models: closed, outward-oriented, free of self-intersection.
+/// A closed, outward-oriented cage of this shape, of at most `vertices` vertices around all points.
 ///
 /// # Errors
-/// Models without points, with coordinates that are not finite, or all in one place, and fewer vertices than the shape needs: 8 for a
-/// box, 12 for a sphere, 4 for a hull.
+/// Models without points or extent, or with coordinates that are not finite, and fewer vertices
+/// than the shape needs: 8 for a box, 12 for a sphere, 4 for a hull.
 pub fn bounding_shape(models: &[&Model], shape: BoundingShape, vertices: usize) -> Result<TriMesh, EncloseError> {
     for model in models {
         check_finite(&model.points)?;
@@ -113,7 +113,7 @@ fn geodesic_sphere(vertices: usize) -> (Vec<DVec3>, Vec<[u32; 3]>) {
                 let outward = (corners[b] - corners[a]).cross(corners[c] - corners[a]).dot(corners[a]) > 0.0;
                 let [a, b, c] = if outward { [a, b, c] } else { [a, c, b] };
                 let at = |i: i64, j: i64| {
-                    // Weights of the icosahedron's vertices name a point, whichever face it is seen from.
+                    // Weights of the icosahedron's vertices name a point from any face.
                     let mut place =
                         [(a, f - i - j), (b, i), (c, j)].map(|(v, w)| if w == 0 { (12, 0) } else { (v, w) });
                     place.sort_unstable();
@@ -147,16 +147,11 @@ fn inradius((vertices, triangles): &(Vec<DVec3>, Vec<[u32; 3]>)) -> f64 {
 }
 
 /// Vertices numbered in the order in which they are first named.
+#[derive(Default)]
 struct Numbered<K> {
     numbers: HashMap<K, u32>,
     places: Vec<K>,
     triangles: Vec<[u32; 3]>,
-}
-
-impl<K> Default for Numbered<K> {
-    fn default() -> Self {
-        Self { numbers: HashMap::new(), places: Vec::new(), triangles: Vec::new() }
-    }
 }
 
 impl<K: Copy + Eq + std::hash::Hash> Numbered<K> {

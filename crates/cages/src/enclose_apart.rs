@@ -3,11 +3,12 @@
 use crate::enclose::{EncloseError, EncloseOptions, enclose};
 use cager_geometry::mesh::{Model, TriMesh};
 
-/// How many times the vertices asked for a cage may have, where fewer leave parts of the model joined.
+/// How many times the vertices asked for a cage may have, where fewer leave limbs joined.
 const MORE_VERTICES: [f64; 2] = [1.3, 1.7];
 
-/// [`enclose`] by about so many vertices, for a model whose limbs move apart. Few vertices enclose limbs that are close together, crossed forearms say, in one surface, whose vertices cannot
-/// move one limb without the other. Such a cage has handles; with more vertices limbs stay apart, so these are tried where it has any, and the cage with the fewest is taken.
+/// [`enclose`] by about so many vertices, for a model whose limbs move apart. Few vertices enclose
+/// limbs close together in one surface, with handles; more are tried then, and the cage with the
+/// fewest handles is taken.
 ///
 /// # Errors
 /// See [`EncloseError`].
@@ -31,7 +32,7 @@ pub fn enclose_apart(model: &Model, vertices: usize) -> Result<TriMesh, EncloseE
 /// [`joints`] of one closed surface without handles; of two, less.
 const NO_HANDLES: i64 = -2;
 
-/// Twice the number of handles without that of surfaces, by Euler's formula: how far parts of a closed mesh are joined.
+/// Twice the number of handles less that of surfaces, by Euler's formula.
 fn joints(cage: &TriMesh) -> i64 {
     cage.triangles.len() as i64 / 2 - cage.vertices.len() as i64
 }
@@ -41,7 +42,8 @@ mod tests {
     use super::*;
     use cager_geometry::mesh::{Point, Polygons};
 
-    /// Boxes, finely divided, which are joined at their low ends along y by nothing but being in one model.
+    /// Boxes, finely divided, which are joined at their low ends along y by nothing but being in
+    /// one model.
     fn boxes(centers: &[Point], half: Point) -> Model {
         const ALONG: usize = 24;
         let (mut points, mut faces) = (Vec::new(), Polygons::new());

@@ -1,4 +1,4 @@
-//! Cages: generated around a model, checked, repaired, and designed from its motion. Plain data in, plain data out; no files, no async.
+//! Cages: generated around a model, checked, repaired, and designed from its motion. No files.
 
 mod bounding_shape;
 mod design;

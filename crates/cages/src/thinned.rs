@@ -1,5 +1,6 @@
-//! A large model by fewer points that stand for all of it: one of each voxel, with the faces that are left between them.
+//! A large model by fewer points: one of each voxel, with the faces left between them.
 
+use crate::enclose::triangles;
 use cager_geometry::mesh::{Model, Polygons, bounds, diagonal};
 use cager_geometry::vector::sub;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -31,15 +32,13 @@ impl Thinned {
         Some(Self { points, places: voxels.of.iter().map(|&voxel| place[voxel as usize]).collect() })
     }
 
-    /// These points, and the faces that have corners in three voxels, as often as several faces become one, so that the edges of a closed surface stay
-    /// closed. What is thinner than a voxel, as wires are, stays as triangles with one corner twice.
+    /// These points, and the faces with corners in three voxels, as often as several become one, so
+    /// that closed surfaces stay closed. What is thinner than a voxel stays as triangles with one
+    /// corner twice.
     pub(crate) fn model(&self, model: &Model) -> Model {
         let mut faces = Polygons::new();
         let (mut sides, mut edges) = (FxHashSet::default(), Vec::new());
-        let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < self.places.len());
-        for [a, b, c] in
-            model.faces.triangulated().into_iter().filter(exists).map(|t| t.map(|v| self.places[v as usize]))
-        {
+        for [a, b, c] in triangles(model).into_iter().map(|t| t.map(|v| self.places[v as usize])) {
             if a != b && b != c && c != a {
                 faces.push(&[a, b, c]);
                 sides.extend([[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]));

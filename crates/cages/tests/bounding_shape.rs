@@ -45,7 +45,7 @@ fn what_no_shape_can_enclose_is_named() {
     let point = Model { points: vec![[1.0; 3]; 2], ..Model::default() };
     for (shape, least) in SHAPES {
         assert_eq!(bounding_shape(&[&empty], shape, 100), Err(EncloseError::Empty));
-        assert_eq!(bounding_shape(&[&nan], shape, 100), Err(EncloseError::NotFinite { point: 0 }));
+        assert_eq!(bounding_shape(&[&nan], shape, 100), Err(EncloseError::NotFinite(0)));
         assert_eq!(bounding_shape(&[&point], shape, 100), Err(EncloseError::NoExtent));
         let ball = model(&sphere([0.0; 3], 1.0, 8));
         let few = EncloseError::TooFewVertices { vertices: least - 1, least };

@@ -219,7 +219,7 @@ fn what_cannot_be_enclosed_is_named() {
     let fails = |model: &Model, vertices| enclose(model, &options(vertices)).unwrap_err();
     assert_eq!(fails(&cloud(vec![]), 50), EncloseError::Empty);
     assert_eq!(fails(&cloud(vec![[1.0, 2.0, 3.0]; 5]), 50), EncloseError::NoExtent);
-    assert_eq!(fails(&cloud(vec![[0.0; 3], [1.0, f64::NAN, 0.0]]), 50), EncloseError::NotFinite { point: 1 });
+    assert_eq!(fails(&cloud(vec![[0.0; 3], [1.0, f64::NAN, 0.0]]), 50), EncloseError::NotFinite(1));
     let sphere = model(&sphere([0.0; 3], 1.0, 12));
     assert_eq!(fails(&sphere, 3), EncloseError::TooFewVertices { vertices: 3, least: 4 });
     assert_enclosed("sphere", &sphere, &[4, 5, 6, 8, 12]);

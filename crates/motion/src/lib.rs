@@ -1,5 +1,5 @@
-//! Motions that are made: recovered from surfaces without correspondence, moved onto other models, and what shapes between poses need. Files in, frames out
-//! that are encoded as any capture. The command line and the service share it; it knows neither requests nor options as they are typed.
+//! Motions recovered from surfaces without correspondence and moved onto other models. Files in,
+//! frames out that are encoded as any capture. Command line and service share it.
 
 pub mod pose_cage;
 pub mod pose_faces;

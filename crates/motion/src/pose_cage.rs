@@ -4,7 +4,7 @@ use cager_cages::{EncloseError, EncloseOptions, enclose};
 use cager_core::cage::{Cage, CageError};
 use cager_geometry::mesh::Model;
 
-/// Vertices of the cage, and points for each. Poses do not determine the vertices of finer cages well enough to be blended.
+/// Vertices of the cage, and points for each. Poses do not determine finer cages well enough.
 const CAGE_VERTICES: [usize; 2] = [32, 120];
 const POINTS_EACH: usize = 16;
 

@@ -251,7 +251,7 @@ impl Wanted<'_> {
             return Err(geometry(detail));
         }
         let Some((first, others)) = files.split_first().filter(|(_, others)| !others.is_empty()) else {
-            return Err(geometry(ShapeError::TooFewPoses { poses: files.len() }.to_string()));
+            return Err(geometry(ShapeError::TooFewPoses(files.len()).to_string()));
         };
         let read = |file: &NamedFile| read_part("pose", &file.name, &file.bytes);
         let mut model = read(first)?;

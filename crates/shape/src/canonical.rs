@@ -1,4 +1,4 @@
-//! A frame that turns with a shape, so that what is computed in it does not depend on how the shape was turned.
+//! A frame that turns with a shape, so that results in it do not depend on how it was turned.
 
 use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};
@@ -6,8 +6,8 @@ use glam::{DMat3, DVec3};
 use crate::points::Moments;
 use crate::similarity::Similarity;
 
-/// Moves the centre of some points to the origin and turns their principal axes onto the axes, each in the direction in which the points reach farther
-/// (their third moment is positive).
+/// Moves the centre of points to the origin and turns principal axes onto the axes, each in the
+/// direction in which the points reach farther (their third moment is positive).
 pub(crate) fn canonical_frame(points: &[Point]) -> Similarity {
     let Moments { center, axes, .. } = Moments::new(points);
     let [first, second] = [0, 1].map(|k| {
@@ -19,7 +19,8 @@ pub(crate) fn canonical_frame(points: &[Point]) -> Similarity {
     Similarity { rotation, scale: 1.0, translation: -(rotation * center) }
 }
 
-/// A length that says how large points are, however they are turned: the diagonal of a solid box with their second moments, `√(12 tr Σ)`.
+/// The size of points, however turned: the diagonal of a box with their second moments, `√(12 tr
+/// Σ)`.
 pub(crate) fn size(points: &[Point]) -> f64 {
     (12.0 * Moments::new(points).variances.iter().sum::<f64>()).max(0.0).sqrt()
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 /// The source of a vertex that no source reaches.
 pub(crate) const NO_SOURCE: u32 = u32::MAX;
 
-/// Of each vertex, the nearest of some source vertices, by its number in `sources`, and the distance to it.
+/// Of each vertex, the nearest source, by its number in `sources`, and the distance to it.
 pub(crate) fn nearest_sources(vertices: &[DVec3], adjacency: &Adjacency, sources: &[u32]) -> (Vec<u32>, Vec<f64>) {
     let mut nearest = vec![NO_SOURCE; vertices.len()];
     let mut distance = vec![f64::INFINITY; vertices.len()];

@@ -7,12 +7,9 @@ use cager_core::inversion::PrepareError;
 /// Why a mesh cannot be solved on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MeshError {
-    /// A coordinate is NaN or infinite.
-    #[error("has a coordinate that is NaN or infinite at vertex {vertex}; repair or remove it")]
-    NotFinite {
-        /// The first such vertex.
-        vertex: usize,
-    },
+    /// A coordinate is NaN or infinite: the first such vertex.
+    #[error("has a coordinate that is NaN or infinite at vertex {0}; repair or remove it")]
+    NotFinite(usize),
     /// No triangle has an area.
     #[error("has no triangle with an area; a mesh with faces is needed")]
     NoArea,
@@ -89,19 +86,16 @@ pub enum TransferError {
         /// The first such point.
         point: usize,
     },
-    /// Two alignments that fit as well as each other.
-    #[error("{}", ambiguous(*up))]
-    Ambiguous {
-        /// Whether the axis that points up was given.
-        up: bool,
-    },
+    /// Two alignments that fit as well as each other; whether the axis that points up was given.
+    #[error("{}", ambiguous(*.0))]
+    Ambiguous(bool),
     /// The registration ended far from the target.
     #[error(
         "the source cannot be laid onto the target: {}; align them by hand, or take another source",
         unreached(*score, *limit)
     )]
     OutOfReach {
-        /// The score, in percent: at most 5, as greater distances are not told apart; NaN where the registration came to nothing.
+        /// In percent, 5 at the most; NaN where the registration came to nothing.
         score: f64,
         /// The most that is taken, in percent.
         limit: f64,
@@ -136,12 +130,9 @@ pub enum ShapeError {
     /// The mesh cannot be solved on.
     #[error("the model {0}")]
     Mesh(#[from] MeshError),
-    /// Fewer than two poses.
-    #[error("there {}; shapes between poses need two or more", if *poses == 1 { "is only one pose" } else { "are no poses" })]
-    TooFewPoses {
-        /// How many there are.
-        poses: usize,
-    },
+    /// Fewer than two poses: how many there are.
+    #[error("there {}; shapes between poses need two or more", if *.0 == 1 { "is only one pose" } else { "are no poses" })]
+    TooFewPoses(usize),
     /// A pose of other points.
     #[error("pose {pose} has {points} points, the model {expected}")]
     OtherPoints {
@@ -168,18 +159,12 @@ pub enum ShapeError {
         /// Poses.
         poses: usize,
     },
-    /// NaN or infinity as a weight.
-    #[error("the weight of pose {pose} is NaN or infinite; give a number")]
-    Weight {
-        /// The pose.
-        pose: usize,
-    },
-    /// Weights that are not a share of the whole each.
-    #[error("the weights sum to {sum}, not to 1")]
-    Sum {
-        /// Their sum.
-        sum: f64,
-    },
+    /// NaN or infinity as a weight: the pose.
+    #[error("the weight of pose {0} is NaN or infinite; give a number")]
+    Weight(usize),
+    /// Weights that are not a share of the whole each: their sum.
+    #[error("the weights sum to {0}, not to 1")]
+    Sum(f64),
     /// Coordinates of something else than the vertices of the cage.
     #[error(
         "the coordinates have {columns} columns, the cage {vertices} vertices; take coordinates of vertices alone, such as mean value coordinates"

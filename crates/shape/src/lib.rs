@@ -1,5 +1,6 @@
-//! Shapes that share nothing: surfaces registered without correspondence, people and other subjects followed through them, motions moved onto other models,
-//! and shapes between the poses of one model. Plain data in, plain data out; knows no files. Results do not depend on the number of threads.
+//! Shapes that share nothing: surfaces registered without correspondence, people and other subjects
+//! followed through them, motions moved onto other models, and shapes between poses. Knows no
+//! files. Results do not depend on the number of threads.
 
 mod canonical;
 pub mod deformation;

@@ -1,11 +1,11 @@
 //! Points as vectors and as matrices, and what they determine: normals, moments.
 
-use cager_geometry::linalg::symmetric_eigen;
+use cager_core::coordinates::DependentNormals;
+use cager_geometry::linalg::{symmetric_eigen, tall_product};
 use cager_geometry::mesh::{self, Point};
+pub use cager_geometry::mesh::welded;
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3};
-
-use crate::registration::welded;
 
 /// As vectors.
 pub(crate) fn vectors(points: &[Point]) -> Vec<DVec3> {
@@ -23,13 +23,34 @@ pub(crate) fn matrix<P: Copy + Into<Point>>(points: &[P]) -> Mat<f64> {
 }
 
 /// The rows of an n × 3 matrix as points.
-pub(crate) fn row_points(matrix: MatRef<'_, f64>) -> Vec<DVec3> {
-    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)])).collect()
+pub(crate) fn row_points<P: From<Point>>(matrix: MatRef<'_, f64>) -> Vec<P> {
+    (0..matrix.nrows()).map(|i| [0, 1, 2].map(|k| matrix[(i, k)]).into()).collect()
+}
+
+/// The points with these coordinates in a cage of these values.
+pub(crate) fn points_in<P: From<Point>>(phi: MatRef<'_, f64>, values: MatRef<'_, f64>) -> Vec<P> {
+    row_points(tall_product(phi, values).as_ref())
+}
+
+/// Values of a cage, one row a column of coordinates: its vertices, then the normals that follow.
+pub(crate) fn cage_values(normals: Option<&DependentNormals>, vertices: &[Point]) -> Mat<f64> {
+    let normals = normals.into_iter().flat_map(|normals| normals.normals(|v| vertices[v as usize]));
+    matrix(&vertices.iter().copied().chain(normals).collect::<Vec<_>>())
+}
+
+/// The least and the greatest of some numbers.
+pub(crate) fn range(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
+    numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }
 
 /// The outer product `a bᵀ`.
 pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// The sum of the diagonal.
+pub(crate) fn trace(a: DMat3) -> f64 {
+    a.x_axis.x + a.y_axis.y + a.z_axis.z
 }
 
 /// Twice the area of a triangle times its unit normal.

@@ -1,7 +1,6 @@
 //! Rotations by their rotation vectors, axis times angle.
 
 use glam::{DMat3, DQuat, DVec3};
-use std::f64::consts::PI;
 
 /// The rotation with this vector.
 pub(crate) fn exp(w: DVec3) -> DMat3 {
@@ -40,18 +39,10 @@ pub(crate) fn right_jacobian(w: DVec3) -> DMat3 {
     DMat3::IDENTITY - k * a + k * k * b
 }
 
-/// The smallest rotation that takes the direction of `a` to that of `b`.
+/// The smallest rotation that takes the direction of `a` to that of `b`; none where one has no direction.
 pub(crate) fn between(a: DVec3, b: DVec3) -> DMat3 {
-    let axis = a.cross(b);
-    let sine = axis.length();
-    if sine < 1e-12 * (a.length() * b.length()).max(f64::MIN_POSITIVE) {
-        if a.dot(b) >= 0.0 {
-            return DMat3::IDENTITY;
-        }
-        let axis = a.try_normalize().map_or(DVec3::X, DVec3::any_orthonormal_vector);
-        return DMat3::from_axis_angle(axis, PI);
-    }
-    exp(axis * (sine.atan2(a.dot(b)) / sine))
+    let ends = a.try_normalize().zip(b.try_normalize());
+    ends.map_or(DMat3::IDENTITY, |(a, b)| DMat3::from_quat(DQuat::from_rotation_arc(a, b)))
 }
 
 /// The rotation half-way from `a` to `b`.

@@ -1,4 +1,4 @@
-//! Convex hulls by insertion of the farthest point (Barber et al. 1996), ended when there are enough vertices and then enlarged.
+//! Convex hulls by insertion of the farthest point (Barber et al. 1996), ended early and enlarged.
 
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::predicates::orient3d;
@@ -13,7 +13,7 @@ struct Facet {
     farthest: (u32, f64),
 }
 
-/// A convex polyhedron of at most `most` vertices around all points, each at least `margin`/√3 inside.
+/// A convex polyhedron of at most `most` vertices, with all points at least `margin`/√3 inside.
 pub(super) fn enlarged_hull(points: &[Point], most: usize, margin: f64) -> TriMesh {
     // Octahedra in place of points give the hull a volume even where the model is flat.
     let reach = 2.0 * margin;
@@ -39,7 +39,7 @@ pub(super) fn enlarged_hull(points: &[Point], most: usize, margin: f64) -> TriMe
     TriMesh { vertices, triangles: facets.iter().map(|f| f.map(index)).collect() }
 }
 
-/// Outward faces of the hull of some of the points, the farthest first, with at most `most` vertices.
+/// Outward faces of the hull of some of the points, the farthest first.
 fn hull(points: &[DVec3], most: usize) -> Vec<[u32; 3]> {
     let mut facets = first_tetrahedron(points);
     while vertex_count(&facets) < most {

@@ -35,8 +35,8 @@ impl Adam {
         self.first.iter().zip(&self.second).map(step).collect()
     }
 
-    /// Reorders the moments after a change of connectivity: `kept[v]` is the previous index of vertex v; an index out of range is a new vertex, which
-    /// gets the mean.
+    /// Follows a change of connectivity: `kept[v]` is the previous index of vertex v, out of range
+    /// for a new one, which gets the mean.
     pub(super) fn renumber(&mut self, kept: &[u32]) {
         let mean = self.mean();
         self.first = kept.iter().map(|&v| self.first.get(v as usize).copied().unwrap_or_default()).collect();

@@ -1,9 +1,9 @@
 //! Constrained moves that keep a cage enclosing and free of self-intersection.
 //!
-//! Before each move, all pairs of nearby features are collected: points of the model and faces, vertices and faces, edges and edges, and each face's
-//! corners and opposite edges. The desired move is first projected so that every pair, linearised, keeps its minimum distance. Then each vertex may
-//! move by at most a fraction of the distance of every pair that it belongs to, less than half where both sides move, so that no pair can meet: a
-//! cage that is valid before a move is valid after it.
+//! Before each move, pairs of nearby features are collected: points and faces, vertices and faces,
+//! edges and edges, corners and opposite edges. The desired move is projected so that every pair,
+//! linearised, keeps its minimum distance. Then each vertex moves by at most a fraction of the
+//! distance of its pairs, less than half where both sides move, so that no pair can meet.
 
 use super::symmetry::Symmetry;
 use cager_core::cage::Cage;
@@ -13,11 +13,12 @@ use cager_geometry::spatial::{Aabb, Bvh, Surface, triangles_intersect};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Fraction of a pair's distance that a vertex may move: where both sides move, and where one is a fixed point.
+/// Fraction of a pair's distance that a vertex may move, where both sides do, and where one is
+/// fixed.
 const SHARE: f64 = 0.45;
 const SHARE_OF_FIXED: f64 = 0.9;
-/// Fraction of its own distance that a corner not at the nearest point may move: no point between it and one at the nearest point can then meet the
-/// other feature, since `0.9 + 0.4 t ≤ √(1 + t²)` for all t.
+/// The same of a corner's own distance where it is not at the nearest point: `0.9 + 0.4 t ≤ √(1 +
+/// t²)`, so points between it and one there do not meet the other feature either.
 const SHARE_OF_FAR: f64 = 0.2;
 /// Sweeps of corrections.
 const SWEEPS: usize = 4;
@@ -39,7 +40,7 @@ pub(super) struct Obstacles {
     symmetry: Option<Symmetry>,
 }
 
-/// Two features that are near each other: their distance is `normal · (Σ weight x)`, less `at_rest`, with x the cage's vertices.
+/// Two features near each other, at the distance `normal · (Σ weight x)` less `at_rest`.
 struct Pair {
     /// Its vertices, the first `used` of them.
     vertices: [u32; 4],
@@ -53,7 +54,7 @@ struct Pair {
 }
 
 impl Obstacles {
-    /// Whether a collapse leaves the cage valid: its new faces intersect no other face, and no point of the model changes sides.
+    /// Whether new faces cut no other face, and no point of the model changes sides.
     pub(super) fn allow(&self, mesh: &TriMesh, old: &[[u32; 3]], new: &[[u32; 3]]) -> bool {
         let at = |t: [u32; 3]| t.map(|v| DVec3::from(mesh.vertices[v as usize]));
         let around = Aabb::around(old.iter().flat_map(|&t| at(t)));
@@ -129,11 +130,12 @@ impl Obstacles {
         let faces = cage.faces();
         let corners = |f: usize| faces[f].vertices.map(|v| x[v as usize]);
         let boxes: Vec<Aabb> = (0..faces.len()).map(|f| Aabb::around(corners(f))).collect();
+        let fixed = Limits { reach, least: self.distances.clearance, share: SHARE_OF_FIXED };
         let with_points = |f: usize| {
             let mut found = Vec::new();
             self.tree.visit(&boxes[f].grown(reach), |i| {
                 let p = self.points[i as usize];
-                found.extend(self.with_point(p, faces[f].vertices, corners(f), reach));
+                found.extend(fixed.with_point(p, faces[f].vertices, corners(f)));
                 true
             });
             found.sort_by(|a: &Pair, b| a.distance.total_cmp(&b.distance));
@@ -142,7 +144,7 @@ impl Obstacles {
         let mut pairs: Vec<Pair> =
             (0..faces.len()).into_par_iter().with_min_len(32).flat_map_iter(with_points).collect();
         let Some(least) = self.distances.gap else { return pairs };
-        let limits = Limits { reach, least };
+        let limits = Limits { reach, least, share: SHARE };
         let tree = Bvh::new(&boxes);
         let ends = |e: usize| cage.edges()[e].vertices.map(|v| x[v as usize]);
         let edge_boxes: Vec<Aabb> = (0..cage.edges().len()).map(|e| Aabb::around(ends(e))).collect();
@@ -176,43 +178,34 @@ impl Obstacles {
         pairs.extend((0..faces.len()).flat_map(in_face));
         pairs
     }
-
-    fn with_point(&self, p: DVec3, vertices: [u32; 3], corners: [DVec3; 3], reach: f64) -> Option<Pair> {
-        let weights = closest_on_triangle(p, corners);
-        let nearest = weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
-        let distance = nearest.distance(p);
-        let normal = (nearest - p) / distance;
-        (distance < reach && normal.is_finite()).then(|| Pair {
-            vertices: [vertices[0], vertices[1], vertices[2], 0],
-            weights: [weights[0], weights[1], weights[2], 0.0],
-            used: 3,
-            normal,
-            at_rest: normal.dot(p),
-            distance,
-            least: self.distances.clearance,
-            share: SHARE_OF_FIXED,
-        })
-    }
 }
 
-/// How near two moving features must be to count as a pair, and their least distance.
+/// How near two features must be to count as a pair, their least distance, and the share of it that each may
+/// move.
 #[derive(Clone, Copy)]
 struct Limits {
     reach: f64,
     least: f64,
+    share: f64,
 }
 
 impl Limits {
+    fn with_point(self, p: DVec3, t: [u32; 3], corners: [DVec3; 3]) -> Option<Pair> {
+        let w = closest_on_triangle(p, corners);
+        let nearest = w[0] * corners[0] + w[1] * corners[1] + w[2] * corners[2];
+        self.pair(([t[0], t[1], t[2], 0], 3), [w[0], w[1], w[2], 0.0], nearest - p, p)
+    }
+
     fn with_face(self, v: usize, p: DVec3, t: [u32; 3], corners: [DVec3; 3]) -> Option<Pair> {
         let w = closest_on_triangle(p, corners);
         let nearest = w[0] * corners[0] + w[1] * corners[1] + w[2] * corners[2];
-        self.pair(([v as u32, t[0], t[1], t[2]], 4), [1.0, -w[0], -w[1], -w[2]], p - nearest)
+        self.pair(([v as u32, t[0], t[1], t[2]], 4), [1.0, -w[0], -w[1], -w[2]], p - nearest, DVec3::ZERO)
     }
 
     fn with_edge(self, vertices: [u32; 4], first: [DVec3; 2], second: [DVec3; 2]) -> Option<Pair> {
         let (s, t) = closest_on_segments(first, second);
         let apart = first[0].lerp(first[1], s) - second[0].lerp(second[1], t);
-        self.pair((vertices, 4), [1.0 - s, s, t - 1.0, -t], apart)
+        self.pair((vertices, 4), [1.0 - s, s, t - 1.0, -t], apart, DVec3::ZERO)
     }
 
     /// Corner i and the edge opposite.
@@ -220,14 +213,16 @@ impl Limits {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         let s = closest_on_segment(corners[i], corners[j], corners[k]);
         let apart = corners[i] - corners[j].lerp(corners[k], s);
-        self.pair(([t[i], t[j], t[k], 0], 3), [1.0, s - 1.0, -s, 0.0], apart)
+        self.pair(([t[i], t[j], t[k], 0], 3), [1.0, s - 1.0, -s, 0.0], apart, DVec3::ZERO)
     }
 
-    fn pair(self, (vertices, used): ([u32; 4], usize), weights: [f64; 4], apart: DVec3) -> Option<Pair> {
+    /// Vertices with their weights, less a fixed point.
+    fn pair(self, (vertices, used): ([u32; 4], usize), weights: [f64; 4], apart: DVec3, fixed: DVec3) -> Option<Pair> {
+        let Self { reach, least, share } = self;
         let distance = apart.length();
         let normal = apart / distance;
-        let found = Pair { vertices, used, weights, normal, at_rest: 0.0, distance, least: self.least, share: SHARE };
-        (distance < self.reach && normal.is_finite()).then_some(found)
+        let found = Pair { vertices, used, weights, normal, at_rest: normal.dot(fixed), distance, least, share };
+        (distance < reach && normal.is_finite()).then_some(found)
     }
 }
 

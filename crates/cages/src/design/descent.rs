@@ -1,5 +1,5 @@
-//! Gradient descent of a cage's least-squares error over a motion (variable projection), constrained by contacts, with relocation of ineffective
-//! vertices.
+//! Gradient descent of a cage's least-squares error over a motion (variable projection),
+//! constrained by contacts, with relocation of ineffective vertices.
 
 use super::adam::Adam;
 use super::contact::Obstacles;
@@ -14,15 +14,15 @@ use cager_geometry::mesh::{Point, TriMesh};
 use faer::{Accum, Mat};
 use glam::DVec3;
 
-/// Ridge of the inner least squares, as a fraction of the mean diagonal entry of `ΦᵀΦ`: keeps cages from following what hardly moves the
-/// model, which the encoder would not follow either.
+/// Ridge of the inner least squares, over the mean diagonal entry of `ΦᵀΦ`: cages do not follow
+/// what hardly moves the model.
 const RIDGE: f64 = 1e-4;
 /// Length of the longest steps, as a fraction of the diagonal.
 const STEP: f64 = 0.001;
-/// Points sampled for a step and for remeshing: with fewer, parts with few points appear better reproduced than they are.
+/// Points of a step and of remeshing: with fewer, parts with few points seem better reproduced.
 const STEP_POINTS: usize = 2_200;
 const REMESH_POINTS: usize = 3_000;
-/// Fraction of the way to the mean of its neighbours that each vertex of an editable cage moves in a step of full length.
+/// How far vertices of an editable cage move to the mean of their neighbours in a full step.
 const FAIRING: f64 = 0.02;
 
 /// A cage under optimisation.
@@ -42,7 +42,8 @@ impl<'a> Descent<'a> {
         Self { cage, samples, obstacles, adam, random: fastrand::Rng::with_seed(options.seed), fairing }
     }
 
-    /// One step; its length is scaled by `step_scale`, from 1 down to 0. Discarded where the result is not a valid cage.
+    /// One step, its length scaled by `step_scale` (1 to 0); discarded where it gives no valid
+    /// cage.
     pub(super) fn step(&mut self, step_scale: f64) {
         let batch = self.samples.batch(STEP_POINTS, &mut self.random);
         let phi = MeanValue.smooth_coordinates(&self.cage, &batch.points);
@@ -90,7 +91,7 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Exchanges up to a share of the vertices, and grows or shrinks the cage towards `goal` vertices by up to as many.
+    /// Exchanges up to a share of the vertices, and goes towards `goal` vertices by up to as many.
     pub(super) fn exchange(&mut self, share: f64, goal: usize) {
         let batch = self.samples.batch(REMESH_POINTS, &mut self.random);
         let phi = MeanValue.smooth_coordinates(&self.cage, &batch.points);

@@ -1,4 +1,4 @@
-//! Adaptive remeshing of a cage: splits the edges that lower the error most and removes the vertices whose loss raises it least.
+//! Adaptive remeshing: splits edges that lower the error most, removes vertices that matter least.
 
 use super::contact::Obstacles;
 use super::fit::{BLOCK_ROWS, Fit};
@@ -17,8 +17,9 @@ pub(super) struct Remeshing {
     pub(super) kept: Vec<u32>,
 }
 
-/// Splits the most useful edges and merges the least useful vertices into neighbours, up to a share of all of them, while a split gains more
-/// than a merger costs; beyond that as many as bring the cage towards `goal` vertices.
+/// Splits the most useful edges and merges the least useful vertices, up to a share of all, while a
+/// split gains more than a merger costs; beyond that as many as bring the cage towards `goal`
+/// vertices.
 pub(super) fn exchange(
     cage: &Cage,
     points: &[Point],
@@ -86,9 +87,9 @@ pub(super) fn exchange(
 
 /// For every edge of the cage, by how much a vertex at its middle would lower `‖X − Φ C‖²`.
 ///
-/// Splitting an edge leaves the surface as it is and adds one function `b` to those that the cage has, so the error falls by
-/// `‖bᵀ R‖²/‖b − Π b‖²`, with `R` the residual and `Π` the projection on the columns of `Φ`. All edges' functions come from one
-/// subdivision of the whole cage, whose functions have a somewhat smaller support.
+/// A split adds one function `b` to those of the cage, so the error falls by `‖bᵀ R‖²/‖b − Π b‖²`,
+/// with `R` the residual and `Π` the projection on the columns of `Φ`. All edges' functions come
+/// from one subdivision of the whole cage, whose functions have a somewhat smaller support.
 fn split_gains(cage: &Cage, points: &[Point], phi: &Mat<f32>, fit: &Fit) -> Vec<f64> {
     let m = cage.vertices().len();
     let Ok(fine) = Cage::new(topology::subdivided(cage)) else { return vec![0.0; cage.edges().len()] };
@@ -108,8 +109,8 @@ fn split_gains(cage: &Cage, points: &[Point], phi: &Mat<f32>, fit: &Fit) -> Vec<
     gains.collect()
 }
 
-/// For every vertex, by how much `‖X − Φ C‖²` would rise if it followed its neighbours: with `a` the row that says so, `a C = 0`, the
-/// least-squares fit under that constraint is worse by `‖a C‖²/(a (ΦᵀΦ)⁻¹ aᵀ)`.
+/// For every vertex, by how much `‖X − Φ C‖²` would rise if it followed its neighbours, `a C = 0`:
+/// by `‖a C‖²/(a (ΦᵀΦ)⁻¹ aᵀ)`.
 fn removal_costs(mesh: &TriMesh, neighbours: &OneRings<'_>, fit: &Fit) -> Vec<f64> {
     let m = mesh.vertices.len();
     let mut inverse = Mat::<f64>::identity(m, m);

@@ -19,8 +19,7 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Fits the motion X, n × c, with the ridge `ρ` as a fraction of the mean diagonal entry of `ΦᵀΦ`, far above the rounding of
-    /// single precision.
+    /// Fits the motion X, n × c, with the ridge `ρ` over the mean diagonal entry of `ΦᵀΦ`.
     pub(super) fn new(phi: MatRef<'_, f32>, motion: MatRef<'_, f32>, ridge: f64) -> Option<Self> {
         Self::of_factor(phi, motion, || ridge_factor(to_double(gram(phi, BLOCK_ROWS).as_ref()), ridge))
     }

@@ -27,14 +27,15 @@ use cager_geometry::mesh::{Model, TriMesh, diagonal};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-/// Least distances that a design keeps, as fractions of the diagonal: between the model's points and the cage, and between parts of a
-/// cage for editing.
+/// Least distances, over the diagonal: of the model's points from the cage, and of parts of an
+/// editable cage.
 const CLEARANCE: f64 = 0.002;
 const GAP: f64 = 0.002;
 
-/// Designs a cage from a rest pose and frames of its motion, each with the points of the rest pose back to back: it is made from some of them, chosen by
-/// others and judged by stretches of time that neither saw ([`Parts`]). `start`, where given, is the cage to begin with. `watch` is called with the progress at least once a
-/// second; it may end the design, whose result is then the best cage so far. Runs on the current rayon pool.
+/// Designs a cage from a rest pose and frames of its motion, each with all points back to back:
+/// made from some frames, chosen by others and judged by stretches that neither saw ([`Parts`]).
+/// `start` is the cage to begin with. `watch` is called at least once a second, and may end the
+/// design with the best cage so far. Runs on the current rayon pool.
 ///
 /// # Errors
 /// See [`DesignError`].
@@ -68,7 +69,7 @@ pub fn design(
         (None, Goal::MeanError(_)) => search::first_vertices(rest.points.len()),
     };
     if vertices > MAX_VERTICES {
-        return Err(DesignError::TooManyVertices { vertices, most: MAX_VERTICES });
+        return Err(DesignError::TooManyVertices(vertices));
     }
     let parts = Parts::of(frames.len());
     let sampled = || Samples::new(rest, frames, &parts, &mut fastrand::Rng::with_seed(options.seed));
@@ -114,7 +115,7 @@ pub fn design(
     Ok(run.optimise(cage, obstacles))
 }
 
-/// The obstacles: the points inside the cage, of a large model those that stand for the others, and, for editable cages, the cage itself.
+/// The points inside the cage, of a large model some, and, for editable cages, the cage itself.
 fn obstacles(rest: &Model, outside: &[u32], style: Style, symmetry: Option<Symmetry>) -> Obstacles {
     let diagonal = diagonal(&rest.points);
     let standing = Thinned::of(rest).map_or_else(|| (0..rest.points.len() as u32).collect(), |thin| thin.points);

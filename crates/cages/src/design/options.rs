@@ -24,7 +24,8 @@ pub enum Style {
 pub enum Goal {
     /// At most so many vertices.
     Vertices(usize),
-    /// As few vertices as keep the mean L2 error on the frames that a cage is chosen by at or below this fraction of the diagonal.
+    /// As few vertices as keep the mean L2 error on the choosing frames below this share of the
+    /// diagonal.
     MeanError(f64),
 }
 
@@ -39,9 +40,10 @@ pub struct DesignOptions {
     pub seed: u64,
     /// The design ends with the best cage so far when this has passed.
     pub time_limit: Option<Duration>,
-    /// Keep the connectivity of the cage to start with, so that only its vertices move; the goal is then ignored.
+    /// Keep the connectivity of the cage to start with; the goal is then ignored.
     pub keep_connectivity: bool,
-    /// Keep the cage to start with symmetric across the plane of this axis (0, 1, 2 for x, y, z), and so its connectivity too.
+    /// Keep the cage symmetric across the plane of this axis (0, 1, 2), and so its connectivity
+    /// too.
     pub symmetry: Option<usize>,
 }
 
@@ -65,7 +67,8 @@ pub struct Progress<'a> {
     pub stage: &'static str,
     /// How much of the work is done, from 0 to 1.
     pub fraction: f64,
-    /// Root mean square error, on the frames that it is chosen by, of the best cage so far, as a fraction of the diagonal; `None` before the first.
+    /// Root mean square error of the best cage on the choosing frames, over the diagonal; `None` at
+    /// first.
     pub error: Option<f64>,
     /// The best cage so far, where it is another one than at the call before.
     pub better: Option<&'a TriMesh>,
@@ -78,11 +81,11 @@ pub struct Stage {
     pub name: String,
     /// Vertices after it.
     pub vertices: usize,
-    /// Root mean square error after it on the frames that the design is made from, as a fraction of the diagonal.
+    /// Root mean square error after it on the frames that are designed from, over the diagonal.
     pub training_error: f64,
     /// The same on the frames between them, by which the best cage is chosen.
     pub validation_error: f64,
-    /// Condition number of the coordinates after it, infinite where they are singular; `None` where it was not computed.
+    /// Condition number of the coordinates, infinite where singular; `None` where not computed.
     pub condition_number: Option<f64>,
     /// Seconds since the design began.
     pub seconds: f64,
@@ -159,14 +162,9 @@ pub enum DesignError {
     },
     /// More vertices than a design is made for: each step takes the cube of their number.
     #[error(
-        "a cage is designed with at most {most} vertices, not {vertices}; ask for fewer, or make one from the rest pose alone"
+        "a cage is designed with at most {MAX_VERTICES} vertices, not {0}; ask for fewer, or make one from the rest pose alone"
     )]
-    TooManyVertices {
-        /// What was asked for, or what the cage to start with has.
-        vertices: usize,
-        /// What is possible.
-        most: usize,
-    },
+    TooManyVertices(usize),
     /// A goal that no cage can reach.
     #[error("a mean error of {0} cannot be a goal; give a fraction of the diagonal above 0, such as 0.001")]
     BadGoal(f64),

@@ -1,4 +1,4 @@
-//! Which frames a design is made from, which choose the best of its cages, and which judge that one in the end, unseen by both.
+//! Which frames a design is made from, which choose its best cage, and which judge that one unseen.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ const FEWEST: usize = 26;
 const THREE_FROM: usize = 100;
 /// Share of the frames that is held back.
 const SHARE: f64 = 0.12;
-/// One of so many frames is left out on each side of a stretch, since it is like what the design sees.
+/// One of so many frames is left out on each side of a stretch: it is like what the design sees.
 const BESIDE: usize = 80;
 
 /// The frames of a capture by what they are for, in order.

@@ -14,11 +14,13 @@ use std::time::Instant;
 
 /// Steps of a design with a given number of vertices.
 const STEPS: usize = 140;
-/// Step lengths fall along a cosine over so many times the steps of a phase; from this share of the steps on, linearly to zero as well: slow steps to the end
-/// bring little, and a cosine over fewer steps leaves larger errors.
+/// Step lengths fall along a cosine over so many times the steps of a phase; from this share on,
+/// linearly to zero as well: slow steps to the end bring little, a shorter cosine leaves larger
+/// errors.
 const COSINE_STEPS: f64 = 1.36;
 const FADE_FROM: f64 = 0.75;
-/// Vertices are exchanged after so many steps each, up to this share of them at a time, until this share of the steps is done.
+/// Vertices are exchanged after so many steps, up to this share at a time, until this share of the
+/// steps.
 const REMESH_EVERY: usize = 12;
 const REMESH_SHARE: f64 = 0.1;
 const REMESH_UNTIL: f64 = 0.75;
@@ -26,7 +28,7 @@ const REMESH_UNTIL: f64 = 0.75;
 const FIRST_EVALUATION: usize = 10;
 const EVALUATE_EVERY: usize = 60;
 
-/// Errors above this, as a fraction of the diagonal, suggest that the frames do not deform the rest pose coherently.
+/// Errors above this share of the diagonal suggest frames that tear the rest pose.
 const NOT_FOLLOWED: f64 = 0.03;
 
 /// The best cage so far.
@@ -110,10 +112,10 @@ impl Run<'_> {
             ));
         }
         let timed_out = ended.is_break() && self.is_late();
-        let Best { mesh, evaluation } = self.best;
+        let Best { mesh, evaluation } = self.best.clone();
         let mut unseen = None;
         if let Ok(cage) = Cage::new(mesh.clone()) {
-            self.stages.push(stage("the best", &cage, &evaluation, self.clock));
+            self.note("the best", &cage, &evaluation);
             let error = self.samples.unseen_error(&cage);
             unseen = error.map(|error| Unseen { error, stretches: self.frames.1.unseen.clone() });
         }
@@ -166,7 +168,7 @@ impl Run<'_> {
         ControlFlow::Continue(())
     }
 
-    /// Symmetry is a relation between the given vertices, so that it fixes the connectivity as well.
+    /// Symmetry relates given vertices, so that it fixes the connectivity as well.
     fn keeps_connectivity(&self) -> bool {
         self.options.keep_connectivity || self.options.symmetry.is_some()
     }
@@ -175,8 +177,9 @@ impl Run<'_> {
         self.options.time_limit.is_some_and(|limit| self.clock.elapsed() >= limit)
     }
 
-    /// Keeps a cage that is better than the best so far, and that is valid where it is to be edited. Moves and remeshing keep the obstacles inside; points
-    /// that these stand for may be outside all the same. They are obstacles themselves then, and the last valid cage is moved on.
+    /// Keeps a cage that is better than the best so far and, if to be edited, valid. Points that
+    /// obstacles stand for may be outside; they become obstacles then, and the last valid cage is
+    /// moved on.
     fn keep(&mut self, descent: &mut Descent<'_>, evaluation: Evaluation) -> bool {
         if evaluation.validation_error.total_cmp(&self.best.evaluation.validation_error).is_ge() {
             return false;
@@ -193,7 +196,7 @@ impl Run<'_> {
         true
     }
 
-    /// Whether a cage to be edited has no defects that the initial one does not have; otherwise the points that are outside.
+    /// Whether a cage to be edited has no new defects; otherwise the points that are outside.
     pub(super) fn validated(&self, mesh: &TriMesh) -> Result<(), Vec<u32>> {
         if self.options.style == Style::Free {
             return Ok(());
@@ -204,7 +207,14 @@ impl Run<'_> {
     }
 
     fn note(&mut self, name: &str, cage: &Cage, evaluation: &Evaluation) {
-        self.stages.push(stage(name, cage, evaluation, self.clock));
+        self.stages.push(Stage {
+            name: name.to_owned(),
+            vertices: cage.vertices().len(),
+            training_error: evaluation.training_error,
+            validation_error: evaluation.validation_error,
+            condition_number: evaluation.condition_number(),
+            seconds: self.clock.elapsed().as_secs_f64(),
+        });
     }
 }
 
@@ -212,15 +222,4 @@ impl Run<'_> {
 fn step_scale(done: f64) -> f64 {
     let fade = ((1.0 - done) / (1.0 - FADE_FROM)).min(1.0);
     0.5 * fade * (1.0 + (PI * done / COSINE_STEPS).cos()) + 0.02
-}
-
-fn stage(name: &str, cage: &Cage, evaluation: &Evaluation, clock: Instant) -> Stage {
-    Stage {
-        name: name.to_owned(),
-        vertices: cage.vertices().len(),
-        training_error: evaluation.training_error,
-        validation_error: evaluation.validation_error,
-        condition_number: evaluation.condition_number(),
-        seconds: clock.elapsed().as_secs_f64(),
-    }
 }

@@ -1,4 +1,4 @@
-//! Data of a design: sampled points with the non-affine part of their motion, and points and frames that cages are chosen and judged by.
+//! Points with the non-affine part of their motion, and those that cages are chosen and judged by.
 
 use super::fit::{BLOCK_ROWS, Fit, ridge_factor};
 use super::parts::Parts;
@@ -27,11 +27,12 @@ const LARGE: usize = 1_000;
 pub(super) struct Samples {
     /// Rest positions, n.
     points: Vec<Point>,
-    /// Training motion, n × c, as fractions of the diagonal: every frame minus its best affine image of the rest pose, which coordinates reproduce exactly, projected to the
-    /// principal components of all frames. A fit to these has the same sum of squared residuals as one to the frames, up to the truncation.
+    /// Training motion, n × c, over the diagonal: each frame less its best affine image of the rest
+    /// pose, which coordinates reproduce exactly, on the principal components of all frames. A fit
+    /// to these has the same sum of squared residuals as one to the frames, up to the truncation.
     training: Mat<f32>,
-    /// Points that cages are judged at, and the principal components of their motion: in training frames and, from column `chosen_from` on, in those that the
-    /// best is chosen by; and the numbers of both.
+    /// Points that cages are judged at, the principal components of their motion, in training
+    /// frames and, from column `chosen_from` on, in the choosing ones; and the numbers of both.
     judged_points: Vec<Point>,
     judged_motion: Mat<f32>,
     chosen_from: usize,
@@ -49,7 +50,7 @@ pub(super) struct Batch {
     pub(super) motion: Mat<f32>,
 }
 
-/// Least-squares errors of a cage over points and frames, as fractions of the diagonal; infinite where it has none.
+/// Least-squares errors of a cage, over the diagonal; infinite where it has none.
 #[derive(Clone, Debug)]
 pub(super) struct Evaluation {
     pub(super) training_error: f64,
@@ -64,7 +65,7 @@ impl Evaluation {
         Self { training_error: f64::INFINITY, validation_error: f64::INFINITY, gram: None }
     }
 
-    /// Condition number of the coordinates, infinite where they are singular; `None` for large cages and where it does not converge.
+    /// Condition number of the coordinates, infinite where singular; `None` for large cages.
     pub(super) fn condition_number(&self) -> Option<f64> {
         let squares = self.gram.as_ref()?.self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
         let (first, last) = (squares.first()?, squares.last()?);
@@ -128,7 +129,8 @@ impl Samples {
         }
     }
 
-    /// The error of a cage on frames that no choice saw, infinite where it has none; `None` where there are no such frames.
+    /// The error of a cage on unseen frames, infinite where it has none; `None` without such
+    /// frames.
     pub(super) fn unseen_error(&self, cage: &Cage) -> Option<f64> {
         let (motion, frames) = self.unseen.as_ref()?;
         let (_, residual) = self.residual(cage, motion);
@@ -157,13 +159,13 @@ pub(super) fn evenly<'a>(frames: &[&'a [f64]], count: usize) -> Vec<&'a [f64]> {
     (0..count).map(|k| frames[k * frames.len() / count]).collect()
 }
 
-/// A motion in its principal directions: the fewest that leave out no more than [`LEFT_OUT`], and at most so many.
+/// A motion in the fewest principal directions that leave out no more than [`LEFT_OUT`].
 fn principal(motion: &Mat<f64>, most: usize) -> Mat<f64> {
     let columns = motion.ncols();
     let Ok(eigen) = gram(motion.as_ref(), BLOCK_ROWS).self_adjoint_eigen(faer::Side::Lower) else {
         return motion.clone();
     };
-    // Sum of squares that may be left out; points have three columns in each frame. Eigenvalues ascend.
+    // Sum of squares that may be left out; points have three columns a frame. Eigenvalues ascend.
     let may_leave = LEFT_OUT * LEFT_OUT * (motion.nrows() * columns) as f64 / 3.0;
     let mut left_out = 0.0;
     let needed = eigen.S().column_vector().iter().position(|square| {
@@ -176,7 +178,7 @@ fn principal(motion: &Mat<f64>, most: usize) -> Mat<f64> {
     out
 }
 
-/// The motion of some points as fractions of the diagonal, less the best affine image of the rest pose.
+/// The motion of some points over the diagonal, less the best affine image of the rest pose.
 fn without_affine(rest: &[Point], rows: &[usize], frames: &[&[f64]]) -> Mat<f64> {
     let scale = diagonal(rest);
     let motion = Mat::from_fn(rows.len(), 3 * frames.len(), |i, c| frames[c / 3][3 * rows[i] + c % 3] / scale);

@@ -1,4 +1,4 @@
-//! Search for the smallest cage within an error bound, by extrapolating how the error falls with the number of vertices.
+//! Search for the smallest cage within an error bound, by how the error falls with the vertices.
 
 use super::descent::Descent;
 use super::options::{MAX_VERTICES, Progress};
@@ -30,8 +30,8 @@ pub(super) fn first_vertices(points: usize) -> usize {
 }
 
 impl Run<'_> {
-    /// Grows or shrinks the cage until its error, as the encoder's default options would leave it on the frames that it is chosen by, is at most
-    /// `error` and not much less.
+    /// Grows or shrinks the cage until its error, as the encoder would leave it on the choosing
+    /// frames, is at most `error` and not much less.
     pub(super) fn search(
         &mut self,
         descent: &mut Descent<'_>,
@@ -69,7 +69,8 @@ impl Run<'_> {
                 break;
             }
             if count > goal && found <= error {
-                // No more vertices could be merged without leaving points outside; a cage that is made with fewer lies farther out.
+                // No more vertices can be merged with all points inside; a cage made with fewer
+                // lies farther out.
                 let options = EncloseOptions { vertices: goal, ..EncloseOptions::default() };
                 let rest = self.rest;
                 let mut watch = || {
@@ -110,8 +111,8 @@ impl Run<'_> {
         ended
     }
 
-    /// Mean L2 error, on the frames that cages are chosen by, of the encoder with spread handles, as a fraction of the diagonal; infinite where it refuses the
-    /// cage.
+    /// Mean L2 error of the encoder on the choosing frames, over the diagonal; infinite where it
+    /// refuses the cage.
     fn encoded_error(&self, best: &Best) -> f64 {
         let Ok(cage) = Cage::new(best.mesh.clone()) else { return f64::INFINITY };
         let options = SolverOptions::for_unknowns(cage.vertices().len());

@@ -14,8 +14,8 @@ pub(super) struct Symmetry {
 }
 
 impl Symmetry {
-    /// The symmetry of a cage across the plane of an axis (0, 1, 2 for x, y, z) through the middle of its bounding box; the first vertex
-    /// without a mirror image where it has none.
+    /// The symmetry across the plane of an axis through the middle of the bounding box; the first
+    /// vertex without a mirror image where there is none.
     pub(super) fn new(mesh: &TriMesh, axis: usize) -> Result<Self, usize> {
         let (low, high) = cager_geometry::mesh::bounds(&mesh.vertices);
         let center = low[axis] + high[axis];

@@ -28,7 +28,7 @@ impl<'a> OneRings<'a> {
     }
 }
 
-/// Every face in four, with a vertex at the middle of every edge: those come after the cage's own, in the order of its edges.
+/// Every face in four, with vertices at the middles of edges after the cage's own, in edge order.
 pub(super) fn subdivided(cage: &Cage) -> TriMesh {
     let m = cage.vertices().len() as u32;
     let at = |v: u32| cage.vertices()[v as usize];
@@ -57,7 +57,7 @@ pub(super) fn split(mesh: &mut TriMesh, [a, b]: [u32; 2]) {
     }
 }
 
-/// Whether `v` may be merged into `into` without changing the surface's topology: they have exactly two neighbours in common.
+/// Whether merging `v` into `into` keeps the topology: they have exactly two common neighbours.
 fn is_collapsible(neighbours: &OneRings<'_>, v: usize, into: usize) -> bool {
     let (one, other) = (neighbours.of(v), neighbours.of(into));
     let common = one.iter().filter(|w| other.binary_search(w).is_ok()).count();
@@ -105,8 +105,8 @@ pub(super) fn collapses(mesh: &TriMesh, neighbours: &OneRings<'_>, v: usize) -> 
     found
 }
 
-/// Merges vertices into others, `(v, into)`, none of which shares a neighbour with another; returns the new mesh and, for each of its
-/// vertices, which it was.
+/// Merges vertices, `(v, into)`, none of which shares a neighbour with another; returns the new
+/// mesh and which vertex each of its vertices was.
 pub(super) fn merged(mesh: &TriMesh, pairs: &[(u32, u32)]) -> (TriMesh, Vec<u32>) {
     let mut target: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
     for &(v, into) in pairs {

@@ -1,4 +1,4 @@
-//! Finishing of a simplified cage: vertices moved towards the middle of their neighbours and edges flipped, as far as it stays valid.
+//! Finishing of a simplified cage: vertices relaxed and edges flipped, as far as it stays valid.
 
 use super::patch::{EnclosedPoints, FaceReplacement, PatchMesh, normal, quality};
 use super::quadric::Quadric;
@@ -18,7 +18,7 @@ pub(super) fn fair(mesh: &mut PatchMesh, quadrics: &[Quadric], enclosed: &Enclos
     flip_edges(mesh, enclosed);
 }
 
-/// Moves a vertex towards the place where its quadric and the distance from its neighbours' middle are least together.
+/// Moves a vertex towards where its quadric and the distance from its neighbours' middle are least.
 fn relax(mesh: &mut PatchMesh, v: u32, quadric: Quadric, enclosed: &EnclosedPoints) {
     let ring = mesh.ring(v);
     let middle = ring.iter().map(|&w| mesh.positions[w as usize]).sum::<DVec3>() / ring.len() as f64;
@@ -41,7 +41,7 @@ fn relax(mesh: &mut PatchMesh, v: u32, quadric: Quadric, enclosed: &EnclosedPoin
     }
 }
 
-/// Flips edges between faces that lie nearly in one plane where that makes the worse of the two better.
+/// Flips edges of nearly coplanar faces where that makes the worse of the two better.
 fn flip_edges(mesh: &mut PatchMesh, enclosed: &EnclosedPoints) {
     for f in 0..mesh.faces.len() as u32 {
         for k in 0..3 {

@@ -4,11 +4,12 @@ use super::lattice::LEVELS;
 use cager_geometry::spatial::{Aabb, Bvh};
 use glam::DVec3;
 
-/// How fast the offset grows with the distance from a gap. Below 1, every point within the offset is joined with the model by a straight
-/// line within it.
+/// Growth of the offset with the distance from a gap. Below 1, every point within the offset is
+/// joined with the model by a straight line within it.
 const GROWTH: f64 = 0.5;
 
-/// The offset of a cage from the model: the largest everywhere but near thin gaps, where it is a half to a quarter of the gap's half width.
+/// The offset of a cage: the largest but near thin gaps, where it is a half to a quarter of half
+/// the gap.
 #[derive(Debug)]
 pub(super) struct Offset {
     pub(super) largest: f64,
@@ -36,7 +37,7 @@ impl Offset {
         Self { largest, gaps: Vec::new() }
     }
 
-    /// The offset that leaves gaps open, but for those so thin that it would have to be below `least` or an eighth of the largest.
+    /// Leaves gaps open, but for those where it would be below `least` or an eighth of the largest.
     pub(super) fn around(balls: &[Ball], largest: f64, least: f64) -> Self {
         let mut gaps = Vec::new();
         for level in 1..=LEVELS {
@@ -54,7 +55,7 @@ impl Offset {
     /// The offset for the surface near a place.
     pub(super) fn at(&self, p: DVec3) -> f64 {
         self.gaps.iter().fold(self.largest, |offset, gaps| {
-            // Within two offsets of the centre, where the gap's sides are, the offset is as small as asked for.
+            // Within two offsets of the centre, at the gap's sides, the offset is as asked for.
             let reach = 2.0 * gaps.offset + (offset - gaps.offset).max(0.0) / GROWTH;
             let nearest = gaps.tree.nearest(p, reach * reach, |i| gaps.centers[i as usize].distance_squared(p));
             nearest

@@ -10,20 +10,20 @@ use std::collections::{HashMap, HashSet};
 /// Balls up to so many times the largest offset are looked for in gaps.
 const MAX_BALL: f64 = 1.15;
 
-/// A ball in a gap touches the surface on both sides: at the least, the cosine between its touching points lies below this.
+/// A ball in a gap touches both sides: the cosine between its touching points lies below this.
 const OPPOSITE: f64 = -0.6;
 
-/// A surface of an area that would take more samples than this has too many narrow gaps, which stay closed.
+/// A surface that would take more samples has too many narrow gaps, which stay closed.
 const MAX_SAMPLES: usize = 100_000;
-/// Samples that are examined, at the most: a cube of a smooth surface has one for each of some directions, and ordinary models have less than half as many.
+/// Samples that are examined, at the most: ordinary models have less than half as many.
 const MAX_EXAMINED_SAMPLES: usize = 90_000;
 /// Places tried beyond one a face. Slivers as long as the model have many more than samples.
 const MAX_TRIES: usize = 2_000_000;
 
-/// Gaps shorter than this many times the largest offset stay closed: few vertices could not follow both sides.
+/// Gaps shorter than so many largest offsets stay closed: few vertices could not follow both sides.
 const MIN_EXTENT: f64 = 3.0;
 
-/// Balls outside the model that touch two opposite sides, in gaps that are not too short. `None` where there are too many narrow gaps.
+/// Balls outside the model that touch opposite sides of long gaps; `None` of too many narrow gaps.
 pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Option<Vec<Ball>> {
     let samples = samples(&source.surface, 0.5 * largest)?;
     let winding = GeneralizedWinding::new(&source.surface);
@@ -39,7 +39,7 @@ pub(super) fn balls_in_gaps(source: &NormalizedModel, largest: f64) -> Option<Ve
     Some(long_gaps(&balls, largest))
 }
 
-/// Points on the surface with their normals, at most one for each direction in a cube of the spacing; `None` where there are too many.
+/// Points on the surface with normals, one a direction in each cube at most; `None` of too many.
 fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
     let area = (0..surface.triangles.len() as u32).map(|f| area(surface.corners(f))).sum::<f64>();
     if area > MAX_SAMPLES as f64 * spacing * spacing {
@@ -75,8 +75,8 @@ fn samples(surface: &Surface, spacing: f64) -> Option<Vec<(DVec3, DVec3)>> {
     Some(samples)
 }
 
-/// The ball on one side of the surface that touches it at a point and, opposite, at another, by shrinking from a radius (Ma, Bae and
-/// Choi 2012). `None` where there is no such ball.
+/// The ball that touches the surface at a point and, opposite, at another, by shrinking from a
+/// radius (Ma, Bae and Choi 2012); `None` where there is none.
 fn ball_between(surface: &Surface, point: DVec3, normal: DVec3, largest: f64) -> Option<Ball> {
     let mut radius = largest;
     let mut other = None;

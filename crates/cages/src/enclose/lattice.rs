@@ -1,5 +1,6 @@
-//! A body-centred cubic lattice that is finer where asked: an octree's cubes with tetrahedra between their centres and corners (Labelle
-//! and Shewchuk 2007, without warping). Cubes that touch differ by one level at most, so that the tetrahedra fit together.
+//! A body-centred cubic lattice that is finer where asked: an octree's cubes with tetrahedra
+//! between their centres and corners (Labelle and Shewchuk 2007, without warping). Cubes that touch
+//! differ by one level at most.
 
 use cager_geometry::spatial::Aabb;
 use glam::DVec3;
@@ -16,7 +17,7 @@ const FACE: [[u32; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
 
 type Place = [u32; 3];
 
-/// Nodes and the tetrahedra between them. No edge is longer than the spacing, nor than the side of the cubes that it joins.
+/// Nodes and tetrahedra. No edge is longer than the spacing, nor than the side of its cubes.
 #[derive(Debug)]
 pub(super) struct Lattice {
     pub(super) positions: Vec<DVec3>,
@@ -38,8 +39,8 @@ impl Lattice {
         }
     }
 
-    /// Nodes joined to each by an edge, as where each node's list begins, and where the last ends, and the lists. They name a node as often
-    /// as there are tetrahedra around the edge to it.
+    /// Where each node's list of neighbours begins, and the lists, which name a node as often as
+    /// tetrahedra share the edge to it.
     pub(super) fn neighbours(&self) -> (Vec<usize>, Vec<u32>) {
         let mut starts = vec![0; self.positions.len() + 1];
         self.tetrahedra.iter().flatten().for_each(|&node| starts[node as usize + 1] += 3);
@@ -125,7 +126,7 @@ impl Octree {
         Self { origin, unit: spacing / f64::from(MAX_SIDE), cells, halved: FxHashSet::default() }
     }
 
-    /// Halves all cubes that are too large, by their centre and side; false where it gave up because more than `most` were.
+    /// Halves all cubes that are too large; false where more than `most` would be.
     pub(super) fn refine(&mut self, most: usize, is_too_large: impl Fn(DVec3, f64) -> bool) -> bool {
         let mut waiting: Vec<Cube> = self.roots().collect();
         while let Some(cube) = waiting.pop() {
@@ -210,8 +211,8 @@ impl Octree {
         found
     }
 
-    /// The tetrahedra between the centre of a cube and the face towards `next`, the cube of the same size there. Those between cubes of
-    /// one size span both, and are found from the lesser of the two.
+    /// The tetrahedra between the centre of a cube and the face towards `next`, of the same size.
+    /// Those between cubes of one size span both, and are found from the lesser.
     fn join(
         &self,
         cube: Cube,

@@ -1,4 +1,4 @@
-//! Level sets by marching tetrahedra: a closed manifold whatever the values are, as long as those at the border are positive.
+//! Level sets by marching tetrahedra: a closed manifold where values at the border are positive.
 
 use super::lattice::Lattice;
 use glam::DVec3;
@@ -102,7 +102,8 @@ mod tests {
         let whole = Aabb::around(lattice.positions.iter().copied());
         let is_on_border = |p: DVec3| (p - whole.low).min(whole.high - p).min_element() < 1e-9;
         for (face, count) in faces {
-            // Only faces around the whole belong to one tetrahedron: they have an edge on the border.
+            // Only faces around the whole belong to one tetrahedron: they have an edge on the
+            // border.
             let on_border = face.iter().filter(|&&v| is_on_border(at(v))).count();
             assert!(count == 2 || (count == 1 && on_border >= 2), "{face:?} belongs to {count}");
         }

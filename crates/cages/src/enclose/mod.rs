@@ -28,13 +28,14 @@ use rayon::prelude::*;
 use simplify::Simplifier;
 use source::NormalizedModel;
 use source::points_on_faces;
-pub(crate) use source::{check_finite, extent};
+pub(crate) use source::{check_finite, extent, triangles};
 use std::ops::ControlFlow;
 
-/// A closed, outward-oriented cage around a model, free of self-intersection, with no point of the model outside: an offset surface,
-/// simplified under quadric error metrics with validity kept at every collapse. The offset is smaller beside thin gaps, so that limbs
-/// stay apart, and grows until the number of vertices is reached. Gaps stay closed in a point cloud, which has no sides, and in a model
-/// that has too many narrow gaps. Runs on the current rayon pool; the result does not depend on it.
+/// A closed, outward-oriented cage around all of a model, free of self-intersection: an offset
+/// surface, simplified under quadric error metrics with validity kept at every collapse. The offset
+/// is smaller beside thin gaps, so that limbs stay apart, and grows until the number of vertices is
+/// reached. Gaps stay closed in a point cloud and where there are too many narrow ones. Runs on the
+/// current rayon pool; the result does not depend on it.
 ///
 /// # Errors
 /// See [`EncloseError`].
@@ -87,7 +88,7 @@ fn enclose_all(
         return Err(EncloseError::TooFewVertices { vertices: options.vertices, least: MIN_VERTICES });
     }
     let mut least = usize::MAX;
-    // Surfaces that are known already, the next to be tried last, from when on its narrow gaps have proved to be too many.
+    // Surfaces that are known already, the next to be tried last, once narrow gaps proved too many.
     let mut known: Option<Vec<Start>> = None;
     while offset < MAX_OFFSET.max(4.0 * clearance) {
         if watch().is_break() {
@@ -124,7 +125,7 @@ const COARSE: f64 = 0.04;
 /// What a cage is simplified from.
 struct Start {
     offset: Offset,
-    /// The surface at the offset, if it has no more parts and handles than the cage has vertices for.
+    /// At the offset, if it has no more parts and handles than the cage has vertices for.
     surface: Option<(Vec<DVec3>, Vec<[u32; 3]>)>,
 }
 
@@ -141,8 +142,9 @@ impl Start {
     }
 }
 
-/// From the first offset on those whose surfaces few enough vertices may enclose, gaps closed; the least comes last. Surfaces of models with many narrow gaps have many
-/// handles at small offsets, and take the longest there, so they are looked at from a large one down.
+/// Offsets whose surfaces few enough vertices may enclose, gaps closed; the least comes last. Small
+/// offsets of models with many narrow gaps take the longest, so they are looked at from a large one
+/// down.
 fn promising_starts(source: &NormalizedModel, first: f64, options: &EncloseOptions) -> Vec<Start> {
     let mut offsets = vec![first];
     while offsets[offsets.len() - 1] < COARSE {
@@ -179,7 +181,7 @@ fn promising_surface(
 /// Vertices of the least closed surface.
 const MIN_VERTICES: usize = 4;
 
-/// Minimum number of vertices per component, or per topological handle; with fewer, a larger offset is tried at once.
+/// Least vertices of a component or handle; with fewer, a larger offset is tried at once.
 const VERTICES_PER_PART: usize = 6;
 
 /// Largest offset tried, as a fraction of the diagonal.
@@ -191,17 +193,17 @@ const MAX_CLEARANCE: f64 = 10.0;
 /// Clearance kept where none is asked for, as a fraction of the offset.
 const DEFAULT_CLEARANCE: f64 = 0.2;
 
-/// A small offset keeps limbs apart; a large one lets few vertices enclose. 1.2 % of the diagonal suits 350 vertices.
+/// Small offsets keep limbs apart, large ones need few vertices: 1.2 % suits 350 vertices.
 fn first_offset(vertices: usize) -> f64 {
     (0.012 * (350.0 / vertices as f64).powf(0.45)).clamp(0.009, 0.06)
 }
 
-/// Cubes of the lattice that may be halved to keep gaps open; a finer surface would take too long to simplify.
+/// Cubes that may be halved to keep gaps open; a finer surface would take too long to simplify.
 fn most_halved(vertices: usize) -> usize {
     (1_200 + 3 * vertices).min(2_500)
 }
 
-/// A valid cage simplified from a surface, or the number of vertices that were left; `usize::MAX` where it did not come to that.
+/// A valid cage simplified from a surface, or the vertices that were left; `usize::MAX` of none.
 fn enclose_from(
     source: &NormalizedModel,
     Start { offset, surface }: Start,

@@ -1,4 +1,4 @@
-//! The offset surface of a model: the boundary of all points closer than a distance, with cavities filled, holes closed by the winding number, and
+//! The offset surface of a model, with cavities filled, holes closed by the winding number, and
 //! components joined by tubes.
 
 use super::gap_offset::Offset;
@@ -13,9 +13,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
-/// Side of the lattice's cubes over the offset. A distance interpolated in a tetrahedron is at most its circumradius, √5/4 of the side, at
-/// points of the model: below 4/√5 every point of the model is inside. The offset at a cube's centre stands for that around it, which
-/// is at most 0.43 of the side less; what this leaves uncovered is found when the cage is verified.
+/// Side of the lattice's cubes over the offset. A distance interpolated in a tetrahedron is at most
+/// its circumradius, √5/4 of the side, at points of the model: below 4/√5 every point is inside.
+/// The offset at a cube's centre stands for that around it, at most 0.43 of the side less; what
+/// this leaves uncovered is found when the cage is verified.
 const SPACING: f64 = 1.3;
 
 /// The same offset everywhere, and the lattice's cubes.
@@ -25,8 +26,8 @@ pub(super) fn uniform_offset(source: &NormalizedModel, largest: f64) -> (Offset,
     (Offset::uniform(largest), Octree::uniform(&bounds, spacing))
 }
 
-/// The offset that keeps gaps of the model open, at least `least` where it is below `largest`, and the lattice's cubes. `None` where more
-/// than `most` cubes would have to be halved for it, or too many places looked at, as in a model that has too many narrow gaps.
+/// The offset that keeps gaps open, at least `least`, and the lattice's cubes. `None` where more
+/// than `most` would be halved, or too many places looked at.
 pub(super) fn offset_with_gaps(
     source: &NormalizedModel,
     largest: f64,
@@ -46,8 +47,8 @@ pub(super) fn offset_with_gaps(
     cubes.refine(most, is_too_large).then_some((offset, cubes))
 }
 
-/// A closed surface at a distance from the model; one component, or with `per_part` as many as there are. `None` where it would have
-/// more than `most_parts` before they are joined.
+/// A closed surface at a distance from the model, in one component unless `per_part`; `None` of
+/// more than `most_parts`.
 pub(super) fn offset_surface(
     source: &NormalizedModel,
     offset: &Offset,
@@ -92,7 +93,7 @@ fn distances(source: &NormalizedModel, lattice: &Lattice, offset: &Offset) -> Ve
     lattice.positions.par_iter().with_min_len(512).map(value).collect()
 }
 
-/// Groups of nodes of one sign that edges of the lattice join: for each node, the first of its group.
+/// For each node, the first of those of its sign that edges of the lattice join with it.
 fn groups(lattice: &Lattice, values: &[f64]) -> Vec<u32> {
     let mut groups = UnionFind::new(values.len());
     for t in &lattice.tetrahedra {
@@ -118,8 +119,7 @@ fn fill_cavities(lattice: &Lattice, values: &mut [f64]) {
 
 const NONE: u32 = u32::MAX;
 
-/// Labels the connected parts of the inside. Parts that hold nothing of the model, which winding numbers of badly oriented faces produce, are
-/// discarded.
+/// Labels the connected parts of the inside. Those that hold nothing of the model are discarded.
 fn components(lattice: &Lattice, source: &NormalizedModel, distance: f64, values: &mut [f64]) -> (Vec<u32>, u32) {
     let group = groups(lattice, values);
     let mut holds_model = vec![false; values.len()];
@@ -147,7 +147,7 @@ fn components(lattice: &Lattice, source: &NormalizedModel, distance: f64, values
     (labels, parts)
 }
 
-/// Pairs of nodes whose links join all parts: a minimum spanning tree over links between parts that meet when all grow at once.
+/// Links that join all parts: a minimum spanning tree over those that meet when all grow at once.
 fn shortest_links(lattice: &Lattice, labels: &[u32], parts: u32) -> Vec<[usize; 2]> {
     let mut origin: Vec<u32> =
         labels.iter().enumerate().map(|(i, &l)| if l == NONE { NONE } else { i as u32 }).collect();
@@ -181,7 +181,7 @@ fn shortest_links(lattice: &Lattice, labels: &[u32], parts: u32) -> Vec<[usize; 
     tree
 }
 
-/// Puts tubes as thick as the offset between the points of the model nearest to the nodes of each link.
+/// Puts tubes between the points of the model nearest to the nodes of each link.
 fn add_tubes(source: &NormalizedModel, lattice: &Lattice, links: &[[usize; 2]], distance: f64, values: &mut [f64]) {
     let segments_of = |nodes: &[usize; 2]| {
         let ends = nodes.map(|n| lattice.positions[n]);

@@ -5,11 +5,10 @@
 pub struct EncloseOptions {
     /// Most vertices that the cage may have.
     pub vertices: usize,
-    /// Least distance of the model's points to the cage, as a fraction of the diagonal; chosen where it is `None`, usually a fifth of
-    /// the offset.
+    /// Least distance of points to the cage, over the diagonal; a fifth of the offset where it is
+    /// `None`.
     pub clearance: Option<f64>,
-    /// One closed surface for each connected part of the model, instead of one around all. Parts too close together for the
-    /// offset share one.
+    /// One closed surface for each connected part. Parts too close for the offset share one.
     pub per_part: bool,
 }
 
@@ -25,12 +24,9 @@ pub enum EncloseError {
     /// No points at all.
     #[error("the rest pose has no points; a cage needs a model to enclose")]
     Empty,
-    /// NaN or infinity.
-    #[error("rest point {point} has a coordinate that is NaN or infinite; repair or delete it")]
-    NotFinite {
-        /// The point.
-        point: usize,
-    },
+    /// NaN or infinity: the point.
+    #[error("rest point {0} has a coordinate that is NaN or infinite; repair or delete it")]
+    NotFinite(usize),
     /// All points in one place.
     #[error(
         "all points of the rest pose lie in one place, so there is nothing to enclose; check the file's unit and contents"

@@ -1,4 +1,4 @@
-//! A closed mesh with local replacement of faces, as long as the model stays enclosed and no faces intersect.
+//! A closed mesh whose faces are replaced as long as the model stays inside and none intersect.
 
 use cager_geometry::spatial::distance::point_triangle2;
 use cager_geometry::spatial::surface::crossing;
@@ -160,7 +160,7 @@ impl PatchMesh {
         Ok(())
     }
 
-    /// Applies a replacement. The new faces take the places of the old, of which there are at least as many.
+    /// Applies a replacement, of as many new faces as old ones at most.
     pub(super) fn apply(&mut self, replacement: &FaceReplacement) {
         if let Some((vertex, to)) = replacement.moved {
             self.positions[vertex as usize] = to;
@@ -207,8 +207,8 @@ pub(super) fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize_or_zero()
 }
 
-/// Whether two faces in these boxes cut each other. Around a vertex that they share, most do not: the edges across from it lie outside the
-/// other's box.
+/// Whether two faces in these boxes cut each other. Around a shared vertex most do not: the edges
+/// across from it lie outside the other's box.
 fn cut_each_other(ids: [[u32; 3]; 2], corners: [[DVec3; 3]; 2], boxes: [&Aabb; 2]) -> bool {
     let is_apart = |k: usize| {
         let (mut own, mut edge) = (0, Aabb::EMPTY);
@@ -227,7 +227,7 @@ fn cut_each_other(ids: [[u32; 3]; 2], corners: [[DVec3; 3]; 2], boxes: [&Aabb; 2
 struct BoxedFace {
     corners: [DVec3; 3],
     around: Aabb,
-    /// Normal of length twice the area, and its square; that is infinite for a sliver, whose plane rounding turns.
+    /// Normal of twice the area, and its square; infinite for a sliver, whose plane rounding turns.
     normal: DVec3,
     normal2: f64,
 }
@@ -242,7 +242,7 @@ impl BoxedFace {
         Self { corners, around: Aabb::around(corners), normal, normal2 }
     }
 
-    /// Whether a point lies so far from the face's plane that it is certainly not within a distance of the face.
+    /// Whether a point is certainly not within a distance of the face, by its plane.
     fn is_plane_farther(&self, p: DVec3, distance: f64) -> bool {
         let away = self.normal.dot(p - self.corners[0]);
         away * away > 1.002 * distance * distance * self.normal2
@@ -256,8 +256,8 @@ impl BoxedFace {
     }
 }
 
-/// How far the worst of some points is outside or too close once `old` faces have become `new`; `margin` is the largest clearance, and
-/// `around` is around all, and so far around the new.
+/// How far the worst of some points is outside or too close once `old` faces are `new`; `margin` is
+/// the largest clearance, and `around` is around all, and so far around the new.
 fn uncovered(
     tree: &Bvh,
     (points, clearances): (&[DVec3], &[f64]),

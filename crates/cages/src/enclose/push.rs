@@ -22,8 +22,8 @@ struct Pushed {
     missing: f64,
 }
 
-/// A cage with all points inside, at least `clearance` away, that differs little from one with most of them inside. `None` where it would cut itself or
-/// points stay outside. Both distances are fractions of `diagonal`.
+/// A cage with all points inside, at least `clearance` away, near one with most inside; `None`
+/// where it would cut itself or points stay outside. Distances are over `diagonal`.
 pub(super) fn pushed_outwards(mut cage: TriMesh, points: &[Point], clearance: f64, diagonal: f64) -> Option<TriMesh> {
     for _ in 0..ROUNDS {
         let surface = Surface::from(&cage);

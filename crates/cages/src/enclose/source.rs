@@ -1,4 +1,4 @@
-//! A model normalised for enclosing: centred, with unit diagonal, and with loose points as degenerate triangles.
+//! A model for enclosing: centred, with unit diagonal, and loose points as degenerate triangles.
 
 use super::gap_offset::Offset;
 use super::options::EncloseError;
@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashSet;
 
-/// While a cage is simplified, about this many points of the model are tested; larger models are subsampled.
+/// About so many points are tested while a cage is simplified; larger models are subsampled.
 const CHECKED_POINTS: usize = 60_000;
 
 /// The model in a frame of reference where it is centred and its diagonal is one.
@@ -30,12 +30,10 @@ pub(super) struct NormalizedModel {
 
 impl NormalizedModel {
     pub(super) fn new(model: &Model, spacing: f64) -> Result<Self, EncloseError> {
-        check_finite(&model.points)?;
         let (low, high, scale) = extent(&model.points)?;
         let center = 0.5 * low + 0.5 * high;
         let points: Vec<DVec3> = model.points.iter().map(|&p| (DVec3::from(p) - center) / scale).collect();
-        let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < points.len());
-        let mut triangles: Vec<[u32; 3]> = model.faces.triangulated().into_iter().filter(exists).collect();
+        let mut triangles = triangles(model);
         let open = has_free_edges(&triangles);
         let mut used = vec![false; points.len()];
         triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -45,8 +43,8 @@ impl NormalizedModel {
         Ok(Self { points, surface, open, on_faces, spacing, center, scale })
     }
 
-    /// Points checked in place of the model while a cage is simplified, with the distance to the cage that keeps the whole model at
-    /// `clearance` of its place.
+    /// Points checked while a cage is simplified, with the distance to the cage that keeps the
+    /// whole model at `clearance`.
     pub(super) fn samples(&self, offset: &Offset, clearance: impl Fn(DVec3) -> f64) -> (Vec<DVec3>, Vec<f64>) {
         let (mut points, radii) = thin(&self.points, self.spacing, offset);
         let mut clearances: Vec<f64> = points.iter().zip(radii).map(|(&p, radius)| clearance(p) + radius).collect();
@@ -61,12 +59,16 @@ impl NormalizedModel {
     }
 }
 
+/// The faces of a model as triangles, but those with corners that there are not.
+pub(crate) fn triangles(model: &Model) -> Vec<[u32; 3]> {
+    let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < model.points.len());
+    model.faces.triangulated().into_iter().filter(exists).collect()
+}
+
 /// Points on the large faces of a model, which are to stay inside too; `spacing` is in its unit.
 pub(super) fn points_on_faces(model: &Model, spacing: f64) -> Vec<Point> {
     let points: Vec<DVec3> = model.points.iter().map(|&p| p.into()).collect();
-    let exists = |t: &[u32; 3]| t.iter().all(|&v| (v as usize) < points.len());
-    let triangles: Vec<[u32; 3]> = model.faces.triangulated().into_iter().filter(exists).collect();
-    on_faces(&points, &triangles, spacing).into_iter().map(Into::into).collect()
+    on_faces(&points, &triangles(model), spacing).into_iter().map(Into::into).collect()
 }
 
 fn on_faces(points: &[DVec3], triangles: &[[u32; 3]], spacing: f64) -> Vec<DVec3> {
@@ -87,12 +89,12 @@ fn on_faces(points: &[DVec3], triangles: &[[u32; 3]], spacing: f64) -> Vec<DVec3
 /// Refuses points with coordinates that are not finite.
 pub(crate) fn check_finite(points: &[Point]) -> Result<(), EncloseError> {
     match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-        Some(point) => Err(EncloseError::NotFinite { point }),
+        Some(point) => Err(EncloseError::NotFinite(point)),
         None => Ok(()),
     }
 }
 
-/// Low and high corner and diagonal of the bounding box; refuses no points, and points in one place.
+/// Corners and diagonal of the bounding box; refuses no points, and points in one place.
 pub(crate) fn extent(points: &[Point]) -> Result<(DVec3, DVec3, f64), EncloseError> {
     if points.is_empty() {
         return Err(EncloseError::Empty);
@@ -111,8 +113,8 @@ pub(super) fn area([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// One point per voxel where there are too many, and for each how far a point may be from it that it stands for. Voxels are smaller near
-/// thin gaps.
+/// One point a voxel, of many, and how far points may be that it stands for. Voxels are smaller
+/// near gaps.
 fn thin(points: &[DVec3], spacing: f64, offset: &Offset) -> (Vec<DVec3>, Vec<f64>) {
     if points.len() <= CHECKED_POINTS {
         return (points.to_vec(), vec![0.0; points.len()]);

@@ -1,14 +1,13 @@
 //! Any subject: a template followed by its cage alone.
 
 use super::finish::Finisher;
-use super::placement::{area, check_start};
 use super::report::{FrameReport, How};
-use super::surfaces::{Followed, Seen, Surfaces};
+use super::surfaces::{Followed, Surfaces};
 use super::{Finished, RecoverError, RecoverProgress, Watch};
 use cager_core::cage::Cage;
 use cager_geometry::linalg::tall_product;
-use cager_geometry::mesh::{Model, Point, TriMesh};
-use cager_shape::registration::{Target, Template, TemplateOptions};
+use cager_geometry::mesh::{Point, TriMesh};
+use cager_shape::registration::Template;
 use cager_shape::tracking::{SecondPass, TrackedFrame, Tracker, smoothed};
 use faer::Mat;
 use std::collections::VecDeque;
@@ -16,26 +15,13 @@ use std::collections::VecDeque;
 /// A template that is followed.
 pub(super) struct Recovering<'a> {
     phi: &'a Mat<f64>,
-    template: Template,
+    pub(super) template: Template,
 }
 
 impl<'a> Recovering<'a> {
     /// A template in its cage.
     pub(super) fn new(rest: &TriMesh, cage: &Cage, phi: &'a Mat<f64>) -> Result<Self, RecoverError> {
-        Ok(Self { phi, template: Template::new(rest, cage, phi.as_ref(), &TemplateOptions::default())? })
-    }
-
-    /// Refuses a template that seems turned or of another size.
-    pub(super) fn check_start(
-        &self,
-        model: &Model,
-        rest: &TriMesh,
-        cage: &Cage,
-        first: (&std::path::Path, &Seen),
-    ) -> Result<(), RecoverError> {
-        let target = Target::new(&first.1.observation, self.template.diagonal());
-        let area_of = |cage: &[Point]| area(&self.positions(cage), &rest.triangles);
-        check_start(model, cage, &self.template, area_of, (first.0, &first.1.observation, &target))
+        Ok(Self { phi, template: Template::new(rest, cage, phi.as_ref(), 0)? })
     }
 
     /// The first pass, from the first frame.
@@ -60,13 +46,14 @@ impl<'a> Recovering<'a> {
     }
 
     /// Where the template's points are in a cage.
-    fn positions(&self, cage: &[Point]) -> Vec<Point> {
+    pub(super) fn positions(&self, cage: &[Point]) -> Vec<Point> {
         let cage = Mat::from_fn(cage.len(), 3, |i, k| cage[i][k]);
         let found = tall_product(self.phi.as_ref(), cage.as_ref());
         (0..found.nrows()).map(|i| std::array::from_fn(|k| found[(i, k)])).collect()
     }
 
-    /// The second pass, from the last frame: frames that lay badly from the frame after them, smoothed between their neighbours, measured and written.
+    /// The second pass, from the last frame: frames refitted from the next one, smoothed, measured,
+    /// written.
     pub(super) fn refine(
         &self,
         surfaces: &Surfaces<'_>,

@@ -1,4 +1,4 @@
-//! Colours of the surfaces on the template: the mean, over all frames, of what is seen at each of its points.
+//! Colours of the surfaces on the template: the mean, over all frames, at each of its points.
 
 use super::surfaces::Colored;
 use cager_geometry::mesh::Point;
@@ -20,7 +20,7 @@ impl Painter {
         Self { sums: vec![([0.0; 3], 0.0); points], reach: MAX_REACH * diagonal }
     }
 
-    /// A frame, by where the template's points are in it. The nearer a colour is, the more it counts.
+    /// A frame, where the template has these points. The nearer a colour is, the more it counts.
     pub(super) fn add(&mut self, positions: &[Point], seen: &Colored) {
         let Self { sums, reach } = self;
         sums.par_iter_mut().zip(positions).with_min_len(64).for_each(|((sum, weight), &p)| {
@@ -33,7 +33,7 @@ impl Painter {
         });
     }
 
-    /// The means. Points where nothing was seen are like the nearest one at rest where something was; none where there is none.
+    /// The means; points where nothing was seen are like the nearest one at rest. None without any.
     pub(super) fn colors(&self, rest: &[Point]) -> Option<Vec<[u8; 3]>> {
         let seen: Vec<usize> = (0..rest.len()).filter(|&v| self.sums[v].1 > 0.0).collect();
         if seen.is_empty() {

@@ -1,5 +1,6 @@
-//! Parts of a template that leave the surface which it follows, parts of surfaces that no template explains, and parts that are stretched as no motion
-//! stretches them: told by what usual frames of the same recovery have, since noise and fit differ from one to the next.
+//! Parts of a template that leave the surface, of surfaces that no template explains, and of a
+//! template that are stretched as by no motion: told by what usual frames have, since noise and fit
+//! differ.
 
 use super::distances::Looked;
 use cager_geometry::mesh::{Point, TriMesh};
@@ -10,8 +11,9 @@ use serde::Serialize;
 /// A part that is not where it should be. Lengths are shares of the template's diagonal.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Departure {
-    /// `off_surface`: points of the template that the surface is far from. `unexplained`: a part of the surface that the template is far from. `stretched`:
-    /// points of the template whose surroundings are longer than at rest.
+    /// `off_surface`: points of the template far from the surface. `unexplained`: a part of the
+    /// surface far from the template. `stretched`: points whose surroundings are longer than at
+    /// rest.
     pub what: &'static str,
     /// The number of the first frame, of the last one, and of the worst.
     pub from: f64,
@@ -25,7 +27,7 @@ pub struct Departure {
     pub points: usize,
     /// The point of the template that is there, or nearest.
     pub vertex: usize,
-    /// Where it is in the worst frame, in the frames' unit; of an unexplained part the place on the surface.
+    /// Where it is in the worst frame, in the frames' unit; of an unexplained part on the surface.
     pub position: Point,
     /// The largest distance in it; of a stretched part how many times as long it is as at rest.
     pub largest: f64,
@@ -85,7 +87,8 @@ pub(super) struct Departures {
     frames: Vec<(usize, Frame)>,
 }
 
-/// A sample of the template: the corners of its triangle, the nearest of them first, and the inverse of the triangle's edges in its plane.
+/// A sample: the corners of its triangle, the nearest first, and the inverse of its edges in its
+/// plane.
 struct Sample {
     corners: [u32; 3],
     inverse: Option<[[f64; 2]; 2]>,
@@ -148,7 +151,7 @@ impl Departures {
         self.frames.push((frame, Frame { noted, usual }));
     }
 
-    /// What was apart, the farthest first; of frames with these numbers, from which the origin was subtracted.
+    /// What was apart, the farthest first; of frames from which the origin was subtracted.
     pub(super) fn found(mut self, numbers: &[f64], origin: Option<Point>) -> Vec<Departure> {
         self.frames.sort_by_key(|(frame, _)| *frame);
         let mut found: Vec<(f64, Departure)> = Vec::new();
@@ -187,7 +190,7 @@ impl Departures {
         closed
     }
 
-    /// Connected parts of what is noted, by the places of samples at rest; those of a few samples are left out.
+    /// Connected parts of what is noted, by samples at rest, but those of a few samples.
     fn parts(&self, noted: &[Noted]) -> Vec<Vec<Noted>> {
         let mut left: Vec<Noted> = noted.to_vec();
         let mut parts = Vec::new();

@@ -1,6 +1,6 @@
 //! How far a template lies from an observed surface, and back.
 
-use super::surfaces::Followed;
+use super::surfaces::Seen;
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Nearest, Surface};
 use cager_shape::registration::{NearestPoints, welded};
@@ -35,22 +35,26 @@ impl Distances {
     }
 }
 
-/// A template that lies farther from the observed points than this share of the diagonal, as they do from it, is nowhere near.
+/// A template farther from the observed points than this share of the diagonal is nowhere near.
 const NOWHERE_NEAR: f64 = 0.2;
 
-/// Whether most points of both, the template's and the observed ones, have none of the other's near.
-pub(super) fn is_elsewhere(samples: &[Point], seen: &Followed, from_surface: Option<Distances>, diagonal: f64) -> bool {
+/// Whether most points of template and surface have none of the other's near.
+pub(super) fn is_elsewhere(
+    samples: &[Point],
+    observed: &[Point],
+    from_surface: Option<Distances>,
+    diagonal: f64,
+) -> bool {
     // What this measures is seldom far, and looked at more closely only then.
     if from_surface.is_none_or(|distances| distances.mean < NOWHERE_NEAR) {
         return false;
     }
-    let observed: Vec<Point> = seen.target.points().iter().map(glam::DVec3::to_array).collect();
     let is_far = |points: &[Point], others: &[Point]| {
         let tree = NearestPoints::new(others.iter().copied());
         let far = points.iter().filter(|&&p| tree.nearest(p).1 > (NOWHERE_NEAR * diagonal).powi(2));
         2 * far.count() > points.len()
     };
-    is_far(samples, &observed) && is_far(&observed, samples)
+    is_far(samples, observed) && is_far(observed, samples)
 }
 
 /// Observed points that are measured to the template, at the most.
@@ -68,10 +72,9 @@ pub(super) struct Looked {
 
 impl Looked {
     /// Of samples of a template.
-    pub(super) fn at(template: &TriMesh, samples: &[Point], seen: &Followed, diagonal: f64) -> Self {
-        let nearest = |surface: &Surface, p: glam::DVec3| surface.nearest(p);
+    pub(super) fn at(template: &TriMesh, samples: &[Point], seen: &Seen, diagonal: f64) -> Self {
         let found: Vec<Option<Nearest>> = seen.surface.as_ref().map_or_else(Vec::new, |surface| {
-            samples.par_iter().with_min_len(64).map(|&p| nearest(surface, p.into())).collect()
+            samples.par_iter().with_min_len(64).map(|&p| surface.nearest(p.into())).collect()
         });
         let there: Vec<f64> = found.iter().map(|found| found.map_or(f64::NAN, |found| found.distance)).collect();
         let is_far = |&d: &f64| d > SEEN_WITHIN * diagonal;
@@ -84,15 +87,15 @@ impl Looked {
             _ => false,
         };
         let at_rim = found.iter().map(at_rim).collect();
-        let every = seen.target.points().len().div_ceil(MAX_MEASURED).max(1);
-        let observed: Vec<glam::DVec3> = seen.target.points().iter().copied().step_by(every).collect();
+        let observed = &seen.observation.points;
+        let every = observed.len().div_ceil(MAX_MEASURED).max(1);
         let template = Surface::from(template);
-        let back = observed.par_iter().with_min_len(64).map(|&p| {
-            let found = nearest(&template, p);
+        let back = observed.par_iter().step_by(every).with_min_len(64).map(|&p| {
+            let found = template.nearest(p.into());
             let heaviest = |found: &Nearest| (0..3).max_by(|&a, &b| found.weights[a].total_cmp(&found.weights[b]));
             let vertex =
                 found.map_or(0, |found| template.triangles[found.face as usize][heaviest(&found).unwrap_or(0)]);
-            (p.to_array(), found.map_or(f64::NAN, |found| found.distance), vertex)
+            (p, found.map_or(f64::NAN, |found| found.distance), vertex)
         });
         Self { there, at_rim, back: back.collect() }
     }
@@ -110,7 +113,7 @@ impl Looked {
     }
 }
 
-/// Whether a surface ends at a sample is looked at where some are farther from it than this share of the diagonal.
+/// Where the surface ends is looked at if some samples are farther than this share of the diagonal.
 const SEEN_WITHIN: f64 = 0.005;
 
 /// The vertices at which a surface ends: those of edges that a single triangle has.

@@ -25,7 +25,7 @@ pub(super) struct Finisher<'a> {
     departures: Departures,
 }
 
-/// Frames that can be read, what left its surface in them, and colours of the template where surfaces had some.
+/// Frames that can be read, what left its surface in them, and colours where surfaces had some.
 pub(super) struct Written {
     pub(super) frames: RecoveredFrames,
     pub(super) departures: Vec<Departure>,
@@ -63,20 +63,21 @@ impl<'a> Finisher<'a> {
             positions = offsets.offset(&positions, &seen.target);
         }
         self.written.write(frame, &positions)?;
-        if let Some(colored) = seen.and_then(|seen| seen.colored.as_ref()) {
+        if let Some(colored) = seen.and_then(|seen| seen.seen.colored.as_ref()) {
             self.painter.add(&positions, colored);
         }
         let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
         let points: Vec<Point> = self.samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
-        let looked = seen.map(|seen| Looked::at(&mesh, &points, seen, self.diagonal));
+        let looked = seen.map(|seen| Looked::at(&mesh, &points, &seen.seen, self.diagonal));
         let distances = looked.as_ref().map_or((None, None), |looked| looked.distances(self.diagonal));
-        let elsewhere = seen.is_some_and(|seen| is_elsewhere(&points, seen, distances.1, self.diagonal));
+        let elsewhere =
+            seen.is_some_and(|seen| is_elsewhere(&points, &seen.seen.observation.points, distances.1, self.diagonal));
         let how = if elsewhere { how.lost() } else { how };
         if let Some(looked) = looked.filter(|_| !elsewhere) {
             self.departures.look(frame, &mesh, &points, &looked, self.diagonal);
         }
         let named = (self.written.number(frame), self.source.file(frame));
-        Ok(FrameReport::new(named, how, distances, seen.map(|seen| (seen.notes, seen.strays))))
+        Ok(FrameReport::new(named, how, distances, seen.map(|seen| &seen.seen)))
     }
 
     /// All frames, ready to be read. `origin` was subtracted from them.

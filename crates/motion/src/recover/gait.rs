@@ -12,7 +12,7 @@ use std::fmt::Write;
 pub struct GaitCurve {
     /// `left ankle`, `right ankle`, `left toe`, `right toe`.
     pub joint: &'static str,
-    /// Along the rig's up axis, in the frames' unit, above the lowest place that any of these joints comes to.
+    /// Along the rig's up axis, above the lowest place that any of these joints comes to.
     pub heights: Vec<f64>,
 }
 
@@ -38,7 +38,8 @@ const TOP: f64 = 46.0;
 const GAP: f64 = 58.0;
 const COLORS: [(&str, &str); 2] = [("left", "#0b6bcb"), ("right", "#c2410c")];
 
-/// The curves of a report as an SVG picture: ankles above, toes below, over frames or, with a rate, seconds. Lost frames are shaded.
+/// The curves of a report as SVG: ankles above, toes below, over frames or seconds; lost frames
+/// shaded.
 pub fn gait_svg(report: &RecoveryReport, frame_rate: Option<f64>) -> String {
     let times: Vec<f64> = report.frames.iter().map(|frame| frame.number / frame_rate.unwrap_or(1.0)).collect();
     let (first, last) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));

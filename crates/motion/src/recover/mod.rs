@@ -1,4 +1,4 @@
-//! One animation of a template from surfaces that have no correspondence: files in, frames out that can be encoded as any capture.
+//! One animation of a template from surfaces without correspondence: files in, frames out.
 
 mod any_subject;
 mod colors;
@@ -23,6 +23,7 @@ pub use gait::GaitCurve;
 pub use gait::gait_svg;
 pub use people::{JOINTS_RATE, manifold_of, rig_of};
 pub use people::{Joints, Person};
+use placement::check_start;
 pub use placement::{Placement, placed_units};
 pub use positions::RecoveredFrames;
 pub use report::{FrameReport, RecoveryReport};
@@ -42,7 +43,7 @@ use cager_shape::people::joints::JointsError;
 use cager_shape::registration::{ObservationError, RegistrationError, outward};
 use finish::{Finisher, Written};
 use report::Seconds;
-use start::Placing;
+use start::check_surface;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfaces::Surfaces;
@@ -59,7 +60,7 @@ pub enum RecoverError {
     /// A stored file cannot be read.
     #[error("{0}")]
     Stored(String),
-    /// A file that holds neither a mesh nor a cloud, is empty, or has coordinates that are NaN or infinite.
+    /// A file without mesh or cloud, that is empty, or has coordinates that are not finite.
     #[error("{0}; or go on without such frames with --force")]
     Unusable(cager_formats::Error),
     /// A file holds no surface that can be followed.
@@ -142,7 +143,7 @@ pub struct RecoverOptions {
     pub up: Option<Up>,
     /// Let vertices leave the cage to meet the surfaces.
     pub offsets: bool,
-    /// Go on past frames that hold no surface, and where the template seems turned or of another size.
+    /// Go on past frames without a surface, and where the template seems turned or of another size.
     pub force: bool,
     /// Points of each surface that are looked at.
     pub points: usize,
@@ -247,9 +248,9 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
     let mut cage = cage.mesh().clone();
     let placement = surfaces.on_pool(|| Placement::find(&mut template, &mut cage, &seen.observation, &options))?;
     surfaces.diagonal = diagonal(&template);
-    let placing = Placing { align: options.align, scale: options.scale, is_person: person.is_some() };
     if !force {
-        surfaces.on_pool(|| placing.check(&template, (&source.file(first), &seen.observation)))?;
+        let (file, is_person) = (source.file(first), person.is_some());
+        surfaces.on_pool(|| check_surface(&template, (&file, &seen.observation), &options, is_person))?;
     }
     let cage = Cage::new(cage)?;
     let mut rest = TriMesh::from(&template);
@@ -276,7 +277,7 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
         let model = surfaces.on_pool(|| {
             let model = Recovering::new(&rest, &cage, &coordinates.phi)?;
             if placement.is_none() && !force {
-                model.check_start(&template, &rest, &cage, (&source.file(first), &seen))?;
+                check_start(&template, &rest, &cage, &model, (&source.file(first), &seen.observation))?;
             }
             Ok::<_, RecoverError>(model)
         })?;

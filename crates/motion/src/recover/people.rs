@@ -10,7 +10,7 @@ use cager_geometry::vector::{distance, norm};
 use cager_shape::people::joints::{CagedJoints, MarkedJoints};
 use cager_shape::people::manifold::Manifold;
 use cager_shape::people::rig::Rig;
-use cager_shape::people::{COORDINATES, FitOptions, PersonFit, PersonModel, PersonTracker};
+use cager_shape::people::{COORDINATES, FitOptions, PersonFit, PersonModel, PersonTracker, SAMPLES};
 
 /// What is known of a person.
 pub struct Person<'a> {
@@ -58,7 +58,7 @@ pub fn rig_of(bytes: &[u8]) -> Result<Rig, String> {
     Rig::from_json(bytes).map_err(|error| error.to_string())
 }
 
-/// A manifold that was learned for this rig: where the waist is in the pelvis's frame is the same in every pose.
+/// A manifold learned for this rig: the waist is at its place in the pelvis's frame.
 ///
 /// # Errors
 /// It is no manifold, or one of another rig.
@@ -82,17 +82,17 @@ impl Person<'_> {
         finisher: &dyn Fn(usize) -> Result<Finisher<'f>, RecoverError>,
         watch: &Watch<'_>,
     ) -> Result<Finished, RecoverError> {
-        let model = surfaces.on_pool(|| PersonModel::new(rest, self.rig, COORDINATES, self.options.samples))?;
+        let model = surfaces.on_pool(|| PersonModel::new(rest, self.rig, COORDINATES, SAMPLES))?;
         let fit = PersonFit { model: &model, manifold: self.manifold, options: self.options };
         let caged = CagedJoints::new(MarkedJoints::of_rig(self.rig), model.cage(), COORDINATES)?;
         let (mut tracker, mut numbers, mut frames) = (PersonTracker::new(&fit), Vec::new(), 0);
         surfaces.each(0.., |frame, seen| {
             frames += 1;
-            // A frame without a surface stays as the one before it; before the first that has one, nothing is known.
+            // A frame without a surface stays as the one before it.
             let how = match seen {
                 Some(seen) => {
                     numbers.push(frame);
-                    How::of_person(tracker.follow(&seen.target.observation()))
+                    How::of_person(tracker.follow(&seen.seen.observation))
                 }
                 None => How::NO_SURFACE,
             };
@@ -104,18 +104,17 @@ impl Person<'_> {
             let first = "it held a surface when it was looked at first, and was changed since".to_owned();
             return Err(RecoverError::NoSurface { frames, first });
         }
-        let mut back = tracker.back();
         surfaces.each((0..frames).rev(), |frame, seen| {
             if let (Some(seen), Ok(at)) = (seen, numbers.binary_search(&frame)) {
-                back.refit(at, || seen.target.observation());
+                tracker.refit(at, &seen.seen.observation);
             }
             Ok(())
         })?;
-        let tracked = back.into_frames();
+        let tracked = tracker.into_frames();
         let mut finisher = finisher(frames)?;
         let (mut reports, mut joints, mut cages) = (Vec::new(), Vec::new(), Vec::new());
         surfaces.each(0..frames, |frame, seen| {
-            // A frame without a surface stays as the one before it, or is as the first that has one.
+            // A frame without a surface is as the one before it, or as the first that has one.
             let at = numbers.partition_point(|&number| number <= frame).saturating_sub(1);
             let vertices = &tracked[at].fit.vertices;
             let how = if seen.is_some() { How::of_person(&tracked[at]) } else { How::NO_SURFACE };

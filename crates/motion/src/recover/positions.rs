@@ -1,4 +1,4 @@
-//! Recovered frames on their way to the encoder: in a scratch file, since they come from the last to the first.
+//! Recovered frames on their way to the encoder, in a scratch file: they come from last to first.
 
 use cager_formats::{Action, Error, FrameReader};
 use cager_geometry::mesh::Point;
@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Frames × points × 3 numbers in double precision, which are written in any order and read from the first.
+/// Frames × points × 3 numbers in double precision, written in any order.
 pub struct RecoveredFrames {
     path: PathBuf,
     file: BufReader<File>,

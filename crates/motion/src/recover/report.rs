@@ -4,10 +4,10 @@ use super::departures::{Departure, told};
 use super::distances::Distances;
 use super::gait::GaitCurve;
 use super::placement::Placement;
+use super::surfaces::Seen;
 use super::{FirstLook, RecoverProgress};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Point, TriMesh};
-use cager_shape::registration::ObservationNotes;
 use cager_shape::tracking::changed_for_good;
 use cager_shape::tracking::{Outcome, TrackedFrame};
 use serde::Serialize;
@@ -26,12 +26,12 @@ pub struct RecoveryReport {
     pub placement: Option<Placement>,
     /// Frames in which part of the template may be somewhere else, by their numbers.
     pub lost: Vec<f64>,
-    /// Parts of the template that left the surface, parts of the surface that it does not explain, and parts that are stretched, lost frames or not: the
-    /// farthest first, twenty at the most.
+    /// Parts that left the surface, that no template explains, or that are stretched: the farthest
+    /// first, twenty at the most.
     pub departures: Vec<Departure>,
-    /// The number of the frame from which on the template lies worse all at once and to the end: the topology seems to have changed for good.
+    /// From which number on the template lies worse to the end: the topology seems to have changed.
     pub changed_from: Option<f64>,
-    /// From the template to the surfaces, on average over the frames that are not lost, or over all where all are.
+    /// From the template to the surfaces, on average over frames that are not lost, if any.
     pub to_surface: Option<f64>,
     /// And back.
     pub from_surface: Option<f64>,
@@ -51,9 +51,9 @@ pub struct FrameReport {
     pub number: f64,
     /// Its file.
     pub file: PathBuf,
-    /// How its cage was found: `followed` from the frame before, by a `wider_search`, `lost`, or `no_surface`.
+    /// How its cage was found: `followed`, `wider_search`, `lost`, or `no_surface`.
     pub outcome: &'static str,
-    /// How well the template lies on the surface: root mean square distances both ways, of positions and normals together; none without a surface.
+    /// Root mean square distances both ways, of positions and normals; none without a surface.
     pub score: Option<f64>,
     /// From the template to the surface; none where that is a cloud.
     pub to_surface: Option<Distances>,
@@ -131,9 +131,9 @@ impl FrameReport {
         (number, file): (f64, PathBuf),
         how: How,
         (to_surface, from_surface): (Option<Distances>, Option<Distances>),
-        seen: Option<(ObservationNotes, usize)>,
+        seen: Option<&Seen>,
     ) -> Self {
-        let (notes, strays) = seen.unwrap_or_default();
+        let (notes, strays) = seen.map(|seen| (seen.notes, seen.strays)).unwrap_or_default();
         Self {
             number,
             file,

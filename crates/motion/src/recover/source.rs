@@ -1,4 +1,4 @@
-//! Where surfaces come from: the files of a capture, or whatever else has them in an order and can give them again.
+//! Where surfaces come from: the files of a capture, or what else can give them again.
 
 use super::RecoverError;
 use cager_formats::{MeshSequence, read_model};

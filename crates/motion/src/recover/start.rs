@@ -1,49 +1,45 @@
-//! Whether the first surface is about where the template is, and about as large: by the middle and the reach of most points, since poses differ and
-//! parts may not be seen.
+//! Whether the first surface is about where the template is, and about as large, by most points:
+//! poses differ, and parts may not be seen.
 
-use super::RecoverError;
 use super::placement::seen;
 use super::spread::Spread;
+use super::{RecoverError, RecoverOptions};
 use cager_geometry::mesh::{Model, Point, diagonal};
 use cager_geometry::vector::distance;
 use cager_shape::registration::{NearestPoints, Observation};
 use std::path::Path;
 
-/// What is brought to the first surface, and so may differ.
-pub(super) struct Placing {
-    pub(super) align: bool,
-    pub(super) scale: bool,
-    /// A person is looked for anywhere, and not scaled.
-    pub(super) is_person: bool,
-}
-
 /// Surfaces that reach so many times farther than the template are larger.
 const LARGER: f64 = 2.0;
-/// Those that reach less than one over this are smaller; in a crouch, or seen in part, they reach less.
+/// Those that reach less than one over this are smaller; in a crouch they reach less.
 const SMALLER: f64 = 2.5;
 /// A point of the template is on the surface that is nearer than this share of the diagonal.
 const ON_SURFACE: f64 = 0.05;
 
-impl Placing {
-    /// Refuses a first surface of another size or place.
-    pub(super) fn check(&self, template: &Model, first: (&Path, &Observation)) -> Result<(), RecoverError> {
-        let (path, surface) = (first.0.to_owned(), &first.1.points);
-        let Some(own) = seen(template).filter(|_| !self.scale).map(|seen| seen.points) else { return Ok(()) };
-        let (Some(rest), Some(there)) = (Spread::of(&own), Spread::of(surface)) else { return Ok(()) };
-        let size = diagonal(&template.points);
-        let (scale, distance) = (there.radius / rest.radius, distance(there.centre, rest.centre));
-        let is_sized = (1.0 / SMALLER..LARGER).contains(&scale);
-        let is_placed = self.align || self.is_person || distance < size;
-        // Where there is more than the subject, such as a floor.
-        if (is_sized && is_placed) || lies_on(&own, surface, ON_SURFACE * size) {
-            return Ok(());
-        }
-        Err(match (is_sized, self.is_person) {
-            (false, true) => RecoverError::OtherPerson { path, scale },
-            (false, false) => RecoverError::OtherSize { path, scale },
-            (true, _) => RecoverError::Elsewhere { path, distance, diagonals: distance / size },
-        })
+/// Refuses a first surface of another size or place, but for what is brought to it. A person is looked
+/// for anywhere, and not scaled.
+pub(super) fn check_surface(
+    template: &Model,
+    (path, surface): (&Path, &Observation),
+    options: &RecoverOptions,
+    is_person: bool,
+) -> Result<(), RecoverError> {
+    let Some(own) = seen(template).filter(|_| !options.scale).map(|seen| seen.points) else { return Ok(()) };
+    let (Some(rest), Some(there)) = (Spread::of(&own), Spread::of(&surface.points)) else { return Ok(()) };
+    let size = diagonal(&template.points);
+    let (scale, distance) = (there.radius / rest.radius, distance(there.centre, rest.centre));
+    let is_sized = (1.0 / SMALLER..LARGER).contains(&scale);
+    let is_placed = options.align || is_person || distance < size;
+    // Where there is more than the subject, such as a floor.
+    if (is_sized && is_placed) || lies_on(&own, &surface.points, ON_SURFACE * size) {
+        return Ok(());
     }
+    let path = path.to_owned();
+    Err(match (is_sized, is_person) {
+        (false, true) => RecoverError::OtherPerson { path, scale },
+        (false, false) => RecoverError::OtherSize { path, scale },
+        (true, _) => RecoverError::Elsewhere { path, distance, diagonals: distance / size },
+    })
 }
 
 /// Whether three of four points of a template are near a surface.
@@ -53,7 +49,7 @@ fn lies_on(template: &[Point], surface: &[Point], reach: f64) -> bool {
     4 * near.count() > 3 * template.len().div_ceil(10)
 }
 
-/// How large something is beside another, `1.150 times as large as`, `about 1000 times smaller than`.
+/// A size beside another, `1.150 times as large as`, `about 1000 times smaller than`.
 pub fn as_large(scale: f64) -> String {
     match scale {
         0.2..10.0 => format!("{scale:.3} times as large as"),
@@ -83,12 +79,13 @@ mod tests {
         (block, points)
     }
 
-    fn check(placing: &Placing, points: Vec<Point>) -> Result<(), RecoverError> {
+    fn check([align, scale, is_person]: [bool; 3], points: Vec<Point>) -> Result<(), RecoverError> {
         let surface = Observation { normals: vec![[0.0, 0.0, 1.0]; points.len()], points };
-        placing.check(&block(1.8).0, (Path::new("scan.ply"), &surface))
+        let options = RecoverOptions { align, scale, up: None, offsets: false, force: false, points: 0, colors: false };
+        check_surface(&block(1.8).0, (Path::new("scan.ply"), &surface), &options, is_person)
     }
 
-    const AS_IT_IS: Placing = Placing { align: false, scale: false, is_person: false };
+    const AS_IT_IS: [bool; 3] = [false; 3];
 
     #[test]
     fn parts_poses_and_surroundings_are_no_other_size_or_place() {
@@ -103,29 +100,28 @@ mod tests {
             (whole().iter().map(|p| moved(p, 1.5)).collect(), "a step on"),
             (whole().into_iter().step_by(4).chain(floor).collect(), "on a floor"),
         ] {
-            assert!(check(&AS_IT_IS, points).is_ok(), "{what}");
+            assert!(check(AS_IT_IS, points).is_ok(), "{what}");
         }
     }
 
     #[test]
     fn another_size_or_place_is_refused_unless_it_is_to_be_found() {
-        let placing = |align, scale, is_person| Placing { align, scale, is_person };
         let scaled = |scale: f64| block(1.8).1.iter().map(|p| p.map(|x| scale * x)).collect::<Vec<_>>();
         for scale in [1000.0, 2.54, 0.3937, 0.01] {
             for align in [false, true] {
-                let found = check(&placing(align, false, false), scaled(scale));
+                let found = check([align, false, false], scaled(scale));
                 let near = |found: f64| (found / scale - 1.0).abs() < 0.05;
                 assert!(matches!(found, Err(RecoverError::OtherSize { scale, .. }) if near(scale)), "{scale}");
             }
-            assert!(check(&placing(true, true, false), scaled(scale)).is_ok());
-            let found = check(&placing(false, false, true), scaled(scale));
+            assert!(check([true, true, false], scaled(scale)).is_ok());
+            let found = check([false, false, true], scaled(scale));
             assert!(matches!(found, Err(RecoverError::OtherPerson { .. })));
         }
         let away = || block(1.8).1.iter().map(|&[x, y, z]| [x, y + 3.0, z]).collect::<Vec<_>>();
-        let found = check(&AS_IT_IS, away());
+        let found = check(AS_IT_IS, away());
         assert!(matches!(found, Err(RecoverError::Elsewhere { distance, .. }) if (distance - 3.0).abs() < 0.1));
-        assert!(check(&placing(true, false, false), away()).is_ok());
-        assert!(check(&placing(false, false, true), away()).is_ok());
+        assert!(check([true, false, false], away()).is_ok());
+        assert!(check([false, false, true], away()).is_ok());
     }
 
     #[test]

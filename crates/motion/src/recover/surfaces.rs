@@ -55,11 +55,8 @@ impl Colored {
 
 /// A surface that can be followed and measured.
 pub(super) struct Followed {
+    pub(super) seen: Seen,
     pub(super) target: Target,
-    pub(super) notes: ObservationNotes,
-    pub(super) strays: usize,
-    pub(super) surface: Option<Surface>,
-    pub(super) colored: Option<Colored>,
 }
 
 /// What is looked at of a frame. The points that are drawn of it depend on its number alone.
@@ -120,9 +117,7 @@ impl Surfaces<'_> {
     /// Reads a frame for a template; nothing of one that has no surface, where that is allowed.
     fn follow(&self, frame: usize) -> Result<Option<Followed>, RecoverError> {
         match self.read(frame) {
-            Ok(Seen { observation, notes, strays, surface, colored }) => {
-                Ok(Some(Followed { target: Target::new(&observation, self.diagonal), notes, strays, surface, colored }))
-            }
+            Ok(seen) => Ok(Some(Followed { target: Target::new(&seen.observation, self.diagonal), seen })),
             Err(error) if self.force && holds_no_surface(&error) => Ok(None),
             Err(error) => Err(error),
         }
@@ -149,8 +144,8 @@ impl Surfaces<'_> {
         Err(RecoverError::NoSurface { frames, first })
     }
 
-    /// Calls `work` with frames in an order, to the last that there is, each read while the one before is worked on; with nothing for those that hold no
-    /// surface, where that is allowed.
+    /// Calls `work` with frames in an order, each read while the one before is worked on; with
+    /// nothing for those without a surface, where that is allowed.
     pub(super) fn each(
         &self,
         order: impl Iterator<Item = usize> + Send,

@@ -34,7 +34,8 @@ pub enum Public {
 pub struct TransferJob<'a> {
     /// The source at rest, with faces.
     pub source: Model,
-    /// A cage around it, or a public one where the method takes that; one is made where there is none.
+    /// A cage around it, or a public one where the method takes that; one is made where there is
+    /// none.
     pub cage: Option<Cage>,
     /// Its frames.
     pub frames: &'a mut dyn FrameReader,
@@ -50,7 +51,7 @@ pub struct TransferJob<'a> {
     pub up: Option<Point>,
     /// Vertices that correspond, where some are known.
     pub pairs: Vec<VertexPair>,
-    /// Whether the detail of the target at rest, which a public cage loses, is brought back to every frame. Of the public cage alone.
+    /// Whether the detail that a public cage loses is brought back to every frame.
     pub detail: bool,
     /// Coordinates in a public cage.
     pub system: &'static dyn CoordinateSystem,

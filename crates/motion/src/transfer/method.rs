@@ -9,11 +9,10 @@ use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::spatial::outside;
 use cager_shape::deformation::Detail;
-use cager_shape::registration::{Observation, ObservationOptions};
-use cager_shape::transfer::alignment::{AlignBy, Aligned, align_surfaces};
+use cager_shape::registration::{Alignment, Observation, ObservationOptions};
+use cager_shape::transfer::alignment::{AlignBy, align_surfaces};
 use cager_shape::transfer::fitted::{CagedTarget, FittedTransfer};
 use cager_shape::transfer::public::PublicTransfer;
-use cager_shape::transfer::rigid::RigidTransfer;
 use cager_shape::transfer::{FittedOptions, Source, needs_cage};
 use cager_shape::{Similarity, TransferError};
 use faer::Mat;
@@ -22,9 +21,10 @@ use std::ops::ControlFlow;
 /// A transfer that is ready.
 pub(super) struct Mover {
     method: Method,
+    name: &'static str,
     detail: Option<Detail>,
     cage_vertices: usize,
-    aligned: Aligned,
+    aligned: Alignment,
     /// Whether the axis that points up was given.
     has_up: bool,
 }
@@ -32,7 +32,6 @@ pub(super) struct Mover {
 enum Method {
     Fitted(Box<FittedTransfer>),
     Public(Box<PublicTransfer>),
-    Rigid(Box<RigidTransfer>),
 }
 
 /// Vertices of the cages that are made.
@@ -54,7 +53,6 @@ impl Mover {
         let pose = match &self.method {
             Method::Fitted(transfer) => transfer.pose(frame, points),
             Method::Public(transfer) => transfer.pose(frame, points),
-            Method::Rigid(transfer) => transfer.pose(frame, points),
         }?;
         Ok(match &self.detail {
             Some(detail) => detail.add(&pose),
@@ -67,7 +65,6 @@ impl Mover {
         match &self.method {
             Method::Fitted(transfer) => transfer.under(frame, points),
             Method::Public(transfer) => transfer.under(frame, points),
-            Method::Rigid(transfer) => transfer.under(frame, points),
         }
     }
 
@@ -82,7 +79,7 @@ impl Mover {
             runner_up: Some(self.aligned.runner_up).filter(|score| score.is_finite()),
             cage_vertices: self.cage_vertices,
             detail: self.detail.is_some(),
-            method: "public",
+            method: self.name,
             ..TransferReport::default()
         };
         let mut warnings = Vec::new();
@@ -93,17 +90,12 @@ impl Mover {
                 if self.has_up { "--align" } else { "--up or --align" },
             ));
         }
-        match &self.method {
-            Method::Fitted(transfer) => {
-                let found = transfer.report();
-                report.method = "fitted";
-                report.score = Some(found.registration.score);
-                report.pose = Some(if found.absolute { "absolute" } else { "relative" });
-                report.turned_area = Some(found.turned);
-                report.correspondence = Some(transfer.source_points());
-            }
-            Method::Rigid(_) => report.method = "rigid",
-            Method::Public(_) => {}
+        if let Method::Fitted(transfer) = &self.method {
+            let found = transfer.report();
+            report.score = Some(found.registration.score);
+            report.pose = Some(if found.absolute { "absolute" } else { "relative" });
+            report.turned_area = Some(found.turned);
+            report.correspondence = Some(transfer.source_points());
         }
         (report, warnings)
     }
@@ -139,8 +131,8 @@ fn fitted(job: &TransferJob<'_>) -> Result<Mover, TransferFailed> {
         FittedTransfer::new(&source, &target, &options)?
     };
     let aligned = transfer.report().aligned;
-    let method = Method::Fitted(Box::new(transfer));
-    Ok(Mover { method, detail: None, cage_vertices: cage.vertices().len(), aligned, has_up: job.up.is_some() })
+    let (method, cage_vertices) = (Method::Fitted(Box::new(transfer)), cage.vertices().len());
+    Ok(Mover { method, name: "fitted", detail: None, cage_vertices, aligned, has_up: job.up.is_some() })
 }
 
 fn around(whose: &'static str, model: &Model, stopped: &dyn Fn() -> bool) -> Result<Cage, TransferFailed> {
@@ -188,12 +180,10 @@ fn public(job: &TransferJob<'_>, cage: Public, rigidity: Option<f64>) -> Result<
         }
     };
     job.go_on()?;
-    let method = if let Some(rigidity) = rigidity {
-        Method::Rigid(Box::new(RigidTransfer::new(&rest, &target, similarity, cage, job.system, rigidity)?))
-    } else {
-        Method::Public(Box::new(PublicTransfer::new(&rest.vertices, &target.vertices, similarity, cage, job.system)?))
-    };
-    Ok(Mover { method, detail, cage_vertices: cage.vertices().len(), aligned, has_up: job.up.is_some() })
+    let transfer = PublicTransfer::new(&rest, &target, similarity, cage, job.system, rigidity)?;
+    let (method, cage_vertices) = (Method::Public(Box::new(transfer)), cage.vertices().len());
+    let name = if rigidity.is_some() { "rigid" } else { "public" };
+    Ok(Mover { method, name, detail, cage_vertices, aligned, has_up: job.up.is_some() })
 }
 
 /// Refuses points where coordinates other than mean value ones do not exist.
@@ -211,17 +201,13 @@ fn reject_outside(
     Err(TransferFailed::Outside { whose, count: found.len(), first, system: system.name() })
 }
 
-fn aligned(job: &TransferJob<'_>, source: &TriMesh, target: &TriMesh) -> Result<Aligned, TransferError> {
-    let draw = ObservationOptions::default();
+fn aligned(job: &TransferJob<'_>, source: &TriMesh, target: &TriMesh) -> Result<Alignment, TransferError> {
     if job.align == AlignBy::AsTheyStand {
-        return Ok(Aligned { similarity: Similarity::IDENTITY, runner_up: f64::INFINITY });
+        return Ok(Alignment::given(Similarity::IDENTITY));
     }
-    let source =
-        Observation::of_mesh(&source.vertices, &source.triangles, &draw).map_err(TransferError::SourceSurface)?.0;
-    let target = if target.triangles.is_empty() {
-        Observation::of_cloud(&target.vertices, &job.target.normals, &draw)?.0
-    } else {
-        Observation::of_mesh(&target.vertices, &target.triangles, &draw)?.0
-    };
+    let draw = ObservationOptions::default();
+    let source = Observation::of_mesh(&source.vertices, &source.triangles, &draw);
+    let (source, _) = source.map_err(TransferError::SourceSurface)?;
+    let (target, _) = Observation::of_surface(&target.vertices, &target.triangles, &job.target.normals, &draw)?;
     Ok(align_surfaces(&source, &target, None, job.align, job.up)[0])
 }

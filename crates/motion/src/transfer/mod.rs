@@ -1,4 +1,4 @@
-//! The motion of one model moved onto another: frames in, frames out that can be encoded as any capture.
+//! The motion of one model moved onto another: frames in, frames out.
 
 mod error;
 mod job;

@@ -7,7 +7,7 @@ use cager_formats::{FrameReader, open_frames};
 use cager_geometry::mesh::Model;
 use std::path::Path;
 
-/// What a `.cager` file says of its motion without decoding a frame, about its own origin no longer.
+/// What a `.cager` file says of its motion without decoding a frame, about no origin.
 pub struct MotionFile {
     /// The model at rest.
     pub rest: Model,

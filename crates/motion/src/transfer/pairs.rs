@@ -5,7 +5,7 @@ use cager_shape::transfer::VertexPair;
 /// Most pairs: each takes a row of coordinates.
 const MAX_PAIRS: usize = 10_000;
 
-/// A vertex of the source and one of the target on each line, counted from 0; `#` begins a comment. There are so many points in source and target.
+/// A vertex of the source and one of the target on each line, from 0; `#` begins a comment.
 ///
 /// # Errors
 /// What cannot be read, with its line, no pairs at all, or too many.

@@ -6,7 +6,7 @@ use cager_shape::Similarity;
 use cager_shape::transfer::alignment::AlignBy;
 use glam::{DMat3, DVec3};
 
-/// The similarity of a matrix of 4 × 4 numbers, row by row; `None` where it does more than turn, scale evenly and move.
+/// The similarity of a 4 × 4 matrix, row by row; `None` where it is none.
 pub(super) fn similarity(m: &[f64; 16]) -> Option<Similarity> {
     let linear = DMat3::from_cols_array_2d(&[[m[0], m[4], m[8]], [m[1], m[5], m[9]], [m[2], m[6], m[10]]]);
     let scale = linear.determinant().cbrt();
@@ -18,7 +18,7 @@ pub(super) fn similarity(m: &[f64; 16]) -> Option<Similarity> {
     is_similarity.then(|| Similarity { rotation: nearest_rotation(rotation), scale, translation })
 }
 
-/// An alignment with a target from which an origin was subtracted: what is given leads to the target's own place.
+/// An alignment with a target from which an origin was subtracted.
 pub fn about_origin(align: AlignBy, origin: Option<Point>) -> AlignBy {
     match (align, origin.map(DVec3::from)) {
         (AlignBy::Given(similarity), Some(origin)) => {

@@ -16,13 +16,13 @@ pub struct TransferReport {
     pub turned_degrees: f64,
     /// The factor by which it was scaled.
     pub scale: f64,
-    /// The score of the next best alignment over that of the best: near one, either may be right. None where only one was tried.
+    /// The next best alignment's score over the best one's; none where only one was tried.
     pub runner_up: Option<f64>,
-    /// How far the source stays from the target where it was laid onto it, as a share of the diagonal; about 0.0015 for the same shape. Of the fitted cage alone.
+    /// How far the source stays from the target, over the diagonal. Of the fitted cage alone.
     pub score: Option<f64>,
     /// `relative` or `absolute`. Of the fitted cage alone.
     pub pose: Option<&'static str>,
-    /// The share of the source's area that was turned by more than 30 degrees to lie on the target. Of the fitted cage alone.
+    /// The share of the source's area turned by more than 30 degrees. Of the fitted cage alone.
     pub turned_area: Option<f64>,
     /// Vertices of the source's cage, or of the one around both.
     pub cage_vertices: usize,
@@ -32,7 +32,8 @@ pub struct TransferReport {
     pub quality: MotionSummary,
     /// How long it took.
     pub seconds: Seconds,
-    /// For each point of the target, the number of a point of the source that was laid there. Of the fitted cage alone.
+    /// For each point of the target, a point of the source that lies there. Of the fitted cage
+    /// alone.
     pub correspondence: Option<Vec<u32>>,
 }
 

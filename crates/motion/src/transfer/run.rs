@@ -24,7 +24,7 @@ pub struct Transferred {
     pub warnings: Vec<String>,
 }
 
-/// Where in the folder for frames on their way those are that are moved, points × 3 numbers in double precision each.
+/// The file of moved frames in the scratch folder, points × 3 numbers in double precision each.
 pub const MOVED: &str = "moved/positions";
 /// Frames that are moved at a time.
 const BATCH: usize = 16;

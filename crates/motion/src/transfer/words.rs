@@ -4,10 +4,9 @@ use super::job::{MethodChoice, Public};
 use super::placing::similarity;
 use cager_geometry::mesh::Point;
 use cager_proto::transfer_messages::{PublicShape, RestPose, SourceAlignment, TransferMethod, UpAxis};
-use cager_shape::transfer::Pose;
 use cager_shape::transfer::alignment::AlignBy;
 use cager_shape::transfer::public_cage::PublicCage;
-use cager_shape::transfer::rigid::RIGIDITY;
+use cager_shape::transfer::{Pose, RIGIDITY};
 
 /// How a motion is moved; with the paper's methods by a cage that is given, or by one of a shape.
 pub fn method(
@@ -48,7 +47,7 @@ pub fn axis(up: UpAxis) -> Point {
     }
 }
 
-/// How a source is laid onto a target; `None` where the matrix does more than turn, scale evenly and move.
+/// How a source is laid onto a target; `None` where the matrix is no similarity.
 pub fn align(align: Option<SourceAlignment>, matrix: Option<[f64; 16]>) -> Option<AlignBy> {
     match (align.unwrap_or_default(), matrix) {
         (_, Some(matrix)) => similarity(&matrix).map(AlignBy::Given),

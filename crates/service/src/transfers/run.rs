@@ -217,7 +217,7 @@ fn refused(error: &TransferFailed, meta: &TransferMeta) -> ApiError {
         TransferFailed::Transfer(FrameNotFinite { .. } | FramePoints { .. }) => {
             ApiError::new(problem::INVALID_FRAME, error.to_string())
         }
-        TransferFailed::Transfer(Ambiguous { up }) => {
+        TransferFailed::Transfer(Ambiguous(up)) => {
             let fields = if *up { "align, matrix, pairs" } else { "up, align, matrix, pairs" };
             ApiError::new(problem::INVALID_GEOMETRY, format!("{error} ({fields})"))
         }

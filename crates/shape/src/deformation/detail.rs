@@ -1,8 +1,9 @@
-//! Detail that a coarse cage loses, brought back: differential coordinates turned by local rotations (the second paper, Eq. 5).
+//! Detail that a coarse cage loses: differential coordinates turned by local rotations (the second
+//! paper, Eq. 5).
 
 use std::collections::BTreeMap;
 
-use crate::registration::welded;
+use crate::points::welded;
 use cager_geometry::linalg::{SparseCholesky, SparsePattern, nearest_rotation};
 use cager_geometry::mesh::{Point, TriMesh};
 use faer::Mat;
@@ -13,7 +14,7 @@ use crate::deformation::gradients::flatness;
 use crate::deformation::graph::edge_growth;
 use crate::deformation::rows::Rows;
 use crate::error::MeshError;
-use crate::points::vectors;
+use crate::points::{outer, row_points, vectors};
 
 /// Brings the detail of a rest pose to poses of it: `min ‖L x − R δ‖² + ω² ‖x − x₁‖²`, `δ = L x₀`.
 pub struct Detail {
@@ -40,7 +41,7 @@ impl Detail {
     /// A mesh that cannot be solved on.
     pub fn new(rest: &TriMesh) -> Result<Self, MeshError> {
         if let Some(vertex) = rest.vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(MeshError::NotFinite { vertex });
+            return Err(MeshError::NotFinite(vertex));
         }
         let rows = Rows::new(&welded(&rest.vertices));
         let vertices = rows.gathered(&vectors(&rest.vertices));
@@ -97,11 +98,7 @@ impl Detail {
                 list.iter().for_each(|&(j, w)| add(j as usize, -w * missing[i]));
             }
             self.factor.solve(&mut change);
-            shape = rough
-                .iter()
-                .enumerate()
-                .map(|(i, p)| *p + DVec3::new(change[(i, 0)], change[(i, 1)], change[(i, 2)]))
-                .collect();
+            shape = rough.iter().zip(row_points::<DVec3>(change.as_ref())).map(|(p, by)| *p + by).collect();
         }
         let moved: Vec<DVec3> = shape.iter().zip(&rough).map(|(to, from)| *to - *from).collect();
         given.iter().zip(self.rows.spread(&moved)).map(|(p, by)| (*p + by).to_array()).collect()
@@ -111,7 +108,7 @@ impl Detail {
     fn rotation(&self, pose: &[DVec3], i: usize) -> DMat3 {
         let sum = self.neighbours[i].iter().fold(DMat3::ZERO, |sum, &(j, w)| {
             let (d, e) = (w * (pose[j as usize] - pose[i]), self.rest[j as usize] - self.rest[i]);
-            sum + DMat3::from_cols(d * e.x, d * e.y, d * e.z)
+            sum + outer(d, e)
         });
         nearest_rotation(sum)
     }

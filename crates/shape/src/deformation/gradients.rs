@@ -1,13 +1,13 @@
 //! Deformation gradients of the triangles of a mesh (Sumner and Popović 2004).
 
 use crate::points::area_vector;
-use crate::registration::welded;
+use crate::points::welded;
 use cager_geometry::linalg::nearest_rotation;
 use cager_geometry::mesh::TriMesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Triangles at rest, ready to say how each is turned and stretched in a pose, and which of them are neighbours.
+/// Triangles at rest, for how each is turned and stretched in a pose, and their neighbours.
 pub struct Gradients {
     triangles: Vec<[u32; 3]>,
     /// Inverse of the triangle's frame at rest; none for a triangle without an area.
@@ -34,7 +34,7 @@ impl Gradients {
         Self { triangles: rest.triangles.clone(), inverse: inverse.collect(), shares, first, areas }
     }
 
-    /// The gradient of each triangle in a pose, given by the positions of the vertices; the identity for a triangle that has no area at rest.
+    /// The gradient of each triangle in a pose; the identity where it has no area at rest.
     pub fn of(&self, pose: &[DVec3]) -> Vec<DMat3> {
         let gradient = |(t, inverse): (&[u32; 3], &Option<DMat3>)| match inverse {
             Some(inverse) => frame(t.map(|v| pose[v as usize])) * *inverse,

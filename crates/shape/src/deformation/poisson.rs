@@ -1,6 +1,6 @@
 //! Meshes from the gradients of their triangles: one sparse factorisation, then a solve a pose.
 
-use crate::registration::welded;
+use crate::points::welded;
 use cager_geometry::linalg::{SparseCholesky, SparsePattern};
 use cager_geometry::mesh::TriMesh;
 use cager_geometry::topology::UnionFind;
@@ -11,11 +11,11 @@ use crate::deformation::gradients::flatness;
 use crate::deformation::rows::Rows;
 use crate::deformation::ties::{Tie, ties};
 use crate::error::MeshError;
-use crate::points::{area_vector, vectors};
+use crate::points::{area_vector, row_points, vectors};
 
-/// Finds the positions of vertices whose triangles are turned and stretched as asked, in least squares by area (the Poisson equation of deformation
-/// transfer, Botsch et al. 2006). Vertices at the same place stay together; parts of the mesh that no edge connects are carried by the nearest points of
-/// the parts near them.
+/// Finds vertices whose triangles are turned and stretched as asked, in least squares by area (the
+/// Poisson equation of deformation transfer, Botsch et al. 2006). Vertices at one place stay
+/// together; parts that no edge connects are carried by the nearest points of others.
 pub struct Poisson {
     rest: Vec<DVec3>,
     rows: Rows,
@@ -52,7 +52,7 @@ impl Poisson {
     /// As [`Self::new`], with vertices that stay together.
     pub(crate) fn joined(rest: &TriMesh, rows: Rows) -> Result<Self, MeshError> {
         if let Some(vertex) = rest.vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(MeshError::NotFinite { vertex });
+            return Err(MeshError::NotFinite(vertex));
         }
         let vertices = vectors(&rest.vertices);
         let mut triangles = Vec::with_capacity(rest.triangles.len());
@@ -99,7 +99,7 @@ impl Poisson {
         Ok(Self { rest: vertices, rows, triangles, ties, offsets, tie_weight, factor })
     }
 
-    /// The pose whose gradients, one for each triangle of the mesh, are nearest to these; the mean of the vertices is as at rest.
+    /// The pose whose gradients are nearest to these, one a triangle; the mean is as at rest.
     pub fn solve(&self, gradients: &[DMat3]) -> Vec<DVec3> {
         let turned = |(tie, rest): (&Tie, &DVec3)| gradients[tie.triangle as usize] * *rest;
         let offsets: Vec<DVec3> = self.ties.iter().zip(&self.offsets).map(turned).collect();
@@ -121,9 +121,7 @@ impl Poisson {
             add(tie.rows[1], -force);
         }
         self.factor.solve(&mut pull);
-        let displaced: Vec<DVec3> =
-            (0..pull.nrows()).map(|row| DVec3::new(pull[(row, 0)], pull[(row, 1)], pull[(row, 2)])).collect();
-        let moved = self.rows.spread(&displaced);
+        let moved = self.rows.spread(&row_points(pull.as_ref()));
         let mean = moved.iter().sum::<DVec3>() / moved.len() as f64;
         moved.iter().zip(&self.rest).map(|(d, p)| *p + (*d - mean)).collect()
     }

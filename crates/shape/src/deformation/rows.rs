@@ -10,7 +10,7 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// From the first vertex at the place of each, as [`welded`](crate::registration::welded) has it.
+    /// From the first vertex at the place of each, see [`welded`](crate::points::welded).
     pub(crate) fn new(place: &[u32]) -> Self {
         let (mut row, mut first) = (vec![0; place.len()], Vec::new());
         for (v, &at) in place.iter().enumerate() {

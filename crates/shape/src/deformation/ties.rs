@@ -20,14 +20,14 @@ pub(crate) struct Tie {
 
 /// Ties of two parts.
 const TIES: usize = 3;
-/// Neighbours of a point that are asked for other parts first; few parts are left to be looked for among all points.
+/// Neighbours of a point that are asked for other parts first.
 const NEAR: u32 = 12;
 /// Points of a part that are compared one by one.
 const FEW: usize = 24;
 
-/// Ties along a tree of parts that are near each other, near to a minimum spanning tree (Kruskal over nearest points, then Borůvka): each part to the
-/// nearest part, up to [`TIES`] for a pair; points without triangles one by one to the nearest point that has one. `part` numbers the sets that triangles
-/// connect, `triangle_at` has a triangle for each row that is in one.
+/// Ties along a tree of near parts (Kruskal over nearest points, then Borůvka), up to [`TIES`] for
+/// a pair; points without triangles go to the nearest point with one. `part` numbers the sets that
+/// triangles connect, `triangle_at` has a triangle for each row that is in one.
 pub(crate) fn ties(at: &[DVec3], part: &[u32], triangle_at: &[Option<u32>]) -> Vec<Tie> {
     let (held, loose): (Vec<u32>, Vec<u32>) =
         (0..at.len() as u32).partition(|&row| triangle_at[row as usize].is_some());
@@ -119,8 +119,8 @@ fn joints(
     }
 }
 
-/// For each set but the largest, the nearest pair of a row of it and a row of another one. Two sets differ in a bit of their numbers: by each bit, rows are
-/// looked for among those that have it otherwise.
+/// For each set but the largest, its nearest pair with another one. Two sets differ in a bit of
+/// their numbers: by each bit, rows are looked for among those that have it otherwise.
 fn nearest_outside(at: &[DVec3], held: &[u32], parts: &mut UnionFind) -> Vec<(f64, u32, u32)> {
     let mut number: HashMap<u32, usize> = HashMap::new();
     let set: Vec<usize> = held

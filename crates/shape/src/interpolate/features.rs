@@ -1,5 +1,5 @@
-//! Edge lengths and dihedral angles of a mesh, and the shape that has wanted ones (Fröhlich and Botsch, Example-driven deformations based on discrete
-//! shells, 2011), by Gauss and Newton.
+//! Edge lengths and dihedral angles of a mesh, and the shape that has wanted ones (Fröhlich and
+//! Botsch, Example-driven deformations based on discrete shells, 2011), by Gauss and Newton.
 
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::{PI, TAU};
@@ -18,7 +18,7 @@ pub(super) struct Features {
     angles: Vec<f64>,
 }
 
-/// Edges of a mesh, ready to be brought to wanted lengths and angles. Positions are those of the mesh's rows.
+/// Edges of a mesh, to be brought to wanted lengths and angles. Positions are those of its rows.
 pub(super) struct Refinement {
     /// Ends of each edge, and one over its length at rest.
     edges: Vec<([u32; 2], f64)>,
@@ -40,7 +40,7 @@ pub(super) const MAX_VERTICES: usize = 100_000;
 const LEAST_SHARE: f64 = 0.05;
 const MAX_STEPS: usize = 8;
 const MAX_HALVINGS: usize = 6;
-/// Steps end where the energy falls by less than this share, and where the mean of its terms is below the second.
+/// Steps end where the energy falls by less, and where the mean of its terms is below the second.
 const MIN_PROGRESS: f64 = 1e-4;
 const NO_ENERGY: f64 = 1e-20;
 /// Added to the diagonal, over its mean.
@@ -56,7 +56,7 @@ impl Features {
         self
     }
 
-    /// Weighted means; weights sum to one. Lengths beyond the poses do not fall to nothing or below, which no edge can have.
+    /// Weighted means; weights sum to one. Lengths beyond the poses stay above nothing.
     pub(super) fn mean(of: &[Self], weights: &[f64]) -> Self {
         let sum = |get: fn(&Self) -> &Vec<f64>| -> Vec<f64> {
             (0..get(&of[0]).len()).map(|k| weights.iter().zip(of).map(|(w, f)| w * get(f)[k]).sum()).collect()
@@ -76,7 +76,8 @@ fn wrapped(angle: f64) -> f64 {
 }
 
 impl Refinement {
-    /// Of a mesh at rest by its rows. Ties between its parts keep their lengths as edges do. None for a mesh of more than [`MAX_VERTICES`].
+    /// Of a mesh by its rows. Ties keep their lengths as edges do. None of more than
+    /// [`MAX_VERTICES`].
     pub(super) fn new(at: &[DVec3], triangles: &[[u32; 3]], ties: &[Tie]) -> Option<Self> {
         if at.len() > MAX_VERTICES {
             return None;

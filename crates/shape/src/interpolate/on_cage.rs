@@ -15,7 +15,7 @@ pub struct CagedShapes {
 }
 
 impl CagedShapes {
-    /// Of a cage, coordinates in it, n × m with one column per vertex, and poses of the model; two or more.
+    /// Of a cage, coordinates in it, n × m with one column a vertex, and two poses or more.
     ///
     /// # Errors
     /// See [`ShapeError`].
@@ -25,12 +25,14 @@ impl CagedShapes {
         Ok(Self { poses, space })
     }
 
-    /// The shape with these weights, one for each pose, as [`ShapeSpace::shape`] has it on the cage; with all weight on a pose, that pose.
+    /// The shape with these weights, as [`ShapeSpace::shape`] has it on the cage; with all weight
+    /// on a pose, that pose.
     ///
     /// # Errors
     /// As [`ShapeSpace::shape`].
     pub fn shape(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
-        Ok(self.model(&self.space.shape(weights)?, weights))
+        let weighted: Vec<(usize, f64)> = weights.iter().copied().enumerate().collect();
+        Ok(self.poses.model(&self.space.shape(weights)?, &weighted))
     }
 
     /// The cage of a shape.
@@ -39,9 +41,5 @@ impl CagedShapes {
     /// As [`ShapeSpace::shape`].
     pub fn cage(&self, weights: &[f64]) -> Result<Vec<Point>, ShapeError> {
         self.space.shape(weights)
-    }
-
-    fn model(&self, cage: &[Point], weights: &[f64]) -> Vec<Point> {
-        self.poses.model(cage, &weights.iter().copied().enumerate().collect::<Vec<_>>())
     }
 }

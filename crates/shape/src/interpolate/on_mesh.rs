@@ -35,8 +35,8 @@ struct Pose {
 const MAX_SUM_ERROR: f64 = 1e-6;
 
 impl ShapeSpace {
-    /// Of poses of one mesh, the first of which the others are measured against; two or more. Rotations go on from each pose to the next one, less than
-    /// half a turn where a part is turned least.
+    /// Of two poses or more of one mesh, measured against the first. Rotations go on from each pose
+    /// to the next one, less than half a turn where a part is turned least.
     ///
     /// # Errors
     /// See [`ShapeError`].
@@ -76,9 +76,10 @@ impl ShapeSpace {
         self.poses.len()
     }
 
-    /// The shape with these weights, one for each pose; below nothing and above one they lead beyond the poses. Triangles are turned and stretched by the
-    /// weighted means of rotation vectors and stretches, the mesh follows in least squares, and is then brought to the weighted means of edge lengths and
-    /// dihedral angles (Fröhlich and Botsch 2011), the last step up to 100,000 vertices.
+    /// The shape with these weights, one a pose; beyond 0 and 1 they lead beyond the poses.
+    /// Triangles take weighted means of rotation vectors and stretches, the mesh follows in least
+    /// squares, and is then, up to 100,000 vertices, brought to the means of edge lengths and
+    /// dihedral angles (Fröhlich and Botsch 2011).
     ///
     /// # Errors
     /// Another number of weights than of poses, weights that are not finite or do not sum to one.
@@ -115,11 +116,11 @@ impl ShapeSpace {
             return Err(ShapeError::OtherWeights { weights: weights.len(), poses: self.poses() });
         }
         if let Some(pose) = weights.iter().position(|weight| !weight.is_finite()) {
-            return Err(ShapeError::Weight { pose });
+            return Err(ShapeError::Weight(pose));
         }
         let sum: f64 = weights.iter().sum();
         if (sum - 1.0).abs() > MAX_SUM_ERROR {
-            return Err(ShapeError::Sum { sum });
+            return Err(ShapeError::Sum(sum));
         }
         Ok(())
     }

@@ -11,8 +11,8 @@ use super::pose_cages::PoseCages;
 use super::poses::check_poses;
 use crate::error::ShapeError;
 
-/// The shapes on a path from pose to pose, one by one. Between two poses it depends on these alone, and each way is the shorter one. An error is the last
-/// item; [`Self::leg`] says where it was.
+/// The shapes on a path from pose to pose. Between two poses it depends on these alone, each way
+/// the shorter one. An error is the last item; [`Self::leg`] says where it was.
 pub struct ShapePath {
     triangles: Vec<[u32; 3]>,
     keys: Keys,
@@ -40,8 +40,8 @@ impl Keys {
 }
 
 impl ShapePath {
-    /// Through poses of one mesh, two or more, in `steps` shapes from each to the next, both ends included; two at least. The end of a stretch is not
-    /// repeated as the beginning of the next one.
+    /// Through two poses or more of one mesh, in `steps` shapes from each to the next, two at
+    /// least, ends included but not repeated.
     ///
     /// # Errors
     /// See [`ShapeError`].
@@ -50,7 +50,8 @@ impl ShapePath {
         Self::new(triangles, Keys::Poses(poses), steps)
     }
 
-    /// As [`Self::on_mesh`], on the cage, with coordinates as for [`CagedShapes`](super::CagedShapes).
+    /// As [`Self::on_mesh`], on the cage, with coordinates as for
+    /// [`CagedShapes`](super::CagedShapes).
     ///
     /// # Errors
     /// See [`ShapeError`].
@@ -63,7 +64,7 @@ impl ShapePath {
         Ok(Self { triangles: triangles.to_vec(), keys, steps: steps.max(2), space, from: 0, step: 0, failed: false })
     }
 
-    /// The pose, counted from 0, with which the stretch begins that the last shape is on, or on which there was an error.
+    /// The pose, from 0, that begins the stretch of the last shape or of the error.
     pub fn leg(&self) -> usize {
         self.from
     }

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 
 use super::poses::check_poses;
 use crate::error::ShapeError;
-use crate::points::{matrix, plain, row_points, vectors};
+use crate::points::{matrix, outer, plain, points_in, row_points, vectors};
 use crate::similarity::Similarity;
 
 /// Poses of a model in a cage.
@@ -22,14 +22,15 @@ pub(super) struct PoseCages {
     missed: Vec<Vec<DVec3>>,
 }
 
-/// Weight of the cage's own shape beside the mean square error of the points: enough for what these hardly determine.
+/// Weight of the cage's own shape beside the error of the points, for what these hardly determine.
 const STIFFNESS: f64 = 1e-4;
 const ITERATIONS: usize = 6;
 const BLOCK_ROWS: usize = 512;
 
 impl PoseCages {
-    /// The cages C of poses P, by `min ‖Φ C − P‖² / n + λ ‖L C − R δ‖² / m`: the Laplacian `δ = L C₀` of the cage at rest, turned with its surroundings,
-    /// decides where points do not (Sorkine et al. 2004). Coordinates Φ are n × m, with one column per vertex.
+    /// The cages C of poses P, by `min ‖Φ C − P‖² / n + λ ‖L C − R δ‖² / m`: the Laplacian `δ = L
+    /// C₀` at rest, turned with its surroundings, decides where points do not (Sorkine et al.
+    /// 2004). Φ is n × m, one column a vertex.
     pub(super) fn new(cage: &Cage, phi: Mat<f64>, poses: &[Vec<Point>]) -> Result<Self, ShapeError> {
         check_poses(poses)?;
         let ((n, m), vertices) = (phi.shape(), cage.vertices().len());
@@ -46,7 +47,7 @@ impl PoseCages {
         let shape = mirrored(gram(laplacian.as_ref(), BLOCK_ROWS));
         let sum = Scale(scale) * mirrored(gram(phi.as_ref(), BLOCK_ROWS)) + Scale(STIFFNESS) * shape;
         let factor = if n < m { None } else { cholesky(sum) }.ok_or(none)?;
-        let rest = plain(&row_points(tall_product(phi.as_ref(), matrix(cage.vertices()).as_ref()).as_ref()));
+        let rest: Vec<Point> = points_in(phi.as_ref(), matrix(cage.vertices()).as_ref());
         let (mut cages, mut missed) = (Vec::new(), Vec::new());
         for pose in poses {
             let start = Similarity::of_points(&rest, pose, true).apply_all(cage.vertices());
@@ -61,7 +62,7 @@ impl PoseCages {
                 found = row_points((&start_matrix + change).as_ref());
             }
             let found = plain(&found);
-            let reached = row_points(tall_product(phi.as_ref(), matrix(&found).as_ref()).as_ref());
+            let reached: Vec<DVec3> = points_in(phi.as_ref(), matrix(&found).as_ref());
             missed.push(pose.iter().zip(reached).map(|(p, q)| DVec3::from(*p) - q).collect());
             cages.push(found);
         }
@@ -70,7 +71,7 @@ impl PoseCages {
 
     /// The model in a cage between or beyond poses, with what their own cages miss of these.
     pub(super) fn model(&self, cage: &[Point], weights: &[(usize, f64)]) -> Vec<Point> {
-        let mut model = row_points(tall_product(self.phi.as_ref(), matrix(cage).as_ref()).as_ref());
+        let mut model: Vec<DVec3> = points_in(self.phi.as_ref(), matrix(cage).as_ref());
         for &(pose, weight) in weights {
             model.iter_mut().zip(&self.missed[pose]).for_each(|(p, missed)| *p += weight * *missed);
         }
@@ -107,7 +108,7 @@ impl Rings {
             let (mut sum, mut delta) = (DMat3::ZERO, DVec3::ZERO);
             for &j in ring {
                 let (e, d) = (start[i] - start[j as usize], now[i] - now[j as usize]);
-                sum += DMat3::from_cols(d * e.x, d * e.y, d * e.z);
+                sum += outer(d, e);
                 delta += e / ring.len() as f64;
             }
             (nearest_rotation(sum) * delta - delta).to_array()

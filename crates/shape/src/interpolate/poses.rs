@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::registration::welded;
+use crate::points::welded;
 use cager_geometry::mesh::{Point, diagonal};
 use cager_geometry::vector::distance;
 use glam::DVec3;
@@ -13,7 +13,7 @@ use crate::error::ShapeError;
 /// Two poses or more, of as many points each, all finite.
 pub(super) fn check_poses(poses: &[Vec<Point>]) -> Result<(), ShapeError> {
     if poses.len() < 2 {
-        return Err(ShapeError::TooFewPoses { poses: poses.len() });
+        return Err(ShapeError::TooFewPoses(poses.len()));
     }
     let expected = poses[0].len();
     for (pose, points) in poses.iter().enumerate() {
@@ -35,7 +35,7 @@ pub(super) struct Seams {
     apart: Vec<(u32, Vec<DVec3>)>,
 }
 
-/// Vertices that are one at rest still are in a pose where they are no farther apart than this share of the diagonal: positions are rounded.
+/// Vertices that are one at rest stay so within this share of the diagonal: positions are rounded.
 const TOGETHER: f64 = 1e-5;
 
 impl Seams {

@@ -1,4 +1,5 @@
-//! Gradients split into rotations and stretches, and rotation vectors that go on from triangle to triangle and from pose to pose.
+//! Gradients split into rotations and stretches; rotation vectors that go on over triangles and
+//! poses.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -21,14 +22,15 @@ pub(super) fn polar(gradients: &[DMat3]) -> (Vec<DMat3>, Vec<DMat3>) {
     (rotations, stretches)
 }
 
-/// Where rotation vectors go on: from triangle to triangle over edges, and from part to part over ties.
+/// Where rotation vectors go on: over edges, and from part to part over ties.
 pub(super) struct Ways<'a> {
     gradients: &'a Gradients,
     /// Triangles at both ends of ties, each way, sorted.
     ties: Vec<[u32; 2]>,
 }
 
-/// What is done next: a triangle, after another one of its part (before all else), or after one of another part or after itself in the pose before.
+/// A triangle to be done, after another of its part (before all else), of another part, or after
+/// itself in the pose before.
 type Next = Reverse<(bool, u64, u32, u32)>;
 
 impl<'a> Ways<'a> {
@@ -40,8 +42,9 @@ impl<'a> Ways<'a> {
         Self { gradients, ties }
     }
 
-    /// Axis times angle of each rotation, whole turns added so that neighbours agree: over the smallest differences first. A part begins where it is
-    /// turned least against the pose before, or against a part that it is tied to. `before` are the vectors of the pose before, zero for the first.
+    /// Axis times angle of each rotation, whole turns added so that neighbours agree, over the
+    /// smallest differences first. A part begins where it is turned least against the pose before
+    /// (zero for the first), or against a part that it is tied to.
     pub(super) fn unwrapped(&self, rotations: &[DMat3], before: &[DVec3]) -> Vec<DVec3> {
         let mut turned: Vec<DQuat> = rotations.iter().map(DQuat::from_mat3).collect();
         let mut turns = vec![DVec3::ZERO; rotations.len()];

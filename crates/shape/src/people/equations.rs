@@ -16,7 +16,7 @@ const BLOCK: usize = 512;
 const DAMPING: f64 = 1e-3;
 
 impl NormalEquations {
-    /// Those of residuals and their derivatives, one column each, both times the root of their weight.
+    /// Of residuals and their derivatives, one column each, both times the root of their weight.
     pub(super) fn new(derivatives: &Mat<f64>, residuals: &[f64]) -> Self {
         let a = gram(derivatives.transpose(), BLOCK);
         let mut b = vec![0.0; derivatives.nrows()];

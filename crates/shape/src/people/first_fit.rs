@@ -1,8 +1,8 @@
 //! A person without a frame before: many starts, of which ever fewer are refined ever further.
 
 use super::fit::{FrameFit, PersonFit, Rounds};
-use super::observed::Observed;
-use super::options::Method;
+use super::matching::Observed;
+use super::options::{FIRST_ROUNDS, Method};
 use super::search::search;
 use super::stages::{LatentStage, QuadStage, Stage};
 use crate::Similarity;
@@ -28,8 +28,7 @@ impl<'a> PersonFit<'a> {
         let starts = search(self.model, self.manifold, KEPT[0], observed);
         if self.options.method == Method::Paper {
             let (placement, latent) = starts.into_iter().next().unwrap_or_else(|| self.middle());
-            let rounds = self.options.first_rounds;
-            return self.finish(observed, self.latent_stage(placement, latent), rounds);
+            return self.finish(observed, self.latent_stage(placement, latent), FIRST_ROUNDS);
         }
         let mut all: Vec<Start<'a>> = starts
             .into_par_iter()
@@ -45,7 +44,7 @@ impl<'a> PersonFit<'a> {
         some.par_iter_mut().for_each(|start| self.improve(observed, start));
         some.sort_by(|a, b| a.score.total_cmp(&b.score));
         some.truncate(KEPT[2]);
-        let [_, quads, vertices] = self.options.first_rounds;
+        let [_, quads, vertices] = FIRST_ROUNDS;
         let finished = some.into_iter().map(|start| {
             let fit = self.finish(observed, start.stage, [quads, quads, vertices]);
             self.refit_with_other_limbs(observed, fit, &[0, 1, 2, 3])
@@ -61,7 +60,7 @@ impl<'a> PersonFit<'a> {
         (Similarity::IDENTITY, vec![0.0; self.manifold.dims()])
     }
 
-    /// The best starts, of which only some face the same way, since the best of all may face the wrong way.
+    /// The best starts, of which only some face the same way: the best may face the wrong one.
     fn different(&self, starts: Vec<Start<'a>>) -> Vec<Start<'a>> {
         let forward = DVec3::from(self.model.rig().forward);
         let mut some: Vec<Start<'a>> = Vec::with_capacity(KEPT[1]);
@@ -75,7 +74,8 @@ impl<'a> PersonFit<'a> {
         some
     }
 
-    /// Latent numbers and quads of a start, twice: once to find what the pose is off the manifold by, and once from there.
+    /// Latent numbers and quads of a start, twice: the second time from its offset off the
+    /// manifold.
     fn improve(&self, observed: &Observed<'_>, start: &mut Start<'a>) {
         let (rig, height) = (self.model.rig(), self.model.height());
         for count in [12, 6] {

@@ -2,10 +2,9 @@
 
 use super::equations::NormalEquations;
 use super::limbs::{limb_scores, pose_with_other_limbs};
-use super::matching::{Match, Matching, NORMAL_LENGTH, Pairs};
+use super::matching::{Match, Matching, NORMAL_LENGTH, Observed, Pairs};
 use super::model::{CAGE_UNKNOWNS, PersonModel};
-use super::observed::Observed;
-use super::options::{FitOptions, Method};
+use super::options::{CARRIED, DEVIATION, FitOptions, Method, OBSERVED, PRIOR, REACH, ROUNDS};
 use super::stages::{Free, LatentStage, Linearized, QuadStage, Stage, VertexStage};
 use crate::Similarity;
 use crate::people::manifold::Manifold;
@@ -19,7 +18,8 @@ use rayon::prelude::*;
 
 /// A stage ends where its step moves no vertex by more than this fraction of the height.
 const STILL: f64 = 2e-4;
-/// A limb whose mean distance is above this fraction of the height, or so many times that of the frame before, is tried elsewhere.
+/// A limb with a mean distance above this share of the height, or this ratio to the frame before,
+/// is tried elsewhere.
 const RESEED_ABOVE: [f64; 2] = [0.015, 1.3];
 /// More rounds for quads of limbs that were put elsewhere.
 const EXTRA_ROUNDS: usize = 4;
@@ -39,7 +39,7 @@ pub struct FrameFit {
     pub vertices: Vec<Point>,
     /// Mean distance of matches, both ways, none beyond a tenth of the height, as a fraction of it.
     pub score: f64,
-    /// Of each quad, the mean distance of the template around it to what was observed, as the score.
+    /// Of each quad, the mean distance of the template around it.
     pub parts: [f64; QUADS],
 }
 
@@ -65,13 +65,13 @@ pub(super) struct Rounds {
 }
 
 impl<'a> PersonFit<'a> {
-    /// Fits a frame, beginning with the fit of a frame before it or after it, or else with a search.
+    /// Fits a frame from the fit of one beside it, or else with a search.
     pub fn fit(&self, observation: &Observation, start: Option<&FrameFit>) -> FrameFit {
         let observed = self.observed(observation);
         if let Some(fit) = start {
             let mut stage = self.latent_stage(fit.placement, fit.latent.clone());
             stage.offset = self.offset(&stage, &fit.pose);
-            let found = self.finish(&observed, stage, self.options.rounds);
+            let found = self.finish(&observed, stage, ROUNDS);
             let (before, now) = (limb_scores(&fit.parts), limb_scores(&found.parts));
             let misplaced = |&limb: &usize| now[limb] > RESEED_ABOVE[0].min(RESEED_ABOVE[1] * before[limb]);
             let limbs: Vec<usize> = (0..now.len()).filter(misplaced).collect();
@@ -89,7 +89,7 @@ impl<'a> PersonFit<'a> {
         let Some(pose) = other else { return fit };
         let mut stage = self.latent_stage(fit.placement, fit.latent.clone());
         stage.offset = pose.iter().zip(stage.pose()).map(|(y, on)| y - on).collect();
-        let [_, quads, vertices] = self.options.rounds;
+        let [_, quads, vertices] = ROUNDS;
         let again = self.finish(observed, stage, [0, quads + EXTRA_ROUNDS, vertices]);
         if again.score < fit.score { again } else { fit }
     }
@@ -99,7 +99,7 @@ impl<'a> PersonFit<'a> {
         if self.options.method == Method::Paper {
             return stage.offset.clone();
         }
-        pose.iter().zip(stage.pose()).map(|(y, on)| (y - on) * self.options.carried).collect()
+        pose.iter().zip(stage.pose()).map(|(y, on)| (y - on) * CARRIED).collect()
     }
 
     /// All stages from a placement and latent numbers.
@@ -136,7 +136,7 @@ impl<'a> PersonFit<'a> {
             placement,
             latent,
             offset: vec![0.0; QUAD_UNKNOWNS],
-            weight: self.options.prior,
+            weight: PRIOR,
             free: Free::Both,
         }
     }
@@ -147,7 +147,7 @@ impl<'a> PersonFit<'a> {
             Method::Paper => 0.0,
         };
         let tree = OrientedPoints::new(&observation.points, &observation.normals, length);
-        let (all, wanted) = (observation.points.len(), self.options.observed.max(1));
+        let (all, wanted) = (observation.points.len(), OBSERVED);
         let chosen = (0..wanted.min(all)).map(|k| k * all / wanted.min(all)).collect();
         Observed { observation, tree, chosen }
     }
@@ -155,11 +155,11 @@ impl<'a> PersonFit<'a> {
     /// The template and an observation, one point in so many of both.
     pub(super) fn matching<'o>(&'o self, observed: &'o Observed<'o>, thin: usize) -> Matching<'o> {
         let thin = if self.options.method == Method::Robust { thin } else { 1 };
-        Matching { model: self.model, options: &self.options, observed, thin }
+        Matching { model: self.model, method: self.options.method, observed, thin }
     }
 
     fn rounds(&self, count: usize) -> Rounds {
-        Rounds { count, thin: 1, reach: self.options.reach }
+        Rounds { count, thin: 1, reach: REACH }
     }
 
     /// Rounds of Gauss–Newton.
@@ -175,7 +175,7 @@ impl<'a> PersonFit<'a> {
                 break;
             }
             let share = round as f64 / (count.max(2) - 1) as f64;
-            let reach = first * (end / first).powf(share) * self.options.deviation * self.model.height();
+            let reach = first * (end / first).powf(share) * DEVIATION * self.model.height();
             let matches = matching.matches(&at.vertices, reach, &mut pairs);
             let derivatives = self.derivatives(&at, &matches);
             let residuals: Vec<f64> = matches.iter().map(|m| m.residual * m.weight.sqrt()).collect();

@@ -1,5 +1,6 @@
-//! Paths of joints: each joint by its coordinates in the rest cage, taken along with the cage (Duveau et al. 2012, §6.2), and their files.
+//! Paths of joints: taken along with the cage by coordinates in it (Duveau et al. 2012, §6.2).
 
+use crate::points::{cage_values, row_points};
 use crate::rotation::between;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, DependentNormals};
@@ -88,12 +89,10 @@ impl CagedJoints {
         Ok(Self { joints, phi, normals: system.values(cage).dependent_normals })
     }
 
-    /// Where the joints are under a cage. `vertices` has as many rows as the system has unknowns: with free normals, these as well.
+    /// Where the joints are under a cage: its vertices and, of free normals, these as well.
     pub fn positions(&self, vertices: &[Point]) -> Vec<Point> {
-        let normals = self.normals.iter().flat_map(|normals| normals.normals(|v| vertices[v as usize]));
-        let values: Vec<Point> = vertices.iter().copied().chain(normals).collect();
-        let found = product(self.phi.as_ref(), Mat::from_fn(values.len(), 3, |i, k| values[i][k]).as_ref());
-        (0..found.nrows()).map(|i| [0, 1, 2].map(|k| found[(i, k)])).collect()
+        let values = cage_values(self.normals.as_ref(), vertices);
+        row_points(product(self.phi.as_ref(), values.as_ref()).as_ref())
     }
 
     /// A table of the paths: `frame,joint,x,y,z`, one line for each joint of each frame.
@@ -108,8 +107,8 @@ impl CagedJoints {
         text
     }
 
-    /// The paths as a BVH file. Joints turn by the smallest rotations that take their bones along, and have positions as well, since bones that are
-    /// followed through a cage need not keep their lengths: positions are exact.
+    /// The paths as a BVH file. Joints turn by the smallest rotations that take their bones along,
+    /// and have positions as well, since bones need not keep their lengths.
     pub fn bvh(&self, frames: &[Vec<Point>], frame_time: f64) -> Vec<u8> {
         let (skeleton, rest) = (self.skeleton(), &self.joints.positions);
         let first_below: Vec<Option<usize>> =

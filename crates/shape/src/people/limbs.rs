@@ -1,10 +1,9 @@
-//! Arms and legs that were fitted in the wrong place: each is tried as in every example, and the best is taken.
+//! Arms and legs fitted in the wrong place: each is tried as in every example.
 //!
-//! Gauss–Newton does not bring an arm back that lies on the trunk instead, since what it should lie on is out of reach there.
+//! Gauss–Newton does not bring an arm back that lies on the trunk: its own place is out of reach.
 
-use super::matching::{MIN_COSINE, NORMAL_LENGTH, SCORE_CAP};
+use super::matching::{MIN_COSINE, NORMAL_LENGTH, Observed, SCORE_CAP};
 use super::model::PersonModel;
-use super::observed::Observed;
 use crate::Similarity;
 use crate::people::manifold::Manifold;
 use crate::people::rig::{QUADS, deform};
@@ -14,7 +13,7 @@ use cager_geometry::mesh::Point;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Quads of each limb, and the quad of the trunk that it is at: left arm, left leg, right arm, right leg.
+/// Quads of each limb and the one of the trunk that it is at: left arm, left leg, right ones.
 pub(super) const LIMBS: [([usize; 4], usize); 4] =
     [([5, 6, 7, 8], 2), ([9, 10, 11, 12], 0), ([13, 14, 15, 16], 2), ([17, 18, 19, 20], 0)];
 /// Examples that are tried at the most.
@@ -29,7 +28,7 @@ pub(super) fn limb_scores(parts: &[f64; QUADS]) -> [f64; 4] {
     LIMBS.map(|(quads, _)| quads.iter().map(|&quad| parts[quad]).sum::<f64>() / 4.0)
 }
 
-/// A placed pose with some limbs put where they explain more of what was observed; none where they are well where they are.
+/// A placed pose with some limbs where they explain more; none where they are well as they are.
 pub(super) fn pose_with_other_limbs(
     (model, manifold): (&PersonModel, &Manifold),
     observed: &Observed<'_>,

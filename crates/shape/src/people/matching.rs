@@ -1,8 +1,7 @@
 //! Matches of a template with what was observed, both ways, and how well it lies there by them.
 
-use super::model::{PersonModel, Sampled};
-use super::observed::Observed;
-use super::options::{FitOptions, Method};
+use super::model::PersonModel;
+use super::options::{DEVIATION, Method};
 use crate::people::rig::QUADS;
 use crate::registration::{Observation, OrientedPoints};
 use cager_geometry::mesh::Point;
@@ -19,6 +18,14 @@ pub(super) const MIN_COSINE: f64 = 0.2;
 const KEPT: f64 = 3e-4;
 /// Queries that one task makes at the least.
 const TASK: usize = 32;
+
+/// An observation, ready to be matched.
+pub(super) struct Observed<'a> {
+    pub(super) observation: &'a Observation,
+    pub(super) tree: OrientedPoints,
+    /// Those of its points that are matched with the template.
+    pub(super) chosen: Vec<usize>,
+}
 
 /// Which sample belongs to which observed point.
 #[derive(Default)]
@@ -53,18 +60,19 @@ pub(super) struct Score {
 #[derive(Clone, Copy)]
 pub(super) struct Matching<'a> {
     pub(super) model: &'a PersonModel,
-    pub(super) options: &'a FitOptions,
+    pub(super) method: Method,
     pub(super) observed: &'a Observed<'a>,
     /// One sample and chosen point in so many is matched.
     pub(super) thin: usize,
 }
 
 impl Matching<'_> {
-    /// Matches of the samples with the observation and, but for the paper's method, back. Samples that hardly moved since `pairs` were found keep theirs.
+    /// Matches of samples with the observation and, but for the paper's method, back. Samples that
+    /// hardly moved keep theirs.
     pub(super) fn matches(&self, vertices: &[Point], reach: f64, pairs: &mut Pairs) -> Vec<Match> {
         let sampled = self.model.sampled(vertices, self.thin);
-        let robust = self.options.method == Method::Robust;
-        let unit = self.options.deviation * self.model.height();
+        let robust = self.method == Method::Robust;
+        let unit = DEVIATION * self.model.height();
         let Observation { points, normals } = self.observed.observation;
         self.find(pairs, &sampled);
         let matched = |sample: usize, point: usize, count: usize| {
@@ -88,7 +96,7 @@ impl Matching<'_> {
     }
 
     /// Brings pairs up to date.
-    fn find(&self, pairs: &mut Pairs, sampled: &Sampled) {
+    fn find(&self, pairs: &mut Pairs, sampled: &Observation) {
         let still2 = (KEPT * self.model.height()).powi(2);
         let Pairs { at, forth, back } = pairs;
         let count = sampled.points.len();
@@ -109,7 +117,7 @@ impl Matching<'_> {
                 *at = sampled.points[s];
             });
         let count_moved = has_moved.iter().filter(|&&moved| moved).count();
-        if self.options.method == Method::Robust && (back.is_empty() || count_moved * 20 > count) {
+        if self.method == Method::Robust && (back.is_empty() || count_moved * 20 > count) {
             let tree = OrientedPoints::new(&sampled.points, &sampled.normals, NORMAL_LENGTH * self.model.diagonal());
             let Observation { points, normals } = self.observed.observation;
             let chosen: Vec<usize> = self.observed.chosen.iter().copied().step_by(self.thin).collect();

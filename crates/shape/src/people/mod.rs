@@ -1,11 +1,13 @@
-//! People, after Duveau, Courtemanche, Reveret and Boyer 2012, "Cage-based motion recovery using manifold learning": a rig of oriented quads that makes
-//! a cage (`rig`), a manifold of poses learned from motion-capture clips (`poses`, `manifold`), and the paths of joints (`joints`).
+//! People, after Duveau, Courtemanche, Reveret and Boyer 2012, "Cage-based motion recovery using
+//! manifold learning": a rig of oriented quads that makes a cage, a manifold of poses learned from
+//! motion-capture clips, and the paths of joints.
 //!
-//! A template with a rig is fitted to observed surfaces of a person (§5) by Gauss–Newton with analytic derivatives, in three stages:
-//! placement and latent numbers of the manifold; quads held to the manifold, to their bones' lengths and to the frame before; vertices of the cage.
+//! A template is fitted to observed surfaces of a person (§5) by Gauss–Newton in three stages:
+//! placement and latent numbers; quads held to manifold, bone lengths and the frame before;
+//! vertices of the cage.
 //!
-//! What is fitted are distances of points of the template to the planes of the observed points that they are matched with, both ways, in the unit
-//! `0.005 · height`, less the farther apart and not at all where the surfaces face apart.
+//! Residuals are distances to the planes of matched points, both ways, in the unit `0.005 ·
+//! height`, that count less the farther and not at all where the surfaces face apart.
 
 mod equations;
 mod first_fit;
@@ -15,7 +17,6 @@ mod limbs;
 pub mod manifold;
 mod matching;
 mod model;
-mod observed;
 mod options;
 pub mod poses;
 pub mod rig;
@@ -27,5 +28,5 @@ mod track;
 
 pub use fit::{FrameFit, PersonFit};
 pub use model::{ModelError, PersonModel};
-pub use options::{COORDINATES, FitOptions, Method};
-pub use track::{BackwardPass, PersonTracker, TrackedFrame};
+pub use options::{COORDINATES, FitOptions, Method, SAMPLES};
+pub use track::{PersonTracker, TrackedFrame};

@@ -1,13 +1,13 @@
-//! A template in the cage of its rig: coordinates of all vertices and of samples of the surface, and derivatives by the cage.
+//! A template in the cage of its rig: coordinates of vertices and samples, derivatives by the cage.
 
-use crate::people::rig::{CAGE_VERTICES, QUADS, Rig, owner};
-use crate::registration::{SurfacePoint, sample_surface};
+use crate::people::rig::{CAGE_VERTICES, QUADS, Rig, extent, owner};
+use crate::points::{cage_values, plain, points_in};
+use crate::registration::{Observation, SurfacePoint, sample_surface};
 use cager_core::cage::{Cage, CageError};
 use cager_core::coordinates::{CoordinateSystem, CoordinatesError, DependentNormals, Derivative};
-use cager_geometry::linalg::{tall_product, zeros};
+use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
-use cager_geometry::vector::{cross, dot, norm};
-use faer::Mat;
+use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3};
 
 /// Unknowns of a cage: three for each vertex.
@@ -20,18 +20,12 @@ pub struct PersonModel {
     normals: Option<DependentNormals>,
     /// Coordinates of the vertices.
     phi: Mat<f64>,
-    /// Those of the samples, then of the two edges at each that span its tangent plane, one column each.
+    /// Those of the samples, then of two edges at each that span its tangent plane, in columns.
     samples: Mat<f64>,
     /// Of each sample, the quad that it follows most.
     parts: Vec<usize>,
     height: f64,
     diagonal: f64,
-}
-
-/// A sample of the surface under some cage.
-pub(super) struct Sampled {
-    pub(super) points: Vec<Point>,
-    pub(super) normals: Vec<Point>,
 }
 
 /// Why a template cannot be fitted by a rig.
@@ -78,8 +72,6 @@ impl PersonModel {
         if coordinates.outside.len() as f64 > OUTSIDE * points as f64 {
             return Err(ModelError::Outside { outside: coordinates.outside.len(), points });
         }
-        let heights: Vec<f64> = template.vertices.iter().map(|&p| dot(p, rig.up)).collect();
-        let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
         let drawn = sample_surface(&template.vertices, &template.triangles, samples, 0);
         if drawn.is_empty() {
             return Err(ModelError::NoSurface);
@@ -104,7 +96,7 @@ impl PersonModel {
             rig: rig.clone(),
             phi: coordinates.phi,
             samples: at_samples,
-            height: (high - low).max(f64::MIN_POSITIVE),
+            height: extent(&template.vertices, rig.up),
             diagonal: diagonal(&template.vertices),
         })
     }
@@ -131,8 +123,7 @@ impl PersonModel {
 
     /// The template under a cage with these vertices.
     pub fn deformed(&self, vertices: &[Point]) -> Vec<Point> {
-        let positions = tall_product(self.phi.as_ref(), self.values(vertices).as_ref());
-        (0..positions.nrows()).map(|i| [0, 1, 2].map(|k| positions[(i, k)])).collect()
+        points_in(self.phi.as_ref(), cage_values(self.normals.as_ref(), vertices).as_ref())
     }
 
     /// Number of samples.
@@ -146,27 +137,28 @@ impl PersonModel {
     }
 
     /// One sample in so many under a cage.
-    pub(super) fn sampled(&self, vertices: &[Point], thin: usize) -> Sampled {
+    pub(super) fn sampled(&self, vertices: &[Point], thin: usize) -> Observation {
         if thin == 1 {
-            return positioned(&tall_product(self.samples.transpose(), self.values(vertices).as_ref()));
+            return self.positioned(self.samples.transpose(), vertices);
         }
         self.sampled_at(vertices, &(0..self.sample_count()).step_by(thin).collect::<Vec<_>>())
     }
 
     /// Some samples under a cage.
-    pub(super) fn sampled_at(&self, vertices: &[Point], samples: &[usize]) -> Sampled {
+    pub(super) fn sampled_at(&self, vertices: &[Point], samples: &[usize]) -> Observation {
         let (all, count) = (self.sample_count(), samples.len().max(1));
         let some = Mat::from_fn(self.samples.nrows(), 3 * samples.len(), |j, i| {
             self.samples[(j, i / count * all + samples[i % count])]
         });
-        positioned(&tall_product(some.transpose(), self.values(vertices).as_ref()))
+        self.positioned(some.transpose(), vertices)
     }
 
-    /// Vertices of a cage, and the normals of its faces where the coordinates have some.
-    fn values(&self, vertices: &[Point]) -> Mat<f64> {
-        let normals = self.normals.iter().flat_map(|normals| normals.normals(|v| vertices[v as usize]));
-        let values: Vec<Point> = vertices.iter().copied().chain(normals).collect();
-        Mat::from_fn(values.len(), 3, |i, k| values[i][k])
+    /// Samples under a cage, by coordinates of positions and of two tangent edges at each.
+    fn positioned(&self, coordinates: MatRef<'_, f64>, vertices: &[Point]) -> Observation {
+        let rows: Vec<DVec3> = points_in(coordinates, cage_values(self.normals.as_ref(), vertices).as_ref());
+        let count = rows.len() / 3;
+        let normal = |i: usize| rows[count + i].cross(rows[2 * count + i]).normalize_or_zero().to_array();
+        Observation { points: plain(&rows[..count]), normals: (0..count).map(normal).collect() }
     }
 
     /// Derivatives of the positions of samples by the vertices of a cage, at that cage.
@@ -212,15 +204,4 @@ fn part(coordinates: &[f64]) -> usize {
     let mut sums = [0.0; QUADS];
     coordinates.iter().enumerate().for_each(|(v, weight)| sums[owner(v)] += weight);
     (0..QUADS).max_by(|&a, &b| sums[a].total_cmp(&sums[b])).unwrap_or(0)
-}
-
-/// Samples, from their positions and then the edges at each that span its tangent plane.
-fn positioned(rows: &Mat<f64>) -> Sampled {
-    let count = rows.nrows() / 3;
-    let row = |i: usize| [0, 1, 2].map(|k| rows[(i, k)]);
-    let unit = |n: Point| n.map(|x| x / norm(n).max(f64::MIN_POSITIVE));
-    Sampled {
-        points: (0..count).map(row).collect(),
-        normals: (0..count).map(|i| unit(cross(row(count + i), row(2 * count + i)))).collect(),
-    }
 }

@@ -1,12 +1,12 @@
-//! Where to begin without a frame before: every example of the manifold under eight headings about the up axis.
+//! Where to begin: every example of the manifold under eight headings about the up axis.
 
+use super::matching::{NORMAL_LENGTH, Observed, SCORE_CAP};
 use super::model::PersonModel;
-use super::observed::Observed;
 use crate::Similarity;
 use crate::people::manifold::Manifold;
 use crate::people::rig::deform;
+use crate::points::vectors;
 use crate::registration::{Observation, OrientedPoints};
-use cager_geometry::mesh::Point;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -31,7 +31,7 @@ pub(super) fn search(
     let Observation { points, normals } = observed.observation;
     let some: Vec<DVec3> = observed.chosen.iter().map(|&p| points[p].into()).collect();
     let seen: Vec<usize> = observed.chosen.iter().copied().step_by(THIN).collect();
-    let cap = 0.1 * model.height();
+    let cap = SCORE_CAP * model.height();
     let center = middle(&some);
     let mut starts: Vec<(f64, Similarity, usize, usize)> = examples
         .par_iter()
@@ -39,13 +39,8 @@ pub(super) fn search(
             let vertices =
                 deform(model.rig(), &manifold.pose(manifold.latent(example)), &Similarity::IDENTITY).vertices;
             let sampled = model.sampled(&vertices, THIN);
-            let vectors = |all: &[Point]| -> Vec<DVec3> { all.iter().map(|&p| p.into()).collect() };
             let (at, facing) = (vectors(&sampled.points), vectors(&sampled.normals));
-            let tree = OrientedPoints::new(
-                &at.iter().map(DVec3::to_array).collect::<Vec<_>>(),
-                &facing.iter().map(DVec3::to_array).collect::<Vec<_>>(),
-                0.02 * model.diagonal(),
-            );
+            let tree = OrientedPoints::new(&at, &facing, NORMAL_LENGTH * model.diagonal());
             (0..HEADINGS)
                 .map(|heading| {
                     let rotation = DMat3::from_axis_angle(up, TAU * heading as f64 / HEADINGS as f64);
@@ -54,13 +49,13 @@ pub(super) fn search(
                     let placement = Similarity { rotation, translation, ..Similarity::IDENTITY };
                     let forth = at.iter().zip(&facing).map(|(&p, &n)| {
                         let p = placement.apply(p);
-                        let found = observed.tree.nearest(p.to_array(), (rotation * n).to_array()).0;
+                        let found = observed.tree.nearest(p, rotation * n).0;
                         p.distance(points[found].into()).min(cap)
                     });
                     let back = seen.iter().map(|&s| {
                         let turned = rotation.transpose() * (DVec3::from(points[s]) - placement.translation);
                         let normal = rotation.transpose() * DVec3::from(normals[s]);
-                        let found = tree.nearest(turned.to_array(), normal.to_array()).0;
+                        let found = tree.nearest(turned, normal).0;
                         turned.distance(at[found]).min(cap)
                     });
                     let cost = forth.sum::<f64>() / at.len() as f64 + back.sum::<f64>() / seen.len() as f64;

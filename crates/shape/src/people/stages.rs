@@ -45,7 +45,7 @@ impl Linearized {
         }
     }
 
-    /// Takes a row of derivatives by the vertices to one by placement and pose, or leaves it as it is.
+    /// Takes derivatives by the vertices to those by placement and pose, or leaves them.
     pub(super) fn pull(&self, row: &[f64], out: &mut [f64]) {
         match &self.by {
             By::Vertices => out.copy_from_slice(row),
@@ -145,7 +145,7 @@ impl Stage for LatentStage<'_> {
     }
 }
 
-/// Stage (b): placement and quads, held by `‖W(y − ŷ)‖²` and the lengths of bones; free where the weights are zero.
+/// Stage (b): placement and quads, held by `‖W(y − ŷ)‖²` and the lengths of bones.
 pub(super) struct QuadStage<'a> {
     pub(super) rig: &'a Rig,
     pub(super) placement: Similarity,
@@ -199,7 +199,7 @@ impl Stage for QuadStage<'_> {
     }
 }
 
-/// Stage (c): the vertices of the cage, whose differential coordinates (each vertex less the mean of its neighbours) stay those of the quads' cage.
+/// Stage (c): the vertices, whose differential coordinates stay those of the quads' cage.
 pub(super) struct VertexStage {
     vertices: Vec<Point>,
     /// Uniform Laplacian, by rows.

@@ -1,4 +1,4 @@
-//! A sequence: each frame from the one before or, where that is lost, from a search; then once more from the last frame to the first.
+//! A sequence: each frame from the one before or, if lost, from a search; then once more backwards.
 
 use super::fit::{FrameFit, PersonFit};
 use super::limbs::limb_scores;
@@ -9,7 +9,7 @@ use crate::registration::Observation;
 pub struct TrackedFrame {
     /// Its fit.
     pub fit: FrameFit,
-    /// Its score, or that of an arm or leg, is far above that of the others, even from a search: part of the person is not there or not found.
+    /// Its score, or that of a limb, is far above the others': part of the person is not found.
     pub lost: bool,
     /// It was found by a search.
     pub searched: bool,
@@ -19,26 +19,28 @@ pub struct TrackedFrame {
 const SUSPECT: f64 = 1.15;
 /// A frame is lost above this many times the usual score.
 const LOST_RATIO: f64 = 1.5;
-/// And where a limb is, above this many times the usual score of the worst limb: an arm that lies elsewhere hardly moves the score of the whole.
+/// And a limb's above this many times the usual one of the worst limb: it hardly moves the whole's.
 const LIMB_LOST: f64 = 1.85;
 /// No frame is found above this score, a share of the height.
 const MAX_SCORE: f64 = 0.03;
 /// Frames that the usual score is of.
 const WINDOW: usize = 31;
 
-/// In the second pass, frames whose score is below this many times that of the next one are left as they are.
+/// Frames that score below so many times the next one are left as they are in the second pass.
 const AGREED: f64 = 0.9;
 
-/// Fits a sequence forwards, frame by frame as they come.
+/// Fits a sequence forwards, frame by frame as they come, then backwards.
 pub struct PersonTracker<'f, 'a> {
     fit: &'f PersonFit<'a>,
     frames: Vec<TrackedFrame>,
+    /// The usual score of the first pass, once that is over.
+    usual: Option<f64>,
 }
 
 impl<'f, 'a> PersonTracker<'f, 'a> {
     /// Before the first frame.
     pub fn new(fit: &'f PersonFit<'a>) -> Self {
-        Self { fit, frames: Vec::new() }
+        Self { fit, frames: Vec::new(), usual: None }
     }
 
     /// The frames so far.
@@ -52,42 +54,27 @@ impl<'f, 'a> PersonTracker<'f, 'a> {
         let last = frames.last().filter(|frame| !frame.lost).map(|frame| &frame.fit);
         let usual = usual_of(frames.iter().rev().take(WINDOW).filter(|frame| !frame.lost).map(|frame| frame.fit.score));
         let mut frame = TrackedFrame { fit: fit.fit(observation, last), lost: false, searched: last.is_none() };
-        if !frame.searched && usual.is_some_and(|usual| frame.fit.score > SUSPECT * usual) {
+        if !frame.searched && frame.fit.score > SUSPECT * usual {
             let found = fit.fit(observation, None);
             if found.score < frame.fit.score {
                 frame = TrackedFrame { fit: found, lost: false, searched: true };
             }
         }
-        frame.lost = frame.fit.score > MAX_SCORE || usual.is_some_and(|usual| frame.fit.score > LOST_RATIO * usual);
+        frame.lost = is_lost(&frame.fit, usual);
         frames.push(frame);
         &frames[frames.len() - 1]
     }
 
-    /// The second pass, from the last frame to the first.
-    pub fn back(self) -> BackwardPass<'f, 'a> {
-        let usual = usual_of(self.frames.iter().map(|frame| frame.fit.score));
-        BackwardPass { fit: self.fit, frames: self.frames, usual }
-    }
-}
-
-/// Fits a sequence backwards after [`PersonTracker`], keeping the better fit of each frame.
-pub struct BackwardPass<'f, 'a> {
-    fit: &'f PersonFit<'a>,
-    frames: Vec<TrackedFrame>,
-    /// The usual score of the first pass.
-    usual: Option<f64>,
-}
-
-impl BackwardPass<'_, '_> {
-    /// Fits a frame from the one after it, unless it lies well already; to be called from the last frame to the first.
-    pub fn refit(&mut self, number: usize, observation: impl FnOnce() -> Observation) {
+    /// Fits a frame from the one after it, unless it lies well, and keeps the better fit; from the last
+    /// frame to the first, after all were followed.
+    pub fn refit(&mut self, number: usize, observation: &Observation) {
+        let scores = self.frames.iter().map(|frame| frame.fit.score);
+        let usual = *self.usual.get_or_insert_with(|| usual_of(scores));
         let (before, from) = self.frames.split_at_mut(number + 1);
         let (Some(frame), Some(from)) = (before.last_mut(), from.first()) else { return };
-        if from.lost || frame.fit.score < AGREED * from.fit.score {
-            return;
+        if !from.lost && frame.fit.score >= AGREED * from.fit.score {
+            frame.take_better(self.fit.fit(observation, Some(&from.fit)), usual);
         }
-        let again = self.fit.fit(&observation(), Some(&from.fit));
-        frame.take_better(again, self.usual);
     }
 
     /// All frames; which of them are lost follows from the usual score of all.
@@ -97,11 +84,15 @@ impl BackwardPass<'_, '_> {
     }
 }
 
+fn is_lost(fit: &FrameFit, usual: f64) -> bool {
+    fit.score > MAX_SCORE || fit.score > LOST_RATIO * usual
+}
+
 impl TrackedFrame {
-    /// Takes another fit if it is better; the frame is found then, if it is good, so that the one before can be fitted from it.
-    fn take_better(&mut self, again: FrameFit, usual: Option<f64>) {
+    /// Takes another fit if it is better.
+    fn take_better(&mut self, again: FrameFit, usual: f64) {
         if again.score < self.fit.score {
-            self.lost = again.score > MAX_SCORE || usual.is_some_and(|usual| again.score > LOST_RATIO * usual);
+            self.lost = is_lost(&again, usual);
             self.fit = again;
         }
     }
@@ -111,10 +102,8 @@ impl TrackedFrame {
 fn judge(frames: &mut [TrackedFrame]) {
     let usual = usual_of(frames.iter().map(|frame| frame.fit.score));
     let usual_limb = usual_of(frames.iter().map(|frame| worst_limb(&frame.fit)));
-    let (Some(usual), Some(usual_limb)) = (usual, usual_limb) else { return };
     for frame in frames {
-        let most = MAX_SCORE.min(LOST_RATIO * usual);
-        frame.lost = frame.fit.score > most || worst_limb(&frame.fit) > LIMB_LOST * usual_limb;
+        frame.lost = is_lost(&frame.fit, usual) || worst_limb(&frame.fit) > LIMB_LOST * usual_limb;
     }
 }
 
@@ -122,11 +111,11 @@ fn worst_limb(fit: &FrameFit) -> f64 {
     limb_scores(&fit.parts).into_iter().fold(0.0, f64::max)
 }
 
-/// The lower quartile: frames that are off raise it least.
-fn usual_of(scores: impl Iterator<Item = f64>) -> Option<f64> {
+/// The lower quartile: frames that are off raise it least. Infinite without any.
+fn usual_of(scores: impl Iterator<Item = f64>) -> f64 {
     let mut scores: Vec<f64> = scores.collect();
     scores.sort_unstable_by(f64::total_cmp);
-    scores.get(scores.len() / 4).copied()
+    scores.get(scores.len() / 4).copied().unwrap_or(f64::INFINITY)
 }
 
 #[cfg(test)]
@@ -146,11 +135,11 @@ mod tests {
     #[test]
     fn a_lost_frame_that_is_fitted_better_on_the_way_back_is_found() {
         let mut lost = TrackedFrame { lost: true, ..frame(0.04, 0.007) };
-        lost.take_better(frame(0.05, 0.007).fit, Some(0.01));
+        lost.take_better(frame(0.05, 0.007).fit, 0.01);
         assert!(lost.lost && lost.fit.score == 0.04);
-        lost.take_better(frame(0.02, 0.007).fit, Some(0.01));
+        lost.take_better(frame(0.02, 0.007).fit, 0.01);
         assert!(lost.lost && lost.fit.score == 0.02);
-        lost.take_better(frame(0.012, 0.007).fit, Some(0.01));
+        lost.take_better(frame(0.012, 0.007).fit, 0.01);
         assert!(!lost.lost && lost.fit.score == 0.012);
     }
 

@@ -1,6 +1,6 @@
 //! What a pose does to a mesh: folded and stretched triangles, volume.
 
-use crate::registration::welded;
+use crate::points::welded;
 use cager_geometry::mesh::{Point, TriMesh};
 use glam::{DMat3, DVec3};
 

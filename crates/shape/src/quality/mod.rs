@@ -1,4 +1,4 @@
-//! Measures of what a motion does to a mesh: how evenly its triangles follow, and how smoothly in time.
+//! What a motion does to a mesh: how evenly its triangles follow, and how smoothly in time.
 
 mod frame;
 mod motion;

@@ -28,8 +28,8 @@ pub struct MotionSummary {
     pub stretched: Option<f64>,
     /// The least and the greatest volume over that at rest; none for a mesh that is not closed.
     pub volume: Option<[f64; 2]>,
-    /// Mean second difference of the target's points over that of the source's, each as a share of its size. None for fewer than three frames, or
-    /// where the source moves evenly.
+    /// Mean second difference of the target's points over the source's, by their sizes. None for
+    /// fewer than three frames, or where the source moves evenly.
     pub jitter: Option<f64>,
 }
 

@@ -2,9 +2,12 @@
 
 use cager_geometry::linalg::{gram, tall_product, transposed_product};
 use cager_geometry::vector::Point;
-use faer::{Mat, MatRef};
+use faer::Mat;
+use glam::DVec3;
 
-/// Points of a template that are pulled to given places: rows beside the matches, of a weight together that is relative to the mean of all matches one way.
+use crate::points::{matrix, row_points};
+
+/// Points of a template that are pulled to given places, with a weight beside all matches one way.
 #[derive(Clone, Debug)]
 pub struct Anchors {
     /// Coordinates of the points, k × m.
@@ -28,11 +31,9 @@ impl Anchors {
         Self { coordinates, places: Mat::from_fn(places.len(), 3, |i, k| places[i][k]), weight }
     }
 
-    /// What pulls a cage, m × 3, of a template of this diagonal.
-    pub(crate) fn pull(&self, cage: MatRef<'_, f64>, diagonal: f64) -> Mat<f64> {
-        let left = &self.places - tall_product(self.coordinates.as_ref(), cage);
-        let pull = transposed_product(self.coordinates.as_ref(), left.as_ref(), BLOCK_ROWS);
-        faer::Scale(self.weight / (diagonal * diagonal)) * pull
+    /// What pulls a cage of a template of this diagonal.
+    pub(crate) fn pull(&self, cage: &[DVec3], diagonal: f64) -> Vec<DVec3> {
+        self.forces(&self.places - self.positions(cage), diagonal)
     }
 
     /// Half the Hessian, m × m, its lower triangle.
@@ -41,9 +42,16 @@ impl Anchors {
     }
 
     /// The Hessian times a change of the cage.
-    pub(crate) fn hessian_times(&self, x: MatRef<'_, f64>, diagonal: f64) -> Mat<f64> {
-        let moved = tall_product(self.coordinates.as_ref(), x);
-        let forces = transposed_product(self.coordinates.as_ref(), moved.as_ref(), BLOCK_ROWS);
-        faer::Scale(self.weight / (diagonal * diagonal)) * forces
+    pub(crate) fn hessian_times(&self, x: &[DVec3], diagonal: f64) -> Vec<DVec3> {
+        self.forces(self.positions(x), diagonal)
+    }
+
+    fn positions(&self, cage: &[DVec3]) -> Mat<f64> {
+        tall_product(self.coordinates.as_ref(), matrix(cage).as_ref())
+    }
+
+    fn forces(&self, by: Mat<f64>, diagonal: f64) -> Vec<DVec3> {
+        let forces = transposed_product(self.coordinates.as_ref(), by.as_ref(), BLOCK_ROWS);
+        row_points((faer::Scale(self.weight / (diagonal * diagonal)) * forces).as_ref())
     }
 }

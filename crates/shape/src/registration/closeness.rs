@@ -1,4 +1,4 @@
-//! How far one surface lies from another, without a floor from sampling: from points of each to the triangles of the other.
+//! How far one surface lies from another, without a floor from sampling: points to triangles.
 
 use cager_geometry::spatial::Surface;
 use cager_geometry::spatial::distance::point_triangle2;
@@ -23,13 +23,13 @@ enum Shape {
     Points { tree: OrientedPoints, points: Vec<DVec3>, normals: Vec<DVec3> },
 }
 
-/// What normals count: the distance that is added, in squares, for a difference of normals of one, as a share of the size.
+/// What a difference of normals of one adds to distances, in squares, as a share of the size.
 const NORMAL_LENGTH: f64 = 0.02;
 /// Points of each surface that are measured.
 const MEASURED: usize = 3000;
 
 impl MeasuredSurface {
-    /// Distances count no more than this share of the size, so that scores near it say only that surfaces are at least so far apart.
+    /// Distances count no more than this share of the size.
     pub const MAX_DISTANCE: f64 = 0.05;
 
     /// Triangles, facing outwards. Distances are shares of `size`.
@@ -48,8 +48,9 @@ impl MeasuredSurface {
         Self { shape: Shape::Points { tree, points: vectors(&cloud.points), normals: vectors(&cloud.normals) }, size }
     }
 
-    /// Mean distance both ways between this surface, of which `own` are points, and triangles that face outwards, as a share of the size: that of the nearest
-    /// point, where what faces away is farther off (by up to 4 %). Distances beyond 5 % count as 5 %. NaN where one of them is not finite.
+    /// Mean distance both ways between this surface, of which `own` are points, and outward
+    /// triangles, as a share of the size; what faces away is farther off (by up to 4 %). Distances
+    /// beyond 5 % count as 5 %. NaN where one of them is not finite.
     pub fn distance(&self, own: &Observation, vertices: &[Point], triangles: &[[u32; 3]], seed: u64) -> f64 {
         let samples = sample_surface(vertices, triangles, MEASURED, seed);
         let normal = |face: u32| area_vector(triangles[face as usize].map(|v| vertices[v as usize]));
@@ -84,7 +85,7 @@ impl MeasuredSurface {
                 surface.tree.nearest(point, most * most, distance2).map_or(most, |(_, d2)| d2.sqrt())
             }
             Shape::Points { tree, points, normals } => {
-                let (k, d2) = tree.nearest(point.to_array(), normal.to_array());
+                let (k, d2) = tree.nearest(point, normal);
                 let plane = (point - points[k]).dot(normals[k]);
                 if d2 < most * most { (plane * plane + turned(normals[k])).sqrt() } else { most }
             }

@@ -1,10 +1,10 @@
-//! Coordinates in single precision, for the many products that need every entry but not every digit.
+//! Coordinates in single precision, for products that need every entry but not every digit.
 
 use faer::MatRef;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Rows that sum to one, back to back. They take a quarter of the memory that passes through a product in double precision that packs them first, and that is what it waits for.
+/// Rows that sum to one, back to back: a product waits for memory, of which they take a quarter.
 pub(crate) struct DenseRows {
     columns: usize,
     /// Columns with what fills them up to whole lanes.

@@ -5,8 +5,8 @@ use glam::DVec3;
 
 use super::nearest::NearestPoints;
 
-/// Oriented points in a tree over six dimensions: position, and unit normal times a length. The nearest there is near in space and faces the same
-/// way, so that a finger is not matched with the back of its neighbour.
+/// Oriented points in a tree over positions and scaled normals. The nearest is near in space and
+/// faces the same way, so that a finger does not match the back of its neighbour.
 pub struct OrientedPoints {
     tree: NearestPoints<6>,
     normal_length: f64,
@@ -17,27 +17,22 @@ impl OrientedPoints {
     ///
     /// # Panics
     /// Without any point.
-    pub fn new(points: &[Point], normals: &[Point], normal_length: f64) -> Self {
+    pub fn new<P: Copy + Into<Point>>(points: &[P], normals: &[P], normal_length: f64) -> Self {
         let joined = points.iter().zip(normals).map(|(&p, &n)| join(p, n, normal_length));
         Self { tree: NearestPoints::new(joined), normal_length }
     }
 
     /// The number of the nearest point, and the squared distance in six dimensions.
-    pub fn nearest(&self, point: Point, normal: Point) -> (usize, f64) {
+    pub fn nearest<P: Into<Point>>(&self, point: P, normal: P) -> (usize, f64) {
         self.tree.nearest(join(point, normal, self.normal_length))
     }
 
-    /// [`Self::nearest`], where the number of a point is known that is near already: nothing is looked for beyond it.
-    pub fn nearest_from(&self, point: Point, normal: Point, known: usize) -> (usize, f64) {
-        self.tree.nearest_from(join(point, normal, self.normal_length), known)
-    }
-
-    /// [`Self::nearest`], from the one that was it before, if any; it is remembered.
+    /// [`Self::nearest`], no farther than the one that was it before, if any; it is remembered.
     pub(crate) fn nearest_again(&self, point: DVec3, normal: DVec3, known: &mut Option<u32>) -> (usize, f64) {
-        let (point, normal) = (point.to_array(), normal.to_array());
+        let joined = join(point, normal, self.normal_length);
         let found = match *known {
-            Some(known) => self.nearest_from(point, normal, known as usize),
-            None => self.nearest(point, normal),
+            Some(known) => self.tree.nearest_from(joined, known as usize),
+            None => self.tree.nearest(joined),
         };
         *known = Some(found.0 as u32);
         found
@@ -67,15 +62,9 @@ impl KnownMatches {
 }
 
 /// A point with its normal in six dimensions.
-pub(crate) fn join(point: Point, normal: Point, normal_length: f64) -> [f64; 6] {
-    let ([x, y, z], [a, b, c]) = (point, normal.map(|x| normal_length * x));
+pub(crate) fn join<P: Into<Point>>(point: P, normal: P, normal_length: f64) -> [f64; 6] {
+    let ([x, y, z], [a, b, c]) = (point.into(), normal.into().map(|x| normal_length * x));
     [x, y, z, a, b, c]
-}
-
-/// How much a match counts: nothing where the surfaces face more than about 78° apart, less the further apart they are.
-pub(crate) fn match_weight(cosine: f64, offset: DVec3, reach: f64) -> f64 {
-    const MIN_COSINE: f64 = 0.2;
-    if cosine > MIN_COSINE { cosine / (1.0 + offset.length_squared() / (reach * reach)).powi(2) } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl<const D: usize> NearestPoints<D> {
         found.first().map_or((0, f64::INFINITY), |found| (found.index as usize, found.dist2.into_inner()))
     }
 
-    /// [`Self::nearest`], where the number of a point is known that is near already: nothing is looked for beyond it.
+    /// [`Self::nearest`], looked for no farther than a known point.
     pub fn nearest_from(&self, query: [f64; D], known: usize) -> (usize, f64) {
         let query = node(query);
         let squares = query.0.iter().zip(&self.points[known].0).map(|(a, b)| (a.into_inner() - b.into_inner()).powi(2));

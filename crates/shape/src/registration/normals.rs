@@ -14,8 +14,9 @@ const PLANE_POINTS: u32 = 12;
 /// Neighbours that agree on a side.
 const NEIGHBOURS: u32 = 8;
 
-/// Unit normals of the points `kept`, each of the plane through its neighbours among all points, all on one side: from point to neighbour, along the way on
-/// which planes turn least (Hoppe et al. 1992), beginning where the side is plain, at the highest point. None where all points lie on a line.
+/// Unit normals of the points `kept`, of planes through their neighbours, all on one side: from
+/// point to neighbour along the way on which planes turn least (Hoppe et al. 1992), from the
+/// highest point. None where all points lie on a line.
 pub(crate) fn estimated_normals(points: &[Point], kept: &[u32]) -> Option<Vec<Point>> {
     let tree = NearestPoints::new(points.iter().copied());
     let mut flat = 0;

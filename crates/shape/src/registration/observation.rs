@@ -1,4 +1,4 @@
-//! A surface as it was seen once: points of it with outward normals, from a mesh or from a cloud, checked.
+//! A surface as it was seen once: points with outward normals, from a mesh or a cloud, checked.
 
 use cager_geometry::mesh::diagonal;
 use cager_geometry::vector::{Point, dot, mean, sub};
@@ -9,7 +9,7 @@ use super::orientation::{Oriented, oriented};
 use super::sampling::sample_surface;
 use crate::points::area_vector;
 
-/// Points of a surface, each with its outward unit normal. Nothing corresponds from one observation to the next.
+/// Points of a surface with outward unit normals. Nothing corresponds between observations.
 #[derive(Clone, Debug, Default)]
 pub struct Observation {
     /// The points.
@@ -49,36 +49,24 @@ pub struct ObservationNotes {
 /// Why a surface cannot be an observation.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ObservationError {
-    /// Fewer points than a surface has.
-    #[error("has {points} points; a surface needs at least {MIN_POINTS}")]
-    TooFewPoints {
-        /// Points there are.
-        points: usize,
-    },
-    /// A coordinate is NaN or infinite.
-    #[error("has a coordinate that is NaN or infinite at vertex {vertex}; repair or remove it")]
-    NotFinite {
-        /// The first such point.
-        vertex: usize,
-    },
-    /// Coordinates that cannot be calculated with, or points that all but coincide.
-    #[error("reaches {extent:e} units; scale it to something between 1e-20 and 1e20")]
-    Extreme {
-        /// The largest coordinate, or the extent.
-        extent: f64,
-    },
+    /// Fewer points than a surface has: how many there are.
+    #[error("has {0} points; a surface needs at least {MIN_POINTS}")]
+    TooFewPoints(usize),
+    /// A coordinate is NaN or infinite: the first such point.
+    #[error("has a coordinate that is NaN or infinite at vertex {0}; repair or remove it")]
+    NotFinite(usize),
+    /// Coordinates that cannot be calculated with, or points that all but coincide: the extent.
+    #[error("reaches {0:e} units; scale it to something between 1e-20 and 1e20")]
+    Extreme(f64),
     /// All faces are points or lines, or none is left.
     #[error("has faces, but none of them has an area; export the mesh again")]
     NoArea,
     /// All points lie on a line or in one place.
     #[error("has points on one line only; a surface cannot be told from them")]
     Line,
-    /// Normals that are zero or not finite.
-    #[error("has no normal at vertex {vertex}; write normals for all points, or for none")]
-    NoNormal {
-        /// The first such point.
-        vertex: usize,
-    },
+    /// Normals that are zero or not finite: the first such point.
+    #[error("has no normal at vertex {0}; write normals for all points, or for none")]
+    NoNormal(usize),
 }
 
 /// The least number of points of an observation.
@@ -87,8 +75,25 @@ const MIN_POINTS: usize = 10;
 const MAX_EXTENT: f64 = 1e20;
 
 impl Observation {
-    /// Points drawn of a triangle mesh, even by area. Faces that run against their neighbours are turned, and all of them where they face inwards;
-    /// vertices that share their position are one for that.
+    /// [`Self::of_mesh`], or [`Self::of_cloud`] where there are no triangles.
+    ///
+    /// # Errors
+    /// See [`ObservationError`].
+    pub fn of_surface(
+        vertices: &[Point],
+        triangles: &[[u32; 3]],
+        normals: &[Point],
+        options: &ObservationOptions,
+    ) -> Result<(Self, ObservationNotes), ObservationError> {
+        if triangles.is_empty() {
+            Self::of_cloud(vertices, normals, options)
+        } else {
+            Self::of_mesh(vertices, triangles, options)
+        }
+    }
+
+    /// Points drawn of a triangle mesh, even by area. Faces that run against their neighbours are
+    /// turned, and all where they face inwards; vertices at one place are one for that.
     ///
     /// # Errors
     /// See [`ObservationError`].
@@ -112,7 +117,7 @@ impl Observation {
         Ok((observation, ObservationNotes { turned, turned_faces, area: Some(area), ..ObservationNotes::default() }))
     }
 
-    /// Points kept of a cloud, with their normals or, where `normals` is empty, estimated ones; all are turned where they point inwards.
+    /// Points kept of a cloud, with given or, without any, estimated normals, turned outwards.
     ///
     /// # Errors
     /// See [`ObservationError`].
@@ -138,7 +143,7 @@ impl Observation {
         } else {
             let unit = |&k: &u32| {
                 let normal = DVec3::from(normals[k as usize]);
-                normal.try_normalize().map(|n| n.to_array()).ok_or(ObservationError::NoNormal { vertex: k as usize })
+                normal.try_normalize().map(|n| n.to_array()).ok_or(ObservationError::NoNormal(k as usize))
             };
             kept.iter().map(unit).collect::<Result<_, _>>()?
         };
@@ -158,23 +163,23 @@ impl Observation {
 
 fn check_points(points: &[Point]) -> Result<(), ObservationError> {
     if points.len() < MIN_POINTS {
-        return Err(ObservationError::TooFewPoints { points: points.len() });
+        return Err(ObservationError::TooFewPoints(points.len()));
     }
     if let Some(vertex) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-        return Err(ObservationError::NotFinite { vertex });
+        return Err(ObservationError::NotFinite(vertex));
     }
     let largest = points.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let extent = diagonal(points);
     if largest > MAX_EXTENT {
-        Err(ObservationError::Extreme { extent: largest })
+        Err(ObservationError::Extreme(largest))
     } else if extent > 0.0 && extent < 1.0 / MAX_EXTENT {
-        Err(ObservationError::Extreme { extent })
+        Err(ObservationError::Extreme(extent))
     } else {
         Ok(())
     }
 }
 
-/// Whether normals point inwards: `Σ (p − centre) · n` of points spread over a closed surface has the sign of the volume, three times which it estimates.
+/// By `Σ (p − centre) · n`, which over a closed surface has the sign of the volume.
 fn points_inwards(points: &[Point], normals: &[Point]) -> bool {
     let center = mean(points);
     points.iter().zip(normals).map(|(&p, &n)| dot(sub(p, center), n)).sum::<f64>() < 0.0

@@ -1,7 +1,6 @@
 //! Triangles turned to face outwards.
 
-use crate::points::renamed;
-use cager_geometry::mesh::welded;
+use crate::points::{renamed, welded};
 use cager_geometry::topology::orientations;
 use cager_geometry::vector::{Point, cross, dot, mean, sub};
 use rayon::prelude::*;
@@ -15,11 +14,10 @@ pub(crate) struct Oriented {
     pub(crate) turned: bool,
 }
 
-/// Turns faces that run against their neighbours, part by part, then all of them where the whole encloses a negative volume. Vertices at the
-/// same place are one: scans double them along seams of their textures.
+/// Turns faces that run against their neighbours, part by part, then all where they enclose a
+/// negative volume. Vertices at one place are one.
 pub(crate) fn oriented(vertices: &[Point], triangles: &[[u32; 3]]) -> Oriented {
-    let welded = welded(vertices);
-    let links = links(&renamed(triangles, &welded));
+    let links = links(&renamed(triangles, &welded(vertices)));
     let mut triangles = triangles.to_vec();
     let against = links.iter().any(|link| link.against);
     let turned_faces = if against { turn_parts(vertices, &mut triangles, &links) } else { 0 };
@@ -30,7 +28,7 @@ pub(crate) fn oriented(vertices: &[Point], triangles: &[[u32; 3]]) -> Oriented {
     Oriented { triangles, turned_faces, turned }
 }
 
-/// The triangles of a mesh turned to face outwards: those that run against their neighbours, then all where they enclose a negative volume.
+/// Triangles turned outwards: those against their neighbours, then all if their volume is negative.
 pub fn outward(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     oriented(vertices, triangles).triangles
 }
@@ -58,7 +56,7 @@ fn links(triangles: &[[u32; 3]]) -> Vec<Link> {
         .collect()
 }
 
-/// Turns faces so that linked ones agree where they can, and each part so that it encloses a positive volume. How many were turned.
+/// Makes linked faces agree where they can, and each part's volume positive. How many were turned.
 fn turn_parts(vertices: &[Point], triangles: &mut [[u32; 3]], links: &[Link]) -> usize {
     let mut of_face: Vec<Vec<(u32, bool)>> = vec![Vec::new(); triangles.len()];
     for &Link { faces: [f, g], against } in links {
@@ -86,7 +84,7 @@ fn turn_parts(vertices: &[Point], triangles: &mut [[u32; 3]], links: &[Link]) ->
     turned
 }
 
-/// Six times the volume that triangles enclose, as seen from `center`; of open surfaces, with cones from there over the borders.
+/// Six times the volume that triangles enclose with cones from `center` over their borders.
 fn volume6(vertices: &[Point], triangles: &[[u32; 3]], center: Point) -> f64 {
     let from = |v: u32| sub(vertices[v as usize], center);
     triangles.iter().map(|&[a, b, c]| dot(from(a), cross(from(b), from(c)))).sum()

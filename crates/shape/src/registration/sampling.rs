@@ -21,15 +21,15 @@ impl SurfacePoint {
     }
 }
 
-/// The vertices that triangles use, in their order: what belongs to the surface. All of them where there are no triangles.
+/// The vertices that triangles use, in their order; all where there are no triangles.
 pub fn surface_vertices(vertices: &[Point], triangles: &[[u32; 3]]) -> Vec<Point> {
     let mut used = vec![triangles.is_empty(); vertices.len()];
     triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
     vertices.iter().zip(used).filter(|(_, used)| *used).map(|(&p, _)| p).collect()
 }
 
-/// `count` points of a surface at random, one in each of as many parts of equal area, in the order of the triangles. None where the surface has
-/// no area.
+/// `count` random points of a surface, one in each of as many parts of equal area, in the order of
+/// the triangles. None where it has no area.
 pub fn sample_surface(vertices: &[Point], triangles: &[[u32; 3]], count: usize, seed: u64) -> Vec<SurfacePoint> {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut sums = Vec::with_capacity(triangles.len());
@@ -55,8 +55,9 @@ pub fn sample_surface(vertices: &[Point], triangles: &[[u32; 3]], count: usize, 
 /// Points that spread ones are chosen among, at the most.
 const MAX_CANDIDATES: usize = 20_000;
 
-/// Up to `count` of some points with these unit normals, spread by position and normal, where a normal counts as much as a distance of `normal_length`. Points
-/// without a normal are taken only where none has one; of very many, those are chosen among that `seed` draws.
+/// Up to `count` of some points, spread by position and normal, which counts as a distance of
+/// `normal_length`. Points without a normal are taken only where none has one; of very many, those
+/// are chosen among that `seed` draws.
 pub(crate) fn spread(points: &[Point], normals: &[Point], count: usize, normal_length: f64, seed: u64) -> Vec<u32> {
     let mut candidates: Vec<u32> = (0..points.len() as u32).filter(|&v| normals[v as usize] != [0.0; 3]).collect();
     if candidates.is_empty() {
@@ -72,7 +73,8 @@ pub(crate) fn spread(points: &[Point], normals: &[Point], count: usize, normal_l
     farthest(&joined, count).into_iter().map(|k| candidates[k as usize]).collect()
 }
 
-/// Up to `count` of some points, each the farthest from those before it; the first is the one of greatest second coordinate.
+/// Up to `count` points, each the farthest from those before; first that of greatest second
+/// coordinate.
 pub fn farthest<const D: usize>(points: &[[f64; D]], count: usize) -> Vec<u32> {
     let Some(first) = (0..points.len()).max_by(|&i, &j| points[i][1].total_cmp(&points[j][1])) else {
         return Vec::new();

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::matching::{KnownMatches, OrientedPoints};
 use super::target::{NORMAL_LENGTH, Target};
 use super::template::Template;
-use crate::points::{matrix, plain};
+use crate::points::vectors;
 
 /// Distances count no more than this in a score, as a share of the diagonal.
 const MAX_SCORED: f64 = 0.05;
@@ -15,19 +15,13 @@ const MAX_SCORED: f64 = 0.05;
 const SCORED_EVERY: usize = 5;
 
 impl Template {
-    /// How well the template lies on a surface in a cage: the root mean square, both ways, of the distance from the plane of the nearest point and of the difference of
-    /// normals together, as a share of the diagonal; distances beyond 5 % count as 5 %.
-    pub fn score(&self, target: &Target, cage: &[Point]) -> f64 {
-        self.score_from(target, cage, 1, &mut self.unmatched(target))
-    }
-
-    /// [`Self::score`] of one point in so many (0 counts as 1), whose matches are looked for near the last ones, unless these are of a surface of another
-    /// number of points.
-    pub fn score_from(&self, target: &Target, cage: &[Point], every: usize, known: &mut KnownMatches) -> f64 {
-        let every = every.max(1);
+    /// How well the template lies on a surface in a cage, by one point in so many: the root mean
+    /// square, both ways, of plane distance and difference of normals, as a share of the diagonal,
+    /// 5 % at the most. Matches are looked for as in [`Self::fit`].
+    pub fn score(&self, target: &Target, cage: &[Point], every: usize, known: &mut KnownMatches) -> f64 {
         known.keep_if_of(self.samples.len(), target.points.len());
-        let (positions, normals) = self.samples_in(matrix(cage).as_ref());
-        let samples = OrientedPoints::new(&plain(&positions), &plain(&normals), target.normal_length);
+        let (positions, normals) = self.samples_in(&vectors(cage));
+        let samples = OrientedPoints::new(&positions, &normals, target.normal_length);
         let scored = |offset: DVec3, own: DVec3, other: DVec3, d2: f64| {
             let far = d2.sqrt() / self.diagonal;
             let plane = offset.dot(other) / self.diagonal;

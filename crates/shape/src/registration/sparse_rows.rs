@@ -1,11 +1,11 @@
-//! Coordinates whose small entries are left out, for the many products of a solver that needs no more.
+//! Coordinates without small entries, for the products of a solver that needs no more.
 
 use faer::MatRef;
-use glam::{DVec3, Vec3A};
+use glam::Vec3A;
 use rayon::prelude::*;
 
-/// The larger entries of coordinates in single precision, by rows and by columns. Rows are scaled to sum to one as coordinates do, so that what moves the whole
-/// cage moves every point.
+/// The larger coordinates in single precision, by rows and by columns. Rows are scaled to sum to
+/// one, so that what moves the whole cage moves every point.
 pub(crate) struct SparseRows {
     rows: Compressed,
     columns: Compressed,
@@ -81,9 +81,4 @@ impl Compressed {
         }
         (0..lists).into_par_iter().with_min_len(128).map(row).collect()
     }
-}
-
-/// The rows of an n × 3 matrix in single precision.
-pub(crate) fn single(matrix: MatRef<'_, f64>) -> Vec<Vec3A> {
-    (0..matrix.nrows()).map(|i| DVec3::new(matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)]).as_vec3a()).collect()
 }

@@ -2,35 +2,23 @@
 
 use cager_core::cage::Cage;
 use cager_geometry::linalg::{gram, rows_of};
-use cager_geometry::mesh::{TriMesh, diagonal};
+use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use faer::{Mat, MatRef};
 use glam::DVec3;
 
 use super::dense_rows::DenseRows;
-use super::rigidity::{Rigidity, node_edges};
-use super::sampling::{SurfacePoint, sample_surface, spread, surface_vertices};
+use super::graph::NodeGraph;
+use super::rigidity::{Rigidity, StrainGraph};
+use super::sampling::{SurfacePoint, sample_surface, surface_vertices};
 use super::sparse_rows::SparseRows;
-use super::welded;
-use crate::points::{plain, renamed, row_points, vectors, vertex_normals};
+use crate::points::welded_normals;
 
-/// How closely a template is looked at.
-#[derive(Clone, Copy, Debug)]
-pub struct TemplateOptions {
-    /// Points of its surface that are matched.
-    pub samples: usize,
-    /// Nodes between which it is held as rigid as possible.
-    pub nodes: usize,
-    /// Weight of the cage's own edges beside those between nodes.
-    pub cage_weight: f64,
-    /// What samples are drawn by.
-    pub seed: u64,
-}
-
-impl Default for TemplateOptions {
-    fn default() -> Self {
-        Self { samples: 3000, nodes: 700, cage_weight: 0.1, seed: 0 }
-    }
-}
+/// Points of the surface that are matched.
+const SAMPLES: usize = 3000;
+/// Nodes between which the surface is held as rigid as possible.
+const NODES: usize = 700;
+/// Weight of the cage's own edges beside those between nodes.
+const CAGE_WEIGHT: f64 = 0.1;
 
 /// Why a template cannot be laid onto anything.
 #[derive(Debug, thiserror::Error)]
@@ -83,26 +71,14 @@ const BLOCK_ROWS: usize = 512;
 const NODE_NORMAL: f64 = 0.1;
 
 impl Template {
-    /// From a rest pose, a cage around it and the coordinates, n × m, one column per vertex of the cage. Vertices at the same place count as one.
+    /// From a rest pose, a cage around it and coordinates, n × m, one column a vertex of the cage;
+    /// samples are drawn by `seed`. Vertices at the same place count as one.
     ///
     /// # Errors
     /// See [`RegistrationError`].
-    pub fn new(
-        rest: &TriMesh,
-        cage: &Cage,
-        phi: MatRef<'_, f64>,
-        options: &TemplateOptions,
-    ) -> Result<Self, RegistrationError> {
-        let (points, vertices) = (rest.vertices.len(), cage.vertices().len());
-        if (phi.nrows(), phi.ncols()) != (points, vertices) {
-            return Err(RegistrationError::OtherCoordinates {
-                rows: phi.nrows(),
-                columns: phi.ncols(),
-                points,
-                vertices,
-            });
-        }
-        let drawn = sample_surface(&rest.vertices, &rest.triangles, options.samples, options.seed);
+    pub fn new(rest: &TriMesh, cage: &Cage, phi: MatRef<'_, f64>, seed: u64) -> Result<Self, RegistrationError> {
+        check_coordinates(&rest.vertices, cage, phi)?;
+        let drawn = sample_surface(&rest.vertices, &rest.triangles, SAMPLES, seed);
         if drawn.is_empty() {
             return Err(RegistrationError::NoSurface);
         }
@@ -117,15 +93,13 @@ impl Template {
             .map(|sample| Sample { corners: corners_of(sample).map(row_of), weights: sample.weights })
             .collect();
         let corner_coordinates = rows_of(phi, &used);
-        let coordinates = Mat::from_fn(samples.len(), vertices, |i, j| {
+        let coordinates = Mat::from_fn(samples.len(), phi.ncols(), |i, j| {
             let Sample { corners, weights } = &samples[i];
             (0..3).map(|k| weights[k] * corner_coordinates[(corners[k] as usize, j)]).sum()
         });
         let mut scaled = gram(coordinates.as_ref(), BLOCK_ROWS);
         scaled *= faer::Scale(1.0 / (samples.len() as f64 * diagonal * diagonal));
-        let first = welded(&rest.vertices);
-        let joined = TriMesh { vertices: rest.vertices.clone(), triangles: renamed(&rest.triangles, &first) };
-        let rigidity = rigidity(&joined, cage, phi, diagonal, options);
+        let rigidity = rigidity(rest, cage, phi, diagonal, seed);
         Ok(Self {
             diagonal,
             samples,
@@ -138,8 +112,8 @@ impl Template {
     }
 
     /// Samples in a cage: positions and unit normals.
-    pub(crate) fn samples_in(&self, cage: MatRef<'_, f64>) -> (Vec<DVec3>, Vec<DVec3>) {
-        let corners = self.corner_coordinates.times(&row_points(cage));
+    pub(crate) fn samples_in(&self, cage: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
+        let corners = self.corner_coordinates.times(cage);
         self.samples.iter().map(|sample| pose(sample, &corners)).unzip()
     }
 
@@ -149,25 +123,29 @@ impl Template {
     }
 }
 
-fn rigidity(rest: &TriMesh, cage: &Cage, phi: MatRef<'_, f64>, diagonal: f64, options: &TemplateOptions) -> Rigidity {
-    let vertices = vectors(&rest.vertices);
-    let nodes = nodes(rest, options.nodes, NODE_NORMAL * diagonal, options.seed);
-    let model_edges = node_edges(&vertices, &rest.triangles, &nodes);
+/// Whether coordinates are of these points in this cage.
+pub(crate) fn check_coordinates(points: &[Point], cage: &Cage, phi: MatRef<'_, f64>) -> Result<(), RegistrationError> {
+    let ((rows, columns), points, vertices) = (phi.shape(), points.len(), cage.vertices().len());
+    if (rows, columns) == (points, vertices) {
+        return Ok(());
+    }
+    Err(RegistrationError::OtherCoordinates { rows, columns, points, vertices })
+}
+
+fn rigidity(rest: &TriMesh, cage: &Cage, phi: MatRef<'_, f64>, diagonal: f64, seed: u64) -> Rigidity {
+    let normals = welded_normals(&rest.vertices, &rest.triangles);
+    let NodeGraph { nodes, edges } =
+        NodeGraph::new(&rest.vertices, &normals, &rest.triangles, NODES, NODE_NORMAL * diagonal, seed);
     let first = nodes.len();
     let cage_edges: Vec<[u32; 2]> = cage.edges().iter().map(|edge| edge.vertices.map(|v| v + first as u32)).collect();
     let coordinates = Mat::from_fn(first + phi.ncols(), phi.ncols(), |i, j| match i.checked_sub(first) {
         Some(vertex) => f64::from(u8::from(vertex == j)),
         None => phi[(nodes[i] as usize, j)],
     });
-    let at_rest: Vec<DVec3> = nodes.iter().map(|&n| vertices[n as usize]).chain(vectors(cage.vertices())).collect();
-    let edges = [&model_edges[..], &cage_edges[..]];
-    Rigidity::new(&at_rest, coordinates.as_ref(), edges, options.cage_weight, diagonal, SPARSE_THRESHOLD)
-}
-
-/// Vertices spread over a mesh, by position and normal.
-fn nodes(rest: &TriMesh, count: usize, normal_length: f64, seed: u64) -> Vec<u32> {
-    let normals = plain(&vertex_normals(&rest.vertices, &rest.triangles));
-    spread(&rest.vertices, &normals, count, normal_length, seed)
+    let nodes = nodes.iter().map(|&node| rest.vertices[node as usize]).chain(cage.vertices().iter().copied());
+    let at_rest: Vec<DVec3> = nodes.map(DVec3::from).collect();
+    let graph = StrainGraph::new(&at_rest, &[(&edges, 1.0), (&cage_edges, CAGE_WEIGHT)], diagonal);
+    Rigidity::new(graph, coordinates.as_ref(), SPARSE_THRESHOLD)
 }
 
 /// The corners of a sample, its position and its unit normal.

@@ -1,16 +1,16 @@
-//! Where the topology of a subject changes for good, so that its template holds no longer: told by scores alone.
+//! Where the topology of a subject changes for good, told by scores alone.
 
 /// Frames on both sides of a change that are compared with each other.
 const BESIDE: usize = 4;
-/// The best of the frames after a change scores so many times the worst of those before it, at the least.
+/// The best of the frames after a change scores so many times the worst of those before.
 const STEP: f64 = 1.25;
 /// So do all frames to the end, but a tenth, against all frames before, but a tenth.
 const TO_THE_END: f64 = 1.25;
 /// Nothing has changed where templates lie as well as this, a share of the diagonal.
 const LIES_WELL: f64 = 1e-3;
 
-/// The first frame from which on a template lies worse all at once, and to the end; none where there is none. Frames with a score that is not finite
-/// count for nothing.
+/// The first frame from which a template lies worse all at once and to the end, if any. Scores that
+/// are not finite count for nothing.
 pub fn changed_for_good(scores: &[f64]) -> Option<usize> {
     let (frames, scores): (Vec<usize>, Vec<f64>) =
         scores.iter().copied().enumerate().filter(|(_, score)| score.is_finite()).unzip();

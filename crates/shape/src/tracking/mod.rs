@@ -1,4 +1,4 @@
-//! A template followed by its cage through a sequence of surfaces, and where the topology of these changed.
+//! A template followed through surfaces by its cage, and where their topology changed.
 
 mod change;
 mod offsets;

@@ -21,7 +21,7 @@ pub enum Outcome {
 pub struct TrackedFrame {
     /// Vertices of the cage.
     pub cage: Vec<Point>,
-    /// How well the template lies on the surface ([`Template::score`]), a share of the diagonal; infinite without a surface.
+    /// [`Template::score`], a share of the diagonal; infinite without a surface.
     pub score: f64,
     /// How it was found.
     pub outcome: Outcome,
@@ -42,19 +42,19 @@ pub struct Tracker<'t> {
 const STARTS_JUDGED_BY: usize = 4;
 /// Frames before that say what scores are usual just now: they change with the pose.
 const RECENT: usize = 9;
-/// A frame that scores above so many times the median of the recent ones is looked for further around.
+/// Frames that score above so many times the recent ones' median are looked for further around.
 const SEARCHED_FROM: f64 = 1.06;
 /// So is one that scores above so many times the median of all.
 const SEARCHED_FROM_ALL: f64 = 1.3;
-/// The surface moves little where the two starts are nearer to each other than this share of the diagonal: to a search that sees much further they are one.
+/// The surface moves little where the two starts are nearer than this share of the diagonal.
 const ALIKE: f64 = 0.02;
 /// For so many frames.
 const SEARCHED_FOR: usize = 3;
 /// A frame that scores above so many times the median of all is lost.
 const LOST_FROM: f64 = 1.6;
-/// Not so one that scores below this share of the diagonal: where surfaces are exact and move little, the usual score is next to nothing.
+/// But not below this share of the diagonal: exact surfaces usually score next to nothing.
 const LIES_WELL: f64 = 1e-3;
-/// Frames before that it takes to say so: a template that is the first frame lies there better than it can elsewhere.
+/// Frames before that it takes: a template that is the first frame lies there best.
 const MIN_JUDGED: usize = 3;
 
 impl<'t> Tracker<'t> {
@@ -69,7 +69,7 @@ impl<'t> Tracker<'t> {
         let ahead = extrapolated(&self.last, &self.before);
         let mut starts = [&self.last, &ahead];
         let mut known = template.unmatched(surface);
-        let near = starts.map(|start| template.score_from(surface, start, STARTS_JUDGED_BY, &mut known));
+        let near = starts.map(|start| template.score(surface, start, STARTS_JUDGED_BY, &mut known));
         if near[1] < near[0] {
             starts.reverse();
         }
@@ -97,7 +97,8 @@ impl<'t> Tracker<'t> {
         TrackedFrame { cage: best.cage, score: best.score, outcome }
     }
 
-    /// The score that is usual just now. What a search further around a frame shortly before has left is as good as it gets where the surface moves little.
+    /// The usual score just now. What a recent wider search has left is as good as it gets where
+    /// the surface moves little.
     fn level(&self, slow: bool) -> f64 {
         let scores = judging(&self.scores);
         let recent = median(&scores[scores.len().saturating_sub(RECENT)..]);
@@ -112,7 +113,7 @@ impl<'t> Tracker<'t> {
     }
 }
 
-/// Scores but the first where there are enough others: a template that is the first frame lies there better than it can elsewhere.
+/// Scores but the first where there are others: a template that is the first frame lies there best.
 fn judging(scores: &[f64]) -> &[f64] {
     if scores.len() > MIN_JUDGED { &scores[1..] } else { scores }
 }
@@ -148,8 +149,8 @@ impl Scored {
         options: &FitOptions,
         known: &mut KnownMatches,
     ) -> Self {
-        let cage = template.fit_from(surface, start, options, known);
-        let score = template.score_from(surface, &cage, 1, known);
+        let cage = template.fit(surface, start, options, known);
+        let score = template.score(surface, &cage, 1, known);
         if score.is_finite() && cage.as_flattened().iter().all(|x| x.is_finite()) {
             Self { cage, score }
         } else {
@@ -163,7 +164,7 @@ fn extrapolated(last: &[Point], before: &[Point]) -> Vec<Point> {
     last.iter().zip(before).map(|(a, b)| std::array::from_fn(|k| 2.0 * a[k] - b[k])).collect()
 }
 
-/// A second pass over frames that were followed, from the last to the first, each of which may come from the frame after it as well where
+/// A second pass, from the last frame to the first: each may come from the frame after it where
 /// that lies better, and is smoothed between its neighbours.
 pub struct SecondPass<'t> {
     template: &'t Template,
@@ -172,7 +173,7 @@ pub struct SecondPass<'t> {
     usual: f64,
 }
 
-/// A frame of the first pass that scores above so many times the median of those around it is fitted again from the frame after it.
+/// Frames that score above so many times the median around them are fitted again.
 const REFITTED_FROM: f64 = 1.03;
 
 impl<'t> SecondPass<'t> {
@@ -189,7 +190,7 @@ impl<'t> SecondPass<'t> {
         score.is_finite() && score > (REFITTED_FROM * median(&self.scores[around])).min(SEARCHED_FROM_ALL * self.usual)
     }
 
-    /// Fits a frame again from the cages of the one or two frames after it, nearest first, if that lies better.
+    /// Fits a frame again from the cages of one or two frames after it, if that lies better.
     pub fn refit(&self, surface: &Target, frame: &mut TrackedFrame, after: &[&[Point]]) {
         let Some(&next) = after.first() else { return };
         let mut starts = vec![next.to_vec()];
@@ -224,10 +225,10 @@ impl<'t> SecondPass<'t> {
 /// How smoothing fits: near the mean of the neighbours where the surface does not say otherwise.
 const SMOOTHING: FitOptions =
     FitOptions { iterations: 2, rigidity: [1e-5; 2], reach: [0.006; 2], hold: 1e-2, ..FitOptions::NEAR };
-/// Vertices that are much further from the mean of their neighbours in time than this share of the diagonal move like that, and are let go.
+/// Vertices much further from their mean in time than this share of the diagonal are let go.
 const MAX_SMOOTHED: f64 = 0.005;
 
-/// A frame's cage again, held between those of the frames beside it: what the surface does not determine, sliding along it, is smoothed.
+/// A frame's cage held between those beside it: what slides along the surface is smoothed.
 pub fn smoothed(template: &Template, surface: &Target, cage: &[Point], [before, after]: [&[Point]; 2]) -> Vec<Point> {
     let most = MAX_SMOOTHED * template.diagonal();
     let reference: Vec<Point> = cage
@@ -238,5 +239,5 @@ pub fn smoothed(template: &Template, surface: &Target, cage: &[Point], [before, 
             along(at, 1.0 / (1.0 + dot(way, way) / (most * most)), way)
         })
         .collect();
-    template.fit_beside(surface, cage, &reference, &SMOOTHING)
+    template.fit_held(surface, cage, &reference, &SMOOTHING, None, &mut template.unmatched(surface)).0
 }

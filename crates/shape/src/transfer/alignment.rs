@@ -2,7 +2,7 @@
 
 use crate::registration::{AlignOptions, Alignment, Observation, align_pairs, alignments};
 use cager_geometry::spatial::Surface;
-use cager_geometry::vector::Point;
+use cager_geometry::vector::{Point, mean};
 use faer::Mat;
 use glam::{DMat3, DVec3};
 
@@ -13,7 +13,7 @@ use crate::transfer::pairs::Pairs;
 /// How a source is aligned with a target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum AlignBy {
-    /// By their surfaces: as they stand and by principal axes, or by turns about the axis up, whichever fits best.
+    /// By surfaces: as they stand and by principal axes, or turns about the axis up.
     #[default]
     Surfaces,
     /// Not at all: both are in one space.
@@ -22,44 +22,25 @@ pub enum AlignBy {
     Given(Similarity),
 }
 
-/// Where the source was laid.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aligned {
-    /// From the source's space to the target's.
-    pub similarity: Similarity,
-    /// The score of the next best alignment over this one's; infinite where no other was found or looked for.
-    pub runner_up: f64,
-}
-
-impl Aligned {
-    /// An alignment that another one comes within 15 % of: either may be right.
-    pub const AMBIGUOUS_BELOW: f64 = 1.15;
-
-    /// Whether another alignment fits almost as well.
-    pub fn is_ambiguous(&self) -> bool {
-        self.runner_up < Self::AMBIGUOUS_BELOW
-    }
-}
-
 /// Steps in which a copy is laid onto itself exactly, and points that are looked at.
 const REFINEMENTS: usize = 12;
 const REFINED_POINTS: usize = 2000;
-/// Surfaces that a similarity brings closer together than this share of the diagonal, in the mean, are the same one.
+/// Surfaces closer than this share of the diagonal, in the mean, are the same one.
 const SAME_SURFACE: f64 = 1e-3;
 
-/// Ways to align a source with a target, the best first; those that are less than doubtful are left out. A copy of the same shape is laid onto the target's
-/// triangles exactly (point to plane, Chen and Medioni 1992).
+/// Ways to align a source with a target, the best first, but those less than doubtful. A copy of
+/// the shape is laid onto the target's triangles exactly (point to plane, Chen and Medioni 1992).
 pub fn align_surfaces(
     source: &Observation,
     target: &Observation,
     surface: Option<&Surface>,
     by: AlignBy,
     up: Option<Point>,
-) -> Vec<Aligned> {
+) -> Vec<Alignment> {
     align_with(source, target, surface, by, up, &Pairs::default())
 }
 
-/// [`align_surfaces`], with pairs that correspond: they determine the alignment, or say which of several it is.
+/// [`align_surfaces`], with pairs that determine the alignment, or say which of several it is.
 pub(crate) fn align_with(
     source: &Observation,
     target: &Observation,
@@ -67,47 +48,28 @@ pub(crate) fn align_with(
     by: AlignBy,
     up: Option<Point>,
     pairs: &Pairs,
-) -> Vec<Aligned> {
-    let only = |similarity| vec![Aligned { similarity, runner_up: f64::INFINITY }];
+) -> Vec<Alignment> {
     let options = AlignOptions { up, scale: true };
     let found = match by {
-        AlignBy::AsTheyStand => return only(Similarity::IDENTITY),
-        AlignBy::Given(similarity) => return only(similarity),
-        AlignBy::Surfaces if pairs.determine() => vec![align_pairs(source, target, &pairs.places(), &options)],
+        AlignBy::AsTheyStand => return vec![Alignment::given(Similarity::IDENTITY)],
+        AlignBy::Given(similarity) => return vec![Alignment::given(similarity)],
+        AlignBy::Surfaces if pairs.determine() => vec![align_pairs(source, target, &pairs.places, &options)],
         AlignBy::Surfaces => alignments(source, target, &options),
     };
-    let best = found[0].score;
     let aligned = |alignment: &Alignment| {
-        let rough = Similarity {
-            rotation: DMat3::from_cols_array_2d(&alignment.rotation),
-            scale: alignment.scale,
-            translation: alignment.translation.into(),
-        };
+        let rough = alignment.similarity;
         let refined = surface.filter(|_| up.is_none()).and_then(|surface| refined(source, target, surface, rough));
-        Aligned { similarity: refined.unwrap_or(rough), runner_up: found[0].runner_up }
+        Alignment { similarity: refined.unwrap_or(rough), runner_up: found[0].runner_up, ..*alignment }
     };
     if !pairs.vertices.is_empty() {
-        let nearest = found.iter().min_by(|a, b| {
-            let apart = |alignment: &Alignment| pairs.apart(|p| alignment.apply(p.to_array()).into());
-            apart(a).total_cmp(&apart(b))
-        });
-        return nearest.map(|alignment| only(aligned(alignment).similarity)).unwrap_or_default();
+        let apart = |a: &&Alignment| pairs.apart(&a.similarity);
+        let nearest = found.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        return nearest.map(|nearest| Alignment::given(aligned(nearest).similarity)).into_iter().collect();
     }
-    let mut near: Vec<(f64, Aligned)> = found
-        .iter()
-        .filter(|alignment| alignment.score <= Aligned::AMBIGUOUS_BELOW * best)
-        .map(|alignment| (alignment.score, aligned(alignment)))
-        .collect();
-    near.sort_by(|a, b| preferred(a).total_cmp(&preferred(b)));
-    near.into_iter().map(|(_, aligned)| aligned).collect()
-}
-
-/// How much better the score of half a turn has to be than that of none: models that are brought together mostly stand alike.
-const HALF_A_TURN: f64 = 0.15;
-
-/// What alignments are chosen by: the score, and how far they turn.
-pub(crate) fn preferred((score, aligned): &(f64, Aligned)) -> f64 {
-    score * (1.0 + HALF_A_TURN * aligned.similarity.angle() / std::f64::consts::PI)
+    let near = found.iter().filter(|alignment| alignment.score <= Alignment::AMBIGUOUS_BELOW * found[0].score);
+    let mut near: Vec<Alignment> = near.map(aligned).collect();
+    near.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
+    near
 }
 
 /// The similarity that lays points of a surface onto its copy; none where the surfaces differ.
@@ -115,15 +77,15 @@ fn refined(source: &Observation, target: &Observation, surface: &Surface, rough:
     let every = source.points.len().div_ceil(REFINED_POINTS).max(1);
     let points: Vec<DVec3> = source.points.iter().step_by(every).map(|&p| p.into()).collect();
     // Of what is seen of the surface: vertices far away that no triangle uses are none of it.
-    let center = target.points.iter().map(|&p| DVec3::from(p)).sum::<DVec3>() / target.points.len() as f64;
+    let center = DVec3::from(mean(&target.points));
     let size = size(&target.points);
     let mut best = rough;
     for _ in 0..REFINEMENTS {
         best = step(&points, surface, best, center, size)?.after(&best);
     }
     let far = |p: &DVec3| surface.nearest(best.apply(*p)).map_or(f64::INFINITY, |n| n.distance);
-    let mean = points.iter().map(far).sum::<f64>() / points.len() as f64;
-    (mean < SAME_SURFACE * size).then_some(best)
+    let apart = points.iter().map(far).sum::<f64>() / points.len() as f64;
+    (apart < SAME_SURFACE * size).then_some(best)
 }
 
 /// One step of Gauss and Newton over rotation, translation and scale.

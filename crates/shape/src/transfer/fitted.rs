@@ -1,27 +1,27 @@
-//! The fitted cage: the source is laid onto the target by its cage, which says what corresponds to what; then the target follows the gradients of the source
-//! (deformation transfer, Sumner and Popović 2004).
+//! The fitted cage: the source is laid onto the target by its cage, which says what corresponds;
+//! then the target follows the gradients of the source (deformation transfer, Sumner and Popović
+//! 2004).
 
-use crate::registration::{NearestPoints, Observation, Registration, outward};
+use crate::registration::{Alignment, NearestPoints, Observation, Registration, outward};
 use cager_core::cage::Cage;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use faer::MatRef;
 use glam::{DMat3, DVec3};
 
 use super::fitted_options::{FittedOptions, Pose};
-use super::registered_source::{Goal, RegisteredSource};
+use super::registered_source::{Goal, RegisteredSource, middles};
 use super::source::{Source, moved_frame};
 use crate::deformation::gradients::Gradients;
 use crate::deformation::graph::CageSpace;
 use crate::deformation::poisson::Poisson;
 use crate::error::{MeshError, TransferError};
 use crate::points::{vectors, welded_normals};
-use crate::transfer::alignment::Aligned;
 
 /// How well source and target go together.
 #[derive(Clone, Debug)]
 pub struct FittedReport {
     /// From the source's space to the target's, before the cage was fitted.
-    pub aligned: Aligned,
+    pub aligned: Alignment,
     /// Where the cage ended, in the target's space.
     pub registration: Registration,
     /// Whether limbs take the source's directions.
@@ -38,7 +38,7 @@ pub struct FittedTransfer {
     /// What undoes the registration's rotations, for absolute poses.
     back: Option<Vec<DMat3>>,
     body: Body,
-    /// The source's triangle for each gradient that the body takes, and for each of the target's points.
+    /// The source's triangle for each gradient of the body, and for each point of the target.
     matches: Vec<u32>,
     under: Vec<u32>,
     source_triangles: Vec<[u32; 3]>,
@@ -66,14 +66,16 @@ pub struct CagedTarget<'a> {
     pub phi: MatRef<'a, f64>,
 }
 
-/// Scores below are of like shapes. Measured, in percent: a man onto himself with another mesh 0.15, in poses of his own 0.24 and 0.27, onto a heavy woman
+/// Scores below are of like shapes. Measured, in percent: a man onto himself with another mesh
+/// 0.15, in poses of his own 0.24 and 0.27, onto a heavy woman
 /// 0.26, in two of her poses 0.31; a horse onto a lion 0.52, onto a cat 0.56.
 const LIKE_SHAPES: f64 = 0.0042;
 /// Passes by which the registration's rotations are smoothed.
 const ROTATION_PASSES: usize = 31;
-/// Passes by which the source's gradients are smoothed over neighbouring triangles: of like shapes, of like shapes where a cage carries the target, whose
-/// graph has longer edges than triangles have, and of unlike ones. A gallop on a cat, by 1, 3, 6, 10 and 20 passes: 3.7, 3.3, 3.0, 2.8 and 2.4 % stretched,
-/// with volumes down to 0.895, 0.889, 0.885, 0.881 and 0.874.
+/// Passes that smooth the source's gradients: of like shapes, of those carried by a cage, whose
+/// graph has longer edges, and of unlike ones. A gallop on a cat, by 1, 3, 6, 10 and 20 passes:
+/// 3.7, 3.3, 3.0, 2.8 and 2.4 % stretched, with volumes down to 0.895, 0.889, 0.885, 0.881 and
+/// 0.874.
 const LIKE_PASSES: usize = 1;
 const GRAPH_PASSES: usize = 3;
 const UNLIKE_PASSES: usize = 10;
@@ -81,8 +83,8 @@ const UNLIKE_PASSES: usize = 10;
 const TURNED: f64 = 30.0;
 
 impl FittedTransfer {
-    /// Aligns, fits and factors, once for a source and a target that follows on its own mesh. Runs on the current rayon pool; the result does not
-    /// depend on it.
+    /// Aligns, fits and factors, for a target that follows on its own mesh. Runs on the current
+    /// rayon pool; the result does not depend on it.
     ///
     /// # Errors
     /// See [`TransferError`].
@@ -92,13 +94,13 @@ impl FittedTransfer {
         let triangles = outward(&target.vertices, &target.triangles);
         let goal = Goal { points: &target.vertices, triangles: &triangles, seen: &seen };
         let laid = RegisteredSource::new(source, &goal, options)?;
-        let found = laid.correspondence();
-        let matches = found.of_triangles(&target.vertices, &triangles);
-        let under = found.of_points(&target.vertices, &welded_normals(&target.vertices, &triangles));
+        let (centers, normals) = middles(&target.vertices, &triangles);
+        let matches = laid.triangles_at(&centers, &normals);
+        let under = laid.triangles_at(&target.vertices, &welded_normals(&target.vertices, &triangles));
         Ok(Self::assembled(laid, Body::Mesh(body), matches, under, &target.vertices, options))
     }
 
-    /// As [`Self::new`], for a target that follows in the space of a cage around it, by one linear solve a pose.
+    /// As [`Self::new`], for a target in the space of a cage around it, by one linear solve a pose.
     ///
     /// # Errors
     /// See [`TransferError`].
@@ -108,22 +110,20 @@ impl FittedTransfer {
         options: &FittedOptions<'_>,
     ) -> Result<Self, TransferError> {
         let points = &target.model.points;
-        let draw = options.observation();
         let mesh = TriMesh::from(target.model);
         let triangles = outward(points, &mesh.triangles);
-        let (seen, normals) = if triangles.is_empty() {
-            let seen = Observation::of_cloud(points, &target.model.normals, &draw)?.0;
+        let (seen, _) = Observation::of_surface(points, &triangles, &target.model.normals, &options.observation())?;
+        let normals = if triangles.is_empty() {
             let near = NearestPoints::new(seen.points.iter().copied());
-            let normals = points.iter().map(|&p| seen.normals[near.nearest(p).0]).collect();
-            (seen, normals)
+            points.iter().map(|&p| seen.normals[near.nearest(p).0]).collect()
         } else {
-            (Observation::of_mesh(points, &triangles, &draw)?.0, welded_normals(points, &triangles))
+            welded_normals(points, &triangles)
         };
         let rest = target.cage.vertices();
         let body = CageSpace::new(points, &normals, &triangles, target.phi, rest)
             .ok_or(TransferError::Target(MeshError::Degenerate))?;
         let laid = RegisteredSource::new(source, &Goal { points, triangles: &triangles, seen: &seen }, options)?;
-        let under = laid.correspondence().of_points(points, &normals);
+        let under = laid.triangles_at(points, &normals);
         let matches = body.graph.nodes.iter().map(|&node| under[node as usize]).collect();
         Ok(Self::assembled(laid, Body::Caged(Box::new(body)), matches, under, points, options))
     }
@@ -179,7 +179,7 @@ impl FittedTransfer {
     /// The target as the source is in a frame, the mean where the source's goes.
     ///
     /// # Errors
-    /// A frame of other points than the rest pose, or with one that is not finite; `frame` is its number in the message.
+    /// Other points than at rest, or one that is not finite; `frame` is the number in the message.
     pub fn pose(&self, frame: usize, points: &[Point]) -> Result<Vec<Point>, TransferError> {
         let pose = moved_frame(frame, points, self.source_points, &self.report.aligned.similarity)?;
         let gradients = self.gradients.smoothed(self.gradients.of(&pose), self.smoothing);
@@ -198,7 +198,7 @@ impl FittedTransfer {
         Ok(shape.iter().map(|p| (*p + by).to_array()).collect())
     }
 
-    /// The source's points under the target's vertices in a frame, in the target's space: what contacts are told by.
+    /// The source's points under the target's vertices, in the target's space: for contacts.
     ///
     /// # Errors
     /// As [`Self::pose`].

@@ -1,6 +1,6 @@
 //! How a motion is moved by the fitted cage.
 
-use crate::registration::{ObservationOptions, StageOptions};
+use crate::registration::ObservationOptions;
 use cager_geometry::mesh::Point;
 
 use crate::transfer::alignment::AlignBy;
@@ -27,8 +27,6 @@ pub struct FittedOptions<'a> {
     pub align: AlignBy,
     /// The axis that points up in both, if known: turns are about it alone.
     pub up: Option<Point>,
-    /// How the cage is fitted.
-    pub stages: StageOptions,
     /// Vertices that are known to correspond, if any: they pull alignment and registration.
     pub pairs: Vec<VertexPair>,
     /// What samples are drawn by.
@@ -40,8 +38,7 @@ pub struct FittedOptions<'a> {
 impl Default for FittedOptions<'_> {
     fn default() -> Self {
         let (pose, align, up) = (Pose::Auto, AlignBy::Surfaces, None);
-        let (stages, pairs) = (StageOptions::default(), Vec::new());
-        Self { pose, align, up, stages, pairs, seed: 0, stopped: &|| false }
+        Self { pose, align, up, pairs: Vec::new(), seed: 0, stopped: &|| false }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Which targets follow by a cage.
 
 use crate::points::area_vector;
-use crate::registration::welded;
+use crate::points::welded;
 use cager_geometry::mesh::TriMesh;
 use cager_geometry::topology::UnionFind;
 use glam::DVec3;
@@ -11,8 +11,8 @@ const MANY_PARTS: usize = 10;
 /// Most of the area.
 const MOST: f64 = 0.5;
 
-/// Whether a target follows better through a cage than on its own triangles: where it has no triangles with an area, or is a soup of them, many parts
-/// of which none has most of the area. Vertices at the same place connect.
+/// Whether a target follows better through a cage: without triangles with an area, or as a soup of
+/// many parts of which none has most of it. Vertices at the same place connect.
 pub fn needs_cage(target: &TriMesh) -> bool {
     let place = welded(&target.vertices);
     let mut parts = UnionFind::new(place.len());

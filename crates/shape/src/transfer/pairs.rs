@@ -1,10 +1,12 @@
-//! Vertices of source and target that are known to correspond: never needed, but they pull the alignment and the registration where there are some.
+//! Vertices of source and target that correspond: never needed, but they pull the alignment and the
+//! registration.
 
 use cager_geometry::mesh::Point;
 use glam::DVec3;
 
 use crate::error::TransferError;
 use crate::points::Moments;
+use crate::similarity::Similarity;
 
 /// A vertex of the source and the vertex of the target that lies at the same place of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,17 +17,18 @@ pub struct VertexPair {
     pub target: u32,
 }
 
-/// Fewer pairs, or pairs on a line, do not determine an alignment; they choose among those that the surfaces offer.
+/// Fewer pairs, or pairs on a line, only choose among the alignments of the surfaces.
 const DETERMINED: usize = 3;
 /// Pairs lie on a line where their second principal extent is below this share of the first.
 const LINE: f64 = 1e-2;
 
-/// Pairs with their places at rest, source and target each in its own space.
+/// Pairs with their places at rest.
 #[derive(Default)]
 pub(crate) struct Pairs {
+    /// Of the source.
     pub(crate) vertices: Vec<u32>,
-    pub(crate) from: Vec<DVec3>,
-    pub(crate) to: Vec<DVec3>,
+    /// In the source's space, in the target's, and a weight of one.
+    pub(crate) places: Vec<(DVec3, DVec3, f64)>,
 }
 
 impl Pairs {
@@ -38,28 +41,22 @@ impl Pairs {
             let missing = TransferError::Pair { pair, whose, vertex, points: points.len() };
             points.get(vertex as usize).map(|&p| DVec3::from(p)).ok_or(missing)
         };
-        let mut found = Self::default();
-        for (k, pair) in pairs.iter().enumerate() {
-            found.vertices.push(pair.source);
-            found.from.push(at(k, "source", pair.source, source)?);
-            found.to.push(at(k, "target", pair.target, target)?);
-        }
-        Ok(found)
+        let place = |(k, pair): (usize, &VertexPair)| {
+            Ok((at(k, "source", pair.source, source)?, at(k, "target", pair.target, target)?, 1.0))
+        };
+        let places = pairs.iter().enumerate().map(place).collect::<Result<_, TransferError>>()?;
+        Ok(Self { vertices: pairs.iter().map(|pair| pair.source).collect(), places })
     }
 
     /// Whether they determine an alignment alone.
     pub(crate) fn determine(&self) -> bool {
-        self.from.len() >= DETERMINED && spread(&self.from) && spread(&self.to)
+        let (from, to): (Vec<DVec3>, Vec<DVec3>) = self.places.iter().map(|&(p, q, _)| (p, q)).unzip();
+        self.places.len() >= DETERMINED && spread(&from) && spread(&to)
     }
 
-    /// Their places.
-    pub(crate) fn places(&self) -> Vec<(Point, Point)> {
-        self.from.iter().zip(&self.to).map(|(p, q)| (p.to_array(), q.to_array())).collect()
-    }
-
-    /// Sum of the squared distances between the places, the source's moved by `moved`.
-    pub(crate) fn apart(&self, moved: impl Fn(DVec3) -> DVec3) -> f64 {
-        self.from.iter().zip(&self.to).map(|(&p, &q)| moved(p).distance_squared(q)).sum()
+    /// Sum of the squared distances between the places, the source's moved.
+    pub(crate) fn apart(&self, by: &Similarity) -> f64 {
+        self.places.iter().map(|&(p, q, _)| by.apply(p).distance_squared(q)).sum()
     }
 }
 

@@ -1,4 +1,4 @@
-//! Where a moved target stands: on the floor where the source does, without sliding where the source does not slide.
+//! Where a moved target stands: on the floor where the source does, sliding only as it does.
 
 use cager_geometry::mesh::Point;
 use glam::DVec3;
@@ -7,14 +7,15 @@ use crate::canonical::size;
 
 /// Points below this height over the floor may stand on it, as a share of the target's size.
 const LOW: f64 = 0.02;
-/// Points that move by less from frame to frame stand, as a share of the mean motion of all points in that time: so it does not matter how many frames
+/// Points that move by less stand, as a share of the mean motion in that time, however many frames
 /// a second has.
 const STILL: f64 = 0.25;
 /// More points than these must stand for a contact.
 const MIN_STANDING: usize = 5;
 
-/// Finds by how much each frame of a target is to be moved as a whole, so that its lowest point is as far over the floor as the source's, and what stands
-/// at the source does not slide. Frames are given in order; corrections are smoothed over one frame.
+/// Finds by how much each frame of a target is to be moved, so that its lowest point is as far over
+/// the floor as the source's, and what stands does not slide. Frames come in order; corrections are
+/// smoothed over one frame.
 pub struct Placement {
     up: DVec3,
     size: f64,
@@ -27,8 +28,8 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// For a target at rest, the source's points under the target's in the target's space, and the height of the floor, below which none of these is in any
-    /// frame (see [`lowest`]). `up` is a unit vector.
+    /// For a target at rest, the source's points under it in its space, and the height of the
+    /// floor, below which none of these ever is ([`lowest`]). `up` is a unit vector.
     pub fn new(target: &[Point], under: &[Point], floor: f64, up: Point) -> Self {
         let higher = lowest(target, up) - lowest(under, up);
         let (size, up) = (size(target), up.into());

@@ -5,65 +5,62 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DependentNormals, SYSTEMS};
 use cager_core::inversion::{Handles, PrepareContext, PrepareError, SolverOptions};
 use cager_core::spectral::Analysis;
-use cager_geometry::linalg::{gram, mirrored, solve_definite, tall_product, transposed_product};
-use cager_geometry::mesh::Point;
+use cager_geometry::linalg::{gram, mirrored, solve_definite, transposed_product};
+use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::outside;
 use cager_geometry::vector::norm;
-use faer::{Mat, MatRef};
+use faer::Mat;
 use glam::DVec3;
 
+use super::rigid::Rigidity;
 use super::source::moved_frame;
 use crate::error::TransferError;
-use crate::points::{matrix, row_points, vectors};
+use crate::points::{cage_values, matrix, points_in, vectors};
 use crate::similarity::Similarity;
 
 /// Moves frames of a source onto a target through a cage around both.
 pub struct PublicTransfer {
     aligned: Similarity,
-    pub(super) source_rest: Vec<DVec3>,
-    pub(super) source: Mat<f64>,
+    source_rest: Vec<DVec3>,
+    source: Mat<f64>,
     target_rest: Vec<DVec3>,
-    pub(super) target: Mat<f64>,
+    target: Mat<f64>,
     /// Values of the cage at rest, columns × 3.
-    pub(super) values: Vec<Point>,
+    values: Vec<Point>,
     inverse: Inverse,
+    rigidity: Option<Rigidity>,
     /// The source's point at rest nearest to each of the target's.
     under: Vec<u32>,
 }
 
 /// How the cage is found for the source's points.
 enum Inverse {
-    /// By one matrix, n × m: transposed, times displacements of the source, it gives those of the cage.
+    /// By one matrix, n × m: transposed, it takes displacements of the source to the cage's.
     Linear(Mat<f64>),
-    /// With normals that follow the vertices.
-    Consistent(Normals),
-}
-
-/// Normals that are functions of the vertices.
-struct Normals {
-    dependent: DependentNormals,
-    /// `Φᵀ Φ` of the source, columns × columns.
-    gram: Mat<f64>,
+    /// With normals that follow the vertices: these, and `Φᵀ Φ` of the source, columns × columns.
+    Consistent(DependentNormals, Mat<f64>),
 }
 
 const BLOCK_ROWS: usize = 512;
-/// Steps of Gauss and Newton with normals, and when they end: the change of the cage as a share of its size.
+/// Steps of Gauss and Newton, and when they end: the change as a share of the cage's size.
 const MAX_STEPS: usize = 20;
 const TOLERANCE: f64 = 1e-12;
 
 impl PublicTransfer {
-    /// Of a source's rest pose, brought to the target by `aligned`, and a target, in a cage around both in the target's space.
+    /// Of a source, brought to the target by `aligned`, and a target, in a cage around both. The
+    /// target is as rigid as possible with a weight, for coordinates of vertices alone.
     ///
     /// # Errors
-    /// Models that have no coordinates in the cage, or lie outside where these end there; a cage that the source does not determine.
+    /// Models without coordinates in the cage; a cage that the source does not determine.
     pub fn new(
-        source: &[Point],
-        target: &[Point],
+        source_mesh: &TriMesh,
+        target_mesh: &TriMesh,
         aligned: Similarity,
         cage: &Cage,
         system: &dyn CoordinateSystem,
+        rigidity: Option<f64>,
     ) -> Result<Self, TransferError> {
-        let source = aligned.apply_all(source);
+        let (source, target) = (aligned.apply_all(&source_mesh.vertices), &target_mesh.vertices);
         let target_phi = coordinates("target", target, cage, system)?;
         let values = system.values(cage);
         let unknowns = values.unknowns();
@@ -81,11 +78,13 @@ impl PublicTransfer {
         let (source_phi, inverse) = if let Some(dependent) = values.dependent_normals {
             let phi = coordinates("source", &source, cage, system)?;
             let gram = mirrored(gram(phi.as_ref(), BLOCK_ROWS));
-            (phi, Inverse::Consistent(Normals { dependent, gram }))
+            (phi, Inverse::Consistent(dependent, gram))
         } else {
             let solver = analysis.solver(options).map_err(refused)?;
             (analysis.coordinates().to_owned(), Inverse::Linear(solver.operator().to_owned()))
         };
+        let rigidity = rigidity
+            .map(|weight| Rigidity::new((source_mesh, &source_phi), (target_mesh, &target_phi), aligned.scale, weight));
         let near = NearestPoints::new(source.iter().copied());
         let under = target.iter().map(|&p| near.nearest(p).0 as u32).collect();
         Ok(Self {
@@ -96,6 +95,7 @@ impl PublicTransfer {
             target: target_phi,
             values: values.rest,
             inverse,
+            rigidity: rigidity.transpose()?,
             under,
         })
     }
@@ -103,14 +103,23 @@ impl PublicTransfer {
     /// The target as the source is in a frame.
     ///
     /// # Errors
-    /// A frame of other points than the rest pose, or with one that is not finite; `frame` is its number in the message.
+    /// Other points than at rest, or one that is not finite; `frame` is the number in the message.
     pub fn pose(&self, frame: usize, points: &[Point]) -> Result<Vec<Point>, TransferError> {
-        let (whole, pose) = self.moved(frame, points)?;
-        let change = self.change(&pose);
-        Ok(self.target_in(change.as_ref(), &whole))
+        let pose = moved_frame(frame, points, self.source_rest.len(), &self.aligned)?;
+        // How the source moves as a whole is taken out and given back.
+        let pairs: Vec<_> = self.source_rest.iter().zip(&pose).map(|(&p, &q)| (p, q, 1.0)).collect();
+        let whole = Similarity::between(&pairs, true);
+        let back = whole.inverse();
+        let pose: Vec<DVec3> = pose.into_iter().map(|p| back.apply(p)).collect();
+        let mut change = self.change(&pose);
+        if let Some(rigidity) = &self.rigidity {
+            change = rigidity.refined(&self.source, [&self.source_rest, &pose], &matrix(&self.values), change);
+        }
+        let moved: Vec<DVec3> = points_in(self.target.as_ref(), change.as_ref());
+        Ok(moved.iter().zip(&self.target_rest).map(|(d, p)| whole.apply(*p + *d).to_array()).collect())
     }
 
-    /// The source's points nearest to the target's at rest, in a frame, in the target's space: what contacts are told by.
+    /// The source's points nearest to the target's at rest, in its space: for contacts.
     ///
     /// # Errors
     /// As [`Self::pose`].
@@ -119,34 +128,19 @@ impl PublicTransfer {
         Ok(self.under.iter().map(|&v| pose[v as usize].to_array()).collect())
     }
 
-    /// How the source moves as a whole in a frame, and its pose in the target's space without that.
-    pub(super) fn moved(&self, frame: usize, points: &[Point]) -> Result<(Similarity, Vec<DVec3>), TransferError> {
-        let pose = moved_frame(frame, points, self.source_rest.len(), &self.aligned)?;
-        let pairs: Vec<_> = self.source_rest.iter().zip(&pose).map(|(&p, &q)| (p, q, 1.0)).collect();
-        let whole = Similarity::between(&pairs, true);
-        let back = whole.inverse();
-        Ok((whole, pose.into_iter().map(|p| back.apply(p)).collect()))
-    }
-
-    /// The target in a cage whose values changed by these, then moved as a whole.
-    pub(super) fn target_in(&self, change: MatRef<'_, f64>, whole: &Similarity) -> Vec<Point> {
-        let moved = row_points(tall_product(self.target.as_ref(), change).as_ref());
-        moved.iter().zip(&self.target_rest).map(|(d, p)| whole.apply(*p + *d).to_array()).collect()
-    }
-
-    /// By how much the values of the cage, columns × 3, change for a pose of the source. At rest they do not.
-    pub(super) fn change(&self, pose: &[DVec3]) -> Mat<f64> {
-        let wanted = Mat::from_fn(pose.len(), 3, |i, k| pose[i][k] - self.source_rest[i][k]);
+    /// The change of the cage's values, columns × 3, for a pose of the source; none at rest.
+    fn change(&self, pose: &[DVec3]) -> Mat<f64> {
+        let wanted = matrix(pose) - matrix(&self.source_rest);
         match &self.inverse {
-            Inverse::Consistent(normals) => self.with_normals(normals, &wanted),
+            Inverse::Consistent(normals, gram) => self.with_normals(normals, gram, &wanted),
             Inverse::Linear(operator) => transposed_product(operator.as_ref(), wanted.as_ref(), BLOCK_ROWS),
         }
     }
 
-    /// Gauss and Newton over the vertices; normals follow them on both sides (printed Eq. 4 drops what they contribute).
-    fn with_normals(&self, normals: &Normals, wanted: &Mat<f64>) -> Mat<f64> {
+    /// Gauss and Newton over vertices; normals follow on both sides (printed Eq. 4 drops them).
+    fn with_normals(&self, normals: &DependentNormals, gram: &Mat<f64>, wanted: &Mat<f64>) -> Mat<f64> {
         let columns = self.values.len();
-        let m = columns - normals.dependent.faces().len();
+        let m = columns - normals.faces().len();
         let rest = matrix(&self.values);
         let projected = transposed_product(self.source.as_ref(), wanted.as_ref(), BLOCK_ROWS);
         let mut vertices: Vec<Point> = self.values[..m].to_vec();
@@ -154,17 +148,15 @@ impl PublicTransfer {
         let mut change = Mat::<f64>::zeros(columns, 3);
         let mut error = f64::INFINITY;
         for _ in 0..MAX_STEPS {
-            let left = &projected - &normals.gram * &change;
-            let chain = chain(&normals.dependent, &vertices, columns);
-            let (hessian, pull) = equations(&normals.gram, &chain, &left, m);
+            let left = &projected - gram * &change;
+            let (hessian, pull) = equations(gram, &chain(normals, &vertices), &left, m);
             let Some(step) = solve_definite(hessian, pull) else { break };
             let mut share = 1.0;
             loop {
                 let moved: Vec<Point> =
                     (0..m).map(|v| [0, 1, 2].map(|k| vertices[v][k] + share * step[(3 * v + k, 0)])).collect();
-                let all = all_values(&normals.dependent, &moved);
-                let tried = Mat::from_fn(columns, 3, |i, k| all[i][k] - rest[(i, k)]);
-                let found = energy(&normals.gram, &projected, &tried);
+                let tried = cage_values(Some(normals), &moved) - &rest;
+                let found = energy(gram, &projected, &tried);
                 if found < error || share < 1e-3 {
                     if found < error {
                         (vertices, change, error) = (moved, tried, found);
@@ -213,11 +205,6 @@ fn refused(error: PrepareError, source: &[Point], cage: &Cage, system: &dyn Coor
     }
 }
 
-/// Vertices, then their faces' normals.
-fn all_values(dependent: &DependentNormals, vertices: &[Point]) -> Vec<Point> {
-    vertices.iter().copied().chain(dependent.normals(|v| vertices[v as usize])).collect()
-}
-
 /// `‖Φ x − y‖² − ‖y‖²`, by `ΦᵀΦ` and `Φᵀ y`.
 fn energy(gram: &Mat<f64>, projected: &Mat<f64>, x: &Mat<f64>) -> f64 {
     let image = gram * x;
@@ -226,7 +213,7 @@ fn energy(gram: &Mat<f64>, projected: &Mat<f64>, x: &Mat<f64>) -> f64 {
 }
 
 /// For each column of `Φ`, which vertices its value depends on, and how.
-fn chain(dependent: &DependentNormals, vertices: &[Point], columns: usize) -> Vec<Vec<(usize, [Point; 3])>> {
+fn chain(dependent: &DependentNormals, vertices: &[Point]) -> Vec<Vec<(usize, [Point; 3])>> {
     const ONE: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut chain: Vec<Vec<(usize, [Point; 3])>> = (0..vertices.len()).map(|v| vec![(v, ONE)]).collect();
     for (face, [by_u, by_v]) in dependent.faces().iter().zip(dependent.derivatives(vertices)) {
@@ -234,7 +221,6 @@ fn chain(dependent: &DependentNormals, vertices: &[Point], columns: usize) -> Ve
         let of_first = [0, 1, 2].map(|i| [0, 1, 2].map(|k| -by_u[i][k] - by_v[i][k]));
         chain.push(vec![(a, of_first), (b, by_u), (c, by_v)]);
     }
-    debug_assert_eq!(chain.len(), columns);
     chain
 }
 

@@ -1,4 +1,4 @@
-//! Public cages: one cage around source and target together, in the target's space (the second paper, §3.2).
+//! Public cages: one around source and target, in the target's space (the second paper, §3.2).
 
 use cager_cages::{BoundingShape, EncloseError, EncloseOptions, bounding_shape, enclose_watched};
 use cager_geometry::mesh::{Model, TriMesh};
@@ -28,7 +28,7 @@ impl PublicCage {
         self.around_watched(source, target, &mut || ControlFlow::Continue(()))
     }
 
-    /// [`Self::around`], given up once `watch` breaks, which is called while an offset surface is made, and not for other shapes.
+    /// [`Self::around`], given up once `watch` breaks, which offset surfaces call.
     ///
     /// # Errors
     /// As [`Self::around`].

@@ -7,7 +7,7 @@ use cager_geometry::mesh::Point;
 use cager_geometry::vector::{add, distance, sub};
 use cager_shape::people::manifold::{Examples, Kind, Manifold};
 use cager_shape::people::rig::{Corrected, PlacementOptions, Rig, correct, enclose, place};
-use cager_shape::people::{COORDINATES, FitOptions, PersonFit, PersonModel};
+use cager_shape::people::{COORDINATES, FitOptions, PersonFit, PersonModel, SAMPLES};
 use cager_shape::registration::Observation;
 
 /// Quads at the joints [`LIMBS`], left and right in turn.
@@ -19,7 +19,7 @@ fn followed(what: &str, rig: &Rig, truth: &Capture, frames: &[usize], seen: &[Ob
     let examples = Examples::new(rig, &poses(rig, "131_01", 0..994, 8)).unwrap();
     let manifold = Manifold::learn(&examples, Kind::Pca, 20).unwrap();
     let options = FitOptions::default();
-    let model = PersonModel::new(&truth.rest, rig, COORDINATES, options.samples).unwrap();
+    let model = PersonModel::new(&truth.rest, rig, COORDINATES, SAMPLES).unwrap();
     let tracked = observe::followed(&PersonFit { model: &model, manifold: &manifold, options }, seen);
     let found: Vec<Vec<Point>> = tracked.iter().map(|frame| model.deformed(&frame.fit.vertices)).collect();
     let all = || found.iter().zip(frames).map(|(found, &f)| errors(found, &truth.frames[f], truth.height)[0]);

@@ -9,7 +9,7 @@ use cager_geometry::vector::distance;
 use cager_shape::people::joints::{CagedJoints, MarkedJoints};
 use cager_shape::people::manifold::{Examples, Kind, Manifold};
 use cager_shape::people::rig::{PlacementOptions, Rig, place};
-use cager_shape::people::{COORDINATES, FitOptions, Method, PersonFit, PersonModel};
+use cager_shape::people::{COORDINATES, FitOptions, Method, PersonFit, PersonModel, SAMPLES};
 use std::time::Instant;
 
 fn rig_of(capture: &Capture, up: Point) -> Rig {
@@ -54,7 +54,7 @@ fn a_walk_is_recovered_by_the_poses_of_its_first_cycle_and_not_by_the_printed_re
     let rig = rig_of(&walk, [0.0, 1.0, 0.0]);
     let own = poses(&rig, "02_02", 5..155, 2);
     let options = FitOptions::default();
-    let model = PersonModel::new(&walk.rest, &rig, COORDINATES, options.samples).unwrap();
+    let model = PersonModel::new(&walk.rest, &rig, COORDINATES, SAMPLES).unwrap();
     let frames: Vec<usize> = (37..73).step_by(3).collect();
     let manifold = learned(&rig, &own, Kind::Pca, 10);
     let fit = PersonFit { model: &model, manifold: &manifold, options };
@@ -82,7 +82,7 @@ fn a_man_is_recovered_with_joints_by_the_poses_of_another_person() {
     let other = poses(&rig, "131_01", 0..994, 8);
     let manifold = learned(&rig, &other, Kind::Pca, 20);
     let options = FitOptions::default();
-    let model = PersonModel::new(&man.rest, &rig, COORDINATES, options.samples).unwrap();
+    let model = PersonModel::new(&man.rest, &rig, COORDINATES, SAMPLES).unwrap();
     let frames: Vec<usize> = (0..60).step_by(3).collect();
     let fit = PersonFit { model: &model, manifold: &manifold, options };
     let (mean, _, cages) =
@@ -122,7 +122,7 @@ fn a_woman_is_recovered_with_the_template_of_a_man() {
     let rig = rig_of(&man, [0.0, 0.0, 1.0]);
     let manifold = learned(&rig, &poses(&rig, "02_02", 8..244, 3), Kind::Pca, 10);
     let options = FitOptions::default();
-    let model = PersonModel::new(&man.rest, &rig, COORDINATES, options.samples).unwrap();
+    let model = PersonModel::new(&man.rest, &rig, COORDINATES, SAMPLES).unwrap();
     let frames: Vec<usize> = (0..60).step_by(5).collect();
     let fit = PersonFit { model: &model, manifold: &manifold, options };
     let (mean, ..) = recovered("heavy woman by the man's template, PCA 10 of the clip", &fit, &woman, &frames, 0.0);
@@ -150,7 +150,7 @@ fn people_are_found_in_single_frames_whatever_their_heading() {
     let rig = rig_of(&man, [0.0, 0.0, 1.0]);
     let manifold = learned(&rig, &poses(&rig, "131_01", 0..994, 8), Kind::Pca, 20);
     let options = FitOptions::default();
-    let model = PersonModel::new(&man.rest, &rig, COORDINATES, options.samples).unwrap();
+    let model = PersonModel::new(&man.rest, &rig, COORDINATES, SAMPLES).unwrap();
     let fit = PersonFit { model: &model, manifold: &manifold, options };
     let mut all = Vec::new();
     for f in (0..60).step_by(3) {

@@ -61,7 +61,7 @@ pub fn followed(fit: &PersonFit<'_>, observations: &[Observation]) -> Vec<Tracke
     for observation in observations {
         tracker.follow(observation);
     }
-    tracker.back().into_frames()
+    tracker.into_frames()
 }
 
 /// Mean distance of vertices, and the largest, in percent of the height.

@@ -10,7 +10,7 @@ use cager_geometry::linalg::tall_product;
 use cager_geometry::mesh::{TriMesh, diagonal};
 use cager_geometry::spatial::Surface;
 use cager_geometry::vector::Point;
-use cager_shape::registration::{Observation, ObservationOptions, Target, Template, TemplateOptions};
+use cager_shape::registration::{Observation, ObservationOptions, Target, Template};
 use cager_shape::tracking::{Outcome, Tracker};
 use faer::Mat;
 
@@ -56,7 +56,7 @@ fn worst_error(spoil: impl Fn(&mut Observation, u64)) -> f64 {
     let model = bar([50, 8, 6], [1.0, 0.16, 0.1]);
     let cage = Cage::new(bar([10, 2, 2], [1.15, 0.26, 0.2])).unwrap();
     let phi = MeanValue.coordinates(&cage, &model.vertices, None).unwrap().phi;
-    let template = Template::new(&model, &cage, phi.as_ref(), &TemplateOptions::default()).unwrap();
+    let template = Template::new(&model, &cage, phi.as_ref(), 0).unwrap();
     let mut tracker = Tracker::new(&template, cage.vertices().to_vec());
     let mut worst: f64 = 0.0;
     for frame in 0..=8_u64 {
@@ -120,7 +120,7 @@ fn crossed_forearms_of_a_scan_part_with_it() {
     let first = scan(5);
     let cage = Cage::new(enclose_apart(&first, 350).unwrap()).unwrap();
     let phi = MeanValue.coordinates(&cage, &first.points, None).unwrap().phi;
-    let template = Template::new(&TriMesh::from(&first), &cage, phi.as_ref(), &TemplateOptions::default()).unwrap();
+    let template = Template::new(&TriMesh::from(&first), &cage, phi.as_ref(), 0).unwrap();
     let mut tracker = Tracker::new(&template, cage.vertices().to_vec());
     let mut sum = 0.0;
     for frame in 5..15 {

@@ -9,11 +9,11 @@ use cager_geometry::vector::{cross, distance, dot, norm, sub};
 use cager_shape::deformation::Detail;
 use cager_shape::interpolate::{CagedShapes, ShapeSpace};
 use cager_shape::quality::Quality;
+use cager_shape::transfer::RIGIDITY;
 use cager_shape::transfer::fitted::{CagedTarget, FittedTransfer};
 use cager_shape::transfer::placement::{Placement, lowest};
 use cager_shape::transfer::public::PublicTransfer;
 use cager_shape::transfer::public_cage::PublicCage;
-use cager_shape::transfer::rigid::{RIGIDITY, RigidTransfer};
 use cager_shape::transfer::{FittedOptions, Pose};
 use cager_shape::{Similarity, TransferError, quality::MotionQuality};
 use std::time::Instant;
@@ -161,10 +161,10 @@ fn a_walk_goes_onto_another_body_closer_than_by_the_methods_of_the_paper() {
         ("hull of 42", PublicCage::Hull(42)),
     ] {
         let cage = Cage::new(shape.around(&around, &target).unwrap()).unwrap();
-        let public = PublicTransfer::new(&man.rest.vertices, &target.vertices, aligned, &cage, &MeanValue).unwrap();
+        let public = PublicTransfer::new(&man.rest, &target, aligned, &cage, &MeanValue, None).unwrap();
         let error = compared(&format!("public, {name}"), &|f, p| public.pose(f, p).unwrap());
         assert!(error > best.error[0]);
-        let rigid = RigidTransfer::new(&man.rest, &target, aligned, &cage, &MeanValue, RIGIDITY).unwrap();
+        let rigid = PublicTransfer::new(&man.rest, &target, aligned, &cage, &MeanValue, Some(RIGIDITY)).unwrap();
         compared(&format!("rigid, {name}"), &|f, p| rigid.pose(f, p).unwrap());
     }
 }
@@ -340,8 +340,7 @@ fn detail_that_a_coarse_cage_loses_comes_back() {
     };
     for (name, cage) in [("sphere of 42", PublicCage::Sphere(42).around(&rest, &rest).unwrap()), ("wrap", wrap)] {
         let cage = Cage::new(cage).unwrap();
-        let through =
-            PublicTransfer::new(&rest.vertices, &rest.vertices, Similarity::IDENTITY, &cage, &MeanValue).unwrap();
+        let through = PublicTransfer::new(&rest, &rest, Similarity::IDENTITY, &cage, &MeanValue, None).unwrap();
         let start = Instant::now();
         let detail = Detail::new(&rest).unwrap();
         let prepared = start.elapsed().as_secs_f64();

@@ -8,23 +8,10 @@ use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use cager_geometry::vector::distance;
 use cager_shape::Similarity;
 use faer::Mat;
-use std::path::{Path, PathBuf};
 
-/// The folder with captures, `CAGER_CAPTURES` or `shared/data` beside the repository.
-pub fn data() -> PathBuf {
-    std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
-}
-
-/// Whether a file of the captures is there; says so where it is not.
-pub fn there(name: &str) -> bool {
-    let path = data().join(name);
-    let there = path.exists();
-    if !there {
-        eprintln!("skipped: there is no {}", path.display());
-    }
-    there
-}
+#[path = "../recovery/common.rs"]
+mod recovery;
+pub use recovery::{data, there};
 
 /// A model of the captures.
 pub fn mesh(name: &str) -> TriMesh {
@@ -33,14 +20,8 @@ pub fn mesh(name: &str) -> TriMesh {
 
 /// Frames of the captures.
 pub fn frames(name: &str) -> Vec<Vec<Point>> {
-    let bytes = std::fs::read(data().join(name)).unwrap();
-    let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = String::from_utf8_lossy(&bytes[10..10 + length]).into_owned();
-    assert!(header.contains("'<f4'"), "{header}");
-    let shape = header.split('(').nth(1).unwrap().split(')').next().unwrap();
-    let shape: Vec<usize> = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
-    let values: Vec<f64> =
-        bytes[10 + length..].as_chunks::<4>().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect();
+    let (shape, values) = recovery::npy(&data().join(name));
+    let values: Vec<f64> = values.into_iter().map(f64::from).collect();
     values.chunks_exact(3 * shape[1]).map(|frame| frame.as_chunks::<3>().0.to_vec()).collect()
 }
 

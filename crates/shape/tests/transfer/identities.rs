@@ -8,11 +8,11 @@ use cager_geometry::spatial::Surface;
 use cager_geometry::vector::distance;
 use cager_shape::deformation::Detail;
 use cager_shape::registration::Observation;
+use cager_shape::transfer::RIGIDITY;
 use cager_shape::transfer::alignment::{AlignBy, align_surfaces};
 use cager_shape::transfer::fitted::{CagedTarget, FittedTransfer};
 use cager_shape::transfer::public::PublicTransfer;
 use cager_shape::transfer::public_cage::PublicCage;
-use cager_shape::transfer::rigid::{RIGIDITY, RigidTransfer};
 use cager_shape::transfer::{FittedOptions, Pose};
 use cager_shape::{Similarity, TransferError};
 use glam::{DMat3, DQuat, DVec3};
@@ -64,8 +64,8 @@ fn a_source_at_rest_leaves_the_target_at_rest_and_one_that_moves_as_a_whole_take
     let aligned = fitted.report().aligned.similarity;
     let around = TriMesh { vertices: aligned.apply_all(&source.rest.vertices), ..source.rest.clone() };
     let cage = Cage::new(PublicCage::Sphere(42).around(&around, &target).unwrap()).unwrap();
-    let public = PublicTransfer::new(&source.rest.vertices, &target.vertices, aligned, &cage, &MeanValue).unwrap();
-    let rigid = RigidTransfer::new(&source.rest, &target, aligned, &cage, &MeanValue, RIGIDITY).unwrap();
+    let public = PublicTransfer::new(&source.rest, &target, aligned, &cage, &MeanValue, None).unwrap();
+    let rigid = PublicTransfer::new(&source.rest, &target, aligned, &cage, &MeanValue, Some(RIGIDITY)).unwrap();
     let methods: [(&str, &Method<'_>); 4] = [
         ("fitted", &|frame| fitted.pose(0, frame).unwrap()),
         ("through a cage", &|frame| through.pose(0, frame).unwrap()),
@@ -89,7 +89,7 @@ fn green_coordinates_keep_rest_poses_and_similarity_motions_with_consistent_norm
     use cager_core::coordinates::Green;
     let (source, target) = pair();
     let cage = Cage::new(PublicCage::Sphere(42).around(&source.rest, &target).unwrap()).unwrap();
-    let of = |aligned| PublicTransfer::new(&source.rest.vertices, &target.vertices, aligned, &cage, &Green::Consistent);
+    let of = |aligned| PublicTransfer::new(&source.rest, &target, aligned, &cage, &Green::Consistent, None);
     let green = of(Similarity::IDENTITY).unwrap();
     let still = farthest(&green.pose(0, &source.rest.vertices).unwrap(), &target.vertices);
     let moved = green.pose(0, &motion().apply_all(&source.rest.vertices)).unwrap();
@@ -139,8 +139,8 @@ fn points_under_the_target_lie_near_it_by_every_method() {
     let aligned = fitted.report().aligned.similarity;
     let around = TriMesh { vertices: aligned.apply_all(&source.rest.vertices), ..source.rest.clone() };
     let cage = Cage::new(PublicCage::Sphere(42).around(&around, &target).unwrap()).unwrap();
-    let public = PublicTransfer::new(&source.rest.vertices, &target.vertices, aligned, &cage, &MeanValue).unwrap();
-    let rigid = RigidTransfer::new(&source.rest, &target, aligned, &cage, &MeanValue, RIGIDITY).unwrap();
+    let public = PublicTransfer::new(&source.rest, &target, aligned, &cage, &MeanValue, None).unwrap();
+    let rigid = PublicTransfer::new(&source.rest, &target, aligned, &cage, &MeanValue, Some(RIGIDITY)).unwrap();
     let moved = motion().apply_all(&source.rest.vertices);
     let wanted = same_motion(&motion(), &aligned, &target.vertices);
     for under in [fitted.under(0, &moved), public.under(0, &moved), rigid.under(0, &moved)] {

@@ -44,7 +44,7 @@ fn options(pairs: Vec<VertexPair>) -> FittedOptions<'static> {
 fn pairs_tell_which_way_round_a_symmetrical_body_is() {
     let (source, target, turn) = pair();
     let found = FittedTransfer::new(&source.source(), &target, &options(Vec::new())).map(|_| ());
-    assert!(matches!(found, Err(TransferError::Ambiguous { up: false })), "{found:?}");
+    assert!(matches!(found, Err(TransferError::Ambiguous(false))), "{found:?}");
     let wanted = turned(&bent(&egg(RINGS[1]).vertices), turn);
     let sides = [0, 1].map(|k| VertexPair { source: side(RINGS[0], k), target: side(RINGS[1], k) });
     let top = VertexPair { source: 0, target: 0 };

@@ -1,4 +1,4 @@
-//! Minimisation of smooth functions by L-BFGS (Nocedal 1980) with a line search that looks for sufficient decrease and curvature (Wolfe).
+//! L-BFGS (Nocedal 1980) with a line search for sufficient decrease and curvature (Wolfe).
 
 use lbfgs::Lbfgs;
 
@@ -9,7 +9,7 @@ const DECREASE: f64 = 1e-4;
 /// Share of the slope that may be left after a step.
 const CURVATURE: f64 = 0.9;
 
-/// Lowers `f(x)`, which writes its gradient, from `x`; ends after so many steps or where no step lowers it. Returns the last value.
+/// Lowers `f(x)`, which writes its gradient, from `x`, in so many steps. Returns the last value.
 pub(super) fn minimize(x: &mut Vec<f64>, steps: usize, mut f: impl FnMut(&[f64], &mut [f64]) -> f64) -> f64 {
     let n = x.len();
     let mut memory = Lbfgs::<f64>::new(n, MEMORY);

@@ -3,12 +3,9 @@
 /// Why a manifold cannot be learned or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ManifoldError {
-    /// Fewer than two poses.
-    #[error("has {poses} poses, and two are the least; give longer clips")]
-    TooFewPoses {
-        /// Poses there are.
-        poses: usize,
-    },
+    /// Fewer than two poses: how many there are.
+    #[error("has {0} poses, and two are the least; give longer clips")]
+    TooFewPoses(usize),
     /// As many latent numbers as poses.
     #[error("{dims} dimensions cannot be learned from {poses} poses; ask for fewer, or give more clips")]
     TooManyDims {

@@ -1,13 +1,13 @@
 //! The poses that a manifold is learned from.
 
 use super::error::ManifoldError;
-use crate::people::rig::{QUAD_UNKNOWNS, Rig};
+use crate::people::rig::{QUAD_UNKNOWNS, Rig, extent};
 use cager_geometry::linalg::zeros;
-use cager_geometry::vector::dot;
+use cager_geometry::mesh::Point;
 use faer::Mat;
 use serde::{Deserialize, Serialize};
 
-/// What each number of a pose counts: positions in units of a seventeenth of the height, rotations 1.5 for each radian.
+/// What numbers of a pose count: positions in seventeenths of the height, rotations 1.5 a radian.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct PoseWeights {
     /// What a unit of length counts.
@@ -19,20 +19,14 @@ pub struct PoseWeights {
 impl PoseWeights {
     /// Those of a rig.
     pub fn of(rig: &Rig) -> Self {
-        Self { position: 17.0 / height(rig), rotation: 1.5 }
+        let corners: Vec<Point> = rig.quads.iter().flat_map(|quad| quad.corners).collect();
+        Self { position: 17.0 / extent(&corners, rig.up), rotation: 1.5 }
     }
 
     /// The weight of a number of a pose.
     pub fn at(&self, number: usize) -> f64 {
         if number % 6 < 3 { self.position } else { self.rotation }
     }
-}
-
-/// Extent of a rig along its up axis.
-fn height(rig: &Rig) -> f64 {
-    let heights = rig.quads.iter().flat_map(|quad| quad.corners).map(|corner| dot(corner, rig.up));
-    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
-    (high - low).max(f64::MIN_POSITIVE)
 }
 
 /// Weighted poses around their mean.
@@ -51,7 +45,7 @@ impl Examples {
     /// With fewer than two poses, or numbers that are not finite.
     pub fn new(rig: &Rig, poses: &[Vec<f64>]) -> Result<Self, ManifoldError> {
         if poses.len() < 2 || poses.iter().any(|pose| pose.len() != QUAD_UNKNOWNS) {
-            return Err(ManifoldError::TooFewPoses { poses: poses.len() });
+            return Err(ManifoldError::TooFewPoses(poses.len()));
         }
         if poses.iter().flatten().any(|x| !x.is_finite()) {
             return Err(ManifoldError::NotFinite);

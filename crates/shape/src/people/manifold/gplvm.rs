@@ -1,8 +1,10 @@
-//! Gaussian process latent variable models of poses (Lawrence 2005; Duveau et al. 2012, §4) with back-constraints (Lawrence and Quiñonero-Candela
-//! 2006): latent numbers are kernel functions of the poses, so that similar poses stay together.
+//! Gaussian process latent variable models of poses (Lawrence 2005; Duveau et al. 2012, §4) with
+//! back-constraints (Lawrence and Quiñonero-Candela 2006): latent numbers are kernel functions of
+//! the poses, so that similar poses stay together.
 //!
-//! `X = K_b A` with `K_b = exp(−d² / 2 d̃²)` over weighted poses, `d̃` their median distance. `A`, α, γ and the noise 1/β minimise
-//! `D/2 log |K| + ½ tr(K⁻¹ Y Yᵀ) + ½ ‖X‖²` with `K = α exp(−γ/2 ‖x − x'‖²) + δ/β`, by L-BFGS from the principal components.
+//! `X = K_b A` with `K_b = exp(−d² / 2 d̃²)` over weighted poses, `d̃` their median distance. `A`,
+//! α, γ and the noise 1/β minimise `D/2 log |K| + ½ tr(K⁻¹ Y Yᵀ) + ½ ‖X‖²` with `K = α exp(−γ/2 ‖x
+//! − x'‖²) + δ/β`, by L-BFGS from the principal components.
 
 use super::descent::minimize;
 use super::error::ManifoldError;
@@ -137,7 +139,7 @@ impl Gplvm {
         derivatives.iter().map(|dk| (0..QUAD_UNKNOWNS).map(|j| self.output(dk, j)).collect()).collect()
     }
 
-    /// Variance of a normalised number of the pose, and its derivatives by the latent numbers (Eq. 9 and 10).
+    /// Variance of a normalised number of the pose, and its derivatives (Eq. 9 and 10).
     pub fn variance(&self, x: &[f64]) -> (f64, Vec<f64>) {
         let k = self.kernel(x);
         let n = k.len();
@@ -186,7 +188,7 @@ struct Covariance {
 }
 
 impl Covariance {
-    /// Of latent numbers, one row each, and the logarithms of α, γ and β; `None` where it is not definite.
+    /// Of latent numbers, one row each, and log α, γ, β; `None` where it is not definite.
     fn new(x: &Mat<f64>, [alpha, gamma, beta]: [f64; 3]) -> Option<Self> {
         let n = x.nrows();
         let (alpha, gamma) = (alpha.exp(), gamma.exp());

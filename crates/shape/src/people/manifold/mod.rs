@@ -1,4 +1,5 @@
-//! Manifolds of poses, learned from examples: a pose `y` of 126 numbers (see [`crate::people::rig::deform`]) as a function of few latent numbers `x`.
+//! Manifolds of poses: a pose `y` of 126 numbers ([`crate::people::rig::deform`]) by few latent
+//! ones.
 //!
 //! What each number counts is said by [`PoseWeights`].
 

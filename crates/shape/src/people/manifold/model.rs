@@ -25,7 +25,7 @@ pub enum Manifold {
     Gplvm(Gplvm),
 }
 
-/// The prior of latent numbers, as residuals `r` for least squares: `½ Σ r²` is, but for a constant, the negative logarithm of the likelihood.
+/// The prior as residuals `r`: `½ Σ r²` is the negative log-likelihood but for a constant.
 #[derive(Clone, Debug)]
 pub struct Prior {
     /// The residuals.
@@ -116,8 +116,8 @@ impl Manifold {
         }
     }
 
-    /// The prior: `½ ‖x‖²` for principal components, `½ log σ²` for a Gaussian process. The paper prints `− log σ²` (Eq. 5), which would reward poses
-    /// unlike any example, against what its text says.
+    /// The prior: `½ ‖x‖²` for principal components, `½ log σ²` for a Gaussian process. The printed
+    /// `− log σ²` (Eq. 5) would reward poses unlike any example.
     pub fn prior(&self, x: &[f64]) -> Prior {
         match self {
             Self::Pca(_) => {
@@ -126,7 +126,7 @@ impl Manifold {
             }
             Self::Gplvm(gplvm) => {
                 let (variance, gradient) = gplvm.variance(x);
-                // The square root needs a positive argument: the logarithm over the least variance there is, and a little.
+                // The square root needs a positive argument: over the least variance, and a little.
                 let over = (variance / gplvm.noise_variance()).ln().max(1e-4) + 0.1;
                 let residual = over.sqrt();
                 let scale = 0.5 / (variance * residual);

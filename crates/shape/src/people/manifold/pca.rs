@@ -1,4 +1,4 @@
-//! Principal components of poses: the linear manifold `y = mean + B x`, with unit variance of each latent number over the examples.
+//! Principal components of poses: `y = mean + B x`, each latent number of unit variance.
 
 use super::Examples;
 use super::error::ManifoldError;

@@ -1,4 +1,4 @@
-//! Poses of a rig from motion-capture clips: the quads are taken along by the bones of a skeleton (Duveau et al. 2012, §6.2).
+//! Poses of a rig from motion-capture clips: bones take quads along (Duveau et al. 2012, §6.2).
 
 mod error;
 mod names;

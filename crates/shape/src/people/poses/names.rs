@@ -5,8 +5,8 @@ use cager_formats::biovision::Skeleton;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Bones of a person that move the quads of a rig. Those of the trunk turn about the joint that is named first; of those of the limbs, whose names
-/// begin with `left` and `right`, a second joint says where the bone ends.
+/// Bones of a person that move quads. Those of the trunk turn about the joint named first; of
+/// limbs, named `left` and `right`, a second joint says where the bone ends.
 pub const BONES: [&str; 16] = [
     "pelvis",
     "abdomen",
@@ -44,11 +44,11 @@ pub struct Naming {
     bones: Vec<BoneNames>,
 }
 
-/// Of one naming: the four joints of the trunk, then shoulder, elbow, wrist, finger, hip, knee, ankle and toe, with `{}` for the side and what the sides
-/// are called.
+/// The joints of the trunk, then shoulder, elbow, wrist, finger, hip, knee, ankle and toe, with
+/// `{}` for the side, and names of the sides.
 type Table = ([&'static str; 4], [&'static str; 8], [[&'static str; 2]; 2]);
 
-/// How the joints of the CMU clips are called in their conversions for Poser and DAZ, for MotionBuilder and for 3ds Max, and by Mixamo, in turn.
+/// CMU's names in conversions for Poser and DAZ, MotionBuilder and 3ds Max, and Mixamo's.
 const TABLES: [Table; 5] = [
     (
         ["hip", "abdomen", "chest", "head"],
@@ -78,7 +78,7 @@ const TABLES: [Table; 5] = [
 ];
 
 impl Naming {
-    /// The known naming that a skeleton follows: CMU in three conversions, or Mixamo, whose prefix `mixamorig:` is left out.
+    /// The known naming that a skeleton follows: CMU in three conversions, or Mixamo.
     ///
     /// # Errors
     /// [`PoseError::UnknownNames`] where it follows none.
@@ -90,7 +90,7 @@ impl Naming {
         })
     }
 
-    /// A naming of one's own: an object in JSON with an entry for each of [`BONES`], `{"joint": …, "end": …}`.
+    /// A JSON object with an entry for each of [`BONES`], `{"joint": …, "end": …}`.
     ///
     /// # Errors
     /// Where it is no such object, has other bones or lacks one.

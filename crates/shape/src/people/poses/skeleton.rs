@@ -1,7 +1,7 @@
 //! Poses of a rig from those of a skeleton.
 //!
-//! Where all its angles are zero a skeleton need not stand as the rig does: each limb of the rig is first turned to the skeleton's bone by the smallest
-//! rotation that does so. Lengths are the rig's throughout, so that clips of any person fit.
+//! Where all its angles are zero a skeleton need not stand as the rig does: each limb is first
+//! turned to the skeleton's bone by the smallest rotation. Lengths are the rig's throughout.
 
 use super::error::PoseError;
 use super::names::Naming;
@@ -26,7 +26,7 @@ const SEGMENTS: [[usize; 2]; SIDE_BONES] = [[5, 6], [6, 7], [7, 8], [9, 10], [10
 #[derive(Clone, Debug)]
 pub struct SkeletonPoses {
     joints: Vec<(usize, Option<usize>)>,
-    /// Of each bone, the rotation that takes the rig's to the skeleton's where all angles are zero, in the skeleton's axes.
+    /// Of each bone, the rotation from the rig's to the skeleton's at zero angles, in its axes.
     alignments: Vec<DMat3>,
     /// From the skeleton's axes to the rig's.
     to_rig: DMat3,

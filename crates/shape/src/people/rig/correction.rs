@@ -1,4 +1,5 @@
-//! Joints corrected by motion: two parts of a body that meet at a joint turn about one point, which cross-sections of a single pose only guess.
+//! Joints corrected by motion: two parts that meet at a joint turn about one point, which a single
+//! pose only guesses.
 
 use super::Rig;
 use super::enclosure::{enclose, extent};
@@ -13,7 +14,7 @@ const ROUNDS: usize = 3;
 /// Points of each bone and frames that are looked at, at the most.
 const MAX_POINTS: usize = 400;
 const MAX_FRAMES: usize = 300;
-/// Points of a bone that are this many times as far off its rigid motion as the usual one bend with a joint.
+/// Points of a bone so many times as far off its rigid motion as usual bend with a joint.
 const BENDING: f64 = 1.5;
 /// Fewer points have no rigid motion.
 const MIN_POINTS: usize = 12;
@@ -39,8 +40,8 @@ struct Meeting {
     moves_corners: bool,
 }
 
-/// Corrects the joints of a rig by frames of its template, one point for each of it, and puts their quads there; joints that do not turn stay. `margin` is that of
-/// the rig's placement.
+/// Corrects the joints of a rig by frames of its template and moves their quads; joints that do not
+/// turn stay. `margin` is that of the placement.
 pub fn correct(rig: &Rig, template: &TriMesh, frames: &[Vec<Point>], margin: f64) -> Corrected {
     let every = frames.len().div_ceil(MAX_FRAMES).max(1);
     let frames: Vec<&Vec<Point>> = frames.iter().step_by(every).collect();
@@ -73,7 +74,7 @@ pub fn correct(rig: &Rig, template: &TriMesh, frames: &[Vec<Point>], margin: f64
         }
     }
     let (rig, enclosure) = enclose(corrected, template, margin);
-    let height = extent(rig.up, template);
+    let height = extent(&template.vertices, rig.up);
     let shifts = std::array::from_fn(|quad| joints[quad].distance(first[quad]) / height);
     Corrected { placed: PlacedRig { rig, enclosure }, shifts }
 }
@@ -115,7 +116,7 @@ fn points_of(bone: [usize; 2], joints: &[DVec3], template: &TriMesh) -> Vec<usiz
     points
 }
 
-/// The rigid motion of a bone in each frame, by those of its points that move rigidly; none of too few.
+/// The rigid motion of a bone in each frame, by its points that move rigidly; none of too few.
 fn motions(points: &[usize], template: &TriMesh, frames: &[&Vec<Point>]) -> Option<Vec<Similarity>> {
     if points.len() < MIN_POINTS || frames.is_empty() {
         return None;
@@ -139,8 +140,8 @@ fn motions(points: &[usize], template: &TriMesh, frames: &[&Vec<Point>]) -> Opti
     Some(fit(&kept))
 }
 
-/// The point of the rest pose that both motions take to about the same place in all frames; where they hardly turn against each other, or about one axis only, near
-/// its first place.
+/// The rest point that both motions take to about the same places; near the first one where they
+/// hardly turn, or about one axis only.
 fn center(above: &[Similarity], below: &[Similarity], first: DVec3) -> DVec3 {
     let mut a = DMat3::from_diagonal(DVec3::splat(above.len() as f64 * TRUSTED_TURN * TRUSTED_TURN));
     let mut b = DVec3::ZERO;
@@ -211,7 +212,8 @@ mod tests {
         for quad in [5, 6, 9] {
             assert!(from_truth(quad).length() < 0.06, "{quad}: {}", from_truth(quad));
         }
-        // The elbow's corners went along; the knee that is never bent stays, and so do joints of the other side.
+        // The elbow's corners went along; the knee that is never bent stays, and so do joints of
+        // the other side.
         assert!((placed.rig.quads[6].corners[0][0] - rig.quads[6].corners[0][0]).abs() < 0.2);
         assert!((from_truth(10) - DVec3::Y * 0.4).length() < 1e-3 && told[10] < 1e-4, "{}", from_truth(10));
         assert!((13..QUADS).all(|quad| told[quad] < 1e-9) && told[6] > 0.01, "{told:?}");

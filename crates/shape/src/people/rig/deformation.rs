@@ -1,7 +1,8 @@
-//! The cage of a posed rig, and its derivatives (Duveau et al. 2012, §3 and Eq. 6: "dV/dy follows trivially").
+//! The cage of a posed rig, and its derivatives (Duveau et al. 2012, §3 and Eq. 6).
 //!
-//! A pose `y` has six numbers for each quad, in the pelvis frame of the rest pose: the position of its joint and its rotation vector `w`. With the
-//! placement Γ of the pelvis, rotation `G` and translation `t`, a corner with offset `u` from its joint is at `v = G (p + exp(w) u) + t`.
+//! A pose has six numbers a quad, in the pelvis frame at rest: the position `p` of its joint and a
+//! rotation vector `w`. With the placement of the pelvis, `G` and `t`, a corner with offset `u` is
+//! at `v = G (p + exp(w) u) + t`.
 
 use super::Rig;
 use super::topology::{CAGE_VERTICES, QUADS, owner};
@@ -13,8 +14,8 @@ use glam::{DMat3, DVec3};
 /// Numbers of a pose.
 pub const QUAD_UNKNOWNS: usize = 6 * QUADS;
 
-/// A placement of the pelvis after a small turn, by its rotation vector, about the origin of the pelvis frame and a small translation: the step of
-/// [`Deformed::pull`]'s first six derivatives.
+/// A placement after a small turn about the origin of the pelvis frame and a small translation: the
+/// step of [`Deformed::pull`]'s first six derivatives.
 #[must_use]
 pub(crate) fn stepped(placement: &Similarity, step: &[f64]) -> Similarity {
     let rotation = exp(DVec3::from_slice(&step[..3])) * placement.rotation;
@@ -27,7 +28,7 @@ pub struct Deformed {
     /// The 86 vertices.
     pub vertices: Vec<Point>,
     rotation: DMat3,
-    /// Of each vertex, its position relative to the pelvis frame's origin, turned: `G (p + exp(w) u)`.
+    /// Of each vertex, its turned position from the pelvis frame's origin: `G (p + exp(w) u)`.
     arms: Vec<DVec3>,
     /// Of each vertex, its derivative by the rotation vector of its quad, transposed.
     by_rotation: Vec<DMat3>,
@@ -67,8 +68,7 @@ pub fn deform(rig: &Rig, pose: &[f64], placement: &Similarity) -> Deformed {
 }
 
 impl Deformed {
-    /// Derivatives of `Σ row · v` over the vertices, by the placement (turn, then translation) and by the pose: 6 + [`QUAD_UNKNOWNS`] numbers from
-    /// 3 × 86.
+    /// Derivatives of `Σ row · v`, by the placement (turn, then translation) and the pose.
     pub fn pull(&self, row: &[f64], out: &mut [f64]) {
         let (place, pose) = out.split_at_mut(6);
         let back = self.rotation.transpose();

@@ -1,8 +1,8 @@
-//! Whether a template lies inside the cage of a rig, and the correction of a rig of which parts stick out.
+//! Whether a template lies inside the cage of a rig, and the correction of one that sticks out.
 
 use super::Rig;
 use super::topology::{CAGE_VERTICES, triangles};
-use crate::points::vertex_normals;
+use crate::points::{range, vectors, vertex_normals};
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::{Surface, outside};
 use cager_geometry::vector::{add, dot, norm, sub};
@@ -26,14 +26,16 @@ impl Rig {
     /// How much of a template lies outside the cage.
     pub fn enclosure(&self, template: &TriMesh) -> Enclosure {
         let found = outside(&self.cage(), &template.vertices);
-        let farthest = found.iter().map(|&(_, distance)| distance).fold(0.0, f64::max) / extent(self.up, template);
+        let farthest =
+            found.iter().map(|&(_, distance)| distance).fold(0.0, f64::max) / extent(&template.vertices, self.up);
         Enclosure { outside: found.into_iter().map(|(point, _)| point).collect(), farthest, moved: 0.0 }
     }
 }
 
-/// Pushes the corners of quads out until the template, and what is `margin` of its height outside of it, lies inside.
+/// Pushes corners out until the template, and what is `margin` of its height around it, lies
+/// inside.
 pub fn enclose(mut rig: Rig, template: &TriMesh, margin: f64) -> (Rig, Enclosure) {
-    let height = extent(rig.up, template);
+    let height = extent(&template.vertices, rig.up);
     let normals = vertex_normals(&template.vertices, &template.triangles);
     let mut wanted = template.vertices.clone();
     wanted.extend(
@@ -46,14 +48,14 @@ pub fn enclose(mut rig: Rig, template: &TriMesh, margin: f64) -> (Rig, Enclosure
         if found.is_empty() {
             break;
         }
-        let surface = Surface::new(cage.vertices.iter().map(|&p| p.into()).collect(), triangles().to_vec());
+        let surface = Surface::new(vectors(&cage.vertices), triangles().to_vec());
         // Of each vertex, the longest way that any point asks for.
         let mut steps = [DVec3::ZERO; CAGE_VERTICES];
         for (point, _) in found {
             let p = DVec3::from(wanted[point as usize]);
             let Some(nearest) = surface.nearest(p) else { continue };
             let squares: f64 = nearest.weights.iter().map(|w| w * w).sum();
-            // A little beyond the point, and never so far that a point between two faces tears one of them away.
+            // A little beyond the point, but never so far that it tears a face away.
             let away = (p - nearest.point) * 1.05 + (p - nearest.point).normalize_or_zero() * 2e-4 * height;
             for (v, weight) in triangles()[nearest.face as usize].into_iter().zip(nearest.weights) {
                 let step = (away * (weight / squares)).clamp_length_max(0.02 * height);
@@ -78,9 +80,8 @@ impl Rig {
     }
 }
 
-/// Extent of a template along an axis.
-pub(super) fn extent(up: Point, template: &TriMesh) -> f64 {
-    let along = template.vertices.iter().map(|&p| dot(p, up));
-    let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
+/// Extent of points along an axis.
+pub(crate) fn extent(points: &[Point], up: Point) -> f64 {
+    let (low, high) = range(points.iter().map(|&p| dot(p, up)));
     (high - low).max(f64::MIN_POSITIVE)
 }

@@ -1,4 +1,4 @@
-//! Rig files, in JSON: axes, quads by their names with joint and corners, and the two vertices at the crotch.
+//! Rig files, in JSON.
 
 use super::{QUAD_NAMES, Quad, Rig, RigError};
 use cager_geometry::mesh::Point;

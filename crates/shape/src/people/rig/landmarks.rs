@@ -1,4 +1,4 @@
-//! Where a person's limbs and joints are, from cross-sections of the surface: left along x, up along y, forward along z.
+//! Where limbs and joints are, by cross-sections: left along x, up along y, forward along z.
 
 use super::RigError;
 use super::sections::{Body, Extent};
@@ -144,7 +144,8 @@ impl Landmarks {
         let upright = ring(beside, DVec3::X * sign).ok_or(none.clone())?;
         let shoulder_center = Extent::of(upright.iter().copied()).center();
         let distance = body.distances(tip);
-        // Positions along the arm, from the tip: the middle of what is at the same distance along the surface.
+        // Positions along the arm: the middle of what is equally far from the tip along the
+        // surface.
         let width = 0.012 * height;
         let at = |d: f64| -> Vec<DVec3> {
             let near = (0..body.points.len())

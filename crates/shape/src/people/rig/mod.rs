@@ -1,4 +1,5 @@
-//! Oriented-quads rigs (Duveau et al. 2012, §3): 21 rigid quads at the joints of a person, whose 84 corners and two vertices at the crotch are a cage.
+//! Oriented-quads rigs (Duveau et al. 2012, §3): 21 rigid quads at the joints of a person, whose 84
+//! corners and two vertices at the crotch are a cage.
 
 mod correction;
 mod deformation;
@@ -13,6 +14,7 @@ mod topology;
 pub use correction::{Corrected, correct};
 pub(crate) use deformation::stepped;
 pub use deformation::{Deformed, QUAD_UNKNOWNS, deform};
+pub(crate) use enclosure::extent;
 pub use enclosure::{Enclosure, enclose};
 pub use error::RigError;
 pub use placement::{PlacedRig, PlacementOptions, place};
@@ -27,8 +29,9 @@ use cager_geometry::vector::cross;
 pub struct Quad {
     /// The joint that it turns about.
     pub joint: Point,
-    /// Its corners. Across the trunk and the legs: front left, front right, back right, back left, as the person sees it, but for legs
-    /// front outer, front inner, back inner, back outer; across the arms: lower front, lower back, upper back, upper front.
+    /// Its corners as the person sees them: across the trunk front left, front right, back right,
+    /// back left; across legs front outer, front inner, back inner, back outer; across arms lower
+    /// front, lower back, upper back, upper front.
     pub corners: [Point; 4],
 }
 

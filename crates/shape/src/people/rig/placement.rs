@@ -1,10 +1,11 @@
-//! Placing a rig in a template that stands with its arms held out (T- or A-pose), by landmarks of its cross-sections. All is relative to the
-//! template's height, so its unit does not matter.
+//! Placing a rig in a template in a T- or A-pose, by landmarks of its cross-sections, relative to
+//! its height.
 
 use super::landmarks::{Arm, Landmarks, Leg};
 use super::sections::{Body, Extent};
 use super::topology::{LEFT_ARM, LEFT_LEG, TO_RIGHT};
 use super::{Enclosure, QUADS, Quad, Rig, RigError, enclose};
+use crate::points::{range, vectors};
 use cager_geometry::mesh::{Point, TriMesh};
 use glam::{DMat3, DVec3};
 
@@ -15,7 +16,7 @@ pub struct PlacementOptions {
     pub up: Point,
     /// To where the person looks; told by the feet where it is not given.
     pub forward: Option<Point>,
-    /// Distance that is kept between the template and the cage where it can be, as a fraction of the height.
+    /// Distance between template and cage where it can be kept, over the height.
     pub margin: f64,
 }
 
@@ -60,10 +61,8 @@ fn axes(template: &TriMesh, options: &PlacementOptions) -> Result<DMat3, RigErro
         let forward = DVec3::from(forward).reject_from_normalized(up).try_normalize().ok_or(RigError::ForwardIsUp)?;
         return Ok(DMat3::from_cols(up.cross(forward), up, forward));
     }
-    let extent = |a: DVec3| {
-        let along = template.vertices.iter().map(|&p| DVec3::from(p).dot(a));
-        along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)))
-    };
+    let points = vectors(&template.vertices);
+    let extent = |a: DVec3| range(points.iter().map(|p| p.dot(a)));
     let level = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis.reject_from_normalized(up));
     let spans = level.map(|axis| axis.try_normalize().map_or(0.0, |axis| extent(axis).1 - extent(axis).0));
     let widest = (0..3).max_by(|&a, &b| spans[a].total_cmp(&spans[b])).unwrap_or(0);
@@ -72,12 +71,8 @@ fn axes(template: &TriMesh, options: &PlacementOptions) -> Result<DMat3, RigErro
     // Feet reach forward of the ankles.
     let ahead = across.cross(up);
     let middle = |from: f64, to: f64| {
-        let inside = template.vertices.iter().map(|&p| DVec3::from(p)).filter(|p| {
-            let h = (p.dot(up) - low) / (high - low);
-            h >= from && h <= to
-        });
-        let (low, high) =
-            inside.map(|p| p.dot(ahead)).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let inside = points.iter().filter(|p| (from..=to).contains(&((p.dot(up) - low) / (high - low))));
+        let (low, high) = range(inside.map(|p| p.dot(ahead)));
         0.5 * (low + high)
     };
     let forward = if middle(0.0, 0.03) - middle(0.06, 0.12) >= 0.0 { ahead } else { -ahead };

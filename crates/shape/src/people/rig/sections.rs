@@ -2,7 +2,7 @@
 
 use crate::deformation::rows::Rows;
 use crate::edge_distances::nearest_sources;
-use crate::registration::welded;
+use crate::points::welded;
 use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::topology::{Adjacency, UnionFind};
 use glam::DVec3;
@@ -53,7 +53,7 @@ impl Body {
         Self { points, triangles: triangles.iter().map(|&t| rows.of(t)).collect() }
     }
 
-    /// The connected parts of the section by the plane through `through`, each as the points where the plane crosses edges.
+    /// The connected parts of a plane section, each as the points where it crosses edges.
     pub(super) fn section(&self, through: DVec3, normal: DVec3) -> Vec<Vec<DVec3>> {
         let height: Vec<f64> = self.points.iter().map(|p| (*p - through).dot(normal)).collect();
         let mut numbers: HashMap<[u32; 2], usize> = HashMap::new();

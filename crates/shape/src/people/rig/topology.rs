@@ -1,4 +1,4 @@
-//! How the quads of a rig are joined to a cage: tubes between neighbouring quads, caps at the ends, and what joins limbs to the trunk.
+//! How quads make a cage: tubes between neighbours, caps at the ends, joints of limbs and trunk.
 
 use std::sync::OnceLock;
 
