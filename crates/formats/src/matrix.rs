@@ -1,8 +1,8 @@
-//! Matrix Market exchange format, coordinate (Boisvert, Pozo and Remington 1996): sparse matrices as text.
+//! Sparse matrices in the Matrix Market format (Boisvert, Pozo and Remington 1996).
 
 use crate::error::{Error, Fault};
 use crate::signature::Signature;
-use crate::text::{Lines, integer, number, quoted, words};
+use crate::text::{Lines, damaged, integer, number, quoted, words};
 use cager_geometry::linalg::SparseMatrix;
 use std::path::Path;
 
@@ -50,10 +50,10 @@ fn read(bytes: &[u8]) -> Result<SparseMatrix, Fault> {
     let (rows, columns, promised) = sizes(&mut lines, kind)?;
     let room = lines.rest().len() / SHORTEST_ENTRY + 1;
     if promised > room {
-        return Err(Fault::damaged(format!(
-            "line {}: {promised} entries are promised, more than the file can hold; copy or export it again",
-            lines.number()
-        )));
+        return Err(damaged(
+            lines.number(),
+            &format!("{promised} entries are promised, more than the file can hold; copy or export it again"),
+        ));
     }
     let mut entries = Vec::with_capacity(promised);
     while let Some(line) = lines.next() {
@@ -61,8 +61,8 @@ fn read(bytes: &[u8]) -> Result<SparseMatrix, Fault> {
             continue;
         }
         if entries.len() == promised {
-            let text = format!("line {}: there are more than the {promised} entries that are promised", lines.number());
-            return Err(Fault::damaged(format!("{text}; export the matrix again")));
+            let what = format!("there are more than the {promised} entries that are promised; export the matrix again");
+            return Err(damaged(lines.number(), &what));
         }
         entries.push(entry(line, lines.number(), kind, rows, columns)?);
     }
@@ -114,15 +114,11 @@ fn sizes(lines: &mut Lines<'_>, kind: Kind) -> Result<(u32, u32, usize), Fault> 
     let mut numbers = words(line);
     let mut next = || numbers.next().and_then(integer::<u64>);
     let (Some(rows), Some(columns), Some(entries)) = (next(), next(), next()) else {
-        return Err(Fault::damaged(format!(
-            "line {place}: the numbers of rows, columns and entries are missing; export the matrix again"
-        )));
+        return Err(damaged(place, "the numbers of rows, columns and entries are missing; export the matrix again"));
     };
     if let Some(word) = numbers.next() {
-        return Err(Fault::damaged(format!(
-            "line {place}: {} follows the numbers of rows, columns and entries; export the matrix again",
-            quoted(word)
-        )));
+        let what = "follows the numbers of rows, columns and entries; export the matrix again";
+        return Err(damaged(place, &format!("{} {what}", quoted(word))));
     }
     let (Ok(r), Ok(c)) = (u32::try_from(rows), u32::try_from(columns)) else {
         return Err(Fault::unsupported(format!(
@@ -130,14 +126,11 @@ fn sizes(lines: &mut Lines<'_>, kind: Kind) -> Result<(u32, u32, usize), Fault> 
         )));
     };
     if entries > u64::from(r) * u64::from(c) {
-        return Err(Fault::damaged(format!(
-            "line {place}: a matrix of {r} × {c} cannot have {entries} entries; export it again"
-        )));
+        return Err(damaged(place, &format!("a matrix of {r} × {c} cannot have {entries} entries; export it again")));
     }
     if kind.symmetric && r != c {
-        return Err(Fault::damaged(format!(
-            "line {place}: a symmetric matrix cannot have {r} rows and {c} columns; export it again"
-        )));
+        let what = format!("a symmetric matrix cannot have {r} rows and {c} columns; export it again");
+        return Err(damaged(place, &what));
     }
     Ok((r, c, usize::try_from(entries).unwrap_or(usize::MAX)))
 }
@@ -147,23 +140,18 @@ fn entry(line: &[u8], place: usize, kind: Kind, rows: u32, columns: u32) -> Resu
     let mut index = |what: &str, most: u32| {
         let word = words.next().unwrap_or_default();
         integer::<u32>(word).filter(|i| (1..=most).contains(i)).map(|i| i - 1).ok_or_else(|| {
-            Fault::damaged(format!(
-                "line {place}: {} is not a {what} from 1 to {most}; export the matrix again",
-                quoted(word)
-            ))
+            let word = quoted(word);
+            damaged(place, &format!("{word} is not a {what} from 1 to {most}; export the matrix again"))
         })
     };
     let (row, column) = (index("row", rows)?, index("column", columns)?);
     if kind.symmetric && column > row {
-        return Err(Fault::damaged(format!(
-            "line {place}: a symmetric matrix has entries on and below its diagonal only; export it again"
-        )));
+        return Err(damaged(place, "a symmetric matrix has entries on and below its diagonal only; export it again"));
     }
     let value = if kind.has_values {
         let word = words.next().unwrap_or_default();
-        let value = number(word).ok_or_else(|| {
-            Fault::damaged(format!("line {place}: {} is not a number; export the matrix again", quoted(word)))
-        })?;
+        let what = || format!("{} is not a number; export the matrix again", quoted(word));
+        let value = number(word).ok_or_else(|| damaged(place, &what()))?;
         if !value.is_finite() {
             return Err(Fault::invalid(format!("line {place}: the entry is NaN or infinite; repair or remove it")));
         }
@@ -173,22 +161,16 @@ fn entry(line: &[u8], place: usize, kind: Kind, rows: u32, columns: u32) -> Resu
     };
     match words.next() {
         None => Ok(Entry { row, column, value, line: place }),
-        Some(word) => {
-            Err(Fault::damaged(format!("line {place}: {} follows the entry; give one entry a line", quoted(word))))
-        }
+        Some(word) => Err(damaged(place, &format!("{} follows the entry; give one entry a line", quoted(word)))),
     }
 }
 
 fn refuse_repetition(entries: &mut [Entry]) -> Result<(), Fault> {
     entries.sort_by_key(|e| (e.row, e.column));
-    match entries.iter().zip(entries.iter().skip(1)).find(|(a, b)| (a.row, a.column) == (b.row, b.column)) {
-        None => Ok(()),
-        Some((a, b)) => Err(Fault::damaged(format!(
-            "line {}: row {}, column {} has an entry on line {} already; leave one of them",
-            b.line,
-            b.row + 1,
-            b.column + 1,
-            a.line
-        ))),
-    }
+    let twins = entries.windows(2).find(|pair| (pair[0].row, pair[0].column) == (pair[1].row, pair[1].column));
+    twins.map_or(Ok(()), |pair| {
+        let (row, column, before) = (pair[1].row + 1, pair[1].column + 1, pair[0].line);
+        let what = format!("row {row}, column {column} has an entry on line {before} already; leave one of them");
+        Err(damaged(pair[1].line, &what))
+    })
 }

@@ -2,12 +2,18 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
+use cager_geometry::mesh::Polygons;
+
+use super::layout::{Layout, Order};
+use super::times::Times;
 use super::widen::{Scalar, widen};
+use crate::error::Fault;
+use crate::scene::{Animation, Failure};
 
 /// Bytes read at once: few calls, and still within the fast caches.
 const BLOCK: usize = 1 << 17;
 
-/// Reads as many values as `out` has from an offset on, by way of `block`; gives whether all are finite.
+/// Reads as many values as `out` has, by way of `block`; gives whether all are finite.
 pub(crate) fn read_values(
     source: &mut (impl Read + Seek),
     start: u64,
@@ -25,4 +31,65 @@ pub(crate) fn read_values(
         finite &= widen(scalar, bytes, values);
     }
     Ok(finite)
+}
+
+/// The frames of a file with a known layout.
+pub(super) struct Blocks<R> {
+    source: R,
+    layout: Layout,
+    faces: Polygons,
+    block: Vec<u8>,
+}
+
+impl<R> Blocks<R> {
+    pub(super) fn new(source: R, layout: Layout) -> Self {
+        Self { source, layout, faces: Polygons::new(), block: Vec::new() }
+    }
+}
+
+// Points and frames are no more than the bytes of the file, which fit.
+impl<R: Read + Seek + Send> Animation for Blocks<R> {
+    fn points(&self) -> usize {
+        self.layout.points as usize
+    }
+
+    fn frames(&self) -> usize {
+        self.layout.frames as usize
+    }
+
+    fn times(&self) -> &Times {
+        &self.layout.times
+    }
+
+    fn faces(&self) -> &Polygons {
+        &self.faces
+    }
+
+    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Failure> {
+        let order = self.layout.order;
+        // Every value is overwritten below.
+        out.resize(order.values() * self.points(), 0.0);
+        let (offset, scalar) = self.layout.block(frame);
+        let is_finite = read_values(&mut self.source, offset, scalar, &mut self.block, out)?;
+        match order {
+            Order::Points => {}
+            Order::Axes => {
+                let (stored, n) = (std::mem::take(out), self.points());
+                out.extend((0..n).flat_map(|i| [0, 1, 2].map(|k| stored[k * n + i])));
+            }
+            Order::Homogeneous => {
+                let stored = std::mem::take(out);
+                for (point, &[x, y, z, w]) in stored.as_chunks().0.iter().enumerate() {
+                    if w != 1.0 {
+                        return Err(Fault::unsupported(format!(
+                            "point {point} has the fourth coordinate {w} where only 1 has a meaning; save the first three of them"
+                        ))
+                        .into());
+                    }
+                    out.extend([x, y, z]);
+                }
+            }
+        }
+        Ok(is_finite)
+    }
 }
