@@ -12,7 +12,7 @@ use cager_capture::coding::Goal;
 use cager_client::messages::SessionOptions;
 use cager_client::transfer_messages::{TransferOptions, TransferStage};
 use cager_client::{MeshFile, NewTransfer, TransferSource};
-use cager_formats::{AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_prim_with_note};
+use cager_formats::{AtomicFile, FrameReader, Target, commit_together, obj_bytes, read_mesh};
 use cager_geometry::mesh::Model;
 use cager_geometry::units::Units;
 use cager_motion::transfer::MethodChoice;
@@ -84,7 +84,7 @@ fn model_file(path: &Path, prim: Option<&str>) -> Result<MeshFile> {
     if !is_scene(path) && prim.is_none() {
         return Ok(mesh_file(path)?);
     }
-    let (model, _) = read_prim_with_note(path, prim)?;
+    let model = read_mesh(path, prim)?.model;
     let name = path.with_extension("obj");
     Ok(MeshFile::new(name.file_name().unwrap_or_default().to_string_lossy(), obj_bytes(&model)))
 }

@@ -231,7 +231,7 @@ impl<'a> Chosen<'a> {
     fn write(
         &mut self,
         BoundModel { rest, decoder, .. }: &BoundModel,
-        writer: &mut dyn FrameWriter,
+        writer: &mut FrameWriter,
         progress: &mut dyn FnMut(usize),
     ) -> Result<(), DecodeError> {
         let fail = |cause| DecodeError::container(self.path, cause);
@@ -297,7 +297,7 @@ pub fn decode(
     let (points, frames) = (bound.rest.points.len(), chosen.wanted.len());
     chosen.options.morphs = chosen.morphs(chosen.what.morphs, &bound.rest)?;
     let mut writer = create_frames(output, points, frames, &bound.rest.faces, &chosen.options)?;
-    chosen.write(&bound, &mut *writer, progress)?;
+    chosen.write(&bound, &mut writer, progress)?;
     let mut notes = writer.notes();
     notes.extend(units::notes(&path, chosen.options.units, chosen.what.units));
     if !dry_run {

@@ -9,7 +9,7 @@ pub(crate) enum Scale {
     Unsaid,
 }
 
-/// The colours of vertices as they are read; none at all where one vertex has none, or one that is no colour.
+/// The colours of vertices; none at all where one vertex has none, or one that is no colour.
 #[derive(Default)]
 pub(crate) struct Colors {
     found: Vec<[f32; 3]>,
@@ -20,8 +20,8 @@ impl Colors {
         self.found.push(color);
     }
 
-    /// In sRGB for so many points. Where the file does not say what the values are, they are of 255 if one is above 2, or if all are whole
-    /// and one is above 1; fractions that rounding or strong light put above 1 are full light.
+    /// In sRGB for so many points. Values of a scale that is not said are of 255 if one is above 2,
+    /// or if all are whole and one is above 1; fractions a little above 1 are full light.
     pub(crate) fn finish(self, points: usize, scale: Scale) -> Vec<[u8; 3]> {
         let all = || self.found.iter().flatten().copied();
         let largest = all().fold(0.0, f32::max);

@@ -1,4 +1,4 @@
-//! What models do not keep of their files: told once, in one sentence, by the names that formats have for it.
+//! What models do not keep of their files, in one sentence with the formats' names.
 
 use std::path::Path;
 
@@ -8,10 +8,11 @@ const SHOWN: usize = 40;
 
 /// What the file of a mesh holds that is not read.
 ///
-/// A reader adds a phrase for each kind, with the word of the format in brackets: `add` for what belongs to points
-/// or to the whole, such as `normals (NORMAL)`, and `add_on_faces` for what belongs to faces and their corners, such as
-/// `texture coordinates (vt)`. Phrases that begin with a number come from `counted`, lists of names of any length
-/// from `listed`. A phrase that is added twice is told once. Commands tell [`Self::sentence`].
+/// A reader adds a phrase for each kind, with the word of the format in brackets: `add` for what
+/// belongs to points or to the whole, such as `normals (NORMAL)`, and `add_on_faces` for what
+/// belongs to faces and their corners, such as `texture coordinates (vt)`. Phrases that begin with
+/// a number come from `counted`, lists of names of any length from `listed`. A phrase that is added
+/// twice is told once. Commands tell [`Self::sentence`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     phrases: Vec<String>,
@@ -47,8 +48,9 @@ impl Dropped {
         self.add("vertex colours");
     }
 
-    /// `rest.obj: texture coordinates (vt) and 3 materials (usemtl) are not kept`; none where nothing is lost. `is_reordered` where faces are stored in an order of
-    /// their own, so that what belongs to them cannot be put back by their numbers.
+    /// `rest.obj: texture coordinates (vt) are not kept`; none where nothing is lost.
+    /// `is_reordered` where faces are in an order of their own, so that what belongs to them cannot
+    /// be put back by numbers.
     pub fn sentence(&self, path: &Path, is_reordered: bool) -> Option<String> {
         let (last, others) = self.phrases.split_last()?;
         let all = if others.is_empty() { last.clone() } else { format!("{} and {last}", others.join(", ")) };

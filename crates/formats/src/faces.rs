@@ -1,4 +1,6 @@
-//! Faces of meshes as they are read: whether they are wanted, and whether they name vertices that exist.
+//! Faces of meshes as they are read: whether they name vertices that exist.
+
+use cager_geometry::mesh::Polygons;
 
 use crate::error::Fault;
 
@@ -15,6 +17,11 @@ pub(crate) fn check_face(corners: &[u32], points: usize, place: impl Fn() -> Str
         Some(&index) => Err(no_such_vertex(&place(), index.into(), points)),
         None => Ok(()),
     }
+}
+
+/// Checks all faces.
+pub(crate) fn check_faces(faces: &Polygons, points: usize, of: &str) -> Result<(), Fault> {
+    faces.iter().enumerate().try_for_each(|(k, face)| check_face(face, points, || format!("face {k}{of}")))
 }
 
 pub(crate) fn no_such_vertex(place: &str, index: i64, points: usize) -> Fault {

@@ -1,7 +1,8 @@
 //! Meshes, point caches, skeletons in motion and sparse matrices to and from files and byte slices.
 //!
-//! Readers take bytes of any origin: they return an error for whatever they do not understand, never panic, and never
-//! allocate more than a small multiple of what the file holds; copies that glTF makes of meshes may take 512 MiB beyond. Writers make files that appear whole or not at all.
+//! Readers take bytes of any origin: they return an error for whatever they do not understand,
+//! never panic, and never allocate more than a small multiple of what the file holds (and 512 MiB
+//! for copies that glTF makes). Writers make files that appear whole or not at all.
 
 mod alembic;
 pub mod atomic;
@@ -37,7 +38,7 @@ pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{
     MeshFormat, ReadModel, model_bytes, obj_bytes, read_mesh, read_mesh_bytes, read_model, read_model_bytes,
-    read_model_with_note, read_prim_with_note, read_prim_with_units, write_model,
+    write_model,
 };
 pub use signature::Signature;
 

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-/// Compares with runs of digits as numbers, so that `2.obj` comes before `10.obj`; only equal strings are equal.
+/// Compares with runs of digits as numbers: `2.obj` comes before `10.obj`.
 pub(crate) fn compare(a: &[u8], b: &[u8]) -> Ordering {
     let (mut x, mut y) = (a, b);
     while let ([p, ..], [q, ..]) = (x, y) {

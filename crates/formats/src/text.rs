@@ -29,7 +29,8 @@ impl<'a> Lines<'a> {
         self.rest
     }
 
-    /// Whether the last line that was returned is the file's last, without an end: such a file may have been cut.
+    /// Whether the last line that was returned is the file's last, without an end: such a file may
+    /// have been cut.
     pub(crate) fn is_cut(&self) -> bool {
         self.rest.is_empty() && !self.ended
     }
@@ -96,6 +97,11 @@ pub(crate) fn point<'a>(
         *coordinate = value;
     }
     Ok(point)
+}
+
+/// What is wrong with a line.
+pub(crate) fn damaged(line: usize, what: &str) -> Fault {
+    Fault::damaged(format!("line {line}: {what}"))
 }
 
 /// Why a word is no number, and what to do.

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cager_formats::{
-    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, create_frames, frame_files, mesh_sequence,
-    open_frames, open_frames_bytes, open_selected_frames, read_mesh, read_model, read_prim_with_note,
+    CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, ReadModel, create_frames, frame_files,
+    mesh_sequence, open_frames, open_frames_bytes, open_selected_frames, read_mesh, read_model,
 };
 use cager_geometry::mesh::Polygons;
 use support::archive::*;
@@ -76,7 +76,7 @@ fn archives_come_back_as_they_were_written() {
 fn the_mesh_is_called_as_the_file_and_lies_below_a_transform() {
     let (_folder, path) = written(&rising(1), &polygons(&[&[0, 1, 2]]), &FrameOptions::default());
     for prim in ["/my_walk/my_walkShape", "my_walk", "my_walkShape", "/my_walk"] {
-        assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 3, "{prim}");
+        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 3, "{prim}");
     }
 }
 
@@ -129,7 +129,7 @@ fn double_precision_and_subdivision_surfaces_are_read() {
 fn faces_are_turned_counterclockwise_and_edges_left_out() {
     let faces: &[&[i32]] = &[&[2, 1, 0], &[0, 1], &[0, 1, 2, 1], &[]];
     let (_folder, path) = saved(&archive("", &[EVEN], &[mesh("m", positions(&rising(1)), faces)]));
-    let (model, note) = read_prim_with_note(&path, None).unwrap();
+    let ReadModel { model, note, .. } = read_mesh(&path, None).unwrap();
     assert_eq!(model.faces, polygons(&[&[0, 1, 2], &[1, 2, 1, 0]]));
     assert!(note.unwrap().contains("left out 2 faces"));
     let mirror = transform("mirror", &[0x00], 0, &[vec![-1.0, 1.0, 1.0]], vec![triangle(1)]);
@@ -414,7 +414,7 @@ fn the_only_mesh_is_taken_whatever_it_is_called() {
     // As of a rest pose beside a capture of several meshes.
     let (_folder, path) = saved(&archive("", &[EVEN], &[triangle(1)]));
     for prim in ["body", "/walk/body"] {
-        assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 3, "{prim}");
+        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 3, "{prim}");
     }
 }
 
@@ -485,7 +485,7 @@ fn one_of_several_meshes_is_chosen_by_path_or_name() {
     };
     for prim in ["/skin/body", "skin/body/", "skin", "/skin"] {
         assert_eq!(take(prim, 2).unwrap(), [vec![5.0; 6]], "{prim}");
-        assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 2, "{prim}");
+        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 2, "{prim}");
     }
     assert!(message(take("body", 2)).contains("holds 2 meshes, /coat/body (3 points) and /skin/body (2 points)"));
     for prim in ["hat", "/hat/body", "/body", "ody", "/coat/body/body"] {

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use cager_formats::{
     CacheFormat, Error, FrameOptions, FrameReader, FrameSelection, MorphOptions, Target, create_frames, open_frames,
-    open_frames_bytes, open_selected_frames, read_model, read_prim_with_note,
+    open_frames_bytes, open_selected_frames, read_mesh, read_model,
 };
 use cager_geometry::mesh::Polygons;
 use gltf::json::Root;
@@ -231,11 +231,11 @@ fn of_several_meshes_all_or_the_chosen_one_are_read() {
         let selection = FrameSelection { prim: Some(prim.to_owned()), ..FrameSelection::default() };
         let frames = all(&mut *open_selected_frames(&path, 2, &selection).unwrap());
         assert_eq!(frames, [[5.0, 0.0, 0.0, 6.0, 0.0, 0.0], [5.0, 3.0, 0.0, 6.0, 3.0, 0.0]]);
-        assert_eq!(read_prim_with_note(&path, Some(prim)).unwrap().0.points.len(), 2);
+        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 2);
     }
     let still = FrameSelection { prim: Some("skin".to_owned()), ..FrameSelection::default() };
     assert_eq!(open_selected_frames(&path, 4, &still).unwrap().frames(), 1);
-    assert!(message(read_prim_with_note(&path, Some("hat"))).contains("holds no mesh hat, but /body/skin"));
+    assert!(message(read_mesh(&path, Some("hat"))).contains("holds no mesh hat, but /body/skin"));
 }
 
 #[test]

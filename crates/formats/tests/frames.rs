@@ -220,7 +220,8 @@ fn a_packed_array_never_gives_more_bytes_than_its_header_promises() {
     let (mut reader, mut frame) = (open_frames(&path, 2).unwrap(), Vec::new());
     assert!(reader.read_next(&mut frame).unwrap());
     assert!(
-        message(reader.read_next(&mut frame)).contains("walk.npz: cannot be unpacked (its checksum is another one)")
+        message(reader.read_next(&mut frame))
+            .contains("walk.npz: frame 1: cannot be unpacked (its checksum is another one)")
     );
 }
 

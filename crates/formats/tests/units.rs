@@ -5,8 +5,8 @@ mod support;
 use std::path::Path;
 
 use cager_formats::{
-    FrameOptions, MeshFormat, MorphOptions, Units, Up, create_frames, open_frames, read_mesh_bytes,
-    read_prim_with_units,
+    FrameOptions, MeshFormat, MorphOptions, ReadModel, Units, Up, create_frames, open_frames, read_mesh,
+    read_mesh_bytes,
 };
 use support::polygons;
 use tempfile::tempdir;
@@ -32,7 +32,7 @@ fn read(path: &Path) -> (Vec<Vec<f64>>, Units) {
     while reader.read_next(&mut values).unwrap() {
         frames.push(values.clone());
     }
-    let (model, _, units) = read_prim_with_units(path, None).unwrap();
+    let ReadModel { model, units, .. } = read_mesh(path, None).unwrap();
     assert_eq!(reader.units(), units, "{}", path.display());
     let [model, first]: [&[f64]; 2] = [model.points.as_flattened(), &frames[0]];
     assert!(model.iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-5 * b.abs().max(1.0)));

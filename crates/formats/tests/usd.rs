@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use cager_formats::{
-    CacheFormat, CageMesh, Error, FrameOptions, FrameReader, FrameSelection, MeshFormat, Units, Up, create_frames,
-    open_frames, open_frames_bytes, open_selected_frames, read_model, read_model_bytes, read_prim_with_units,
+    CacheFormat, CageMesh, Error, FrameOptions, FrameReader, FrameSelection, MeshFormat, ReadModel, Units, Up,
+    create_frames, open_frames, open_frames_bytes, open_selected_frames, read_mesh, read_model, read_model_bytes,
 };
 use cager_geometry::mesh::Polygons;
 use support::{all, message, numbers, polygons, wide};
@@ -56,7 +56,7 @@ fn files_come_back_as_they_were_written() {
         assert!(!reader.numbers_are_times());
         assert_eq!(all(&mut *reader), wide(&frames));
         assert_eq!(reader.mesh().unwrap(), (path.as_path(), &faces()));
-        let (model, _, found) = read_prim_with_units(&path, None).unwrap();
+        let ReadModel { model, units: found, .. } = read_mesh(&path, None).unwrap();
         assert_eq!((model.points.as_flattened(), model.faces), (&wide(&frames)[0][..], faces()));
         assert_eq!(found, units);
     }
@@ -380,7 +380,7 @@ fn files_of_the_library_read_back_to_their_truth() {
     let data = data();
     for (name, capture, every, count) in [("arm", "supercages-arm", 10, 13), ("horse", "horse-gallop", 1, 12)] {
         let path = data.join("studio").join(name).with_extension("usdc");
-        let (rest, _, units) = read_prim_with_units(&path, None).unwrap();
+        let ReadModel { model: rest, units, .. } = read_mesh(&path, None).unwrap();
         let turned = |points: &[f64]| {
             points
                 .as_chunks()

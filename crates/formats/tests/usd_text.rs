@@ -5,8 +5,8 @@ mod support;
 use std::path::{Path, PathBuf};
 
 use cager_formats::{
-    CacheFormat, Error, FrameReader, MeshFormat, Units, Up, create_frames, open_frames, open_frames_bytes,
-    read_mesh_bytes, read_model_bytes, read_prim_with_units,
+    CacheFormat, Error, FrameReader, MeshFormat, ReadModel, Units, Up, create_frames, open_frames, open_frames_bytes,
+    read_mesh, read_mesh_bytes, read_model_bytes,
 };
 use cager_geometry::mesh::Polygons;
 use support::{all, message, numbers, polygons};
@@ -266,8 +266,8 @@ fn data() -> PathBuf {
 fn texts_of_the_library_hold_what_its_binary_files_do() {
     for (name, every) in [("arm", 1), ("horse", 2)] {
         let path = data().join("studio").join(name);
-        let [(text, _, units), (model, _, told)] =
-            ["usda", "usdc"].map(|kind| read_prim_with_units(&path.with_extension(kind), None).unwrap());
+        let [ReadModel { model: text, units, .. }, ReadModel { model, units: told, .. }] =
+            ["usda", "usdc"].map(|kind| read_mesh(&path.with_extension(kind), None).unwrap());
         assert_eq!((&text.points, &text.faces, units), (&model.points, &model.faces, told));
         let open = |kind| open_frames(path.with_extension(kind), model.points.len()).unwrap();
         let (mut text, mut binary) = (open("usda"), open("usdc"));

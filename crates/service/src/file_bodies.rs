@@ -14,7 +14,7 @@ const TEXT_BYTES: usize = 64;
 pub(crate) fn instead_of_numbers(start: &[u8]) -> Option<String> {
     let start = &start[..start.len().min(TELLING_BYTES)];
     Some(match Signature::of(start) {
-        Some(Signature::Text | Signature::Obj | Signature::Ply | Signature::Off | Signature::Stl)
+        Some(Signature::Text | Signature::MeshText(_))
             if !start.iter().take(TEXT_BYTES).all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace()) =>
         {
             return None;

@@ -58,7 +58,7 @@ pub fn decode_joined(
             writer.change_mesh(rest.points.len(), &rest.faces, &chosen.options)?;
         }
         let bound = chosen.bind()?;
-        chosen.write(&bound, &mut *writer, &mut |count| progress(done + count))?;
+        chosen.write(&bound, &mut writer, &mut |count| progress(done + count))?;
         done += chosen.wanted.len();
     }
     let mut notes = writer.notes();

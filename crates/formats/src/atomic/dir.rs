@@ -10,8 +10,8 @@ use super::temporary::{self, Temporary};
 use super::{Place, hide_temporary, inherit, sync_folder};
 use crate::error::Error;
 
-/// A folder that takes its name once all its files are complete; dropped before [`AtomicDir::commit`] it leaves
-/// nothing.
+/// A folder that takes its name once all its files are complete; dropped before
+/// [`AtomicDir::commit`] it leaves nothing.
 ///
 /// A killed process leaves it under a hidden name, as with [`AtomicFile`](super::AtomicFile).
 #[derive(Debug)]
@@ -24,12 +24,13 @@ pub struct AtomicDir {
 }
 
 impl AtomicDir {
-    /// Begins a folder at `path`, where there must be nothing, or a folder with nothing but files that may be replaced by
-    /// their names. They go when the new folder takes the name. The folder around it must exist.
+    /// Begins a folder at `path`, where there must be nothing, or a folder with nothing but files
+    /// that may be replaced by their names. They go when the new folder takes the name. The folder
+    /// around it must exist.
     ///
     /// # Errors
-    /// [`Error::Target`] where `path` is a file or a folder with something else in it, [`Error::Io`] where the folder around
-    /// it is missing or closed to writing.
+    /// [`Error::Target`] where `path` is a file or a folder with something else in it,
+    /// [`Error::Io`] where the folder around it is missing or closed to writing.
     pub fn create(path: impl AsRef<Path>, may_replace: impl Fn(&str) -> bool) -> Result<Self, Error> {
         let path = path.as_ref();
         let place = Place::new(path)?;
@@ -44,7 +45,7 @@ impl AtomicDir {
         &self.folder.0
     }
 
-    /// Begins a file in the folder; interruption is no error here, unlike for a file begun by its path.
+    /// Begins a file in the folder.
     ///
     /// # Errors
     /// Those of [`File::create`].
@@ -57,8 +58,8 @@ impl AtomicDir {
     /// Makes the files durable and gives the folder its name.
     ///
     /// # Errors
-    /// [`Error::Target`] where someone else has put files there meanwhile, [`Error::Io`]; the folder is then not
-    /// created, unless it is its name alone that could not be made durable.
+    /// [`Error::Target`] where someone else has put files there meanwhile, [`Error::Io`]; the
+    /// folder is then not created, unless it is its name alone that could not be made durable.
     pub fn commit(self) -> Result<(), Error> {
         let failed = |cause| hide_temporary(&self.path, &cause);
         self.make_durable().map_err(failed)?;

@@ -22,6 +22,12 @@ impl Target {
         }
     }
 
+    /// The file beside this one that has another extension.
+    pub(crate) fn beside(&self, extension: &str) -> Self {
+        let path = self.path().with_extension(extension);
+        if self.replaces() { Self::Replacing(path) } else { Self::New(path) }
+    }
+
     /// Whether what is there may be replaced.
     pub fn replaces(&self) -> bool {
         matches!(self, Self::Replacing(_))

@@ -10,8 +10,8 @@ use crate::error::Error;
 
 static NAMES: Mutex<Names> = Mutex::new(Names(BTreeSet::new()));
 
-/// The temporary names of this process. Whoever makes, renames or removes one holds the lock, so that none is missing
-/// here and several outputs that belong together take their names in one step.
+/// The temporary names of this process. Whoever makes, renames or removes one holds the lock, so
+/// that none is missing here and several outputs that belong together take their names in one step.
 pub(super) struct Names(BTreeSet<PathBuf>);
 
 pub(super) fn lock() -> MutexGuard<'static, Names> {
@@ -19,11 +19,12 @@ pub(super) fn lock() -> MutexGuard<'static, Names> {
     NAMES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the temporary files and folders of this process, for one that ends without dropping its outputs, as on a
-/// signal.
+/// Removes the temporary files and folders of this process, for one that ends without dropping its
+/// outputs, as on a signal.
 ///
-/// From then on no output can be begun, given its name or dropped: a thread that tries waits until the process has
-/// ended, which is to follow at once. So no thread reports the missing files as an error of its own.
+/// From then on no output can be begun, given its name or dropped: a thread that tries waits until
+/// the process has ended, which is to follow at once. So no thread reports the missing files as an
+/// error of its own.
 pub fn remove_temporaries() {
     let names = lock();
     names.0.iter().for_each(|path| remove(path));
@@ -31,8 +32,7 @@ pub fn remove_temporaries() {
 }
 
 impl Names {
-    /// Has `make` make something under a new name in `folder`, a name that says whose leftover it is, should the process
-    /// be killed.
+    /// Has `make` make something under a new name in `folder` that says whose it is.
     pub(super) fn begin<T>(
         &mut self,
         folder: &Path,
@@ -44,7 +44,7 @@ impl Names {
         Ok((made, Temporary(path)))
     }
 
-    /// Gives what was moved aside its name back. Where that fails it stays under its temporary name, since it is the user's.
+    /// Gives back the name of what was moved aside, which stays, as the user's, where that fails.
     pub(super) fn give_back(&mut self, aside: &mut Option<Temporary>, target: &Path) -> io::Result<()> {
         let Some(mut aside) = aside.take() else { return Ok(()) };
         let path = std::mem::take(&mut aside.0);
@@ -55,7 +55,7 @@ impl Names {
     }
 }
 
-/// A temporary file or folder, removed when dropped unless it has been renamed. Dropping takes the lock.
+/// A temporary file or folder, removed when dropped, which takes the lock, unless renamed.
 #[derive(Debug)]
 pub(super) struct Temporary(pub(super) PathBuf);
 
@@ -71,8 +71,8 @@ impl Drop for Temporary {
 /// How often the removal of a folder is tried.
 const REMOVALS: usize = 5;
 
-/// Removes a file, or a folder that other threads may still write into: under another name they do not find it any
-/// more. Nobody is left to be told of what cannot be removed.
+/// Removes a file, or a folder that other threads may still write into: under another name they do
+/// not find it any more. Nobody is left to be told of what cannot be removed.
 fn remove(path: &Path) {
     let gone = path.with_extension("gone.tmp");
     while fs::symlink_metadata(path).is_ok_and(|found| found.is_dir()) {
@@ -89,7 +89,8 @@ fn remove(path: &Path) {
     let _ = fs::remove_file(path);
 }
 
-/// A folder of a temporary name, removed with all that is in it when dropped, or by [`remove_temporaries`] on a signal.
+/// A folder of a temporary name, removed with all that is in it when dropped, or by
+/// [`remove_temporaries`] on a signal.
 #[derive(Debug)]
 pub struct ScratchDir(Temporary);
 
@@ -104,8 +105,8 @@ impl ScratchDir {
         begun.map(|((), made)| Self(made)).map_err(|cause| Error::write(folder, cause))
     }
 
-    /// Runs what may make the folder anew where it is missing: [`remove_temporaries`] waits for it, so it should be short.
-    /// It must not begin, name or drop an output.
+    /// Runs what may make the folder anew where it is missing: [`remove_temporaries`] waits for it,
+    /// so it should be short. It must not begin, name or drop an output.
     pub fn undisturbed<T>(&self, work: impl FnOnce() -> T) -> T {
         let _names = lock();
         work()

@@ -1,4 +1,4 @@
-//! Finding the files of a capture: in a folder, by a glob pattern, by names with a place for a number.
+//! Finding the files of a capture: in a folder, by a glob, by numbered names.
 
 use std::fs;
 use std::io;
@@ -7,8 +7,19 @@ use std::path::{Component, Path, PathBuf};
 use super::numbered::NumberedNames;
 use crate::error::{Error, Fault};
 
+/// The files of a folder or a pattern; none of a path that is one file.
+pub(super) fn several(path: &Path) -> Result<Option<Vec<PathBuf>>, Error> {
+    match fs::metadata(path) {
+        Ok(found) if found.is_dir() => in_folder(path).map(Some),
+        Ok(found) if found.is_file() => Ok(None),
+        Ok(_) => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
+        Err(_) if is_pattern(path) => matching(path).map(Some),
+        Err(cause) => Err(Error::read(path, cause)),
+    }
+}
+
 /// Whether a path that is not there can be a pattern.
-pub(super) fn is_pattern(path: &Path) -> bool {
+fn is_pattern(path: &Path) -> bool {
     path.to_str().is_some_and(|text| text.contains(['*', '?', '[']))
         || path.iter().any(|part| part.to_str().and_then(NumberedNames::parse).is_some())
 }
@@ -29,9 +40,9 @@ pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     read().map_err(|cause| Error::read(folder, cause))
 }
 
-/// The files that a pattern matches. Each part of its path is a name where there is such a file or folder, else a glob, or a name with a place for a
-/// number.
-pub(super) fn matching(path: &Path) -> Result<Vec<PathBuf>, Error> {
+/// The files that a pattern matches. Each part of its path is a name where there is such a file or
+/// folder, else a glob, or a name with a place for a number.
+fn matching(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let pattern = Pattern::of(path, false);
     let found = pattern.files(path)?;
     if found.is_empty() && pattern.has_brackets {

@@ -1,11 +1,11 @@
-//! Arrays whose first index varies fastest (Fortran order): each frame is spread over the whole array.
+//! Arrays in Fortran order, in which each frame is spread over the whole array.
 
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 /// Memory for the frames that are brought together at a time.
 const MAX_BYTES: usize = 256 << 20;
 
-/// Such an array, frame after frame: as many frames as memory has room for are gathered in one pass over the file.
+/// Such an array, frame after frame: as many as memory has room for are gathered in one pass.
 pub(super) struct Transposed<R> {
     source: BufReader<R>,
     start: u64,

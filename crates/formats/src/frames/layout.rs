@@ -18,6 +18,8 @@ pub(super) struct Layout {
     pub(super) order: Order,
     /// Of an array whose first index varies fastest: how many rows each frame has.
     pub(super) fortran: Option<u64>,
+    /// Where each frame is and how it is stored, where they do not follow each other.
+    pub(super) blocks: Vec<(u64, Scalar)>,
     /// When its frames are, where the header tells.
     pub(super) times: Times,
 }
@@ -49,7 +51,14 @@ pub(super) const LONGEST_HEADER: usize = 12 + (1 << 16);
 impl Layout {
     /// As most formats have it, frames numbered from 0.
     pub(super) fn new(points: u64, frames: u64, start: u64, scalar: Scalar) -> Self {
-        Self { points, frames, start, scalar, order: Order::Points, fortran: None, times: Times::default() }
+        let (blocks, times) = (Vec::new(), Times::default());
+        Self { points, frames, start, scalar, order: Order::Points, fortran: None, blocks, times }
+    }
+
+    /// Where a frame is, which fits as its end is within the file, and how it is stored.
+    pub(super) fn block(&self, frame: usize) -> (u64, Scalar) {
+        let size = self.points * (self.order.values() * self.scalar.size()) as u64;
+        self.blocks.get(frame).copied().unwrap_or((self.start + frame as u64 * size, self.scalar))
     }
 
     /// Compares what the header promises with the points that are expected and the bytes there are.

@@ -1,18 +1,20 @@
-//! Maya's geometry cache in one file, `.mcx` or the older `.mc`: a header, then a block for each frame with its time in ticks and the arrays of its
-//! channels, all big-endian. Chunks of `.mcx` count their bytes in 64 bits and end at multiples of eight. The text beside it says how long a frame is.
-//! Maya's default is a file for each frame, `walkFrame12.mcx`, whose header has the time.
+//! Maya's geometry cache in one file, `.mcx` or the older `.mc`: a header, then a block for each
+//! frame with its time in ticks and the arrays of its channels, all big-endian. Chunks of `.mcx`
+//! count their bytes in 64 bits and end at multiples of eight. The text beside it says how long a
+//! frame is. Maya's default is a file for each frame, `walkFrame12.mcx`, whose header has the time.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::FrameReader;
-use super::block::read_values;
+use super::block::Blocks;
+use super::layout::Layout;
 use super::numbers;
 use super::times::{Times, near_whole};
 use super::widen::Scalar;
 use crate::error::{Error, Fault};
-use crate::scene::{self, Animation, MeshInfo, shown};
+use crate::scene::{self, shown};
 
 /// Ticks of a second.
 pub(super) const TICKS: f64 = 6000.0;
@@ -37,20 +39,21 @@ pub(super) fn open<'a>(
     (prim, folder): (Option<&str>, Option<&Path>),
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let told = folder.and_then(|_| frame_rate(path));
-    let mut cache = Cache::open(source, length, prim, told).map_err(|failure| failure.at(path))?;
-    if let Some((base, _)) = FrameName::of(path).filter(|_| cache.is_one_frame) {
+    let found = Chunks::open(source, length)
+        .and_then(|mut chunks| Ok((layout(&mut chunks, length, prim, told)?, chunks.source)));
+    let ((mut layout, is_one_frame), source) = found.map_err(|failure| failure.at(path))?;
+    if let Some((base, _)) = FrameName::of(path).filter(|_| is_one_frame) {
         let all = path.with_file_name(base + "Frame*").with_extension(path.extension().unwrap_or_default());
         let what = format!(
             "it is one frame of a cache with a file for each; for all of them give the pattern '{}'",
             all.display()
         );
-        cache.info.times.note = Some(what);
+        layout.times.note = Some(what);
     }
-    scene::open(path, cache, expected_points)
+    scene::open(path, Blocks::new(source, layout), expected_points)
 }
 
-/// The numbers of files that are called as Maya calls those of a cache with a file for each frame; none where other files are among them, or several
-/// caches.
+/// The numbers of the files of one cache that has a file for each frame, by their names.
 pub(super) fn numbers_of(files: &[PathBuf]) -> Option<Vec<f64>> {
     let ticks = TICKS / files.first().and_then(|file| frame_rate(file)).unwrap_or(USUAL);
     let names: Vec<_> = files.iter().map(|file| FrameName::of(file)).collect::<Option<_>>()?;
@@ -102,7 +105,7 @@ fn frame_rate(path: &Path) -> Option<f64> {
     exact.or_else(|| ticks().map(|ticks| TICKS / ticks))
 }
 
-/// The rate at which these times in ticks are those of whole frames: the one that is told in ticks, or that of television next to it.
+/// The rate at which these ticks are whole frames: the one that is told, or television's near it.
 fn fitting(ticks: &[i32], told: f64) -> f64 {
     let is_off = |rate: f64| {
         let off = |&tick: &i32| ((f64::from(tick) * rate / TICKS).round() * TICKS / rate - f64::from(tick)).abs();
@@ -110,15 +113,6 @@ fn fitting(ticks: &[i32], told: f64) -> f64 {
     };
     let television = told * 1000.0 / 1001.0;
     if ticks.len() > 2 && is_off(told) > 1e-3 && is_off(television) < 1.0 { television } else { told }
-}
-
-struct Cache<R> {
-    chunks: Chunks<R>,
-    info: MeshInfo,
-    frames: Vec<Array>,
-    block: Vec<u8>,
-    /// Whether other frames are in files of their own.
-    is_one_frame: bool,
 }
 
 /// Where the positions of a frame are.
@@ -131,53 +125,57 @@ struct Array {
 /// The name of a channel and what it has in a frame.
 type Channel = (Vec<u8>, Array);
 
-impl<R: Read + Seek> Cache<R> {
-    fn open(source: R, length: u64, prim: Option<&str>, told: Option<f64>) -> Result<Self, Fault> {
-        let mut chunks = Chunks::open(source, length)?;
-        let header = chunks.chunk(0, length)?;
-        let start = chunks.start_time(header)?;
-        let mut at = header.end;
-        let (mut frames, mut ticks, mut name, mut is_one_frame) = (Vec::new(), Vec::new(), None, false);
-        while at < length {
-            let group = chunks.chunk(at, length)?;
-            at = group.end;
-            let (time, channels) = chunks.frame(group)?;
-            // The only block of a file may have its time in the header.
-            is_one_frame = time.is_none() && frames.is_empty() && at >= length;
-            let Some(time) = time.or(start.filter(|_| is_one_frame)) else {
-                return Err(damaged(&format!("frame {} has no time", frames.len())));
-            };
-            let found = match &name {
-                None => Some(choose(channels, prim)?),
-                Some(name) => channels.into_iter().find(|(found, _)| found == name),
-            };
-            let Some((chosen, array)) = found else {
-                return Err(damaged(&format!("frame {} lacks the channel that is read", frames.len())));
-            };
-            let points = frames.first().map_or(array.points, |first: &Array| first.points);
-            if array.points != points || points == 0 {
-                let (found, frame) = (array.points, frames.len());
-                let what = format!(
-                    "has {found} points in frame {frame}, and {points} in frame 0; export a mesh with all its points in every frame"
-                );
-                return Err(Fault::invalid(what));
-            }
-            name = Some(chosen);
-            frames.push(array);
-            ticks.push(time);
+/// Where the frames of the channel are that is read, and whether others are in files of their own.
+fn layout<R: Read + Seek>(
+    chunks: &mut Chunks<R>,
+    length: u64,
+    prim: Option<&str>,
+    told: Option<f64>,
+) -> Result<(Layout, bool), Fault> {
+    let header = chunks.chunk(0, length)?;
+    let start = chunks.start_time(header)?;
+    let mut at = header.end;
+    let (mut blocks, mut points, mut ticks) = (Vec::new(), None, Vec::new());
+    let (mut name, mut is_one_frame) = (None, false);
+    while at < length {
+        let group = chunks.chunk(at, length)?;
+        at = group.end;
+        let (time, channels) = chunks.frame(group)?;
+        let frame = blocks.len();
+        // The only block of a file may have its time in the header.
+        is_one_frame = time.is_none() && frame == 0 && at >= length;
+        let Some(time) = time.or(start.filter(|_| is_one_frame)) else {
+            return Err(damaged(&format!("frame {frame} has no time")));
+        };
+        let found = match &name {
+            None => Some(choose(channels, prim)?),
+            Some(name) => channels.into_iter().find(|(found, _)| found == name),
+        };
+        let Some((chosen, array)) = found else {
+            return Err(damaged(&format!("frame {frame} lacks the channel that is read")));
+        };
+        let (found, points) = (array.points, *points.get_or_insert(array.points));
+        if found != points || points == 0 {
+            let what = format!(
+                "has {found} points in frame {frame}, and {points} in frame 0; export a mesh with all its points in every frame"
+            );
+            return Err(Fault::invalid(what).into());
         }
-        if frames.is_empty() {
-            return Err(Fault::invalid("holds no frames; export the cache again"));
-        }
-        let told = told.map(|told| fitting(&ticks, told));
-        let seconds: Vec<f64> = ticks.iter().map(|&tick| f64::from(tick) / TICKS).collect();
-        let mut times = Times::of(&seconds, told)?;
-        if let (true, Some(rate)) = (is_one_frame, told) {
-            (times.frame_rate, times.first) = (told, near_whole(rate * seconds[0]));
-        }
-        let info = MeshInfo { points: frames[0].points as usize, frames: frames.len(), times, ..MeshInfo::default() };
-        Ok(Self { chunks, info, frames, block: Vec::new(), is_one_frame })
+        name = Some(chosen);
+        blocks.push((array.start, array.scalar));
+        ticks.push(time);
     }
+    let Some(points) = points else {
+        return Err(Fault::invalid("holds no frames; export the cache again").into());
+    };
+    let told = told.map(|told| fitting(&ticks, told));
+    let seconds: Vec<f64> = ticks.iter().map(|&tick| f64::from(tick) / TICKS).collect();
+    let mut times = Times::of(&seconds, told)?;
+    if let (true, Some(rate)) = (is_one_frame, told) {
+        (times.frame_rate, times.first) = (told, near_whole(rate * seconds[0]));
+    }
+    let layout = Layout::new(points.into(), blocks.len() as u64, 0, Scalar::F32Big);
+    Ok((Layout { blocks, times, ..layout }, is_one_frame))
 }
 
 /// The channel that is meant, of those that are no normals.
@@ -197,19 +195,6 @@ fn choose(channels: Vec<Channel>, prim: Option<&str>) -> Result<Channel, Fault> 
         meant.len(),
         if names.is_empty() { String::new() } else { format!(", among them {}", names.join(", ")) }
     )))
-}
-
-impl<R: Read + Seek + Send> Animation for Cache<R> {
-    fn info(&self) -> &MeshInfo {
-        &self.info
-    }
-
-    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Fault> {
-        let Array { start, scalar, .. } = self.frames[frame];
-        // Every value is overwritten below.
-        out.resize(3 * self.info.points, 0.0);
-        Ok(read_values(&mut self.chunks.source, start, scalar, &mut self.block, out)?)
-    }
 }
 
 /// A file as chunks: four letters, a number of bytes, and as many bytes.

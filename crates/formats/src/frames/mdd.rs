@@ -27,10 +27,8 @@ pub(super) fn times(stored: &[u8]) -> Result<Times, Fault> {
     Times::of(&times, None)
 }
 
-/// The first eight bytes; the times are for the caller to write.
-pub(super) fn header(points: i32, frames: i32) -> [u8; 8] {
-    let mut header = [0; 8];
-    header[..4].copy_from_slice(&frames.to_be_bytes());
-    header[4..].copy_from_slice(&points.to_be_bytes());
-    header
+/// A header for frames at these times.
+pub(super) fn header(points: i32, frames: i32, times: impl Iterator<Item = f32>) -> Vec<u8> {
+    let counts = [frames, points].into_iter().flat_map(i32::to_be_bytes);
+    counts.chain(times.flat_map(f32::to_be_bytes)).collect()
 }

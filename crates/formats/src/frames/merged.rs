@@ -10,12 +10,12 @@ use crate::mesh::{MeshFormat, read_model};
 /// Files in which the merging of the rest pose is looked for.
 const LOOKED_AT: usize = 16;
 
-/// The points that corners belong to, once a frame is known that has as many points as the rest pose.
+/// The points that corners belong to, of a frame with as many points as the rest pose.
 #[derive(Default)]
 pub(super) struct Merged(Option<Polygons>);
 
 impl Merged {
-    /// A model from one of `files`, its corners merged as in the rest pose: points that only happen to meet in its frame stay apart.
+    /// A model from one of `files`, its corners merged as in the rest pose.
     ///
     /// # Errors
     /// Points that the rest pose has in one place and that part in this frame.

@@ -53,7 +53,7 @@ pub use write::{
 /// Frames per second that files hold: beyond, times are infinite, or frames no longer apart.
 pub const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
-/// Positions of one capture, frame by frame, in order. Memory does not grow with the number of frames.
+/// Positions of one capture, frame by frame; memory does not grow with the number of frames.
 pub trait FrameReader: Send {
     /// Number of points of every frame.
     fn points(&self) -> usize;
@@ -66,8 +66,7 @@ pub trait FrameReader: Send {
         None
     }
 
-    /// The number that the source assigns to frame `frame`, from a file name or the sampling of a cache; `frame` counts from 0. Numbers
-    /// ascend.
+    /// The number that the source gives to a frame, counted from 0. Numbers ascend.
     fn number(&self, frame: usize) -> f64 {
         frame as f64
     }
@@ -92,11 +91,11 @@ pub trait FrameReader: Send {
         None
     }
 
-    /// Reads the next frame into `out`, which then holds 3 × points coordinates `x y z x y z …`; false at the end, with
-    /// `out` empty.
+    /// Reads the next frame into `out`, which then holds 3 × points coordinates `x y z x y z …`;
+    /// false at the end, with `out` empty.
     ///
     /// # Errors
-    /// [`Error::NonFinite`], [`Error::PointCount`], and those of the format; the next call tries the same frame again.
+    /// [`Error::NonFinite`] and those of the format; the next call tries the same frame again.
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error>;
 
     /// Skips the next frame, without checking it where that avoids reading it; false at the end.
@@ -111,8 +110,7 @@ pub trait FrameReader: Send {
 /// A file format for the frames of a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CacheFormat {
-    /// A NumPy array, frames × points × 3, or points × 3 for one frame; 32- or 64-bit floats. Frames × 3·points, frames × 3 × points, a fourth
-    /// coordinate that is 1 throughout, and Fortran order are read as well.
+    /// A NumPy array, frames × points × 3; other orders of its axes are read as well.
     Npy,
     /// Point cache 2, as 3ds Max and Blender write it.
     Pc2,
@@ -140,42 +138,19 @@ pub enum CacheFormat {
 
 impl CacheFormat {
     /// All formats.
-    pub const ALL: [Self; 12] = [
-        Self::Npy,
-        Self::Pc2,
-        Self::Mdd,
-        Self::Mcx,
-        Self::Mc,
-        Self::Abc,
-        Self::Usdc,
-        Self::Usdz,
-        Self::Usda,
-        Self::Usd,
-        Self::Glb,
-        Self::Gltf,
-    ];
+    pub const ALL: [Self; 12] = {
+        use CacheFormat::*;
+        [Npy, Pc2, Mdd, Mcx, Mc, Abc, Usdc, Usdz, Usda, Usd, Glb, Gltf]
+    };
 
-    /// Whether a file has a whole scene, which may have several meshes and other files; a `.glb` is taken as one mesh.
+    /// Whether a file has a whole scene of several meshes; a `.glb` is taken as one mesh.
     pub fn is_scene(self) -> bool {
         matches!(self, Self::Abc | Self::Usdc | Self::Usdz | Self::Usda | Self::Usd | Self::Gltf)
     }
 
     /// The file name extension, without the dot.
     pub fn extension(self) -> &'static str {
-        match self {
-            Self::Npy => "npy",
-            Self::Pc2 => "pc2",
-            Self::Mdd => "mdd",
-            Self::Mcx => "mcx",
-            Self::Mc => "mc",
-            Self::Abc => "abc",
-            Self::Usdc => "usdc",
-            Self::Usdz => "usdz",
-            Self::Usda => "usda",
-            Self::Usd => "usd",
-            Self::Glb => "glb",
-            Self::Gltf => "gltf",
-        }
+        ["npy", "pc2", "mdd", "mcx", "mc", "abc", "usdc", "usdz", "usda", "usd", "glb", "gltf"][self as usize]
     }
 
     /// The format that the path's extension names, if any.

@@ -21,11 +21,11 @@ impl Place<'_> {
         let file = format!("numpy.load(path{options})");
         self.name.map_or_else(|| file.clone(), |name| format!("{file}[{name:?}]"))
     }
+}
 
-    /// The statement that saves what is made of the array.
-    fn save(self, made: &str) -> String {
-        format!("convert it in Python with numpy.save(\"converted.npy\", {made})")
-    }
+/// The statement that saves what is made of an array.
+fn save(made: &str) -> String {
+    format!("convert it in Python with numpy.save(\"converted.npy\", {made})")
 }
 
 pub(super) fn layout(head: &[u8], expected_points: u64, place: Place<'_>) -> Result<Layout, Fault> {
@@ -44,7 +44,7 @@ pub(super) fn layout(head: &[u8], expected_points: u64, place: Place<'_>) -> Res
 }
 
 /// The header, and where the array begins.
-fn parse(head: &[u8]) -> Result<(Header<'_>, u64), Fault> {
+fn parse(head: &[u8]) -> Result<(Header, u64), Fault> {
     let (start, length) = header_bounds(head)?;
     let text = head.get(start..start + length).ok_or_else(truncated)?;
     let header = python::header(text).ok_or_else(|| {
@@ -83,41 +83,41 @@ fn truncated() -> Fault {
     Fault::damaged("ends within its header; copy or save the file again")
 }
 
-fn scalar(header: &Header<'_>, points: u64, place: Place<'_>) -> Result<Scalar, Fault> {
+fn scalar(header: &Header, points: u64, place: Place<'_>) -> Result<Scalar, Fault> {
     let advice = match &header.kind {
-        Kind::Plain(b"<f4") => return Ok(Scalar::F32Little),
-        Kind::Plain(b">f4") => return Ok(Scalar::F32Big),
-        Kind::Plain(b"<f8") => return Ok(Scalar::F64Little),
-        Kind::Plain(b">f8") => return Ok(Scalar::F64Big),
-        Kind::Plain(b"|O") if header.shape.is_empty() => {
-            let load = place.load(", allow_pickle=True");
-            return Err(Fault::unsupported(format!(
-                "holds one Python object, not an array; save the frames in it, where {load}.item() is a dictionary with numpy.save(\"converted.npy\", {load}.item()[NAME])"
-            )));
-        }
-        Kind::Plain(b"|O") => {
-            let load = place.load(", allow_pickle=True");
-            let made = format!("numpy.array([frame for frame in {load} if len(frame) == {points}], \"<f4\")");
-            format!(
-                "has Python objects, which may be frames of any number of points; keep those of {points}: {}",
-                place.save(&made)
-            )
-        }
-        Kind::Plain(kind) => {
-            let save = place.save(&format!("{}.astype(\"<f4\")", place.load("")));
-            format!("has values of type {}, not 32- or 64-bit floats; {save}", quoted(kind))
-        }
+        Kind::Plain(kind) => match kind.as_str() {
+            "<f4" => return Ok(Scalar::F32Little),
+            ">f4" => return Ok(Scalar::F32Big),
+            "<f8" => return Ok(Scalar::F64Little),
+            ">f8" => return Ok(Scalar::F64Big),
+            "|O" if header.shape.is_empty() => {
+                let load = place.load(", allow_pickle=True");
+                format!(
+                    "holds one Python object, not an array; save the frames in it, where {load}.item() is a dictionary with numpy.save(\"converted.npy\", {load}.item()[NAME])"
+                )
+            }
+            "|O" => {
+                let load = place.load(", allow_pickle=True");
+                let made = format!("numpy.array([frame for frame in {load} if len(frame) == {points}], \"<f4\")");
+                format!(
+                    "has Python objects, which may be frames of any number of points; keep those of {points}: {}",
+                    save(&made)
+                )
+            }
+            kind => {
+                let save = save(&format!("{}.astype(\"<f4\")", place.load("")));
+                format!("has values of type {}, not 32- or 64-bit floats; {save}", quoted(kind.as_bytes()))
+            }
+        },
         Kind::Records(fields) => {
             let load = place.load("");
-            let has = |name: &&str| fields.contains(&name.as_bytes());
-            let axes = ["x", "y", "z"].iter().all(has);
-            let made = if axes {
+            let made = if ["x", "y", "z"].iter().all(|axis| fields.iter().any(|field| field == axis)) {
                 format!("numpy.stack([{load}[k] for k in \"xyz\"], -1).astype(\"<f4\")")
             } else {
-                format!("{load}[{}]", fields.first().map_or("NAME".to_owned(), |field| quoted(field)))
+                format!("{load}[{}]", fields.first().map_or("NAME".to_owned(), |field| quoted(field.as_bytes())))
             };
-            let names: Vec<String> = fields.iter().take(6).map(|field| quoted(field)).collect();
-            format!("has records ({}), not plain floats; {}", names.join(", "), place.save(&made))
+            let names: Vec<String> = fields.iter().take(6).map(|field| quoted(field.as_bytes())).collect();
+            format!("has records ({}), not plain floats; {}", names.join(", "), save(&made))
         }
     };
     Err(Fault::unsupported(advice))
@@ -126,6 +126,10 @@ fn scalar(header: &Header<'_>, points: u64, place: Place<'_>) -> Result<Scalar, 
 /// Frames, points, and how the coordinates of a frame follow each other.
 fn axes(shape: &[u64], expected: u64, place: Place<'_>) -> Result<(u64, u64, Order), Fault> {
     let flat = expected.saturating_mul(3);
+    let arranged = |what: &str, method: String| {
+        let save = save(&format!("{}.{method}", place.load("")));
+        Err(Fault::unsupported(format!("has the shape {}, {what}; {save}", listed(shape))))
+    };
     // A batch of one capture.
     let inner = match shape {
         [1, inner @ ..] if shape.len() > 3 => inner,
@@ -137,20 +141,12 @@ fn axes(shape: &[u64], expected: u64, place: Place<'_>) -> Result<(u64, u64, Ord
         // x y z x y z … in each row, as tools for faces save them.
         [frames, values] if values == flat => (frames, expected, Order::Points),
         [values] if values == flat => (1, expected, Order::Points),
-        [values, frames] if values == flat => {
-            let made = format!("{}.T", place.load(""));
-            let what = format!("has the shape ({values}, {frames}), a column for each frame; {}", place.save(&made));
-            return Err(Fault::unsupported(what));
-        }
+        [values, _] if values == flat => return arranged("a column for each frame", "T".to_owned()),
         [points, frames, 3] if points == expected && frames != expected => {
-            let made = format!("{}.transpose(1, 0, 2)", place.load(""));
-            let what = format!("has the shape ({points}, {frames}, 3), points before frames; {}", place.save(&made));
-            return Err(Fault::unsupported(what));
+            return arranged("points before frames", "transpose(1, 0, 2)".to_owned());
         }
         [points, 3, frames] if points == expected && frames != expected && frames != 3 => {
-            let made = format!("{}.transpose(2, 0, 1)", place.load(""));
-            let what = format!("has the shape ({points}, 3, {frames}), points before frames; {}", place.save(&made));
-            return Err(Fault::unsupported(what));
+            return arranged("points before frames", "transpose(2, 0, 1)".to_owned());
         }
         [frames, points, 3] => (frames, points, Order::Points),
         [points, 3] => (1, points, Order::Points),
@@ -159,9 +155,7 @@ fn axes(shape: &[u64], expected: u64, place: Place<'_>) -> Result<(u64, u64, Ord
         [3, points] => (1, points, Order::Axes),
         [frames, points, 4] => (frames, points, Order::Homogeneous),
         [.., points, 3] if points == expected => {
-            let made = format!("{}.reshape(-1, {points}, 3)", place.load(""));
-            let what = format!("has the shape {}, frames along several axes; {}", listed(shape), place.save(&made));
-            return Err(Fault::unsupported(what));
+            return arranged("frames along several axes", format!("reshape(-1, {points}, 3)"));
         }
         [frames, values] if values > 4 && values % 3 == 0 => (frames, values / 3, Order::Points),
         _ => {
@@ -182,9 +176,7 @@ fn listed(shape: &[u64]) -> String {
 /// The type and shape of an array, in words.
 pub(super) fn described(head: &[u8]) -> String {
     match parse(head) {
-        Ok((Header { kind: Kind::Plain(kind), shape, .. }, _)) => {
-            format!("{} {}", String::from_utf8_lossy(kind), listed(&shape))
-        }
+        Ok((Header { kind: Kind::Plain(kind), shape, .. }, _)) => format!("{kind} {}", listed(&shape)),
         Ok((Header { shape, .. }, _)) => format!("records {}", listed(&shape)),
         Err(_) => "not an array".to_owned(),
     }
@@ -195,21 +187,20 @@ pub(super) fn axes_count(head: &[u8]) -> usize {
     parse(head).map_or(0, |(header, _)| header.shape.len())
 }
 
-/// The only number of an array.
+/// The only number of an array; of whole ones, those of 16 bits.
 pub(super) fn single_number(file: &[u8]) -> Option<f64> {
     let (header, start) = parse(file).ok()?;
-    let Kind::Plain(&[order, ref kind @ ..]) = header.kind else { return None };
+    let Kind::Plain(kind) = &header.kind else { return None };
     let only = header.shape.iter().all(|&length| length == 1);
     let mut bytes = file.get(usize::try_from(start).ok()?..).filter(|_| only)?.to_vec();
-    if order == b'>' {
+    if kind.starts_with('>') {
         bytes.reverse();
     }
-    Some(match (kind, bytes.as_slice()) {
-        (b"f4", &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]).into(),
-        (b"f8", &[a, b, c, d, e, f, g, h]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-        ([b'i' | b'u', _], &[low, ref high @ ..]) if high.iter().all(|&byte| byte == 0) => low.into(),
-        ([b'i' | b'u', _], &[low, high, ref rest @ ..]) if rest.iter().all(|&byte| byte == 0) => {
-            u16::from_le_bytes([low, high]).into()
+    Some(match (kind.get(1..)?, bytes.as_slice()) {
+        ("f4", &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]).into(),
+        ("f8", &[a, b, c, d, e, f, g, h]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        (kind, _) if kind.starts_with(['i', 'u']) && bytes.iter().skip(2).all(|&byte| byte == 0) => {
+            f64::from(*bytes.first()?) + 256.0 * f64::from(bytes.get(1).copied().unwrap_or(0))
         }
         _ => return None,
     })

@@ -1,4 +1,4 @@
-//! File names with a place for the number of a frame, as renderers and compositors write them: `walk.%04d.obj`, `walk.####.obj`.
+//! File names with a place for the number of a frame: `walk.%04d.obj`, `walk.####.obj`.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ pub(super) struct NumberedNames {
 }
 
 impl NumberedNames {
-    /// The name in a path of mesh files to write that has such a place; a point cache holds all frames in one file.
+    /// The numbered name in a path of mesh files; a point cache holds all frames in one file.
     pub(super) fn of(path: &Path) -> Option<Self> {
         MeshFormat::guess(path)?;
         Self::parse(path.file_name()?.to_str()?)

@@ -1,6 +1,7 @@
-//! One file of a zip archive, unpacked while it is read: neither memory nor the disk ever hold the whole.
+//! One file of a zip archive, unpacked while it is read, as frames may be larger than memory.
 
-use std::io::{self, Read, Seek, SeekFrom, Take};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
 use flate2::Crc;
@@ -21,38 +22,20 @@ pub(super) struct Entry {
 }
 
 /// The bytes of an [`Entry`], and never more of them than the archive announces.
-pub(super) struct Unpacked<R> {
+pub(super) struct Unpacked {
     entry: Entry,
-    /// Always there between calls.
-    source: Option<Source<R>>,
+    file: File,
+    source: Box<dyn Read + Send>,
     at: u64,
     /// Of all bytes so far; none once some were passed over.
     sum: Option<Crc>,
 }
 
-enum Source<R> {
-    Stored(Take<R>),
-    Deflated(Box<DeflateDecoder<Take<R>>>),
-}
-
-impl<R: Read + Seek> Unpacked<R> {
-    pub(super) fn new(mut source: R, entry: &Entry) -> io::Result<Self> {
-        source.seek(SeekFrom::Start(entry.start))?;
-        let packed = source.take(entry.packed);
-        let source = if entry.deflated {
-            Source::Deflated(Box::new(DeflateDecoder::new(packed)))
-        } else {
-            Source::Stored(packed)
-        };
-        Ok(Self { entry: entry.clone(), source: Some(source), at: 0, sum: Some(Crc::new()) })
-    }
-
-    /// The archive.
-    pub(super) fn into_inner(self) -> Option<R> {
-        self.source.map(|source| match source {
-            Source::Stored(packed) => packed.into_inner(),
-            Source::Deflated(decoder) => decoder.into_inner().into_inner(),
-        })
+impl Unpacked {
+    /// Unpacks from the beginning; one reader of a file at a time, as all share its position.
+    pub(super) fn new(file: &File, entry: &Entry) -> io::Result<Self> {
+        let source = entry.source(file, 0)?;
+        Ok(Self { entry: entry.clone(), file: file.try_clone()?, source, at: 0, sum: Some(Crc::new()) })
     }
 
     fn damaged(&self, why: &str) -> io::Error {
@@ -60,28 +43,26 @@ impl<R: Read + Seek> Unpacked<R> {
             format!("cannot be unpacked ({why}); copy the file again, or save its arrays again with numpy.savez");
         io::Error::other(Fault::damaged(what).at(&self.entry.path))
     }
+}
 
-    fn restart(&mut self) -> io::Result<()> {
-        let entry = self.entry.clone();
-        let taken = Self { source: self.source.take(), entry: entry.clone(), at: 0, sum: None };
-        let source = taken.into_inner().ok_or_else(|| self.damaged("it could not be read before"))?;
-        *self = Self::new(source, &entry)?;
-        Ok(())
+impl Entry {
+    /// What is unpacked from an offset of the packed bytes on.
+    fn source(&self, file: &File, from: u64) -> io::Result<Box<dyn Read + Send>> {
+        let mut file = file.try_clone()?;
+        file.seek(SeekFrom::Start(self.start + from))?;
+        let packed = file.take(self.packed - from);
+        Ok(if self.deflated { Box::new(DeflateDecoder::new(packed)) } else { Box::new(packed) })
     }
 }
 
-impl<R: Read + Seek> Read for Unpacked<R> {
+impl Read for Unpacked {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let left = usize::try_from(self.entry.length - self.at).unwrap_or(usize::MAX);
         let room = out.len().min(left);
         if room == 0 {
             return Ok(0);
         }
-        let read = match &mut self.source {
-            Some(Source::Stored(packed)) => packed.read(&mut out[..room]),
-            Some(Source::Deflated(decoder)) => decoder.read(&mut out[..room]),
-            None => Ok(0),
-        };
+        let read = self.source.read(&mut out[..room]);
         let count = match read {
             Ok(0) => return Err(self.damaged("it ends too early")),
             Err(cause) if cause.kind() == io::ErrorKind::InvalidInput || cause.kind() == io::ErrorKind::InvalidData => {
@@ -100,24 +81,19 @@ impl<R: Read + Seek> Read for Unpacked<R> {
     }
 }
 
-impl<R: Read + Seek> Seek for Unpacked<R> {
+impl Seek for Unpacked {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         let wanted = super::layout::offset(self.at, self.entry.length, to)?;
         if wanted < self.at {
-            self.restart()?;
+            *self = Self::new(&self.file, &self.entry)?;
         }
-        match &mut self.source {
-            // Whole frames are passed over; the header before the first is read, so that its checksum can be compared.
-            Some(Source::Stored(packed)) if wanted - self.at > 1 << 17 => {
-                let inside = wanted.min(self.entry.packed);
-                packed.get_mut().seek(SeekFrom::Start(self.entry.start + inside))?;
-                packed.set_limit(self.entry.packed - inside);
-                (self.at, self.sum) = (wanted, None);
-            }
-            _ => {
-                let between = wanted - self.at;
-                io::copy(&mut self.by_ref().take(between), &mut io::sink())?;
-            }
+        let between = wanted - self.at;
+        // Frames are passed over; the header is read, so that its checksum can be compared.
+        if !self.entry.deflated && between > 1 << 17 {
+            self.source = self.entry.source(&self.file, wanted.min(self.entry.packed))?;
+            (self.at, self.sum) = (wanted, None);
+        } else {
+            io::copy(&mut self.by_ref().take(between), &mut io::sink())?;
         }
         Ok(self.at)
     }

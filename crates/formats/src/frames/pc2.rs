@@ -1,5 +1,5 @@
-//! Point cache 2: `POINTCACHE2\0`, then version, points, first frame, frames per sample and samples, then `f32`; all
-//! little-endian.
+//! Point cache 2: `POINTCACHE2\0`, then version, points, first frame, frames per sample and
+//! samples, then `f32`; all little-endian.
 
 use super::layout::Layout;
 use super::widen::Scalar;

@@ -1,126 +1,65 @@
 //! As much of Python's syntax as the headers of `.npy` files need.
 
-use crate::text::integer;
+use serde_json::Value;
 
 /// The header of an array as it stands.
-pub(super) struct Header<'a> {
-    pub(super) kind: Kind<'a>,
+pub(super) struct Header {
+    pub(super) kind: Kind,
     pub(super) fortran: bool,
     pub(super) shape: Vec<u64>,
 }
 
 /// The type of an array's values.
-pub(super) enum Kind<'a> {
+pub(super) enum Kind {
     /// Such as `<f4`.
-    Plain(&'a [u8]),
+    Plain(String),
     /// Records, with the names of their fields.
-    Records(Vec<&'a [u8]>),
+    Records(Vec<String>),
 }
 
 /// The dictionary that a `.npy` file begins with.
-pub(super) fn header(text: &[u8]) -> Option<Header<'_>> {
-    Parser { rest: text }.header()
+pub(super) fn header(text: &[u8]) -> Option<Header> {
+    let Ok(Value::Object(mut found)) = serde_json::from_str(&as_json(&String::from_utf8_lossy(text))) else {
+        return None;
+    };
+    let kind = match found.remove("descr")? {
+        Value::String(kind) => Kind::Plain(kind),
+        // `[('x', '<f4'), …]`.
+        Value::Array(fields) => {
+            Kind::Records(fields.iter().filter_map(|field| Some(field.get(0)?.as_str()?.to_owned())).collect())
+        }
+        _ => return None,
+    };
+    let fortran = found.remove("fortran_order")?.as_bool()?;
+    let shape = serde_json::from_value(found.remove("shape")?).ok()?;
+    found.is_empty().then_some(Header { kind, fortran, shape })
 }
 
-struct Parser<'a> {
-    rest: &'a [u8],
-}
-
-impl<'a> Parser<'a> {
-    fn header(mut self) -> Option<Header<'a>> {
-        let (mut kind, mut fortran, mut shape) = (None, None, None);
-        self.symbol(b'{')?;
-        while self.symbol(b'}').is_none() {
-            let key = self.string()?;
-            self.symbol(b':')?;
-            match key {
-                b"descr" => kind = Some(self.kind()?),
-                b"fortran_order" => fortran = Some(self.boolean()?),
-                b"shape" => shape = Some(self.tuple()?),
-                _ => return None,
+/// The JSON of a literal of Python, which has other quotes, brackets and words.
+fn as_json(text: &str) -> String {
+    let (mut json, mut quote) = (String::new(), None);
+    for c in text.chars() {
+        match (quote, c) {
+            (Some(opening), c) if c == opening => {
+                json.push('"');
+                quote = None;
             }
-            if self.symbol(b',').is_none() && self.peek() != Some(b'}') {
-                return None;
+            (Some(_), '"' | '\\') => json.extend(['\\', c]),
+            (None, '\'' | '"') => {
+                json.push('"');
+                quote = Some(c);
             }
-        }
-        self.peek().is_none().then_some(Header { kind: kind?, fortran: fortran?, shape: shape? })
-    }
-
-    /// A type such as `'<f4'`, or a list of fields, `[('x', '<f4'), …]`.
-    fn kind(&mut self) -> Option<Kind<'a>> {
-        if self.peek()? != b'[' {
-            return self.string().map(Kind::Plain);
-        }
-        let (mut depth, mut fields, mut before) = (0_usize, Vec::new(), 0);
-        loop {
-            let symbol = self.peek()?;
-            if symbol == b'\'' || symbol == b'"' {
-                let text = self.string()?;
-                if before == b'(' && depth == 1 {
-                    fields.push(text);
-                }
-            } else {
-                self.rest = &self.rest[1..];
-                match symbol {
-                    b'[' => depth += 1,
-                    b']' => depth = depth.checked_sub(1)?,
-                    _ => {}
-                }
-                if depth == 0 {
-                    return Some(Kind::Records(fields));
-                }
+            (None, '(') => json.push('['),
+            (None, ')' | ']' | '}') => {
+                let inside = json.trim_end();
+                json.truncate(inside.strip_suffix(',').unwrap_or(inside).len());
+                json.push(if c == ')' { ']' } else { c });
             }
-            before = symbol;
+            (None, 'T' | 'F') => json.push(c.to_ascii_lowercase()),
+            // Python 2 wrote `3L`.
+            (None, 'L') => {}
+            (_, c) => json.push(c),
         }
     }
-
-    fn string(&mut self) -> Option<&'a [u8]> {
-        let quote = self.peek().filter(|quote| b"'\"".contains(quote))?;
-        let text = &self.rest[1..];
-        let end = text.iter().position(|&b| b == quote)?;
-        self.rest = &text[end + 1..];
-        Some(&text[..end])
-    }
-
-    fn boolean(&mut self) -> Option<bool> {
-        self.peek()?;
-        for (word, value) in [(b"True".as_slice(), true), (b"False", false)] {
-            if let Some(rest) = self.rest.strip_prefix(word) {
-                self.rest = rest;
-                return Some(value);
-            }
-        }
-        None
-    }
-
-    fn tuple(&mut self) -> Option<Vec<u64>> {
-        let mut numbers = Vec::new();
-        self.symbol(b'(')?;
-        while self.symbol(b')').is_none() {
-            numbers.push(self.number()?);
-            if self.symbol(b',').is_none() && self.peek() != Some(b')') {
-                return None;
-            }
-        }
-        Some(numbers)
-    }
-
-    fn number(&mut self) -> Option<u64> {
-        self.peek()?;
-        let end = self.rest.iter().position(|b| !b.is_ascii_digit())?;
-        let (digits, rest) = self.rest.split_at(end);
-        // Python 2 wrote `3L`.
-        self.rest = rest.strip_prefix(b"L").unwrap_or(rest);
-        integer(digits)
-    }
-
-    fn symbol(&mut self, wanted: u8) -> Option<()> {
-        (self.peek()? == wanted).then(|| self.rest = &self.rest[1..])
-    }
-
-    /// The next byte that is not white space.
-    fn peek(&mut self) -> Option<u8> {
-        self.rest = self.rest.trim_ascii_start();
-        self.rest.first().copied()
-    }
+    json
 }

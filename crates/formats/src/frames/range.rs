@@ -10,8 +10,8 @@ use cager_geometry::units::Units;
 use super::FrameReader;
 use crate::error::{Error, Fault};
 
-/// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of their source. Written
-/// `A-B` or `A-BxSTEP`.
+/// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of
+/// their source. Written `A-B` or `A-BxSTEP`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameRange {
     first: usize,
@@ -48,7 +48,7 @@ impl FrameRange {
         (first <= last).then(|| Self { first: first - start, last: last - start, step: self.step })
     }
 
-    /// Whether there are all of these among `frames` frames of `source`, which have these numbers there.
+    /// Whether all of these are among `frames` frames of `source`, which have these numbers.
     ///
     /// # Errors
     /// [`Error::Invalid`] with the frames that there are; of numbers, the frames that have them.

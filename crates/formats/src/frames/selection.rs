@@ -9,14 +9,14 @@ use super::FrameRange;
 pub struct FrameSelection {
     /// Only these frames.
     pub range: Option<FrameRange>,
-    /// The rest pose, the cage: files that are left out where they lie among the frames, unless they are called as frames are.
+    /// The rest pose, the cage: files that are no frames, unless they are called as frames are.
     pub no_frames: Vec<PathBuf>,
-    /// The mesh of a scene (Alembic, USD, glTF) that has several, by its path or name; the array of an `.npz` file, by its name.
+    /// The mesh of a scene that has several, by its path or name; the array of an `.npz` file.
     pub prim: Option<String>,
-    /// The animation of a file of glTF that has several, by its name or its number from 0; the first one that moves the mesh by default.
+    /// The animation of glTF, by its name or number; by default the first that moves the mesh.
     pub animation: Option<String>,
-    /// Frames per second to take of an animation that has keys and no frames (glTF); those at the times of its keys by default.
+    /// Frames per second to take of glTF; by default frames are at the times of its keys.
     pub rate: Option<f64>,
-    /// Whether files of several sequences are taken one after another, in natural order, instead of refused.
+    /// Whether files of several sequences are taken in natural order, instead of refused.
     pub join_sequences: bool,
 }

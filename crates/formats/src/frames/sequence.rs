@@ -1,4 +1,4 @@
-//! A capture with each frame in a file of its own: meshes, arrays, or scenes and caches of one frame.
+//! A capture with each frame in a file of its own.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use super::{FrameReader, FrameSelection, cut, npz, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{FrameFaces, MeshFormat, read_frame_file};
 
-/// Reads the positions; the faces may differ from those of the rest pose, and are kept to be compared.
+/// Reads positions, and the faces to compare them.
 pub(super) struct SequenceReader {
     sequence: Sequence,
     points: usize,

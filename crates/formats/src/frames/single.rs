@@ -1,7 +1,6 @@
 //! A capture with all frames in one file.
 
 use std::fs::{self, File};
-use std::io::BufReader;
 use std::path::Path;
 
 use super::{CacheFormat, FrameReader, FrameSelection, cache, maya, npz};
@@ -31,21 +30,19 @@ pub(super) fn is_animated(path: &Path) -> Result<bool, Error> {
     Ok(glb::is_animated(&fs::read(path).map_err(|cause| Error::read(path, cause))?))
 }
 
-/// Opens a point cache, or the frames in an archive of arrays; `is_frame` where it is one of many files of a frame each.
+/// Opens a capture in one file; `is_frame` where it is one of many files of a frame each.
 pub(super) fn open_cache(
     path: &Path,
     expected_points: usize,
     selection: &FrameSelection,
     is_frame: bool,
 ) -> Result<Box<dyn FrameReader>, Error> {
-    let read = |cause| Error::read(path, cause);
-    let open = || File::open(path).map_err(read);
     if is_archive(path) {
-        let prim = selection.prim.as_deref();
-        return npz::open(path, BufReader::new(open()?), expected_points, prim, is_frame);
+        return npz::open(path, expected_points, selection.prim.as_deref(), is_frame);
     }
     let Some(format) = CacheFormat::from_path(path) else { return Err(unknown(path)) };
-    let file = open()?;
+    let read = |cause| Error::read(path, cause);
+    let file = File::open(path).map_err(read)?;
     let length = file.metadata().map_err(read)?.len();
     cache::open(format, path, file, length, expected_points, selection, path.parent())
 }

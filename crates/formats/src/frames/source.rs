@@ -16,15 +16,18 @@ use crate::mesh::{MeshFormat, extensions};
 
 /// Opens the frames of a capture whose rest pose has `expected_points` points.
 ///
-/// `source` is a `.npy`, `.pc2`, `.mdd`, `.mcx`, `.abc`, `.usd` or animated `.glb` file, a `.npz` file in which one array fits, one mesh file, a folder of mesh files or of any other of these
-/// with one frame each, or a pattern for such files. Files of one mesh format are taken in the order of the numbers in their names, `2.obj` before
-/// `10.obj` and `1.5.obj` before `2.obj`; other files, and in a folder hidden ones, are passed over. In a pattern every part of the path may be a glob
-/// or have `%04d` or `####` in place of a number; what is there by that name is no pattern.
+/// `source` is a capture in one file, an `.npz` file in which one array fits, one mesh file, or a
+/// folder or pattern of mesh files or of any other of these with one frame each. Files are taken in
+/// the order of the numbers in their names, `2.obj` before `10.obj` and `1.5.obj` before `2.obj`;
+/// other files, and in a folder hidden ones, are passed over. In a pattern every part of the path
+/// may be a glob or have `%04d` or `####` in place of a number; what is there by that name is no
+/// pattern.
 ///
 /// # Errors
-/// [`Error::PointCount`] where a cache has another number of points, [`Error::Damaged`] where its size is not what its
-/// header promises, [`Error::Unsupported`] for formats that are not read, and mesh formats mixed in one folder,
-/// [`Error::Invalid`] where there is no frame, [`Error::SeveralSequences`], [`Error::Io`].
+/// [`Error::PointCount`] where a cache has another number of points, [`Error::Damaged`] where its
+/// size is not what its header promises, [`Error::Unsupported`] for formats that are not read, and
+/// mesh formats mixed in one folder, [`Error::Invalid`] where there is no frame,
+/// [`Error::SeveralSequences`], [`Error::Io`].
 pub fn open_frames(source: impl AsRef<Path>, expected_points: usize) -> Result<Box<dyn FrameReader>, Error> {
     open_selected_frames(source, expected_points, &FrameSelection::default())
 }
@@ -39,26 +42,22 @@ pub fn open_selected_frames(
     selection: &FrameSelection,
 ) -> Result<Box<dyn FrameReader>, Error> {
     let path = source.as_ref();
-    let reader = match fs::metadata(path) {
-        Ok(found) if found.is_dir() => open_files(path, files::in_folder(path)?, expected_points, selection),
-        Ok(found) if !found.is_file() => Err(Fault::unsupported("is not a regular file; copy it to one").at(path)),
-        Ok(_) => open_file(path, expected_points, selection),
-        Err(_) if files::is_pattern(path) => open_files(path, files::matching(path)?, expected_points, selection),
-        Err(cause) => Err(Error::read(path, cause)),
-    }?;
+    let reader = match files::several(path)? {
+        Some(found) => open_files(path, found, expected_points, selection)?,
+        None => open_file(path, expected_points, selection)?,
+    };
     RangeReader::open(reader, selection.range, path)
 }
 
 /// The files that [`open_frames`] reads for `source`; none where it finds none.
 pub fn frame_files(source: impl AsRef<Path>) -> Vec<PathBuf> {
     let path = source.as_ref();
-    let found = match fs::metadata(path) {
-        Ok(found) if found.is_dir() => files::in_folder(path),
-        Ok(_) => return vec![path.to_owned()],
-        Err(_) => files::matching(path),
+    let found = match files::several(path) {
+        Ok(Some(found)) => found,
+        _ if path.exists() => return vec![path.to_owned()],
+        _ => Vec::new(),
     };
-    let (meshes, others): (Vec<_>, Vec<_>) =
-        found.unwrap_or_default().into_iter().partition(|path| MeshFormat::guess(path).is_some());
+    let (meshes, others) = by_mesh(found);
     if meshes.is_empty() { captures(&others) } else { meshes }
 }
 
@@ -73,20 +72,14 @@ pub struct MeshSequence {
     pub notes: Vec<String>,
 }
 
-/// The mesh files of a folder or pattern in the order of their numbers, or one file, whatever each of them holds; `no_frames` are left out as in a
-/// [`FrameSelection`].
+/// The mesh files of a folder or pattern in the order of their numbers, or one file; `no_frames`
+/// are left out as in a [`FrameSelection`].
 ///
 /// # Errors
 /// As [`open_frames`], where there is no mesh file, or several sequences or formats.
 pub fn mesh_sequence(source: impl AsRef<Path>, no_frames: &[PathBuf]) -> Result<MeshSequence, Error> {
     let path = source.as_ref();
-    let found = match fs::metadata(path) {
-        Ok(found) if found.is_dir() => files::in_folder(path)?,
-        Ok(_) => vec![path.to_owned()],
-        Err(_) if files::is_pattern(path) => files::matching(path)?,
-        Err(cause) => return Err(Error::read(path, cause)),
-    };
-    let (meshes, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|path| MeshFormat::guess(path).is_some());
+    let (meshes, others) = by_mesh(files::several(path)?.unwrap_or_else(|| vec![path.to_owned()]));
     let (files, notes) = without(meshes, no_frames, true);
     if files.is_empty() {
         return Err(no_frames_in(path, &others));
@@ -97,7 +90,7 @@ pub fn mesh_sequence(source: impl AsRef<Path>, no_frames: &[PathBuf]) -> Result<
     Ok(MeshSequence { files, numbers, notes })
 }
 
-/// The numbers that the names of files in this order tell; none where they tell none, or another order.
+/// The numbers in the names of files, where they tell this order.
 pub fn frame_numbers(files: &[PathBuf]) -> Option<Vec<f64>> {
     let sequence = Sequence::of(files.to_vec()).ok()?;
     sequence.numbers.filter(|_| sequence.files == files)
@@ -116,7 +109,7 @@ pub fn open_frames_bytes<'a>(
     open_frames_in(format, name, Cursor::new(bytes), bytes.len() as u64, expected_points)
 }
 
-/// Opens the frames of a cache file of `length` bytes wherever it lies; `name` is the path in error messages.
+/// Opens the frames of a cache file of `length` bytes; `name` is the path in error messages.
 ///
 /// # Errors
 /// As [`open_frames`].
@@ -130,7 +123,8 @@ pub fn open_frames_in<'a>(
     cache::open(format, name, source, length, expected_points, &FrameSelection::default(), None)
 }
 
-/// Opens `length` bytes that are x y z of every point of every frame as little-endian `f32`, with nothing before; `name` is the path in error messages.
+/// Opens `length` bytes of x y z of every point of every frame as little-endian `f32`, with nothing
+/// before; `name` is the path in error messages.
 ///
 /// # Errors
 /// Another length; no points or frames.
@@ -160,7 +154,7 @@ fn open_files(
     expected_points: usize,
     selection: &FrameSelection,
 ) -> Result<Box<dyn FrameReader>, Error> {
-    let (meshes, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|path| MeshFormat::guess(path).is_some());
+    let (meshes, others) = by_mesh(found);
     let caches = captures(&others);
     let (frames, notes) = without(meshes, &selection.no_frames, caches.is_empty());
     if let [only] = frames.as_slice()
@@ -190,16 +184,9 @@ fn check_frames(files: &[PathBuf], points: usize, selection: &FrameSelection) ->
     let mut files = files.to_vec();
     files.sort();
     let count = files.len();
-    let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
-    for extension in files.iter().filter_map(|path| path.extension()) {
-        *kinds.entry(extension.to_string_lossy().to_lowercase()).or_default() += 1;
-    }
-    if kinds.len() > 1 {
-        let list: Vec<_> = kinds.iter().map(|(extension, count)| format!("{count} .{extension}")).collect();
-        let most = kinds.iter().max_by_key(|(_, count)| **count).map_or("", |(extension, _)| extension.as_str());
+    if let Some((kinds, most)) = kinds(&files) {
         return Err(Fault::invalid(format!(
-            "has {count} captures of several kinds ({}); name one of them, or where each is one frame, pick these with a pattern such as '*.{most}'",
-            list.join(", ")
+            "has {count} captures of several kinds ({kinds}); name one of them, or where each is one frame, pick these with a pattern such as '*.{most}'"
         )));
     }
     let frames = |path: &PathBuf| single::open_cache(path, points, selection, true).ok().map(|found| found.frames());
@@ -222,7 +209,7 @@ fn check_frames(files: &[PathBuf], points: usize, selection: &FrameSelection) ->
     Ok(())
 }
 
-/// Captures among files; scenes where there is nothing else, as the scene often lies beside what was exported from it.
+/// Captures among files; scenes, from which others are often exported, where there is nothing else.
 fn captures(files: &[PathBuf]) -> Vec<PathBuf> {
     let all = files.iter().filter(|path| single::is_cache(path)).cloned();
     let (scenes, others): (Vec<_>, Vec<_>) =
@@ -245,8 +232,9 @@ fn open_sequence(
     Ok(Box::new(SequenceReader::new(sequence, expected_points, notes, selection.prim.as_deref())))
 }
 
-/// Files without the rest pose and the cage, however they are spelled, and what to say of it. One that is called as the others are stays, as the first
-/// frame often is the rest pose; so does one where there is nothing else.
+/// Files without the rest pose and the cage, however they are spelled, and what to say of it. One
+/// that is called as the others stays, as the first frame often is the rest pose; so does one where
+/// there is nothing else.
 fn without(files: Vec<PathBuf>, no_frames: &[PathBuf], nothing_else: bool) -> (Vec<PathBuf>, Vec<String>) {
     let excluded: Vec<PathBuf> = no_frames.iter().filter_map(|path| path.canonicalize().ok()).collect();
     let is_excluded = |path: &PathBuf| path.canonicalize().is_ok_and(|found| excluded.contains(&found));
@@ -270,18 +258,26 @@ fn without(files: Vec<PathBuf>, no_frames: &[PathBuf], nothing_else: bool) -> (V
 }
 
 fn one_format(files: &[PathBuf]) -> Result<(), Fault> {
-    let mut counts = BTreeMap::new();
-    for format in files.iter().filter_map(|path| MeshFormat::guess(path)) {
-        *counts.entry(format.extension()).or_insert(0_usize) += 1;
-    }
-    if counts.len() == 1 {
-        return Ok(());
+    let Some((kinds, _)) = kinds(files) else { return Ok(()) };
+    Err(Fault::unsupported(format!(
+        "mixes mesh formats ({kinds}); keep one, or pick it with a pattern such as \"*.obj\""
+    )))
+}
+
+/// How many files there are of each extension, and the most frequent, where there are several.
+fn kinds(files: &[PathBuf]) -> Option<(String, String)> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for extension in files.iter().filter_map(|path| path.extension()) {
+        *counts.entry(extension.to_string_lossy().to_lowercase()).or_default() += 1;
     }
     let list: Vec<_> = counts.iter().map(|(extension, count)| format!("{count} .{extension}")).collect();
-    Err(Fault::unsupported(format!(
-        "mixes mesh formats ({}); keep one, or pick it with a pattern such as \"*.obj\"",
-        list.join(", ")
-    )))
+    let (most, _) = counts.into_iter().max_by_key(|(_, count)| *count)?;
+    (list.len() > 1).then(|| (list.join(", "), most))
+}
+
+/// Mesh files, and others.
+fn by_mesh(files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    files.into_iter().partition(|path| MeshFormat::guess(path).is_some())
 }
 
 /// The error of a source without frames, with what may have been meant.

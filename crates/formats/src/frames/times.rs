@@ -42,9 +42,9 @@ impl Times {
         self.numbers.iter_mut().flatten().for_each(|told| *told += number);
     }
 
-    /// By the times of all frames in seconds; `told` is the frame rate of the program that wrote them, where it is known.
+    /// By the times of all frames in seconds; `told` is a frame rate that the file says.
     ///
-    /// Times that are not evenly spaced are kept as numbers that are not: a number over the frame rate is its frame's time.
+    /// Uneven times are kept as numbers: a number over the frame rate is its frame's time.
     pub(crate) fn of(times: &[f64], told: Option<f64>) -> Result<Self, Fault> {
         let mut found = Self::default();
         let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return Ok(found) };

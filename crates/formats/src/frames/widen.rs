@@ -51,7 +51,7 @@ pub(crate) fn half_precision(bits: u16) -> f64 {
     if bits >> 15 == 0 { size } else { -size }
 }
 
-// The loops have no branch, so that they are vectorised: adding one to an exponent of all ones carries into the sign bit.
+// Without branches, so vectorised: adding one to an exponent of all ones carries into the sign bit.
 
 fn single(bytes: &[u8], out: &mut [f64], decode: impl Fn([u8; 4]) -> u32) -> bool {
     let mut carried = 0;

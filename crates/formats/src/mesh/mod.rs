@@ -57,38 +57,17 @@ pub enum MeshFormat {
 
 impl MeshFormat {
     /// All formats.
-    pub const ALL: [Self; 11] = [
-        Self::Obj,
-        Self::Ply,
-        Self::Off,
-        Self::Stl,
-        Self::Glb,
-        Self::Abc,
-        Self::Usdc,
-        Self::Usdz,
-        Self::Usda,
-        Self::Usd,
-        Self::Gltf,
-    ];
+    pub const ALL: [Self; 11] = {
+        use MeshFormat::*;
+        [Obj, Ply, Off, Stl, Glb, Abc, Usdc, Usdz, Usda, Usd, Gltf]
+    };
 
     /// Formats of one mesh that stands still, of which each file of a folder may be a frame.
     pub(crate) const STILL: [Self; 5] = [Self::Obj, Self::Ply, Self::Off, Self::Stl, Self::Glb];
 
     /// The file name extension, without the dot.
     pub fn extension(self) -> &'static str {
-        match self {
-            Self::Obj => "obj",
-            Self::Ply => "ply",
-            Self::Off => "off",
-            Self::Stl => "stl",
-            Self::Glb => "glb",
-            Self::Abc => "abc",
-            Self::Usdc => "usdc",
-            Self::Usdz => "usdz",
-            Self::Usda => "usda",
-            Self::Usd => "usd",
-            Self::Gltf => "gltf",
-        }
+        ["obj", "ply", "off", "stl", "glb", "abc", "usdc", "usdz", "usda", "usd", "gltf"][self as usize]
     }
 
     /// The format that the extension of `path` stands for, in upper or lower case.
@@ -166,7 +145,7 @@ impl ReadModel {
     }
 }
 
-/// Reads a model from a file, of a scene (Alembic, USD, glTF) the mesh that `prim` names by its path or name, where it has several.
+/// Reads a model from a file, of a scene the mesh that `prim` names by its path or name.
 ///
 /// # Errors
 /// As [`read_model`]; no such mesh, or several of that name.
@@ -190,44 +169,22 @@ pub fn read_model(path: &Path) -> Result<Model, Error> {
     parse_file(path, None).map(|parsed| parsed.model)
 }
 
-/// As [`read_model`], with what was left out of the file, in words.
-///
-/// # Errors
-/// As [`read_model`].
-pub fn read_model_with_note(path: &Path) -> Result<(Model, Option<String>), Error> {
-    read_prim_with_note(path, None)
-}
-
-/// As [`read_model_with_note`], of a scene (Alembic, USD, glTF) the mesh that `prim` names by its path or name, where it has several.
-///
-/// # Errors
-/// As [`read_model`]; no such mesh, or several of that name.
-pub fn read_prim_with_note(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>), Error> {
-    read_prim_with_units(path, prim).map(|(model, note, _)| (model, note))
-}
-
-/// As [`read_prim_with_note`], with the unit and the upward axis of the points, as far as the file says them.
-///
-/// # Errors
-/// As [`read_prim_with_note`].
-pub fn read_prim_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Option<String>, Units), Error> {
-    read_mesh(path, prim).map(|ReadModel { model, note, units, .. }| (model, note, units))
-}
-
 /// Reads a model from the bytes of a file; `name` is the path in error messages.
 ///
-/// Coordinates are as exact as `f64` can hold them. A `.glb` gives the triangles and points of its default scene, each
-/// node's mesh at its place; a mesh with a skin is where its joints put it at rest.
+/// Coordinates are as exact as `f64` can hold them. A `.glb` gives the triangles and points of its
+/// default scene, each node's mesh at its place; a mesh with a skin is where its joints put it at
+/// rest.
 ///
 /// # Errors
-/// [`Error::Damaged`] where the bytes do not follow the format or end too early, [`Error::Unsupported`] for variants
-/// that are not read, [`Error::Invalid`] for a coordinate that is not finite, a face with a vertex
-/// that does not exist, and a file without points. Faces of fewer than three corners are left out.
+/// [`Error::Damaged`] where the bytes do not follow the format or end too early,
+/// [`Error::Unsupported`] for variants that are not read, [`Error::Invalid`] for a coordinate that
+/// is not finite, a face with a vertex that does not exist, and a file without points. Faces of
+/// fewer than three corners are left out.
 pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<Model, Error> {
     read_bytes(format, name, bytes, Contents::PointsAndFaces, None).map(|parsed| parsed.model)
 }
 
-/// The faces of the file of a frame, and the text that they are in: most frames have the same ones, which are then not parsed again.
+/// The faces of a frame and their text: most frames have the same, which are then not parsed again.
 #[derive(Default)]
 pub(crate) struct FrameFaces {
     pub(crate) faces: Polygons,
@@ -235,8 +192,9 @@ pub(crate) struct FrameFaces {
     pub(crate) text: Vec<u8>,
 }
 
-/// A frame of a capture: its points, and its faces where nothing is wrong with them, since a frame needs none. They are taken from `known` where they
-/// are the same; the caller puts them there again.
+/// A frame of a capture: its points, and its faces where nothing is wrong with them, as a frame
+/// needs none. They are taken from `known` where they are the same; the caller puts them there
+/// again.
 pub(crate) fn read_frame_file(path: &Path, known: &mut FrameFaces) -> Result<Model, Error> {
     let (format, bytes) = read_named(path)?;
     let read = |contents| read_bytes(format, path, &bytes, contents, None).map(|parsed| parsed.model);

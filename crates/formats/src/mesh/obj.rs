@@ -1,4 +1,4 @@
-//! Wavefront OBJ: `v`, `vn` and `f` lines; everything else is skipped, and so are faces that are edges or points.
+//! Wavefront OBJ: `v`, `vn` and `f` lines, without faces that are edges or points.
 
 use cager_geometry::mesh::Model;
 
@@ -7,14 +7,14 @@ use super::unread::Unread;
 use crate::colors::{Colors, Scale};
 use crate::error::Fault;
 use crate::faces::{Contents, no_such_vertex};
-use crate::text::{self, Lines, integer, point, quoted, words};
+use crate::text::{self, Lines, damaged, integer, point, quoted, words};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
     let parsed = scan(bytes, contents, None)?;
     let points = parsed.model.points.len();
     let named = parsed.model.faces.indices().iter().max();
     if named.is_some_and(|&index| index as usize >= points) {
-        // Faces may come before their vertices, so that only now it is known how many there are to check against.
+        // Faces may come before their vertices, whose number is known only now.
         return scan(bytes, contents, Some(points));
     }
     Ok(parsed)
@@ -29,23 +29,18 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
     while let Some(line) = lines.next() {
         let number = lines.number();
         let keyword = words(line).next().unwrap_or_default();
-        let is_vertex = match keyword {
-            b"v" => true,
-            // `fo` is what faces were called at first.
-            b"f" | b"fo" if contents == Contents::PointsAndFaces => false,
-            b"vn" if contents == Contents::PointsAndFaces && model.faces.is_empty() => {
-                let mut words = words(&line[keyword.len()..]);
-                model.normals.extend(point(&mut words, String::new).ok());
-                unread.note(keyword, line);
-                continue;
+        let is_vertex = keyword == b"v";
+        if !is_vertex && contents == Contents::Points {
+            continue;
+        }
+        // `fo` is what faces were called at first.
+        if !is_vertex && keyword != b"f" && keyword != b"fo" {
+            if keyword == b"vn" && model.faces.is_empty() {
+                model.normals.extend(point(&mut words(&line[keyword.len()..]), String::new).ok());
             }
-            _ => {
-                if contents == Contents::PointsAndFaces {
-                    unread.note(keyword, line);
-                }
-                continue;
-            }
-        };
+            unread.note(keyword, line);
+            continue;
+        }
         let joined;
         let line = if line.ends_with(b"\\") {
             joined = join(line, &mut lines);
@@ -57,7 +52,7 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
         if is_vertex {
             let point = point(&mut words, || format!("line {number}"))?;
             model.points.push(point);
-            // Written after the position by many programs (x y z r g b), outside of the specification.
+            // Written after the position by many programs, outside of the specification.
             if contents == Contents::PointsAndFaces
                 && let [Some(red), Some(green), Some(blue), None] = [(); 4].map(|()| words.next().map(text::number))
                 && let (Some(red), Some(green), Some(blue)) = (red, green, blue)
@@ -73,7 +68,7 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
             if face.len() >= 3 {
                 model.faces.push(&face);
             } else if lines.is_cut() {
-                return Err(Fault::damaged(format!("line {number}: the face has {} corners", face.len())));
+                return Err(damaged(number, &format!("the face has {} corners", face.len())));
             } else {
                 left_out += 1;
             }
@@ -102,15 +97,11 @@ fn join(line: &[u8], lines: &mut Lines<'_>) -> Vec<u8> {
     joined
 }
 
-/// The vertex of a corner written `v`, `v/vt`, `v//vn` or `v/vt/vn`, where negative numbers count back from the last
-/// vertex.
+/// The vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative numbers count back.
 fn corner(word: &[u8], before: usize, points: Option<usize>, line: usize) -> Result<u32, Fault> {
     let digits = word.split(|&b| b == b'/').next().unwrap_or(word);
     let Some(index) = integer::<i64>(digits) else {
-        return Err(Fault::damaged(format!(
-            "line {line}: {} is not a vertex number; export the mesh again",
-            quoted(word)
-        )));
+        return Err(damaged(line, &format!("{} is not a vertex number; export the mesh again", quoted(word))));
     };
     let from_zero = if index < 0 { before as i64 + index } else { index - 1 };
     let exists = from_zero >= 0 && points.is_none_or(|points| from_zero < points as i64);

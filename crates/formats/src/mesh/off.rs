@@ -1,4 +1,4 @@
-//! Object File Format in ASCII, one vertex a line; colours, normals and texture coordinates are skipped.
+//! Object File Format in ASCII, one vertex a line.
 
 use cager_geometry::mesh::Model;
 
@@ -6,7 +6,7 @@ use super::parsed::Parsed;
 use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::faces::{Contents, check_face};
-use crate::text::{Lines, integer, point, quoted, words};
+use crate::text::{Lines, damaged, integer, point, quoted, words};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
     let mut lines = ContentLines(Lines::new(bytes));
@@ -62,7 +62,7 @@ impl<'a> Iterator for ContentLines<'a> {
     }
 }
 
-/// Numbers of vertices and faces, from the line of the keyword or those after it, and what the keyword promises beside positions.
+/// Numbers of vertices and faces, and what the keyword promises beside positions.
 fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize, Dropped), Fault> {
     let mut dropped = Dropped::default();
     let mut line = lines.next().unwrap_or_default();
@@ -98,20 +98,17 @@ fn counts(lines: &mut ContentLines<'_>) -> Result<(usize, usize, Dropped), Fault
     let points = found.next().flatten();
     let faces = found.next().or_else(|| words(lines.next()?).map(integer).next()).flatten();
     points.zip(faces).map(|(points, faces)| (points, faces, dropped)).ok_or_else(|| {
-        Fault::damaged(format!(
-            "line {number}: the numbers of vertices and faces are missing, so this is not an OFF file; export the mesh again"
-        ))
+        let what = "the numbers of vertices and faces are missing, so this is not an OFF file; export the mesh again";
+        damaged(number, what)
     })
 }
 
-/// A number of corners and as many vertices, which may go on over several lines; gives whether a colour follows on the last one.
+/// A number of corners and as many vertices; gives whether a colour follows.
 fn read_face(line: &[u8], lines: &mut ContentLines<'_>, face: &mut Vec<u32>) -> Result<bool, Fault> {
     let start = lines.0.number();
     let unreadable = |word: &[u8], number: usize| {
-        Fault::damaged(format!(
-            "line {number}: {} is not a whole number that a face can have; export the mesh again",
-            quoted(word)
-        ))
+        let word = quoted(word);
+        damaged(number, &format!("{word} is not a whole number that a face can have; export the mesh again"))
     };
     let first = words(line).next().unwrap_or_default();
     let corners: usize = integer(first).ok_or_else(|| unreadable(first, start))?;
@@ -126,10 +123,9 @@ fn read_face(line: &[u8], lines: &mut ContentLines<'_>, face: &mut Vec<u32>) -> 
             return Ok(words.next().is_some());
         }
         line = lines.next().ok_or_else(|| {
-            Fault::damaged(format!(
-                "line {start}: the face has {} of the {corners} corners that it promises; export the mesh again",
-                face.len()
-            ))
+            let has = face.len();
+            let what = format!("the face has {has} of the {corners} corners that it promises; export the mesh again");
+            damaged(start, &what)
         })?;
     }
 }

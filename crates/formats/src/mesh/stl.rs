@@ -1,4 +1,4 @@
-//! Stereolithography, ASCII and binary: triangles without shared vertices, which are shared again by position.
+//! Stereolithography, ASCII and binary: triangles that share vertices by position.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use cager_geometry::mesh::{Model, Point};
 
 use super::parsed::Parsed;
 use crate::error::Fault;
-use crate::text::{Lines, point, quoted, words};
+use crate::text::{Lines, damaged, point, quoted, words};
 
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
@@ -26,7 +26,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parsed, Fault> {
     Ok(parsed)
 }
 
-/// Whether a binary file has something in the two bytes behind each triangle, where programs write colours.
+/// Whether a binary file has colours in the two bytes behind each triangle.
 fn has_colors(bytes: &[u8]) -> bool {
     let triangles = || promised_size(bytes).and_then(|end| bytes.get(HEADER..usize::try_from(end).ok()?));
     let mut triangles = triangles().unwrap_or_default().chunks_exact(TRIANGLE);
@@ -35,7 +35,7 @@ fn has_colors(bytes: &[u8]) -> bool {
 
 /// Calls `each` with the corners of every face.
 fn scan(bytes: &[u8], each: impl FnMut(&[Point])) -> Result<(), Fault> {
-    // Binary files may begin with "solid" too, but no text has the very size that its bytes 80 to 83 would promise.
+    // Binary files may begin with "solid" too, but no text has the size that it promises.
     let promised = promised_size(bytes);
     if promised == Some(bytes.len() as u64) {
         return scan_binary(bytes, each);
@@ -102,19 +102,17 @@ fn scan_ascii(bytes: &[u8], mut each: impl FnMut(&[Point])) -> Result<(), Fault>
             b"vertex" => face.push(point(&mut words, || format!("line {number}"))?),
             b"endloop" => {
                 if face.len() < 3 {
-                    return Err(Fault::damaged(format!(
-                        "line {number}: the face has {} corners where at least 3 are needed; export the mesh again",
-                        face.len()
-                    )));
+                    let corners = face.len();
+                    let what =
+                        format!("the face has {corners} corners where at least 3 are needed; export the mesh again");
+                    return Err(damaged(number, &what));
                 }
                 each(&face);
                 face.clear();
             }
             _ => {
-                return Err(Fault::damaged(format!(
-                    "line {number}: {} is not a word of an STL file; export the mesh again",
-                    quoted(keyword)
-                )));
+                let what = format!("{} is not a word of an STL file; export the mesh again", quoted(keyword));
+                return Err(damaged(number, &what));
             }
         }
     }

@@ -41,7 +41,7 @@ impl<'a> Unread<'a> {
         }
     }
 
-    /// Tells what is lost. One object, one group and one kind of smoothing divide nothing, and normals of points that have no faces are kept for those who look.
+    /// Tells what is lost. One object, one group and one kind of smoothing divide nothing.
     pub(super) fn tell(self, parsed: &mut Parsed) {
         let Parsed { model, dropped, .. } = parsed;
         if self.texture_coordinates {

@@ -3,21 +3,21 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use cager_geometry::mesh::Model;
+use cager_geometry::mesh::{Model, Polygons};
 
 use super::{MeshFormat, extensions};
 use crate::atomic::AtomicFile;
 use crate::error::{Error, Fault};
-use crate::faces::check_face;
+use crate::faces::check_faces;
 
 /// Writes a model to a `.obj`, `.ply` or `.off` file, which appears whole or not at all.
 ///
-/// Text holds every coordinate exactly, in its shortest form. `.ply` is binary little-endian, `float` where that holds
-/// all coordinates exactly and `double` otherwise.
+/// Text holds every coordinate exactly, in its shortest form. `.ply` is binary little-endian,
+/// `float` where that holds all coordinates exactly and `double` otherwise.
 ///
 /// # Errors
-/// [`Error::Unsupported`] for other formats, [`Error::Invalid`] for a model that could not be read back,
-/// [`Error::Target`] and [`Error::Io`] where the file cannot be created.
+/// [`Error::Unsupported`] for other formats, [`Error::Invalid`] for a model that could not be read
+/// back, [`Error::Target`] and [`Error::Io`] where the file cannot be created.
 pub fn write_model(path: &Path, model: &Model) -> Result<(), Error> {
     let bytes = model_bytes(path, model)?;
     let mut file = AtomicFile::create(path)?;
@@ -28,7 +28,7 @@ pub fn write_model(path: &Path, model: &Model) -> Result<(), Error> {
 /// A model as the bytes of a mesh file of this name.
 ///
 /// # Errors
-/// A name that says no format that is written; a model with NaN, infinities or faces without points.
+/// A name of no format that is written; a model with NaN, infinities or faces without points.
 pub fn model_bytes(path: &Path, model: &Model) -> Result<Vec<u8>, Error> {
     let Some(format @ (MeshFormat::Obj | MeshFormat::Ply | MeshFormat::Off)) = MeshFormat::guess(path) else {
         let written = extensions(&[MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Off]);
@@ -56,10 +56,7 @@ fn check(model: &Model) -> Result<(), Fault> {
             "vertex {k} has a coordinate that is NaN or infinite; repair the model before writing it"
         )));
     }
-    for (k, face) in model.faces.iter().enumerate() {
-        check_face(face, model.points.len(), || format!("face {k}"))?;
-    }
-    Ok(())
+    check_faces(&model.faces, model.points.len(), "")
 }
 
 /// A model as the bytes of an OBJ file, with every coordinate exact.
@@ -80,12 +77,12 @@ fn write_obj<W: Write>(out: &mut W, model: &Model) -> io::Result<()> {
             None => writeln!(out, "v {x:?} {y:?} {z:?}")?,
         }
     }
-    write_obj_faces(out, model.faces.iter())
+    write_obj_faces(out, &model.faces)
 }
 
 /// The `f` lines of an OBJ file.
-pub(crate) fn write_obj_faces<'a>(out: &mut impl Write, faces: impl Iterator<Item = &'a [u32]>) -> io::Result<()> {
-    for face in faces {
+pub(crate) fn write_obj_faces(out: &mut impl Write, faces: &Polygons) -> io::Result<()> {
+    for face in faces.iter() {
         out.write_all(b"f")?;
         for &index in face {
             write!(out, " {}", u64::from(index) + 1)?;
@@ -110,7 +107,7 @@ pub(crate) fn write_off(out: &mut impl Write, model: &Model) -> io::Result<()> {
     Ok(())
 }
 
-/// A binary STL file: the triangles of all faces in single precision. Normals are left at 0, which tells readers to take those of the triangles.
+/// A binary STL file, with normals of 0, which tell readers to compute them.
 pub(crate) fn write_stl(out: &mut impl Write, model: &Model) -> io::Result<()> {
     let triangles = model.triangles();
     let count = u32::try_from(triangles.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;

@@ -1,23 +1,34 @@
 //! What a geometry cache of Maya has beside positions, and the text that Maya opens it by.
 
 use super::super::maya::{EXACT_RATE, TICKS};
-use super::output::FrameOptions;
+use super::output::{Announced, FrameOptions};
+use super::scene::name;
 use crate::error::Fault;
 
 /// Header and blocks of a cache of one channel.
 pub(super) struct Blocks {
     /// Whether sizes have 64 bits, as in `.mcx`.
-    pub(super) is_wide: bool,
+    is_wide: bool,
     /// The channel, as Maya calls the shape.
-    pub(super) name: String,
-    pub(super) points: u32,
+    name: String,
+    points: u32,
     /// Whether positions are in double precision.
-    pub(super) is_double: bool,
+    is_double: bool,
     /// When frames are.
-    pub(super) ticks: Vec<i32>,
+    ticks: Vec<i32>,
 }
 
 impl Blocks {
+    pub(super) fn new(announced: &Announced, is_wide: bool, options: &FrameOptions) -> Result<Self, Fault> {
+        let Announced { path, points, frames, .. } = announced;
+        if !is_wide && *points > i32::MAX as usize / 24 {
+            let what = "cannot hold so many points, as its blocks have no room for more than 2 GiB; write .mcx instead";
+            return Err(Fault::unsupported(what));
+        }
+        let (ticks, name) = (ticks(*frames, options)?, format!("{}Shape", name(path)));
+        Ok(Self { is_wide, name, points: *points as u32, is_double: options.origin.is_some(), ticks })
+    }
+
     pub(super) fn header(&self) -> Vec<u8> {
         let chunks = [self.chunk(b"VRSN", b"0.1\0"), self.chunk(b"STIM", &[0; 4]), self.chunk(b"ETIM", &[0, 0, 0, 1])];
         self.group(b"CACH", &chunks.concat(), 0)
@@ -88,7 +99,7 @@ impl Blocks {
 }
 
 /// The times of frames, which Maya counts in whole ticks.
-pub(super) fn ticks(frames: usize, options: &FrameOptions) -> Result<Vec<i32>, Fault> {
+fn ticks(frames: usize, options: &FrameOptions) -> Result<Vec<i32>, Fault> {
     let all: Vec<f64> = (0..frames).map(|frame| (options.number(frame) * TICKS / options.fps).round()).collect();
     if all.iter().any(|tick| tick.abs() > f64::from(i32::MAX)) || all.windows(2).any(|pair| pair[1] <= pair[0]) {
         return Err(Fault::unsupported(

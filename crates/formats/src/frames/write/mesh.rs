@@ -13,16 +13,13 @@ use crate::mesh::{MeshFormat, write_obj_faces, write_off, write_ply, write_stl};
 
 /// A mesh format that frames are written in, with what is the same in all of them.
 pub(super) struct FrameMesh {
-    form: Form,
+    pub(super) format: MeshFormat,
+    /// The mesh; its points change.
+    model: Model,
+    /// The `f` lines of `.obj`.
+    faces: Vec<u8>,
     /// What is added to all positions, in double precision.
     origin: Option<Point>,
-}
-
-enum Form {
-    /// The `f` lines.
-    Obj(Vec<u8>),
-    /// The model; its points change.
-    Other(MeshFormat, Model),
 }
 
 impl FrameMesh {
@@ -45,28 +42,18 @@ impl FrameMesh {
             ))
             .at(path));
         }
-        if format == MeshFormat::Obj {
-            let mut text = Vec::new();
-            write_obj_faces(&mut text, faces.iter()).map_err(|cause| Error::write(path, cause))?;
-            return Ok(Self { form: Form::Obj(text), origin: options.origin });
+        let mut text = Vec::new();
+        match format {
+            MeshFormat::Obj => write_obj_faces(&mut text, faces).map_err(|cause| Error::write(path, cause))?,
+            MeshFormat::Stl if faces.is_empty() => {
+                let what = "cannot be .stl, which holds triangles alone, and there are only points; write .ply instead";
+                return Err(Fault::unsupported(what).at(path));
+            }
+            MeshFormat::Stl => check_precision(options, path)?,
+            _ => {}
         }
-        if format == MeshFormat::Stl && faces.is_empty() {
-            let what = "cannot be .stl, which holds triangles alone, and there are only points; write .ply instead";
-            return Err(Fault::unsupported(what).at(path));
-        }
-        if format == MeshFormat::Stl {
-            check_precision(options, path)?;
-        }
-        let model = Model { points: Vec::new(), faces: faces.clone(), ..Model::default() };
-        Ok(Self { form: Form::Other(format, model), origin: options.origin })
-    }
-
-    /// What it is written as.
-    pub(super) fn format(&self) -> MeshFormat {
-        match self.form {
-            Form::Obj(_) => MeshFormat::Obj,
-            Form::Other(format, _) => format,
-        }
+        let model = Model { faces: faces.clone(), ..Model::default() };
+        Ok(Self { format, model, faces: text, origin: options.origin })
     }
 
     /// Writes the mesh of a frame.
@@ -76,26 +63,22 @@ impl FrameMesh {
 
     fn write_points(&mut self, out: &mut impl Write, positions: &[f32]) -> io::Result<()> {
         let (points, origin) = (positions.as_chunks().0, self.origin);
+        if self.format == MeshFormat::Obj {
+            for point in points {
+                match origin {
+                    Some(origin) => write_vertex(out, &add(point.map(f64::from), origin))?,
+                    None => write_vertex(out, point)?,
+                }
+            }
+            return out.write_all(&self.faces);
+        }
         let place = |p: &[f32; 3]| origin.map_or(p.map(f64::from), |origin| add(p.map(f64::from), origin));
-        match &mut self.form {
-            Form::Obj(faces) => {
-                for point in points {
-                    match origin {
-                        Some(_) => write_vertex(out, &place(point))?,
-                        None => write_vertex(out, point)?,
-                    }
-                }
-                out.write_all(faces)
-            }
-            Form::Other(format, model) => {
-                model.points.clear();
-                model.points.extend(points.iter().map(place));
-                match format {
-                    MeshFormat::Off => write_off(out, model),
-                    MeshFormat::Stl => write_stl(out, model),
-                    _ => write_ply(out, model),
-                }
-            }
+        self.model.points.clear();
+        self.model.points.extend(points.iter().map(place));
+        match self.format {
+            MeshFormat::Off => write_off(out, &self.model),
+            MeshFormat::Stl => write_stl(out, &self.model),
+            _ => write_ply(out, &self.model),
         }
     }
 }

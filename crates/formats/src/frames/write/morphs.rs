@@ -1,57 +1,40 @@
-//! All frames as morph targets of glTF, in one binary file or as text and a file of numbers: their principal components, which are known once all frames are.
+//! All frames as morph targets of glTF, their principal components.
 
 use std::io::{BufWriter, Write};
 
 use cager_geometry::mesh::Polygons;
-use cager_geometry::units::Change;
 
 use super::super::CacheFormat;
-use super::output::{Announced, FrameOptions, FrameWriter, check_precision, extend_changed};
+use super::collected::{Collected, Collection, MOST_BYTES, check_room};
+use super::output::{Announced, FrameOptions, MorphOptions, check_precision};
 use super::scene::name;
 use crate::atomic::{AtomicFile, Target, commit_together};
 use crate::error::{Error, Fault};
-use crate::faces::check_face;
+use crate::faces::check_faces;
 use crate::glb::{MOST_FRAMES, MorphScene, Morphs, Wanted};
 
-/// Bytes that frames may have, which are all in memory.
-const MOST_BYTES: usize = 1 << 30;
-
 pub(super) struct MorphWriter {
-    announced: Announced,
     file: AtomicFile,
     /// Of text, the numbers.
     data: Option<AtomicFile>,
     wanted: Wanted,
     scene: MorphScene,
-    /// To metres with Y up.
-    change: Change,
-    frames: Vec<f32>,
-    notes: Vec<String>,
 }
 
 impl MorphWriter {
     pub(super) fn create(
-        announced: Announced,
+        announced: &Announced,
         target: &Target,
         faces: &Polygons,
         options: &FrameOptions,
-    ) -> Result<Self, Error> {
+    ) -> Result<Collected<Self>, Error> {
         let path = &announced.path;
-        if options.origin.is_some() {
-            check_precision(options, path)?;
-        }
+        check_precision(options, path)?;
         let change = options.change_to_metres();
-        let wanted = Wanted {
-            targets: options.morphs.targets,
-            max_error: options.morphs.max_error,
-            is_guarantee: options.morphs.is_guarantee,
-            diagonal: options
-                .morphs
-                .diagonal
-                .map(|diagonal| change.scale * diagonal)
-                .filter(|&diagonal| diagonal > 0.0),
-        };
-        check(&announced, faces, &wanted).map_err(|fault| fault.at(path))?;
+        let MorphOptions { targets, max_error, is_guarantee, diagonal, floats, normals } = options.morphs;
+        let diagonal = diagonal.map(|diagonal| change.scale * diagonal).filter(|&diagonal| diagonal > 0.0);
+        let wanted = Wanted { targets, max_error, is_guarantee, diagonal };
+        check(announced, faces, &wanted).map_err(|fault| fault.at(path))?;
         let (times, note) = times(announced.frames, options).map_err(|fault| fault.at(path))?;
         let scene = MorphScene {
             name: name(path),
@@ -59,33 +42,20 @@ impl MorphWriter {
             times,
             numbering: [options.number(0), options.fps],
             origin: change.apply(options.origin.unwrap_or_default()),
-            floats: options.morphs.floats,
-            normals: options.morphs.normals,
+            floats,
+            normals,
         };
-        let notes = note.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
-        let data = match CacheFormat::from_path(path) {
-            Some(CacheFormat::Gltf) => Some(AtomicFile::create(data_beside(target))?),
-            _ => None,
-        };
+        let is_text = CacheFormat::from_path(path) == Some(CacheFormat::Gltf);
+        let data = is_text.then(|| AtomicFile::create(target.beside("bin"))).transpose()?;
         let file = AtomicFile::create(target)?;
-        Ok(Self { announced, file, data, wanted, scene, change, frames: Vec::new(), notes })
+        Ok(Collected::new(Self { file, data, wanted, scene }, change, note))
     }
+}
 
-    /// Writes the file, once all frames are there.
-    fn write(&mut self) -> Result<(), Error> {
-        let Announced { path, points, frames, .. } = &self.announced;
-        let morphs = Morphs::of(&self.frames, *points, &self.wanted, &self.scene).map_err(|fault| fault.at(path))?;
-        let found = morphs.deviation();
-        if found.targets > 0 {
-            self.notes.push(format!(
-                "{}: its {} morph targets are {:.1e} of the diagonal from the {frames} frames at most, {:.1e} in the mean ({})",
-                path.display(),
-                found.targets,
-                found.share(found.largest),
-                found.share(found.rms),
-                if self.scene.floats { "floats" } else { "16 bits a coordinate" },
-            ));
-        }
+impl Collection for MorphWriter {
+    fn write(&mut self, announced: &Announced, all: &[f32]) -> Result<Option<String>, Error> {
+        let Announced { path, points, frames, .. } = announced;
+        let morphs = Morphs::of(all, *points, &self.wanted, &self.scene).map_err(|fault| fault.at(path))?;
         let mut out = BufWriter::with_capacity(1 << 16, &mut self.file);
         let written = match &mut self.data {
             None => morphs.write(&mut out),
@@ -96,15 +66,23 @@ impl MorphWriter {
                 morphs.write_apart(&mut out, &mut data, &name).and_then(|()| data.flush())
             }
         };
-        let written = written.and_then(|()| out.flush());
-        written.map_err(|cause| Error::write(path, cause))
+        written.and_then(|()| out.flush()).map_err(|cause| Error::write(path, cause))?;
+        let found = morphs.deviation();
+        Ok((found.targets > 0).then(|| {
+            format!(
+                "its {} morph targets are {:.1e} of the diagonal from the {frames} frames at most, {:.1e} in the mean ({})",
+                found.targets,
+                found.share(found.largest),
+                found.share(found.rms),
+                if self.scene.floats { "floats" } else { "16 bits a coordinate" },
+            )
+        }))
     }
-}
 
-/// The file of numbers that belongs to one of text.
-fn data_beside(target: &Target) -> Target {
-    let path = target.path().with_extension("bin");
-    if target.replaces() { Target::Replacing(path) } else { Target::New(path) }
+    fn commit(self) -> Result<(), Error> {
+        // The numbers first, as the text says that they are there.
+        commit_together(self.data.into_iter().chain([self.file]).collect())
+    }
 }
 
 fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(), Fault> {
@@ -112,17 +90,14 @@ fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(),
     let targets = wanted.most().min(frames).min(3 * points);
     // Frames and targets, then weights and errors of each frame.
     let bytes = (frames + targets).saturating_mul(12 * points).saturating_add(frames.saturating_mul(32 * targets));
-    if bytes > MOST_BYTES || frames > MOST_FRAMES {
-        return Err(Fault::unsupported(format!(
-            "cannot hold {frames} frames of {points} points as morph targets, which takes more than {} MB or more than {MOST_FRAMES} frames; take fewer of them (--range), or write .usdc or .abc",
-            MOST_BYTES >> 20
-        )));
-    }
-    faces.iter().enumerate().try_for_each(|(k, face)| check_face(face, points, || format!("face {k}")))
+    let bytes = if frames > MOST_FRAMES { usize::MAX } else { bytes };
+    let most = format!("takes more than {} MB or more than {MOST_FRAMES} frames", MOST_BYTES >> 20);
+    check_room(announced, bytes, &format!("morph targets, which {most}"))?;
+    check_faces(faces, points, "")
 }
 
-/// The seconds of frames from the first one on, in single precision, and what is to be said of them: programs play from 0 s, and would stand still until a late
-/// first key.
+/// The seconds of frames from the first one on, in single precision, and what is to be said of
+/// them: programs play from 0 s, and would stand still until a late first key.
 fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<String>), Fault> {
     if frames < 2 {
         return Ok((Vec::new(), None));
@@ -136,35 +111,4 @@ fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<Stri
     }
     let note = || format!("frame {first} is at 0 s, where programs begin to play; its number is kept in extras");
     Ok((seconds, (first != 0.0).then(note)))
-}
-
-impl FrameWriter for MorphWriter {
-    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
-        self.announced.admit(positions)?;
-        extend_changed(&mut self.frames, positions, &self.change);
-        if self.announced.written + 1 == self.announced.frames {
-            let written = self.write();
-            // What was not written is not counted, so that nothing is finished.
-            if written.is_err() {
-                self.frames.truncate(self.frames.len() - positions.len());
-                return written;
-            }
-        }
-        self.announced.written += 1;
-        Ok(())
-    }
-
-    fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
-        Err(self.announced.one_mesh())
-    }
-
-    fn notes(&self) -> Vec<String> {
-        self.notes.clone()
-    }
-
-    fn finish(self: Box<Self>) -> Result<(), Error> {
-        self.announced.check_complete()?;
-        // The numbers first, as the text says that they are there.
-        commit_together(self.data.into_iter().chain([self.file]).collect())
-    }
 }

@@ -8,54 +8,108 @@ use cager_geometry::units::{Change, Units};
 use crate::error::{Error, Fault};
 use crate::frames::RATES;
 
-/// The frames of an output, one after another; dropped before [`FrameWriter::finish`] they leave nothing.
-pub trait FrameWriter: Send {
+/// An output of frames; dropped before [`FrameWriter::finish`] it leaves nothing.
+pub struct FrameWriter {
+    announced: Announced,
+    output: Box<dyn Output>,
+}
+
+impl FrameWriter {
+    pub(super) fn new(announced: Announced, output: Box<dyn Output>) -> Self {
+        Self { announced, output }
+    }
+
     /// Writes the next frame, 3 × points coordinates `x y z x y z …`.
     ///
     /// # Errors
-    /// [`Error::PointCount`] for another number of coordinates, [`Error::NonFinite`], [`Error::FrameCount`] for more
-    /// frames than announced, [`Error::Unsupported`] where morph targets lose more than they may, [`Error::Io`].
-    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error>;
+    /// [`Error::PointCount`] for another number of coordinates, [`Error::NonFinite`],
+    /// [`Error::FrameCount`] for more frames than announced, [`Error::Unsupported`] where morph
+    /// targets lose more than they may, [`Error::Io`].
+    pub fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
+        self.announced.admit(positions)?;
+        self.output.write(&self.announced, positions)?;
+        self.announced.written += 1;
+        Ok(())
+    }
 
-    /// Writes the cage of the next frame, 3 × points coordinates, where [`FrameOptions::cage`] announced one: once for each frame, before or after it.
+    /// Writes the cage of the next frame, 3 × points coordinates, where [`FrameOptions::cage`]
+    /// announced one: once for each frame, before or after it.
     ///
     /// # Errors
     /// As [`Self::write_frame`]; [`Error::Unsupported`] where no cage was announced.
-    fn write_cage(&mut self, _positions: &[f32]) -> Result<(), Error> {
-        Err(no_cage(Path::new("the output")))
+    pub fn write_cage(&mut self, positions: &[f32]) -> Result<(), Error> {
+        self.output.write_cage(&self.announced, positions)
     }
 
-    /// Goes on with frames of another mesh: the number of its points, its faces, and of the options its origin and what rounding may lose.
+    /// Goes on with frames of another mesh: the number of its points, its faces, and of the options
+    /// its origin and what rounding may lose.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] where the output is no folder of mesh files, [`Error::Invalid`] for no points and faces without their points.
-    fn change_mesh(&mut self, points: usize, faces: &Polygons, options: &FrameOptions) -> Result<(), Error>;
+    /// [`Error::Unsupported`] where the output is no folder of mesh files, [`Error::Invalid`] for
+    /// no points and faces without their points.
+    pub fn change_mesh(&mut self, points: usize, faces: &Polygons, options: &FrameOptions) -> Result<(), Error> {
+        self.output.change_mesh(&mut self.announced, points, faces, options)
+    }
 
     /// What the user should know of the output, once all frames are written.
-    fn notes(&self) -> Vec<String> {
-        Vec::new()
+    pub fn notes(&self) -> Vec<String> {
+        self.output.notes().iter().map(|note| format!("{}: {note}", self.announced.path.display())).collect()
     }
 
     /// Makes the frames durable and gives the output its name.
     ///
     /// # Errors
-    /// [`Error::FrameCount`] for fewer frames than announced, [`Error::Target`], [`Error::Io`]; the output is then not
-    /// created.
-    fn finish(self: Box<Self>) -> Result<(), Error>;
+    /// [`Error::FrameCount`] for fewer frames than announced, [`Error::Target`], [`Error::Io`]; the
+    /// output is then not created.
+    pub fn finish(self) -> Result<(), Error> {
+        self.announced.check_complete()?;
+        self.output.finish(&self.announced)
+    }
+}
+
+/// A format of frames, of which each was checked before it is written.
+pub(super) trait Output: Send {
+    fn write(&mut self, announced: &Announced, positions: &[f32]) -> Result<(), Error>;
+
+    fn write_cage(&mut self, announced: &Announced, _positions: &[f32]) -> Result<(), Error> {
+        Err(no_cage(&announced.path))
+    }
+
+    fn change_mesh(
+        &mut self,
+        announced: &mut Announced,
+        _points: usize,
+        _faces: &Polygons,
+        _options: &FrameOptions,
+    ) -> Result<(), Error> {
+        let folder = announced.path.with_extension("");
+        let folder = if folder == Path::new("-") { Path::new("frames") } else { &folder };
+        let what = format!(
+            "holds one mesh in all frames, and these have several; name a folder for mesh files, such as {}, or write the frames of each mesh to a file of their own",
+            folder.join("").display()
+        );
+        Err(Fault::unsupported(what).at(&announced.path))
+    }
+
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+
+    fn finish(self: Box<Self>, announced: &Announced) -> Result<(), Error>;
 }
 
 /// What some formats store beside the positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOptions {
-    /// Frames per second, for the times in `.mdd`, `.mcx`, `.abc`, `.usdc` and `.glb`: 24 by default.
+    /// Frames per second, for formats with times: 24 by default.
     pub fps: f64,
-    /// The number of each frame, ascending, for the names of files and the times in `.pc2`, `.mdd`, `.mcx`, `.abc`, `.usdc` and `.glb`; 0, 1, 2, … where the list is empty.
+    /// The number of each frame, ascending; 0, 1, 2, … where empty.
     pub numbers: Vec<f64>,
-    /// What is added to all positions, which are then written in double precision by the formats that have it.
+    /// What is added to all positions, in double precision by the formats that have it.
     pub origin: Option<Point>,
-    /// What rounding may lose where an origin is added; formats of single precision that lose more are refused.
+    /// What rounding may lose where an origin is added, in formats of single precision.
     pub rounding: f64,
-    /// What the positions mean, for the formats that say it: USD as it is, and glTF in metres with Y up, which is what USD says of what is not told.
+    /// What the positions mean: USD says it, and glTF is written in metres with Y up.
     pub units: Units,
     /// The cage that is kept beside the mesh, in USD alone.
     pub cage: Option<CageMesh>,
@@ -85,7 +139,7 @@ pub struct MorphOptions {
     pub diagonal: Option<f64>,
     /// Whether positions are floats instead of whole numbers of 16 bits.
     pub floats: bool,
-    /// Whether normals are written, of the mean shape and of each target: 12 bytes for each point of them.
+    /// Whether normals are written, of the mean shape and of each target.
     pub normals: bool,
 }
 
@@ -119,15 +173,6 @@ impl Default for FrameOptions {
             morphs: MorphOptions::default(),
         }
     }
-}
-
-/// Adds the positions of a frame after a change of coordinates.
-pub(super) fn extend_changed(out: &mut Vec<f32>, positions: &[f32], change: &Change) {
-    if change.is_none() {
-        return out.extend_from_slice(positions);
-    }
-    let changed = |point: &[f32; 3]| change.apply(point.map(f64::from)).map(|x| x as f32);
-    out.extend(positions.as_chunks().0.iter().flat_map(changed));
 }
 
 /// Refuses formats of single precision where it loses too much about an origin.
@@ -201,17 +246,6 @@ impl Announced {
             Some(culprit) => Err(Error::NonFinite { path: path(), frame, point: culprit / 3 }),
             None => Ok(()),
         }
-    }
-
-    /// Why a file of all frames cannot go on with another mesh.
-    pub(super) fn one_mesh(&self) -> Error {
-        let folder = self.path.with_extension("");
-        let folder = if folder == Path::new("-") { Path::new("frames") } else { &folder };
-        let what = format!(
-            "holds one mesh in all frames, and these have several; name a folder for mesh files, such as {}, or write the frames of each mesh to a file of their own",
-            folder.join("").display()
-        );
-        Fault::unsupported(what).at(&self.path)
     }
 
     pub(super) fn check_complete(&self) -> Result<(), Error> {

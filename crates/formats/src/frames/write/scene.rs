@@ -5,21 +5,20 @@ use std::path::Path;
 use cager_geometry::mesh::Polygons;
 
 use super::super::CacheFormat;
-use super::output::{Announced, CageMesh, FrameOptions, FrameWriter, no_cage};
+use super::output::{Announced, CageMesh, FrameOptions, Output, no_cage};
 use crate::alembic::{self, Schedule};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
-use crate::faces::check_face;
+use crate::faces::check_faces;
 use crate::usd::{self, Scene};
 
 /// Bytes that a package may have.
 const LONGEST_PACKAGE: usize = 0xf000_0000;
 
 pub(super) struct SceneWriter {
-    announced: Announced,
     mesh: Mesh,
-    /// Points of the cage, and frames of it that are written.
-    cage: Option<(usize, usize)>,
+    /// Of the cage.
+    cage: Option<Announced>,
 }
 
 enum Mesh {
@@ -29,14 +28,14 @@ enum Mesh {
 
 impl SceneWriter {
     pub(super) fn create(
-        announced: Announced,
+        announced: &Announced,
         target: &Target,
         format: CacheFormat,
         faces: &Polygons,
         options: &FrameOptions,
     ) -> Result<Self, Error> {
         let path = &announced.path;
-        check(&announced, format, faces).map_err(|fault| fault.at(path))?;
+        check(announced, format, faces).map_err(|fault| fault.at(path))?;
         let (name, write) = (name(path), |cause| Error::write(path, cause));
         if let Some(cage) = &options.cage {
             check_cage(cage).map_err(|fault| fault.at(path))?;
@@ -53,14 +52,14 @@ impl SceneWriter {
             };
             let cage = options.cage.as_ref();
             let mesh = usd::MeshWriter::new(file, faces, cage.map(|cage| &cage.faces), scene).map_err(write)?;
-            let cage = cage.map(|cage| (cage.points, 0));
-            return Ok(Self { announced, mesh: Mesh::Usd(mesh), cage });
+            let cage = cage.map(|cage| Announced { points: cage.points, path: path.clone(), ..*announced });
+            return Ok(Self { mesh: Mesh::Usd(mesh), cage });
         }
         let step = options.even_step();
         let numbers = if step.is_some() { vec![options.number(0)] } else { options.numbers.clone() };
         let schedule = Schedule { fps: options.fps, numbers, step };
         let mesh = alembic::MeshWriter::new(file, &name, faces, schedule, options.origin).map_err(write)?;
-        Ok(Self { announced, mesh: Mesh::Alembic(mesh), cage: None })
+        Ok(Self { mesh: Mesh::Alembic(mesh), cage: None })
     }
 }
 
@@ -76,17 +75,14 @@ fn check(announced: &Announced, format: CacheFormat, faces: &Polygons) -> Result
             "cannot hold more than 4 GiB, as packages have no room for more; write .usdc instead",
         ));
     }
-    faces.iter().enumerate().try_for_each(|(k, face)| check_face(face, announced.points, || format!("face {k}")))
+    check_faces(faces, announced.points, "")
 }
 
 fn check_cage(cage: &CageMesh) -> Result<(), Fault> {
     if cage.points == 0 || cage.points > i32::MAX as usize {
         return Err(Fault::invalid(format!("cannot have a cage of {} points", cage.points)));
     }
-    cage.faces
-        .iter()
-        .enumerate()
-        .try_for_each(|(k, face)| check_face(face, cage.points, || format!("face {k} of the cage")))
+    check_faces(&cage.faces, cage.points, " of the cage")
 }
 
 /// The name of the mesh: that of the file, with `_` for what names in Maya cannot have.
@@ -98,44 +94,31 @@ pub(super) fn name(path: &Path) -> String {
     if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("mesh_{name}") }
 }
 
-impl FrameWriter for SceneWriter {
-    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
-        self.announced.admit(positions)?;
+impl Output for SceneWriter {
+    fn write(&mut self, announced: &Announced, positions: &[f32]) -> Result<(), Error> {
         let written = match &mut self.mesh {
             Mesh::Alembic(mesh) => mesh.write_frame(positions),
             Mesh::Usd(mesh) => mesh.write_frame(positions, false),
         };
-        written.map_err(|cause| Error::write(&self.announced.path, cause))?;
-        self.announced.written += 1;
-        Ok(())
+        written.map_err(|cause| Error::write(&announced.path, cause))
     }
 
-    fn write_cage(&mut self, positions: &[f32]) -> Result<(), Error> {
-        let (Mesh::Usd(mesh), Some((points, written))) = (&mut self.mesh, &mut self.cage) else {
-            return Err(no_cage(&self.announced.path));
+    fn write_cage(&mut self, announced: &Announced, positions: &[f32]) -> Result<(), Error> {
+        let (Mesh::Usd(mesh), Some(cage)) = (&mut self.mesh, &mut self.cage) else {
+            return Err(no_cage(&announced.path));
         };
-        let Announced { path, frames, .. } = &self.announced;
-        let cage = Announced { path: path.clone(), points: *points, frames: *frames, written: *written };
         cage.admit(positions)?;
-        mesh.write_frame(positions, true).map_err(|cause| Error::write(path, cause))?;
-        *written += 1;
+        mesh.write_frame(positions, true).map_err(|cause| Error::write(&announced.path, cause))?;
+        cage.written += 1;
         Ok(())
     }
 
-    fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
-        Err(self.announced.one_mesh())
-    }
-
-    fn finish(self: Box<Self>) -> Result<(), Error> {
-        self.announced.check_complete()?;
-        if let Some((_, written)) = self.cage.filter(|(_, written)| *written < self.announced.frames) {
-            let path = self.announced.path.clone();
-            return Err(Error::FrameCount { path, announced: self.announced.frames, written });
-        }
+    fn finish(self: Box<Self>, announced: &Announced) -> Result<(), Error> {
+        self.cage.map_or(Ok(()), |cage| cage.check_complete())?;
         let finished = match self.mesh {
             Mesh::Alembic(mesh) => mesh.finish(),
             Mesh::Usd(mesh) => mesh.finish(),
         };
-        finished.map_err(|cause| Error::write(&self.announced.path, cause))?.commit()
+        finished.map_err(|cause| Error::write(&announced.path, cause))?.commit()
     }
 }

@@ -1,20 +1,19 @@
 //! Each frame in a mesh file of its own.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
 
 use super::super::numbered::NumberedNames;
 use super::mesh::FrameMesh;
-use super::output::{Announced, FrameOptions, FrameWriter};
+use super::output::{Announced, FrameOptions, Output};
 use crate::atomic::{AtomicDir, AtomicGroup, Target};
 use crate::error::Error;
 use crate::mesh::MeshFormat;
 
 pub(super) struct SequenceWriter {
-    announced: Announced,
     place: Place,
     mesh: FrameMesh,
     names: NumberedNames,
@@ -30,9 +29,9 @@ enum Place {
 }
 
 impl Place {
-    fn create_file(&mut self, name: &str) -> io::Result<File> {
+    fn create_file(&mut self, name: &str, path: &Path) -> Result<File, Error> {
         match self {
-            Self::Own(folder) => folder.create_file(name),
+            Self::Own(folder) => folder.create_file(name).map_err(|cause| Error::write(path, cause)),
             Self::Shared(group) => group.create_file(name),
         }
     }
@@ -40,14 +39,14 @@ impl Place {
 
 impl SequenceWriter {
     pub(super) fn create(
-        announced: Announced,
+        announced: &Announced,
         target: &Target,
         faces: &Polygons,
         names: NumberedNames,
         options: &FrameOptions,
     ) -> Result<Self, Error> {
         let format = if names.extension_is("ply") { MeshFormat::Ply } else { MeshFormat::Obj };
-        let mesh = FrameMesh::new(format, &announced, faces, options)?;
+        let mesh = FrameMesh::new(format, announced, faces, options)?;
         let (path, is_frame) = (&announced.path, |name: &str| names.number(name).is_some());
         let place = if shares_folder(target.path()) {
             let new = (0..announced.frames).map(|frame| names.name(options.number(frame))).collect();
@@ -55,32 +54,33 @@ impl SequenceWriter {
         } else {
             Place::Own(AtomicDir::create(path, |name| target.replaces() && is_frame(name))?)
         };
-        Ok(Self { announced, place, mesh, names, options: options.clone() })
+        Ok(Self { place, mesh, names, options: options.clone() })
     }
 }
 
-impl FrameWriter for SequenceWriter {
-    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
-        self.announced.admit(positions)?;
-        let name = self.names.name(self.options.number(self.announced.written));
-        let path = self.announced.path.join(&name);
-        let failed = |cause| Error::write(&path, cause);
-        let mut file = BufWriter::with_capacity(1 << 16, self.place.create_file(&name).map_err(failed)?);
+impl Output for SequenceWriter {
+    fn write(&mut self, announced: &Announced, positions: &[f32]) -> Result<(), Error> {
+        let name = self.names.name(self.options.number(announced.written));
+        let path = announced.path.join(&name);
+        let mut file = BufWriter::with_capacity(1 << 16, self.place.create_file(&name, &path)?);
         self.mesh.write(&mut file, positions, &path)?;
-        file.flush().map_err(failed)?;
-        self.announced.written += 1;
+        file.flush().map_err(|cause| Error::write(&path, cause))
+    }
+
+    fn change_mesh(
+        &mut self,
+        announced: &mut Announced,
+        points: usize,
+        faces: &Polygons,
+        options: &FrameOptions,
+    ) -> Result<(), Error> {
+        announced.points = points;
+        announced.check(&self.options).map_err(|fault| fault.at(&announced.path))?;
+        self.mesh = FrameMesh::new(self.mesh.format, announced, faces, options)?;
         Ok(())
     }
 
-    fn change_mesh(&mut self, points: usize, faces: &Polygons, options: &FrameOptions) -> Result<(), Error> {
-        self.announced.points = points;
-        self.announced.check(&self.options).map_err(|fault| fault.at(&self.announced.path))?;
-        self.mesh = FrameMesh::new(self.mesh.format(), &self.announced, faces, options)?;
-        Ok(())
-    }
-
-    fn finish(self: Box<Self>) -> Result<(), Error> {
-        self.announced.check_complete()?;
+    fn finish(self: Box<Self>, _: &Announced) -> Result<(), Error> {
         match self.place {
             Place::Own(folder) => folder.commit(),
             Place::Shared(group) => group.commit(),
@@ -88,7 +88,7 @@ impl FrameWriter for SequenceWriter {
     }
 }
 
-/// Whether the files that a path names go beside others: those of a numbered name in the current folder, or in one that holds something.
+/// Whether files of a numbered name go into the current folder, or one that holds something.
 pub(super) fn shares_folder(path: &Path) -> bool {
     if NumberedNames::of(path).is_none() {
         return false;

@@ -5,20 +5,19 @@ use std::io::{BufWriter, Write};
 use cager_geometry::mesh::Polygons;
 
 use super::mesh::FrameMesh;
-use super::output::{Announced, FrameOptions, FrameWriter};
+use super::output::{Announced, FrameOptions, Output};
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
 use crate::mesh::MeshFormat;
 
 pub(super) struct SingleWriter {
-    announced: Announced,
     file: AtomicFile,
     mesh: FrameMesh,
 }
 
 impl SingleWriter {
     pub(super) fn create(
-        announced: Announced,
+        announced: &Announced,
         target: &Target,
         format: MeshFormat,
         faces: &Polygons,
@@ -34,28 +33,19 @@ impl SingleWriter {
             ))
             .at(&announced.path));
         }
-        let mesh = FrameMesh::new(format, &announced, faces, options)?;
-        Ok(Self { announced, file: AtomicFile::create(target)?, mesh })
+        let mesh = FrameMesh::new(format, announced, faces, options)?;
+        Ok(Self { file: AtomicFile::create(target)?, mesh })
     }
 }
 
-impl FrameWriter for SingleWriter {
-    fn write_frame(&mut self, positions: &[f32]) -> Result<(), Error> {
-        self.announced.admit(positions)?;
+impl Output for SingleWriter {
+    fn write(&mut self, announced: &Announced, positions: &[f32]) -> Result<(), Error> {
         let mut out = BufWriter::with_capacity(1 << 16, &mut self.file);
-        self.mesh.write(&mut out, positions, &self.announced.path)?;
-        out.flush().map_err(|cause| Error::write(&self.announced.path, cause))?;
-        drop(out);
-        self.announced.written += 1;
-        Ok(())
+        self.mesh.write(&mut out, positions, &announced.path)?;
+        out.flush().map_err(|cause| Error::write(&announced.path, cause))
     }
 
-    fn change_mesh(&mut self, _: usize, _: &Polygons, _: &FrameOptions) -> Result<(), Error> {
-        Err(self.announced.one_mesh())
-    }
-
-    fn finish(self: Box<Self>) -> Result<(), Error> {
-        self.announced.check_complete()?;
+    fn finish(self: Box<Self>, _: &Announced) -> Result<(), Error> {
         self.file.commit()
     }
 }

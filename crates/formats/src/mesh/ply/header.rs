@@ -2,7 +2,7 @@
 
 use crate::colors::Scale;
 use crate::error::Fault;
-use crate::text::{Lines, integer, quoted, words};
+use crate::text::{Lines, damaged, integer, quoted, words};
 
 pub(super) struct Header<'a> {
     pub(super) encoding: Encoding,
@@ -87,49 +87,34 @@ impl Header<'_> {
 }
 
 impl Element {
-    /// Columns of x, y and z.
-    pub(super) fn coordinates(&self) -> Result<[usize; 3], Fault> {
-        let column = |axis| {
-            self.scalar(axis).ok_or_else(|| {
-                Fault::unsupported(format!("has vertices without {axis}; export the mesh with x, y and z"))
-            })
-        };
-        Ok([column("x")?, column("y")?, column("z")?])
+    /// The kind of a property that is a single number.
+    pub(super) fn scalar(&self, name: &str) -> Option<Scalar> {
+        let mut scalars = self.properties.iter().filter(|property| property.name == name);
+        scalars.find_map(|property| if let Kind::Scalar(scalar) = property.kind { Some(scalar) } else { None })
     }
 
-    /// Columns of the normal; `None` where one is missing.
-    pub(super) fn normals(&self) -> Option<[usize; 3]> {
-        Some([self.scalar("nx")?, self.scalar("ny")?, self.scalar("nz")?])
-    }
-
-    fn scalar(&self, name: &str) -> Option<usize> {
-        self.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
-    }
-
-    /// Columns of red, green and blue, and the value of full light in each; `None` where one is missing, or of another kind.
-    pub(super) fn colors(&self) -> Option<([(usize, f64); 3], Scale)> {
-        let mut columns = [(0, 1.0); 3];
+    /// Full light in red, green and blue; `None` where one is missing or of another kind.
+    pub(super) fn full_light(&self) -> Option<([f64; 3], Scale)> {
+        let mut most = [1.0; 3];
         let mut floats = 0;
-        for (column, name) in columns.iter_mut().zip(["red", "green", "blue"]) {
-            let at = self.properties.iter().position(|property| property.name == name)?;
-            let Kind::Scalar(scalar) = self.properties[at].kind else { return None };
-            let most = match scalar {
+        for (most, name) in most.iter_mut().zip(["red", "green", "blue"]) {
+            let scalar = self.scalar(name)?;
+            *most = match scalar {
                 Scalar::U8 => 255.0,
                 Scalar::U16 => 65535.0,
                 Scalar::F32 | Scalar::F64 => 1.0,
                 _ => return None,
             };
             floats += usize::from(scalar.is_float());
-            *column = (at, most);
         }
         match floats {
-            0 => Some((columns, Scale::Fractions)),
-            3 => Some((columns, Scale::Unsaid)),
+            0 => Some((most, Scale::Fractions)),
+            3 => Some((most, Scale::Unsaid)),
             _ => None,
         }
     }
 
-    /// Column of the list of vertices of each face or strip: the one of that name, or the only list there is.
+    /// Column of the list of vertices of each face or strip, by its name, or the only list.
     pub(super) fn corners(&self) -> Result<usize, Fault> {
         let is_named = |k: &usize| matches!(self.properties[*k].name.as_str(), "vertex_indices" | "vertex_index");
         let lists = || (0..self.properties.len()).filter(|&k| matches!(self.properties[k].kind, Kind::List { .. }));
@@ -194,9 +179,5 @@ fn parse_kind(words: &[&[u8]]) -> Option<Kind> {
 }
 
 fn unreadable(lines: &Lines<'_>, line: &[u8]) -> Fault {
-    Fault::damaged(format!(
-        "line {}: {} is not understood in a PLY header; export the mesh again",
-        lines.number(),
-        quoted(line)
-    ))
+    damaged(lines.number(), &format!("{} is not understood in a PLY header; export the mesh again", quoted(line)))
 }

@@ -10,7 +10,7 @@ use super::parsed::Parsed;
 use crate::colors::Colors;
 use crate::error::Fault;
 use crate::faces::{Contents, no_such_vertex};
-use header::{Element, Encoding, Header, Kind};
+use header::{Element, Encoding, Header, Kind, Property};
 use values::{Ascii, Binary, Values};
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
@@ -54,76 +54,60 @@ fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values:
     Ok(parsed)
 }
 
+/// What is read of a vertex, where all three of a kind are there.
+const READ: [&str; 9] = ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"];
+
 fn read_points<V: Values>(
     element: &Element,
     contents: Contents,
     values: &mut V,
     model: &mut Model,
 ) -> Result<(), Fault> {
-    let columns = element.coordinates()?;
-    let said = element.colors().filter(|_| contents == Contents::PointsAndFaces);
-    let color_columns = said.map(|(columns, _)| columns);
-    let normal_columns = element.normals().filter(|_| contents == Contents::PointsAndFaces);
+    if let Some(axis) = READ[..3].iter().find(|axis| element.scalar(axis).is_none()) {
+        return Err(Fault::unsupported(format!("has vertices without {axis}; export the mesh with x, y and z")));
+    }
+    let all = contents == Contents::PointsAndFaces;
+    let has_normals = all && READ[3..6].iter().all(|name| element.scalar(name).is_some());
+    let full_light = element.full_light().filter(|_| all);
     let mut colors = Colors::default();
     // Three scalars take at least three bytes.
     let most = (values.remaining() / 3) as u64;
     model.points.reserve_exact(element.count.min(most) as usize);
-    if normal_columns.is_some() {
+    if has_normals {
         model.normals.reserve_exact(element.count.min(most) as usize);
     }
-    let role = |column| {
-        let axis = |columns: [usize; 3]| columns.iter().position(|&c| c == column);
-        axis(columns)
-            .map(Role::Coordinate)
-            .or(normal_columns.and_then(axis).map(Role::Normal))
-            .or(color_columns.and_then(|columns| channel_of(columns, column)))
-    };
-    let roles: Vec<_> = element.properties.iter().enumerate().map(|(k, property)| (property.kind, role(k))).collect();
+    let place = |property: &Property| READ.iter().position(|name| *name == property.name);
+    let columns: Vec<_> = element.properties.iter().map(|property| (property.kind, place(property))).collect();
     for k in 0..element.count {
-        let (mut point, mut color, mut normal) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-        for &(kind, ref role) in &roles {
+        let mut found = [0.0; READ.len()];
+        for &(kind, place) in &columns {
             let value = match kind {
                 Kind::Scalar(scalar) => values.next(scalar),
                 Kind::List { count, item } => skip_list(values, count, item).map(|()| 0.0),
             };
             let value = value.map_err(|fault| fault.inside(element, k))?;
-            match *role {
-                Some(Role::Coordinate(axis)) => point[axis] = value,
-                Some(Role::Normal(axis)) => normal[axis] = value,
-                Some(Role::Channel(channel, most)) => color[channel] = (value / most) as f32,
-                None => {}
+            if let (Kind::Scalar(_), Some(place)) = (kind, place) {
+                found[place] = value;
             }
         }
-        if !point.iter().all(|x| x.is_finite()) {
+        let [x, y, z, nx, ny, nz, red, green, blue] = found;
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
             return Err(Fault::invalid(format!(
                 "vertex {k} has a coordinate that is NaN or infinite; repair or remove it"
             )));
         }
-        model.points.push(point);
-        if color_columns.is_some() {
-            colors.push(color);
+        model.points.push([x, y, z]);
+        if has_normals {
+            model.normals.push([nx, ny, nz]);
         }
-        if normal_columns.is_some() {
-            model.normals.push(normal);
+        if let Some(([full_red, full_green, full_blue], _)) = full_light {
+            colors.push([red / full_red, green / full_green, blue / full_blue].map(|x| x as f32));
         }
     }
-    if let Some((_, scale)) = said {
+    if let Some((_, scale)) = full_light {
         model.colors = colors.finish(model.points.len(), scale);
     }
     Ok(())
-}
-
-/// What a column of the vertices holds, of three each.
-enum Role {
-    Coordinate(usize),
-    Normal(usize),
-    /// And the value of full light.
-    Channel(usize, f64),
-}
-
-fn channel_of(columns: [(usize, f64); 3], column: usize) -> Option<Role> {
-    let channel = columns.iter().position(|&(c, _)| c == column)?;
-    Some(Role::Channel(channel, columns[channel].1))
 }
 
 /// Calls `each` with the number of every item of an element and its list of vertices.
