@@ -39,7 +39,7 @@ pub(crate) fn right_jacobian(w: DVec3) -> DMat3 {
     DMat3::IDENTITY - k * a + k * k * b
 }
 
-/// The smallest rotation that takes the direction of `a` to that of `b`; none where one has no direction.
+/// The smallest rotation from the direction of `a` to that of `b`; none where one has none.
 pub(crate) fn between(a: DVec3, b: DVec3) -> DMat3 {
     let ends = a.try_normalize().zip(b.try_normalize());
     ends.map_or(DMat3::IDENTITY, |(a, b)| DMat3::from_quat(DQuat::from_rotation_arc(a, b)))

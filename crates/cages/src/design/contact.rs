@@ -180,8 +180,8 @@ impl Obstacles {
     }
 }
 
-/// How near two features must be to count as a pair, their least distance, and the share of it that each may
-/// move.
+/// How near two features must be to count as a pair, their least distance, and the share of it that
+/// each may move.
 #[derive(Clone, Copy)]
 struct Limits {
     reach: f64,

@@ -6,7 +6,7 @@ use super::surfaces::{Followed, Surfaces};
 use super::{Finished, RecoverError, RecoverProgress, Watch};
 use cager_core::cage::Cage;
 use cager_geometry::linalg::tall_product;
-use cager_geometry::mesh::{Point, TriMesh};
+use cager_geometry::mesh::Point;
 use cager_shape::registration::Template;
 use cager_shape::tracking::{SecondPass, TrackedFrame, Tracker, smoothed};
 use faer::Mat;
@@ -14,16 +14,11 @@ use std::collections::VecDeque;
 
 /// A template that is followed.
 pub(super) struct Recovering<'a> {
-    phi: &'a Mat<f64>,
+    pub(super) phi: &'a Mat<f64>,
     pub(super) template: Template,
 }
 
-impl<'a> Recovering<'a> {
-    /// A template in its cage.
-    pub(super) fn new(rest: &TriMesh, cage: &Cage, phi: &'a Mat<f64>) -> Result<Self, RecoverError> {
-        Ok(Self { phi, template: Template::new(rest, cage, phi.as_ref(), 0)? })
-    }
-
+impl Recovering<'_> {
     /// The first pass, from the first frame.
     pub(super) fn follow(
         &self,

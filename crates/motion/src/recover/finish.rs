@@ -57,27 +57,28 @@ impl<'a> Finisher<'a> {
         frame: usize,
         mut positions: Vec<Point>,
         how: How,
-        seen: Option<&Followed>,
+        followed: Option<&Followed>,
     ) -> Result<FrameReport, RecoverError> {
-        if let (Some(offsets), Some(seen)) = (&self.offsets, seen) {
-            positions = offsets.offset(&positions, &seen.target);
+        if let (Some(offsets), Some(followed)) = (&self.offsets, followed) {
+            positions = offsets.offset(&positions, &followed.target);
         }
+        let seen = followed.map(|followed| &followed.seen);
         self.written.write(frame, &positions)?;
-        if let Some(colored) = seen.and_then(|seen| seen.seen.colored.as_ref()) {
+        if let Some(colored) = seen.and_then(|seen| seen.colored.as_ref()) {
             self.painter.add(&positions, colored);
         }
         let mesh = TriMesh { vertices: positions, triangles: self.rest.triangles.clone() };
         let points: Vec<Point> = self.samples.iter().map(|sample| sample.at(&mesh.vertices, &mesh.triangles)).collect();
-        let looked = seen.map(|seen| Looked::at(&mesh, &points, &seen.seen, self.diagonal));
+        let looked = seen.map(|seen| Looked::at(&mesh, &points, seen, self.diagonal));
         let distances = looked.as_ref().map_or((None, None), |looked| looked.distances(self.diagonal));
         let elsewhere =
-            seen.is_some_and(|seen| is_elsewhere(&points, &seen.seen.observation.points, distances.1, self.diagonal));
+            seen.is_some_and(|seen| is_elsewhere(&points, &seen.observation.points, distances.1, self.diagonal));
         let how = if elsewhere { how.lost() } else { how };
         if let Some(looked) = looked.filter(|_| !elsewhere) {
             self.departures.look(frame, &mesh, &points, &looked, self.diagonal);
         }
         let named = (self.written.number(frame), self.source.file(frame));
-        Ok(FrameReport::new(named, how, distances, seen.map(|seen| &seen.seen)))
+        Ok(FrameReport::new(named, how, distances, seen))
     }
 
     /// All frames, ready to be read. `origin` was subtracted from them.

@@ -40,7 +40,7 @@ use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::units::Up;
 use cager_shape::people::ModelError;
 use cager_shape::people::joints::JointsError;
-use cager_shape::registration::{ObservationError, RegistrationError, outward};
+use cager_shape::registration::{ObservationError, RegistrationError, Template, outward};
 use finish::{Finisher, Written};
 use report::Seconds;
 use start::check_surface;
@@ -275,7 +275,8 @@ pub fn recover(job: RecoverJob<'_>, watch: &Watch<'_>) -> Result<Recovered, Reco
             warnings.push(format!("{outside} points of the template lie outside of the cage, and follow it less well"));
         }
         let model = surfaces.on_pool(|| {
-            let model = Recovering::new(&rest, &cage, &coordinates.phi)?;
+            let phi = &coordinates.phi;
+            let model = Recovering { phi, template: Template::new(&rest, &cage, phi.as_ref(), 0)? };
             if placement.is_none() && !force {
                 check_start(&template, &rest, &cage, &model, (&source.file(first), &seen.observation))?;
             }

@@ -90,9 +90,9 @@ impl Person<'_> {
             frames += 1;
             // A frame without a surface stays as the one before it.
             let how = match seen {
-                Some(seen) => {
+                Some(followed) => {
                     numbers.push(frame);
-                    How::of_person(tracker.follow(&seen.seen.observation))
+                    How::of_person(tracker.follow(&followed.seen.observation))
                 }
                 None => How::NO_SURFACE,
             };
@@ -105,8 +105,8 @@ impl Person<'_> {
             return Err(RecoverError::NoSurface { frames, first });
         }
         surfaces.each((0..frames).rev(), |frame, seen| {
-            if let (Some(seen), Ok(at)) = (seen, numbers.binary_search(&frame)) {
-                tracker.refit(at, &seen.seen.observation);
+            if let (Some(followed), Ok(at)) = (seen, numbers.binary_search(&frame)) {
+                tracker.refit(at, &followed.seen.observation);
             }
             Ok(())
         })?;

@@ -16,8 +16,8 @@ const SMALLER: f64 = 2.5;
 /// A point of the template is on the surface that is nearer than this share of the diagonal.
 const ON_SURFACE: f64 = 0.05;
 
-/// Refuses a first surface of another size or place, but for what is brought to it. A person is looked
-/// for anywhere, and not scaled.
+/// Refuses a first surface of another size or place, but for what is brought to it. A person is
+/// looked for anywhere, and not scaled.
 pub(super) fn check_surface(
     template: &Model,
     (path, surface): (&Path, &Observation),

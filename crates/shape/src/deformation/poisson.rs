@@ -11,7 +11,7 @@ use crate::deformation::gradients::flatness;
 use crate::deformation::rows::Rows;
 use crate::deformation::ties::{Tie, ties};
 use crate::error::MeshError;
-use crate::points::{area_vector, row_points, vectors};
+use crate::points::{area_vector, mean, row_points, vectors};
 
 /// Finds vertices whose triangles are turned and stretched as asked, in least squares by area (the
 /// Poisson equation of deformation transfer, Botsch et al. 2006). Vertices at one place stay
@@ -122,7 +122,7 @@ impl Poisson {
         }
         self.factor.solve(&mut pull);
         let moved = self.rows.spread(&row_points(pull.as_ref()));
-        let mean = moved.iter().sum::<DVec3>() / moved.len() as f64;
+        let mean = mean(&moved);
         moved.iter().zip(&self.rest).map(|(d, p)| *p + (*d - mean)).collect()
     }
 

@@ -134,11 +134,11 @@ impl Refinement {
             if energy <= least {
                 break;
             }
-            let (mut values, mut pull) = self.equations(&pose, wanted);
-            let mean = self.damp(&mut values);
-            if mean <= 0.0 {
+            let Equations { mut values, mut pull, trace } = self.equations(&pose, wanted);
+            if trace <= 0.0 {
                 return pose;
             }
+            values[..3 * self.rows].fill(DAMPING * (trace / (3 * self.rows) as f64));
             let Some(factor) = pattern.factor(&values) else { return pose };
             factor.solve(&mut pull);
             let mut step = 1.0;
@@ -171,39 +171,22 @@ impl Refinement {
         lengths + angles.map(|(a, wanted)| ANGLE_WEIGHT * wrapped(wanted - a).powi(2)).sum::<f64>()
     }
 
-    /// `JᵀJ`, in the order of the pattern's places, and `Jᵀr`.
-    fn equations(&self, pose: &[DVec3], wanted: &Features) -> (Vec<f64>, Mat<f64>) {
+    fn equations(&self, pose: &[DVec3], wanted: &Features) -> Equations {
         let at = |v: u32| pose[v as usize];
-        let mut values = vec![0.0; 3 * self.rows];
-        let mut pull = Mat::zeros(3 * self.rows, 1);
+        let (values, pull) = (vec![0.0; 3 * self.rows], Mat::zeros(3 * self.rows, 1));
+        let mut equations = Equations { values, pull, trace: 0.0 };
         for (([a, b], unit), wanted) in self.edges.iter().zip(&wanted.lengths) {
             let d = at(*a) - at(*b);
             let direction = d.normalize_or_zero() * *unit;
-            add_term(&[*a, *b], &[direction, -direction], (wanted - d.length()) * unit, &mut values, &mut pull);
+            equations.add(&[*a, *b], &[direction, -direction], (wanted - d.length()) * unit);
         }
         let weight = ANGLE_WEIGHT.sqrt();
         for (corners, wanted) in self.hinges.iter().zip(&wanted.angles) {
             let hinge = Hinge::new(corners.map(at));
             let gradient = hinge.gradient().map(|g| weight * g);
-            add_term(corners, &gradient, weight * wrapped(wanted - hinge.angle()), &mut values, &mut pull);
+            equations.add(corners, &gradient, weight * wrapped(wanted - hinge.angle()));
         }
-        (values, pull)
-    }
-
-    /// Adds to the diagonal; gives its mean.
-    fn damp(&self, values: &mut [f64]) -> f64 {
-        let mut sum = 0.0;
-        let mut next = 3 * self.rows;
-        let counts = self.edges.iter().map(|_| 2).chain(self.hinges.iter().map(|_| 4));
-        for count in counts {
-            for i in 0..3 * count {
-                sum += values[next + i];
-                next += i + 1;
-            }
-        }
-        let mean = sum / (3 * self.rows) as f64;
-        values[..3 * self.rows].fill(DAMPING * mean);
-        mean
+        equations
     }
 }
 
@@ -215,17 +198,23 @@ fn add_places(vertices: &[u32], places: &mut Vec<(u32, u32)>) {
     }
 }
 
-fn add_term<const N: usize>(
-    vertices: &[u32; N],
-    gradient: &[DVec3; N],
-    residual: f64,
-    values: &mut Vec<f64>,
-    pull: &mut Mat<f64>,
-) {
-    for i in 0..3 * N {
-        let g = gradient[i / 3][i % 3];
-        pull[(3 * vertices[i / 3] as usize + i % 3, 0)] += g * residual;
-        values.extend((0..=i).map(|j| g * gradient[j / 3][j % 3]));
+/// Normal equations of least squares.
+struct Equations {
+    /// `JᵀJ`, in the order of the pattern's places, after its diagonal.
+    values: Vec<f64>,
+    /// `Jᵀr`.
+    pull: Mat<f64>,
+    trace: f64,
+}
+
+impl Equations {
+    fn add<const N: usize>(&mut self, vertices: &[u32; N], gradient: &[DVec3; N], residual: f64) {
+        for i in 0..3 * N {
+            let g = gradient[i / 3][i % 3];
+            self.pull[(3 * vertices[i / 3] as usize + i % 3, 0)] += g * residual;
+            self.values.extend((0..=i).map(|j| g * gradient[j / 3][j % 3]));
+            self.trace += g * g;
+        }
     }
 }
 

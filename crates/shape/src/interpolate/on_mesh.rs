@@ -9,7 +9,7 @@ use super::rotations::{Ways, polar};
 use crate::deformation::gradients::Gradients;
 use crate::deformation::poisson::{Poisson, offsets};
 use crate::error::ShapeError;
-use crate::points::vectors;
+use crate::points::{mean, vectors};
 
 /// The shapes that weights of some poses name.
 pub struct ShapeSpace {
@@ -124,8 +124,4 @@ impl ShapeSpace {
         }
         Ok(())
     }
-}
-
-fn mean(points: &[DVec3]) -> DVec3 {
-    points.iter().sum::<DVec3>() / points.len() as f64
 }

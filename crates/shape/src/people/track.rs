@@ -65,8 +65,8 @@ impl<'f, 'a> PersonTracker<'f, 'a> {
         &frames[frames.len() - 1]
     }
 
-    /// Fits a frame from the one after it, unless it lies well, and keeps the better fit; from the last
-    /// frame to the first, after all were followed.
+    /// Fits a frame from the one after it, unless it lies well, and keeps the better fit; from the
+    /// last frame to the first, after all were followed.
     pub fn refit(&mut self, number: usize, observation: &Observation) {
         let scores = self.frames.iter().map(|frame| frame.fit.score);
         let usual = *self.usual.get_or_insert_with(|| usual_of(scores));

@@ -33,7 +33,7 @@ impl Anchors {
 
     /// What pulls a cage of a template of this diagonal.
     pub(crate) fn pull(&self, cage: &[DVec3], diagonal: f64) -> Vec<DVec3> {
-        self.forces(&self.places - self.positions(cage), diagonal)
+        self.forces(&(&self.places - self.positions(cage)), diagonal)
     }
 
     /// Half the Hessian, m × m, its lower triangle.
@@ -43,14 +43,14 @@ impl Anchors {
 
     /// The Hessian times a change of the cage.
     pub(crate) fn hessian_times(&self, x: &[DVec3], diagonal: f64) -> Vec<DVec3> {
-        self.forces(self.positions(x), diagonal)
+        self.forces(&self.positions(x), diagonal)
     }
 
     fn positions(&self, cage: &[DVec3]) -> Mat<f64> {
         tall_product(self.coordinates.as_ref(), matrix(cage).as_ref())
     }
 
-    fn forces(&self, by: Mat<f64>, diagonal: f64) -> Vec<DVec3> {
+    fn forces(&self, by: &Mat<f64>, diagonal: f64) -> Vec<DVec3> {
         let forces = transposed_product(self.coordinates.as_ref(), by.as_ref(), BLOCK_ROWS);
         row_points((faer::Scale(self.weight / (diagonal * diagonal)) * forces).as_ref())
     }

@@ -19,15 +19,13 @@ const NEIGHBOURS: u32 = 8;
 /// highest point. None where all points lie on a line.
 pub(crate) fn estimated_normals(points: &[Point], kept: &[u32]) -> Option<Vec<Point>> {
     let tree = NearestPoints::new(points.iter().copied());
-    let mut flat = 0;
     let mut normals: Vec<Point> = kept
         .par_iter()
         .map(|&k| {
             plane_normal(&tree.several(PLANE_POINTS, points[k as usize]).iter().map(|&i| points[i]).collect::<Vec<_>>())
         })
         .collect();
-    normals.iter().for_each(|n| flat += usize::from(n.iter().all(|x| *x == 0.0)));
-    if flat == kept.len() {
+    if normals.iter().all(|n| *n == [0.0; 3]) {
         return None;
     }
     let kept_points: Vec<Point> = kept.iter().map(|&k| points[k as usize]).collect();

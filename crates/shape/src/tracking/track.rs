@@ -73,8 +73,7 @@ impl<'t> Tracker<'t> {
         if near[1] < near[0] {
             starts.reverse();
         }
-        let mut best = Scored::fit(template, surface, starts[0], &FitOptions::NEAR, &mut known);
-        let mut outcome = Outcome::Followed;
+        let mut best = fitted(template, surface, starts[0], &FitOptions::NEAR, &mut known);
         let usual = median(judging(&self.scores));
         let alike = farthest_apart(starts) < ALIKE * template.diagonal();
         let most = (SEARCHED_FROM * self.level(alike)).min(SEARCHED_FROM_ALL * usual);
@@ -84,17 +83,17 @@ impl<'t> Tracker<'t> {
                 break;
             }
             self.searched = Some(self.scores.len());
-            let again = Scored::fit(template, surface, start, &FitOptions::FAR, &mut known);
+            let again = fitted(template, surface, start, &FitOptions::FAR, &mut known);
             if again.score < best.score {
-                (best, outcome) = (again, Outcome::SearchedWider);
+                best = TrackedFrame { outcome: Outcome::SearchedWider, ..again };
             }
         }
         if self.scores.len() >= MIN_JUDGED && is_lost(best.score, usual) {
-            outcome = Outcome::Lost;
+            best.outcome = Outcome::Lost;
         }
         self.scores.push(best.score);
         self.before = std::mem::replace(&mut self.last, best.cage.clone());
-        TrackedFrame { cage: best.cage, score: best.score, outcome }
+        best
     }
 
     /// The usual score just now. What a recent wider search has left is as good as it gets where
@@ -135,27 +134,21 @@ fn median(scores: &[f64]) -> f64 {
     scores.get(scores.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
-/// A cage and how well it lies.
-struct Scored {
-    cage: Vec<Point>,
-    score: f64,
-}
-
-impl Scored {
-    fn fit(
-        template: &Template,
-        surface: &Target,
-        start: &[Point],
-        options: &FitOptions,
-        known: &mut KnownMatches,
-    ) -> Self {
-        let cage = template.fit(surface, start, options, known);
-        let score = template.score(surface, &cage, 1, known);
-        if score.is_finite() && cage.as_flattened().iter().all(|x| x.is_finite()) {
-            Self { cage, score }
-        } else {
-            Self { cage: start.to_vec(), score: f64::INFINITY }
-        }
+/// A fit from a cage, or that cage where it comes to nothing.
+fn fitted(
+    template: &Template,
+    surface: &Target,
+    start: &[Point],
+    options: &FitOptions,
+    known: &mut KnownMatches,
+) -> TrackedFrame {
+    let cage = template.fit(surface, start, options, known);
+    let score = template.score(surface, &cage, 1, known);
+    let outcome = Outcome::Followed;
+    if score.is_finite() && cage.as_flattened().iter().all(|x| x.is_finite()) {
+        TrackedFrame { cage, score, outcome }
+    } else {
+        TrackedFrame { cage: start.to_vec(), score: f64::INFINITY, outcome }
     }
 }
 
@@ -198,10 +191,9 @@ impl<'t> SecondPass<'t> {
         let mut known = self.template.unmatched(surface);
         for options in [FitOptions::NEAR, FitOptions::FAR] {
             for start in &starts {
-                let again = Scored::fit(self.template, surface, start, &options, &mut known);
+                let again = fitted(self.template, surface, start, &options, &mut known);
                 if again.score < frame.score {
-                    (frame.cage, frame.score) = (again.cage, again.score);
-                    frame.outcome = Outcome::SearchedWider;
+                    *frame = TrackedFrame { outcome: Outcome::SearchedWider, ..again };
                 }
             }
             if frame.score <= SEARCHED_FROM_ALL * self.usual {
@@ -223,8 +215,7 @@ impl<'t> SecondPass<'t> {
 }
 
 /// How smoothing fits: near the mean of the neighbours where the surface does not say otherwise.
-const SMOOTHING: FitOptions =
-    FitOptions { iterations: 2, rigidity: [1e-5; 2], reach: [0.006; 2], hold: 1e-2, ..FitOptions::NEAR };
+const SMOOTHING: FitOptions = FitOptions { iterations: 2, rigidity: [1e-5; 2], reach: [0.006; 2], hold: 1e-2 };
 /// Vertices much further from their mean in time than this share of the diagonal are let go.
 const MAX_SMOOTHED: f64 = 0.005;
 

@@ -15,7 +15,7 @@ use crate::deformation::gradients::Gradients;
 use crate::deformation::graph::CageSpace;
 use crate::deformation::poisson::Poisson;
 use crate::error::{MeshError, TransferError};
-use crate::points::{vectors, welded_normals};
+use crate::points::{mean, trace, vectors, welded_normals};
 
 /// How well source and target go together.
 #[derive(Clone, Debug)]
@@ -208,14 +208,10 @@ impl FittedTransfer {
     }
 }
 
-fn mean(points: &[DVec3]) -> DVec3 {
-    points.iter().sum::<DVec3>() / points.len() as f64
-}
-
 /// The share of the area whose triangles are turned by more than [`TURNED`].
 fn turned(turns: &[DMat3], areas: &[f64]) -> f64 {
     let least = TURNED.to_radians().cos();
-    let far = |r: &DMat3| 0.5 * (r.x_axis.x + r.y_axis.y + r.z_axis.z - 1.0) < least;
+    let far = |r: &DMat3| 0.5 * (trace(*r) - 1.0) < least;
     // From 0, since an empty sum is −0.
     let sum = turns.iter().zip(areas).filter(|(r, _)| far(r)).fold(0.0, |sum, (_, area)| sum + area);
     sum / areas.iter().sum::<f64>()

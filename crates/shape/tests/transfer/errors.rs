@@ -83,15 +83,6 @@ fn a_body_that_is_the_same_either_way_round_is_refused_as_ambiguous() {
     assert!(matches!(error, TransferError::Ambiguous(false)), "{error}");
 }
 
-#[test]
-fn no_stages_leave_the_source_where_it_is_aligned() {
-    let source = Caged::new(body(), 40);
-    let mut options = FittedOptions::default();
-    options.stages.stages = 0;
-    let transfer = FittedTransfer::new(&source.source(), &body(), &options).unwrap();
-    assert!(transfer.report().registration.score < 1e-3);
-}
-
 /// Each triangle alone, drawn in a little towards its middle by `gap`.
 fn apart(mesh: &TriMesh, gap: f64) -> TriMesh {
     let mut soup = TriMesh { vertices: Vec::new(), triangles: Vec::new() };
