@@ -195,9 +195,8 @@ fn numpy_finds_the_same() {
 fn by_numpy(python: &str, captured: &Frames, decoded: &Frames) -> [f64; 3] {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../benches/sted.py");
     let faces: Vec<Vec<u32>> = grid().iter().map(<[u32]>::to_vec).collect();
-    let input = format!(
-        r#"{{"faces": {faces:?}, "captured": {captured:?}, "decoded": {decoded:?}, "diagonal": {DIAGONAL}}}"#
-    );
+    let input =
+        format!(r#"{{"faces": {faces:?}, "captured": {captured:?}, "decoded": {decoded:?}, "diagonal": {DIAGONAL}}}"#);
     let mut child =
         Command::new(python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");
     child.stdin.take().expect("piped").write_all(input.as_bytes()).expect("python reads");

@@ -2,8 +2,8 @@
 
 use cager_core::coordinates::DependentNormals;
 use cager_geometry::linalg::{symmetric_eigen, tall_product};
-use cager_geometry::mesh::{self, Point};
 pub use cager_geometry::mesh::welded;
+use cager_geometry::mesh::{self, Point};
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3};
 

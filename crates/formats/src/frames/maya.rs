@@ -159,14 +159,14 @@ fn layout<R: Read + Seek>(
             let what = format!(
                 "has {found} points in frame {frame}, and {points} in frame 0; export a mesh with all its points in every frame"
             );
-            return Err(Fault::invalid(what).into());
+            return Err(Fault::invalid(what));
         }
         name = Some(chosen);
         blocks.push((array.start, array.scalar));
         ticks.push(time);
     }
     let Some(points) = points else {
-        return Err(Fault::invalid("holds no frames; export the cache again").into());
+        return Err(Fault::invalid("holds no frames; export the cache again"));
     };
     let told = told.map(|told| fitting(&ticks, told));
     let seconds: Vec<f64> = ticks.iter().map(|&tick| f64::from(tick) / TICKS).collect();

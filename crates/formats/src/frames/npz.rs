@@ -187,12 +187,11 @@ fn listed(names: impl ExactSizeIterator<Item = String>) -> String {
     list.join(", ")
 }
 
+/// Readable arrays by name, and the first other one.
+type Listed = (Vec<(String, Entry)>, Option<Unreadable>);
+
 /// The arrays of an archive of `length` bytes by name, and the first that is not readable.
-fn list<R: Read + Seek>(
-    path: &Path,
-    archive: &mut ZipArchive<R>,
-    length: u64,
-) -> Result<(Vec<(String, Entry)>, Option<Unreadable>), Error> {
+fn list<R: Read + Seek>(path: &Path, archive: &mut ZipArchive<R>, length: u64) -> Result<Listed, Error> {
     let (mut readable, mut unreadable) = (Vec::new(), None);
     if archive.len() > MAX_ARRAYS {
         let what = format!("has {} arrays, more than {MAX_ARRAYS}; save the frames as one array", archive.len());

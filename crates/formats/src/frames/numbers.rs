@@ -18,7 +18,20 @@ pub(super) fn of_names(names: &[&str]) -> Option<Vec<f64>> {
     let parts: Vec<&str> =
         ends.iter().map(|end| Some(&end[..end.len().checked_sub(suffix)?])).collect::<Option<_>>()?;
     let numbers = parts.iter().map(|part| number(part)).collect::<Option<Vec<f64>>>()?;
+    if let Some(fractions) = fractions(&names[0][..prefix], &parts)
+        && !evenly_spaced(&numbers)
+        && evenly_spaced(&fractions)
+    {
+        return Some(fractions);
+    }
     (distinct(&numbers) && !are_versions(&parts, &numbers)).then_some(numbers)
+}
+
+/// `1.25 1.5 1.75` of names that begin with `f1.`.
+fn fractions(begin: &str, parts: &[&str]) -> Option<Vec<f64>> {
+    let whole = begin.strip_suffix('.')?;
+    let digits = &whole[whole.trim_end_matches(|c: char| c.is_ascii_digit()).len()..];
+    parts.iter().map(|part| number(&format!("{digits}.{part}"))).collect()
 }
 
 /// Whether no two numbers are equal.
@@ -58,7 +71,7 @@ fn prefix(names: &[&str]) -> usize {
     if end > 0 && first[end - 1] == b'-' && separated {
         end -= 1;
     }
-    names[0].floor_char_boundary(end)
+    (0..=end).rfind(|&k| names[0].is_char_boundary(k)).unwrap_or(0)
 }
 
 /// Bytes after the number: what all names end with, less its digits and fraction.
@@ -157,6 +170,7 @@ mod tests {
             (vec!["t_-0.5", "t_-0.25"], vec![-0.5, -0.25]),
             (vec!["f0.98", "f0.99", "f1.00", "f1.01"], vec![0.98, 0.99, 1.0, 1.01]),
             (vec!["f1.250", "f1.500", "f1.750"], vec![250.0, 500.0, 750.0]),
+            (vec!["f1.25", "f1.5", "f1.75"], vec![1.25, 1.5, 1.75]),
             (vec!["w_v2.8", "w_v2.9", "w_v2.11", "w_v2.12"], vec![8.0, 9.0, 11.0, 12.0]),
             (vec!["v2.9", "v2.10"], vec![9.0, 10.0]),
             (vec!["s2.9", "s2.10", "s2.12", "s2.13", "s2.14"], vec![9.0, 10.0, 12.0, 13.0, 14.0]),

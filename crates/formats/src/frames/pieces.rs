@@ -39,7 +39,7 @@ impl<'a> Name<'a> {
     /// The texts in lower case.
     pub(super) fn texts(&self) -> String {
         let texts: Vec<String> = self.pieces.iter().step_by(2).map(|text| text.to_lowercase()).collect();
-        format!("{}{}", texts.join("#"), if self.pieces.len() % 2 == 0 { "#" } else { "" })
+        format!("{}{}", texts.join("#"), if self.pieces.len().is_multiple_of(2) { "#" } else { "" })
     }
 
     pub(super) fn numbers(&self) -> impl Iterator<Item = &'a str> {
