@@ -253,7 +253,11 @@ fn a_part_of_the_frames_is_edited_alone() {
     let line = "edit out.cager --with-cages all.npy --frames-range 18-20 -o c.cager";
     refused(&dir, line, &["out.cager", "has frames 0 to 19"]);
     // Frames that are added have no normals.
-    refused(&dir, "edit out.cager --with-cages two.npy -o c.cager", &["two.npy", "no normals", "green or mvc coordinates"]);
+    refused(
+        &dir,
+        "edit out.cager --with-cages two.npy -o c.cager",
+        &["two.npy", "no normals", "green or mvc coordinates"],
+    );
     dir.cager("decode out.cager --with-cages all.npy -o moved.npy").succeeds();
     refused(&dir, "decode out.cager --with-cages two.npy -o x.npy", &["two.npy", "no normals"]);
 }

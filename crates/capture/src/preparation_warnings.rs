@@ -11,7 +11,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
     if !found.outside.is_empty() {
         let (outside, points) = (found.outside.len(), solver.decoder().points());
         let what = if 2 * outside > points {
-            "check the cage, above all its units and axes"
+            "check the cage (cager cage --check), above all its units and axes"
         } else {
             "points outside follow the cage too, but an enlarged cage usually gives lower errors"
         };
@@ -45,7 +45,7 @@ pub fn preparation_warnings(options: SolverOptions, solver: &Solver) -> Vec<Stri
             Regularizer::Tikhonov => "what they leave open is damped".to_owned(),
             Regularizer::TruncatedSvd if options.spectrum >= weak => "what they leave open is dropped".to_owned(),
             _ => format!(
-                "it follows the rounding of the data there, so expect spikes, or use the differential regularizer with spectrum {weak}"
+                "it follows the rounding of the data there, so expect spikes, or use the differential regularizer (regularizer differential, spectrum {weak})"
             ),
         };
         warnings.push(format!(
@@ -66,11 +66,13 @@ pub(crate) fn held_frames(held: &[usize], frames: usize, handles: Handles, is_co
     let first = held.first()?;
     let closer = match (is_coded, handles) {
         (true, _) => "",
-        (false, Handles::All) => "an error bound stores what it leaves, and ",
-        (false, _) => "handles at all points follow more closely, an error bound stores what the cage leaves, and ",
+        (false, Handles::All) => "an error bound (max_error) stores what it leaves, and ",
+        (false, _) => {
+            "handles at all points (handles all) follow more closely, an error bound (max_error) stores what the cage leaves, and "
+        }
     };
     Some(format!(
-        "in {} of {frames} frames, the first is {first}, the cage would have run away from the model: it cannot follow these frames, and the points determine some of its vertices too weakly; it was held to the shape of the rest cage there; {closer}a cage made from the rest pose alone usually stays near by itself",
+        "in {} of {frames} frames, the first is {first}, the cage would have run away from the model: it cannot follow these frames, and the points determine some of its vertices too weakly; it was held to the shape of the rest cage there; {closer}a cage made from the rest pose alone (cager cage --rest) usually stays near by itself",
         held.len()
     ))
 }

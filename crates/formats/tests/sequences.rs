@@ -89,6 +89,19 @@ fn files_that_are_several_captures_are_called_what_they_are() {
 }
 
 #[test]
+fn names_with_hash_signs_and_of_one_number_are_refused_in_words() {
+    for names in [&["A1b1.npy", "a#b1.npy"][..], &["A1b1.npy", "a#b2.npy", "run.npy"], &["x1.npy", "x1.NPY", "x2.npy"]]
+    {
+        let folder = shot(names, 1);
+        match open(folder.path()) {
+            Ok(reader) => assert_eq!(numbers(&*reader), [0.0, 1.0], "{names:?}"),
+            Err(error) => assert!(error.to_string().contains("several sequences"), "{error}"),
+        }
+    }
+    assert!(message(open(shot(&["x1.npy", "x1.NPY", "x2.npy"], 1).path())).contains("have the same frame number"));
+}
+
+#[test]
 fn a_file_unlike_the_others_is_named_with_its_frame() {
     let folder = shot(&["a.1.usdc", "a.2.usdc", "a.4.usdc"], 1);
     let read = || {

@@ -60,8 +60,17 @@ fn a_cage_that_would_run_away_stays_near_and_is_blamed_with_what_helps() {
         assert!(what.iter().all(|what| said.contains(what)), "{said}");
         said
     };
-    told("", &["the cage would have run away", "handles at all points follow more closely, an error bound stores"]);
-    let said = told(" --handles all", &["the cage would have run away", "there; an error bound stores what it leaves"]);
+    told(
+        "",
+        &[
+            "the cage would have run away",
+            "handles at all points (handles all) follow more closely, an error bound (max_error) stores",
+        ],
+    );
+    let said = told(
+        " --handles all",
+        &["the cage would have run away", "there; an error bound (max_error) stores what it leaves"],
+    );
     assert!(!said.contains("handles at all points"), "{said}");
     // What is advised helps.
     let said = dir.cager(&encode.replace("weak.obj", "cage.obj")).succeeds().stderr;

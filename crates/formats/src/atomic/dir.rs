@@ -45,7 +45,8 @@ impl AtomicDir {
         &self.folder.0
     }
 
-    /// Begins a file in the folder.
+    /// Begins a file in the folder; interruption is no error here, unlike for a file begun by its
+    /// path.
     ///
     /// # Errors
     /// Those of [`File::create`].

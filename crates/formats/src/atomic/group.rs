@@ -2,20 +2,26 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use super::pending::{Pending, take_names};
-use super::target::Target;
+use super::temporary::{self, Names, Temporary};
+use super::{hide_temporary, inherit, sync_folder};
 use crate::error::Error;
 
 /// Files that take their names in a folder together once all are complete; dropped before
 /// [`AtomicGroup::commit`] they leave nothing.
+///
+/// A killed process leaves them in a folder of a hidden name, as with
+/// [`AtomicFile`](super::AtomicFile).
 #[derive(Debug)]
 pub struct AtomicGroup {
     folder: PathBuf,
+    written: Temporary,
     /// Names of the files that are there and go.
-    replaced: BTreeSet<String>,
-    files: Vec<Pending>,
+    replaced: Vec<PathBuf>,
+    /// Names of the new files, in their order.
+    names: Vec<String>,
 }
 
 impl AtomicGroup {
@@ -33,7 +39,7 @@ impl AtomicGroup {
     ) -> Result<Self, Error> {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let failed = |cause| Error::write(folder, cause);
-        let (mut replaced, mut others) = (BTreeSet::new(), Vec::new());
+        let (mut replaced, mut others) = (Vec::new(), Vec::new());
         for entry in fs::read_dir(folder).map_err(failed)? {
             let entry = entry.map_err(failed)?;
             let name = entry.file_name();
@@ -42,39 +48,83 @@ impl AtomicGroup {
             if !is_file || !replaces {
                 return Err(in_the_way(&entry.path(), is_file));
             }
-            if new.contains(name) {
-                replaced.insert(name.to_owned());
-            } else {
-                others.push(entry.path());
-            }
+            if new.contains(name) { &mut replaced } else { &mut others }.push(entry.path());
         }
+        replaced.sort();
         if let Some(other) = others.iter().min() {
             return Err(no_frame(other, others.len() - 1));
         }
-        Ok(Self { folder: folder.to_owned(), replaced, files: Vec::new() })
+        let begun = temporary::lock().begin(folder, |path| fs::create_dir(path));
+        let ((), written) = begun.map_err(|cause| hide_temporary(folder, &cause))?;
+        Ok(Self { folder: folder.to_owned(), written, replaced, names: Vec::new() })
     }
 
     /// Begins a file that is to have this name.
     ///
     /// # Errors
-    /// As of [`AtomicFile::create`](super::AtomicFile::create).
-    pub fn create_file(&mut self, name: &str) -> Result<File, Error> {
-        let path = self.folder.join(name);
-        let target = if self.replaced.contains(name) { Target::Replacing(path) } else { Target::New(path) };
-        let (file, pending) = Pending::create(target)?;
-        self.files.push(pending);
+    /// Those of [`File::create`].
+    pub fn create_file(&mut self, name: &str) -> io::Result<File> {
+        // Not between the removal of the folder and the end of the process.
+        let _names = temporary::lock();
+        let file = File::create(self.written.0.join(name))?;
+        self.names.push(name.to_owned());
         Ok(file)
     }
 
     /// Makes the files durable and gives them their names.
     ///
     /// # Errors
-    /// As of [`commit_together`](super::commit_together).
+    /// [`Error::Target`] where someone else has put a file there meanwhile, [`Error::Io`]; all is
+    /// as it was then, unless it is the names alone that could not be made durable.
     pub fn commit(self) -> Result<(), Error> {
-        for file in &self.files {
-            file.open().and_then(|open| file.complete(&open)).map_err(|cause| file.error(&cause))?;
+        let failed = |cause: io::Error| hide_temporary(&self.folder, &cause);
+        for name in &self.names {
+            let file = File::open(self.written.0.join(name)).map_err(failed)?;
+            inherit(&file, &self.folder.join(name)).and_then(|()| file.sync_all()).map_err(failed)?;
         }
-        take_names(&self.files)
+        // Outlives the lock, which removing it takes.
+        let mut aside = None;
+        let mut names = temporary::lock();
+        let mut moves: Vec<(PathBuf, PathBuf)> = Vec::new();
+        let done = self.take_names(&mut names, &mut aside, &mut moves);
+        if let Err(error) = done {
+            for (from, to) in moves.iter().rev() {
+                let _ = fs::rename(to, from);
+            }
+            return Err(error);
+        }
+        drop(names);
+        drop(aside);
+        sync_folder(&self.folder).map_err(failed)
+    }
+
+    /// Moves old files aside and new ones to their names, and lists what was moved.
+    fn take_names(
+        &self,
+        names: &mut Names,
+        aside: &mut Option<Temporary>,
+        moves: &mut Vec<(PathBuf, PathBuf)>,
+    ) -> Result<(), Error> {
+        let failed = |cause: io::Error| hide_temporary(&self.folder, &cause);
+        let mut rename = |from: PathBuf, to: PathBuf| {
+            fs::rename(&from, &to).map_err(failed)?;
+            moves.push((from, to));
+            Ok::<_, Error>(())
+        };
+        if !self.replaced.is_empty() {
+            let aside = aside.insert(names.begin(&self.folder, |path| fs::create_dir(path)).map_err(failed)?.1);
+            for old in self.replaced.iter().filter(|old| old.exists()) {
+                rename(old.clone(), aside.0.join(old.file_name().unwrap_or_default()))?;
+            }
+        }
+        for name in &self.names {
+            let to = self.folder.join(name);
+            if fs::symlink_metadata(&to).is_ok() {
+                return Err(in_the_way(&to, true));
+            }
+            rename(self.written.0.join(name), to)?;
+        }
+        Ok(())
     }
 }
 
@@ -138,25 +188,18 @@ mod tests {
         assert_eq!(names(folder), ["f.1", "f.2", "f.3", "notes.txt"]);
         // Dropped, they leave nothing; committed, the old ones go.
         let new = ["f.1", "f.2", "f.3", "f.9"];
-        fs::write(folder.join("f.1"), "old").expect("a file");
+        drop(create(true, &new).expect("a group"));
         let mut group = create(true, &new).expect("a group");
-        write(&mut group, &new);
-        assert_eq!(fs::read(folder.join("f.1")).expect("a file"), b"old");
-        drop(group);
-        assert_eq!(names(folder), ["f.1", "f.2", "f.3", "notes.txt"]);
-        let mut group = create(true, &new).expect("a group");
-        write(&mut group, &new);
-        group.commit().expect("names");
+        write(&mut group, &["f.2", "f.9"]);
         assert_eq!(fs::read(folder.join("f.1")).expect("a file"), b"new");
-        assert_eq!(names(folder), ["f.1", "f.2", "f.3", "f.9", "notes.txt"]);
+        group.commit().expect("names");
+        assert_eq!(names(folder), ["f.2", "f.9", "notes.txt"]);
         // What someone else puts there meanwhile stays, and all the rest.
-        fs::write(folder.join("f.1"), "old").expect("a file");
-        let mut group = create(true, &["f.1", "f.2", "f.3", "f.5", "f.9"]).expect("a group");
-        write(&mut group, &["f.1", "f.2", "f.5"]);
+        let mut group = create(true, &["f.2", "f.5", "f.9"]).expect("a group");
+        write(&mut group, &["f.2", "f.5"]);
         fs::write(folder.join("f.5"), "theirs").expect("a file");
         group.commit().expect_err("a file in the way");
-        assert_eq!(names(folder), ["f.1", "f.2", "f.3", "f.5", "f.9", "notes.txt"]);
-        assert_eq!(fs::read(folder.join("f.1")).expect("a file"), b"old");
+        assert_eq!(names(folder), ["f.2", "f.5", "f.9", "notes.txt"]);
         assert_eq!(fs::read(folder.join("f.5")).expect("a file"), b"theirs");
     }
 }

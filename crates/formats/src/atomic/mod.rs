@@ -1,9 +1,9 @@
-//! Files and folders that appear whole or not at all: written, synced, then renamed.
+//! Files and folders that appear whole or not at all: written under a temporary name, synced, then
+//! renamed.
 
 mod dir;
 mod file;
 mod group;
-mod pending;
 mod target;
 mod temporary;
 
@@ -29,7 +29,8 @@ pub fn destination(path: &Path) -> Result<PathBuf, Error> {
     Ok(target.file_name().map_or_else(|| folder.clone(), |name| folder.join(name)))
 }
 
-/// Where an output really goes, through symbolic links, and the folder around it.
+/// Where an output really goes, through symbolic links, so that those stay; and the folder around
+/// it.
 #[derive(Debug)]
 struct Place {
     folder: PathBuf,
@@ -69,13 +70,15 @@ fn behind_links(path: &Path) -> PathBuf {
     path
 }
 
-/// Gives a new file the mode and, where allowed, the owner of the one that it replaces.
+/// Gives a new file or folder the mode and, where it is allowed to, the owner of the one that it
+/// replaces.
 fn inherit(file: &File, old: &Path) -> io::Result<()> {
     let Ok(found) = fs::metadata(old) else { return Ok(()) };
     #[cfg(unix)]
     {
         use std::os::unix::fs::{MetadataExt, fchown};
-        // Only root may give files away; before the mode, parts of which this clears.
+        // Only root may give files away; before the mode, since a change of owner clears parts of
+        // it.
         let _ = fchown(file, Some(found.uid()), Some(found.gid()));
     }
     file.set_permissions(found.permissions())

@@ -32,7 +32,8 @@ pub fn remove_temporaries() {
 }
 
 impl Names {
-    /// Has `make` make something under a new name in `folder` that says whose it is.
+    /// Has `make` make something under a new name in `folder`, a name that says whose leftover it
+    /// is, should the process be killed.
     pub(super) fn begin<T>(
         &mut self,
         folder: &Path,
@@ -44,7 +45,8 @@ impl Names {
         Ok((made, Temporary(path)))
     }
 
-    /// Gives back the name of what was moved aside, which stays, as the user's, where that fails.
+    /// Gives what was moved aside its name back. Where that fails it stays under its temporary
+    /// name, since it is the user's.
     pub(super) fn give_back(&mut self, aside: &mut Option<Temporary>, target: &Path) -> io::Result<()> {
         let Some(mut aside) = aside.take() else { return Ok(()) };
         let path = std::mem::take(&mut aside.0);
@@ -55,7 +57,8 @@ impl Names {
     }
 }
 
-/// A temporary file or folder, removed when dropped, which takes the lock, unless renamed.
+/// A temporary file or folder, removed when dropped unless it has been renamed. Dropping takes the
+/// lock.
 #[derive(Debug)]
 pub(super) struct Temporary(pub(super) PathBuf);
 

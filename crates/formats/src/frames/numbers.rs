@@ -1,13 +1,13 @@
 //! The numbers of frames, as the names of their files tell them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Runs of missing frames that a message lists.
 const LISTED: usize = 6;
 
-/// The numbers in names that differ by nothing else: `f-2 f0 f1.5` or `walk.0010_left
-/// walk.0011_left`. In the order of the names; `None` where a name has no number, two are equal, or
-/// the names differ elsewhere.
+/// The numbers in names that differ by nothing else: `f-2 f0 f1.5` or
+/// `walk.0010_left walk.0011_left`. In the order of the names; `None` where a name has no number,
+/// two are equal, or the names differ elsewhere.
 pub(super) fn of_names(names: &[&str]) -> Option<Vec<f64>> {
     if names.len() < 2 {
         return None;
@@ -17,64 +17,84 @@ pub(super) fn of_names(names: &[&str]) -> Option<Vec<f64>> {
     let suffix = suffix(&ends);
     let parts: Vec<&str> =
         ends.iter().map(|end| Some(&end[..end.len().checked_sub(suffix)?])).collect::<Option<_>>()?;
-    let numbers = parts.iter().map(|part| number(part)).collect::<Option<Vec<f64>>>()?;
-    if let Some(fractions) = fractions(&names[0][..prefix], &parts)
-        && !evenly_spaced(&numbers)
-        && evenly_spaced(&fractions)
-    {
-        return Some(fractions);
+    if are_versions(&parts) {
+        return None;
     }
-    (distinct(&numbers) && !are_versions(&parts, &numbers)).then_some(numbers)
-}
-
-/// `1.25 1.5 1.75` of names that begin with `f1.`.
-fn fractions(begin: &str, parts: &[&str]) -> Option<Vec<f64>> {
-    let whole = begin.strip_suffix('.')?;
-    let digits = &whole[whole.trim_end_matches(|c: char| c.is_ascii_digit()).len()..];
-    parts.iter().map(|part| number(&format!("{digits}.{part}"))).collect()
+    let numbers = fractions(&names[0][..prefix], &parts)
+        .or_else(|| parts.iter().map(|part| number(part)).collect::<Option<Vec<f64>>>())?;
+    distinct(&numbers).then_some(numbers)
 }
 
 /// Whether no two numbers are equal.
 pub(super) fn distinct(numbers: &[f64]) -> bool {
-    steps(numbers).iter().all(|&step| step > 0.0)
+    let mut sorted = numbers.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.windows(2).all(|pair| pair[0] < pair[1])
 }
 
 /// Whether all steps between neighbours are the same.
 pub(super) fn evenly_spaced(numbers: &[f64]) -> bool {
-    let steps = steps(numbers);
+    let mut sorted = numbers.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let steps: Vec<f64> = sorted.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.iter().all(|step| (step - steps[0]).abs() <= 1e-6 * steps[0])
 }
 
-/// From each number to the next larger one.
-fn steps(numbers: &[f64]) -> Vec<f64> {
-    let mut sorted = numbers.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.windows(2).map(|pair| pair[1] - pair[0]).collect()
+/// Numbers whose whole part is in the prefix, as of `0.04 0.08` or `f1.25 f1.5`; none where the
+/// point before the digits only separates them from a name that ends in a digit, as in
+/// `shot2.0010 shot2.0011`.
+fn fractions(prefix: &str, parts: &[&str]) -> Option<Vec<f64>> {
+    let before = prefix.strip_suffix('.')?;
+    let name = before.trim_end_matches(|c: char| c.is_ascii_digit());
+    let whole = &before[name.len()..];
+    let digits = parts.iter().all(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()));
+    if whole.is_empty() || !digits {
+        return None;
+    }
+    // As in `_-0.5`, but not in `walk-0.5`.
+    let stem = name.strip_suffix('-').filter(|stem| !stem.ends_with(|c: char| c.is_alphanumeric()));
+    let sign = if stem.is_some() { "-" } else { "" };
+    let decimals: Vec<f64> =
+        parts.iter().map(|part| number(&format!("{sign}{whole}.{part}"))).collect::<Option<_>>()?;
+    let counted: Vec<f64> = parts.iter().map(|part| number(part)).collect::<Option<_>>()?;
+    let width = parts[0].len();
+    let word = name.rsplit(|c: char| !c.is_alphabetic()).next().unwrap_or_default();
+    let is_zero = whole.bytes().all(|b| b == b'0') && !matches!(word, "v" | "ver" | "version" | "take");
+    let separates = if parts.iter().all(|part| part.len() == width) {
+        // The order is the same either way; frames of renderers have four digits.
+        !is_zero || width >= 4 && !word.is_empty()
+    } else {
+        // Digits that are not filled up count, as in `shot2.9 shot2.10`, unless only as decimals
+        // they have even steps.
+        let filled = parts.iter().any(|part| part.len() > 1 && part.starts_with('0'));
+        let even = |numbers: &[f64]| numbers.len() > 2 && evenly_spaced(numbers);
+        !filled && if is_zero { even(&counted) } else { even(&counted) || !even(&decimals) }
+    };
+    (!separates).then_some(decimals)
 }
 
-/// Bytes before the number: what all names begin with, less its digits and sign.
-fn prefix(names: &[&str]) -> usize {
-    let first = names[0].as_bytes();
-    let same = |k: &usize| names.iter().all(|name| name.as_bytes().get(*k) == Some(&first[*k]));
-    let end = (0..first.len()).take_while(same).count();
-    let before_digits = |end: usize| first[..end].iter().rposition(|b| !b.is_ascii_digit()).map_or(0, |at| at + 1);
-    let mut end = before_digits(end);
-    // The point of `0.04` belongs to the number, and that of `shot2.0010` and `v0.001` does not.
-    if let Some(before) = first[..end].strip_suffix(b".") {
-        let whole = before_digits(before.len());
-        let is_zero = whole < before.len() && before[whole..].iter().all(|&b| b == b'0');
-        let is_named = whole > 0 && first[whole - 1].is_ascii_alphabetic();
-        end = if is_zero && !is_named { whole } else { end };
+/// Bytes before the number: what all names begin with, less the digits and the sign that belong to
+/// the number.
+fn prefix(stems: &[&str]) -> usize {
+    let first = stems[0].as_bytes();
+    let same = |k: &usize| stems.iter().all(|stem| stem.as_bytes().get(*k) == Some(&first[*k]));
+    let mut end = (0..first.len()).take_while(same).count();
+    while end > 0 && first[end - 1].is_ascii_digit() {
+        end -= 1;
     }
     // `walk-1` has a hyphen, `f_-1` and `-1` a sign.
     let separated = end < 2 || !first[end - 2].is_ascii_alphanumeric();
     if end > 0 && first[end - 1] == b'-' && separated {
         end -= 1;
     }
-    (0..=end).rfind(|&k| names[0].is_char_boundary(k)).unwrap_or(0)
+    while !stems[0].is_char_boundary(end) {
+        end -= 1;
+    }
+    end
 }
 
-/// Bytes after the number: what all names end with, less its digits and fraction.
+/// Bytes after the number: what all names end with, less the digits and the fraction that belong to
+/// the number.
 fn suffix(ends: &[&str]) -> usize {
     let last = ends[0].as_bytes();
     let from_end = |text: &[u8], k: usize| text.len().checked_sub(k + 1).map(|at| text[at]);
@@ -90,18 +110,29 @@ fn suffix(ends: &[&str]) -> usize {
     }
 }
 
-/// Whether `1.01 1.02 2.01 2.02` are frames 1 and 2 of two versions or takes: fractions of one
-/// width come again and again, one apart in their last digit, and the numbers are not evenly
-/// spaced.
-fn are_versions(parts: &[&str], numbers: &[f64]) -> bool {
-    let fractions: BTreeSet<&str> = parts.iter().map(|part| part.split_once('.').map_or("", |(_, f)| f)).collect();
-    let width = fractions.first().map_or(0, |fraction| fraction.len());
-    let unit = 10_f64.powi(-(width as i32));
+/// Whether `1.01 1.02 2.01 2.02` are frames 1 and 2 of two versions or takes: few whole numbers
+/// that follow each other, again and again.
+fn are_versions(parts: &[&str]) -> bool {
+    let mut versions: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
+    let width = parts[0].rsplit('.').next().map_or(0, str::len);
+    for part in parts {
+        match part.split_once('.').map(|(version, frame)| (version, frame, frame.parse())) {
+            Some((version, frame, Ok(number))) if frame.len() == width => {
+                versions.entry(version).or_default().push(number);
+            }
+            _ => return false,
+        }
+    }
+    let most = 10_u64.saturating_pow(width as u32) / 2;
+    let counted = |frames: &mut Vec<u64>| {
+        frames.sort_unstable();
+        frames.len() > 1 && frames.len() as u64 <= most && frames.windows(2).all(|pair| pair[1] == pair[0] + 1)
+    };
+    let decimals: Option<Vec<f64>> = parts.iter().map(|part| number(part)).collect();
     width > 1
-        && fractions.len() < parts.len()
-        && fractions.iter().all(|fraction| fraction.len() == width)
-        && steps(numbers).iter().any(|&step| step < 1.5 * unit)
-        && !evenly_spaced(numbers)
+        && versions.len() > 1
+        && versions.values_mut().all(counted)
+        && decimals.is_none_or(|decimals| !evenly_spaced(&decimals))
 }
 
 /// Decimal digits, with a sign and a fraction where there are any; none where `f64` would round.
@@ -112,8 +143,9 @@ fn number(text: &str) -> Option<f64> {
     (plain(whole) && plain(fraction) && digits.len() <= 15).then(|| text.parse().ok())?.map(|x: f64| x + 0.0)
 }
 
-/// The frames that are missing from these numbers, in words such as `4 and 7 to 9`. Only whole
-/// numbers are looked at, so that frames between frames are no gaps.
+/// The frames that are missing from these numbers, in words such as `4, 7–9`; none where they have
+/// the same distance throughout. Only whole numbers are looked at, so that frames between frames
+/// are no gaps.
 pub fn missing_frames(numbers: &[f64]) -> Option<String> {
     let whole: Vec<i64> = numbers.iter().filter(|x| x.fract() == 0.0 && x.abs() < 1e15).map(|&x| x as i64).collect();
     let steps: Vec<i64> = whole.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -141,7 +173,8 @@ pub fn missing_frames(numbers: &[f64]) -> Option<String> {
     Some(if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) })
 }
 
-/// A number as names have it, with at least `digits` digits before the point.
+/// A number as names have it: at least `digits` digits before the point, and only as many after it
+/// as there must be.
 pub(super) fn padded(number: f64, digits: usize) -> String {
     let sign = if number < 0.0 { "-" } else { "" };
     let text = number.abs().to_string();
@@ -168,9 +201,9 @@ mod tests {
             (vec!["0.04", "0.08", "0.12"], vec![0.04, 0.08, 0.12]),
             (vec!["0.5", "0.04", "0.45"], vec![0.5, 0.04, 0.45]),
             (vec!["t_-0.5", "t_-0.25"], vec![-0.5, -0.25]),
+            (vec!["f1.25", "f1.5", "f1.75"], vec![1.25, 1.5, 1.75]),
             (vec!["f0.98", "f0.99", "f1.00", "f1.01"], vec![0.98, 0.99, 1.0, 1.01]),
             (vec!["f1.250", "f1.500", "f1.750"], vec![250.0, 500.0, 750.0]),
-            (vec!["f1.25", "f1.5", "f1.75"], vec![1.25, 1.5, 1.75]),
             (vec!["w_v2.8", "w_v2.9", "w_v2.11", "w_v2.12"], vec![8.0, 9.0, 11.0, 12.0]),
             (vec!["v2.9", "v2.10"], vec![9.0, 10.0]),
             (vec!["s2.9", "s2.10", "s2.12", "s2.13", "s2.14"], vec![9.0, 10.0, 12.0, 13.0, 14.0]),

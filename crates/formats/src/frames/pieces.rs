@@ -1,59 +1,59 @@
-//! The names of a capture's files in pieces: texts and numbers.
+//! The names of a capture's files in pieces: text and numbers.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// The folder that holds all files, and their names below it.
-pub(super) fn below_folder(files: &[PathBuf]) -> (PathBuf, Vec<String>) {
-    let mut folder = files.first().and_then(|file| file.parent()).unwrap_or(Path::new("")).to_owned();
-    while !files.iter().all(|file| file.starts_with(&folder)) && folder.pop() {}
-    let below = |file: &PathBuf| file.strip_prefix(&folder).unwrap_or(file).to_string_lossy().into_owned();
-    let names = files.iter().map(below).collect();
-    (folder, names)
+/// Names of files below the folder that holds them all.
+pub(super) struct Names {
+    pub(super) folder: PathBuf,
+    /// Without extensions.
+    pub(super) labels: Vec<String>,
+    pub(super) extensions: Vec<String>,
 }
 
-/// The name of a file below the folder of all.
-pub(super) struct Name<'a> {
-    /// Without the extension.
-    pub(super) label: &'a str,
-    /// With its dot.
-    pub(super) extension: &'a str,
-    /// Of the label: texts at even places, which may be empty, and digits at odd ones.
-    pub(super) pieces: Vec<&'a str>,
+/// What stands for a number in texts; no name has it.
+pub(super) const NUMBER: char = '\0';
+
+/// A name in pieces: what stands between its numbers, in lower case, and the numbers.
+pub(super) struct Pieces<'a> {
+    pub(super) texts: String,
+    pub(super) numbers: Vec<&'a str>,
 }
 
-impl<'a> Name<'a> {
-    pub(super) fn of(name: &'a str) -> Self {
-        let dot = Path::new(name).extension().map_or(0, |extension| extension.len() + 1);
-        let (label, extension) = name.split_at(name.len() - dot);
-        let (mut pieces, mut rest) = (Vec::new(), label);
-        while pieces.is_empty() || !rest.is_empty() {
-            let is_text = pieces.len() % 2 == 0;
-            let end = rest.find(|c: char| c.is_ascii_digit() == is_text).unwrap_or(rest.len());
-            pieces.push(&rest[..end]);
-            rest = &rest[end..];
+impl<'a> Pieces<'a> {
+    pub(super) fn of(label: &'a str) -> Self {
+        let (mut texts, mut numbers, mut rest) = (String::new(), Vec::new(), label);
+        while !rest.is_empty() {
+            let end = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+            if end > 0 {
+                numbers.push(&rest[..end]);
+                texts.push(NUMBER);
+            }
+            let next = rest[end..].find(|c: char| c.is_ascii_digit()).map_or(rest.len(), |at| end + at);
+            texts.push_str(&rest[end..next].to_lowercase());
+            rest = &rest[next..];
         }
-        Self { label, extension, pieces }
-    }
-
-    /// The texts in lower case.
-    pub(super) fn texts(&self) -> String {
-        let texts: Vec<String> = self.pieces.iter().step_by(2).map(|text| text.to_lowercase()).collect();
-        format!("{}{}", texts.join("#"), if self.pieces.len().is_multiple_of(2) { "#" } else { "" })
-    }
-
-    pub(super) fn numbers(&self) -> impl Iterator<Item = &'a str> {
-        self.pieces.iter().skip(1).step_by(2).copied()
+        Self { texts, numbers }
     }
 
     /// The numbers without the zeros that fill them up.
     pub(super) fn values(&self) -> Vec<&'a str> {
-        self.numbers().map(|digits| digits.trim_start_matches('0')).collect()
+        self.numbers.iter().map(|digits| digits.trim_start_matches('0')).collect()
     }
 }
 
-impl fmt::Display for Name<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{}", self.label, self.extension)
+impl Names {
+    pub(super) fn of(files: &[PathBuf]) -> Self {
+        let mut folder = files.first().and_then(|file| file.parent()).unwrap_or(Path::new("")).to_owned();
+        while !files.iter().all(|file| file.starts_with(&folder)) && folder.pop() {}
+        let below = |file: &PathBuf| file.strip_prefix(&folder).unwrap_or(file).to_path_buf();
+        let labels = files.iter().map(|file| below(file).with_extension("").to_string_lossy().into_owned()).collect();
+        let extension =
+            |file: &PathBuf| file.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
+        Self { labels, extensions: files.iter().map(extension).collect(), folder }
+    }
+
+    /// A file below the folder.
+    pub(super) fn name(&self, file: usize) -> String {
+        format!("{}{}", self.labels[file], self.extensions[file])
     }
 }

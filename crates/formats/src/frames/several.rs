@@ -1,59 +1,76 @@
 //! What is said of files that are not one sequence, and patterns that pick one.
 
-use std::path::Path;
-
-use super::pieces::Name;
+use super::pieces::{Names, Pieces};
 
 /// Sequences that a message lists.
 const LISTED: usize = 4;
 
 /// What was found in place of one sequence, and how to pick one.
-pub(super) fn several(folder: &Path, names: &[Name<'_>], groups: &[Vec<&Name<'_>>]) -> String {
-    let (mut words, mut patterns) = (Vec::new(), Vec::new());
+pub(super) fn several(names: &Names, pieces: &[Pieces<'_>], groups: &[Vec<usize>]) -> String {
+    let mut words = Vec::new();
+    let mut patterns = Vec::new();
     for files in groups.iter().take(LISTED) {
-        let pattern = pattern(names, files);
-        let like = pattern.clone().unwrap_or_else(|| files[0].to_string());
-        words.push(if files.len() > 1 { format!("{} like {like}", files.len()) } else { files[0].to_string() });
+        let pattern = pattern(names, pieces, files);
+        words.push(match (files.as_slice(), &pattern) {
+            (&[only], _) => names.name(only),
+            (_, Some(pattern)) => format!("{} like {pattern}", files.len()),
+            (&[first, ..], None) => format!("{} like {}", files.len(), names.name(first)),
+            ([], None) => continue,
+        });
         if files.len() > 1 {
-            patterns.extend(pattern.map(|pattern| format!("'{}'", folder.join(pattern).display())));
+            patterns.extend(pattern.map(|pattern| format!("'{}'", names.folder.join(pattern).display())));
         }
     }
     if groups.len() > LISTED {
         words.push("more".to_owned());
     }
-    patterns.truncate(2);
-    let cure = match patterns.as_slice() {
-        [] => "move the others elsewhere, or pick one with a pattern".to_owned(),
-        patterns => format!("pick one with a pattern such as {}", patterns.join(" or ")),
+    let cure = match patterns.first() {
+        Some(_) => format!("pick one with a pattern such as {}", patterns[..patterns.len().min(2)].join(" or ")),
+        None => "move the others elsewhere, or pick one with a pattern".to_owned(),
     };
-    let numbers: Vec<Vec<&str>> = names.iter().map(Name::values).collect();
-    let twin = (0..names.len())
-        .flat_map(|a| (a + 1..names.len().min(a + 64)).map(move |b| (a, b)))
-        .find(|&(a, b)| !numbers[a].is_empty() && numbers[a] == numbers[b] && names[a].texts() == names[b].texts());
-    let twins = twin
-        .map_or_else(String::new, |(a, b)| format!(", and {} and {} have the same frame number", names[a], names[b]));
+    let numbers: Vec<Vec<&str>> = pieces.iter().map(Pieces::values).collect();
+    let twin = (0..pieces.len())
+        .flat_map(|a| (a + 1..pieces.len().min(a + 64)).map(move |b| (a, b)))
+        .find(|&(a, b)| !numbers[a].is_empty() && pieces[a].texts == pieces[b].texts && numbers[a] == numbers[b]);
+    let twins = twin.map_or_else(String::new, |(a, b)| {
+        format!(", and {} and {} have the same frame number", names.name(a), names.name(b))
+    });
     format!("holds files of several sequences or versions: {}{twins}; {cure}", words.join(", "))
 }
 
 /// The shortest pattern that matches these files and none of the others.
-fn pattern(names: &[Name<'_>], files: &[&Name<'_>]) -> Option<String> {
-    let first = files.first()?;
-    let with = |place: fn(usize) -> Option<String>| {
-        let mut pattern = String::new();
-        for (k, piece) in first.pieces.iter().enumerate() {
-            let others = || files.iter().map(|name| name.pieces[k]);
-            let is_text = k % 2 == 0 || others().all(|other| other == *piece);
-            let digits = if others().all(|other| other.len() == piece.len()) { piece.len() } else { 0 };
-            pattern += &if is_text { glob::Pattern::escape(piece) } else { place(digits)? };
+fn pattern(names: &Names, pieces: &[Pieces<'_>], files: &[usize]) -> Option<String> {
+    let first = *files.first()?;
+    let of_group = &pieces[first];
+    let same = |k: usize| files.iter().all(|&file| pieces[file].numbers.get(k) == of_group.numbers.get(k));
+    let width = |k: usize| {
+        files.iter().all(|&file| pieces[file].numbers.get(k).map(|n| n.len()) == Some(of_group.numbers[k].len()))
+    };
+    let with = |place: &dyn Fn(usize) -> Option<String>| {
+        let (mut pattern, mut rest, mut k) = (String::new(), names.labels[first].as_str(), 0);
+        while !rest.is_empty() {
+            let end = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+            if end > 0 {
+                pattern.push_str(&if same(k) { rest[..end].to_owned() } else { place(k)? });
+                k += 1;
+            }
+            let next = rest[end..].find(|c: char| c.is_ascii_digit()).map_or(rest.len(), |at| end + at);
+            pattern.push_str(&glob::Pattern::escape(&rest[end..next]));
+            rest = &rest[next..];
         }
-        Some(pattern + first.extension)
+        Some(pattern + &names.extensions[first])
     };
-    let stars = with(|_| Some("*".to_owned()));
-    let digits = with(|count| (count > 0).then(|| "?".repeat(count)));
+    let digits = |k: usize| width(k).then(|| of_group.numbers[k].len());
+    let candidates = [
+        with(&|_| Some("*".to_owned())),
+        with(&|k| digits(k).map(|count| "?".repeat(count))),
+        with(&|k| digits(k).filter(|&count| count < 7).map(|count| "[0-9]".repeat(count))),
+        with(&|_| Some("[0-9]*".to_owned())),
+    ];
     let options = glob::MatchOptions { require_literal_separator: true, ..Default::default() };
-    let picks = |pattern: &glob::Pattern| {
-        let matches = |name: &Name<'_>| pattern.matches_with(&name.to_string(), options);
-        names.iter().all(|name| matches(name) == files.iter().any(|file| std::ptr::eq(*file, name)))
-    };
-    stars.into_iter().chain(digits).find(|text| glob::Pattern::new(text).is_ok_and(|pattern| picks(&pattern)))
+    candidates.into_iter().flatten().find(|text| {
+        glob::Pattern::new(text).is_ok_and(|pattern| {
+            (0..pieces.len()).all(|file| pattern.matches_with(&names.name(file), options) == files.contains(&file))
+        })
+    })
 }

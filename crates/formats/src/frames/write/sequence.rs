@@ -31,9 +31,10 @@ enum Place {
 impl Place {
     fn create_file(&mut self, name: &str, path: &Path) -> Result<File, Error> {
         match self {
-            Self::Own(folder) => folder.create_file(name).map_err(|cause| Error::write(path, cause)),
+            Self::Own(folder) => folder.create_file(name),
             Self::Shared(group) => group.create_file(name),
         }
+        .map_err(|cause| Error::write(path, cause))
     }
 }
 

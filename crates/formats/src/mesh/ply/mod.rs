@@ -76,7 +76,12 @@ fn read_points<V: Values>(
     if has_normals {
         model.normals.reserve_exact(element.count.min(most) as usize);
     }
-    let place = |property: &Property| READ.iter().position(|name| *name == property.name);
+    // Of scalars that have one name the first counts.
+    let mut is_free = [true; READ.len()];
+    let mut place = |property: &Property| {
+        let place = READ.iter().position(|name| *name == property.name)?;
+        (matches!(property.kind, Kind::Scalar(_)) && std::mem::take(&mut is_free[place])).then_some(place)
+    };
     let columns: Vec<_> = element.properties.iter().map(|property| (property.kind, place(property))).collect();
     for k in 0..element.count {
         let mut found = [0.0; READ.len()];
