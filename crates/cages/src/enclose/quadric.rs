@@ -3,7 +3,8 @@
 use glam::{DMat3, DVec3};
 use std::ops::AddAssign;
 
-/// Weight of the distance from merged vertices beside that from planes: even where it is flat.
+/// Weight of the distance from the vertices that were merged, beside that from their faces' planes:
+/// it places vertices evenly where the surface is flat.
 const EVENNESS: f64 = 0.01;
 
 /// A sum of squared distances weighted by area: xᵀ A x + 2 bᵀ x + c.
@@ -16,6 +17,9 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
+    /// No distances.
+    pub(super) const ZERO: Self = Self { a: DMat3::ZERO, b: DVec3::ZERO, c: 0.0, area: 0.0 };
+
     /// A third of a face's share: distance to its plane, and to one corner.
     pub(super) fn of_corner(corners: [DVec3; 3], corner: usize) -> Self {
         let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);

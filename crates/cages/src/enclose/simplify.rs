@@ -1,10 +1,10 @@
-//! Simplification of a closed mesh by edge collapses that keep its topology, the model inside, and
-//! it free of self-intersection.
+//! Simplification of a closed mesh by edge collapses that keep it valid: its topology (link
+//! condition), the model inside, and free of self-intersection.
 
 use super::patch::{EnclosedPoints, FaceReplacement, PatchMesh, Violation, normal, quality};
 use super::quadric::Quadric;
 use glam::DVec3;
-use std::cmp::Reverse;
+use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
@@ -36,15 +36,15 @@ enum Rejection {
     Validity,
 }
 
-/// A collapse that may be worth trying. The cheapest is the greatest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// A collapse that may be worth trying.
+#[derive(Clone, Copy, Debug)]
 struct Candidate {
-    /// Bits of non-negative numbers are in the order of the numbers.
-    cost: Reverse<u64>,
-    edge: Reverse<[u32; 2]>,
+    cost: f64,
+    edge: [u32; 2],
     /// Versions of the end vertices when it was proposed; it is stale once they change.
     versions: [u32; 2],
-    /// The place found valid for the vertex, if one cost more than expected; else [`NONE`].
+    /// Which of the places found valid is the vertex's, if one cost more than expected; else
+    /// [`NONE`].
     place: u32,
     /// Which limits hold.
     stage: u8,
@@ -52,20 +52,42 @@ struct Candidate {
 
 const NONE: u32 = u32::MAX;
 
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Candidate {
+    /// The cheapest is the greatest.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.cost.total_cmp(&self.cost).then_with(|| other.edge.cmp(&self.edge))
+    }
+}
+
 /// A mesh that is being simplified.
 pub(super) struct Simplifier<'a> {
     pub(super) mesh: PatchMesh,
     pub(super) quadrics: Vec<Quadric>,
     enclosed: &'a EnclosedPoints,
     versions: Vec<u32>,
-    /// Edges of each vertex that could not be collapsed, until something near them changes.
+    /// Edges of each vertex that could not be collapsed; they are tried again when something near
+    /// them changes.
     rejected: Vec<Vec<[u32; 2]>>,
     vertices: usize,
 }
 
 impl<'a> Simplifier<'a> {
     pub(super) fn new(positions: Vec<DVec3>, faces: Vec<[u32; 3]>, enclosed: &'a EnclosedPoints) -> Self {
-        let mut quadrics = vec![Quadric::default(); positions.len()];
+        let mut quadrics = vec![Quadric::ZERO; positions.len()];
         for face in &faces {
             let corners = face.map(|v| positions[v as usize]);
             (0..3).for_each(|k| quadrics[face[k] as usize] += Quadric::of_corner(corners, k));
@@ -80,7 +102,8 @@ impl<'a> Simplifier<'a> {
         self.vertices
     }
 
-    /// Collapses edges until at most `target` vertices are left; false where it ends before.
+    /// Collapses edges until at most `target` vertices are left; false where it ends before,
+    /// stopped or as hardly any can be collapsed.
     pub(super) fn simplify(&mut self, target: usize, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         while self.vertices > target {
             let before = self.vertices;
@@ -96,7 +119,8 @@ impl<'a> Simplifier<'a> {
         true
     }
 
-    /// Collapses edges until `goal` vertices are left or none can be; false where it was stopped.
+    /// Collapses edges until `goal` vertices are left or none can be collapsed; false where it was
+    /// stopped.
     fn collapse_cheapest(&mut self, goal: usize, watch: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         let mut heap = BinaryHeap::new();
         // Apart from the candidates, so that these are small and soon moved about in the heap.
@@ -111,15 +135,14 @@ impl<'a> Simplifier<'a> {
             if tried % WATCH_EVERY == 0 && watch().is_break() {
                 return false;
             }
-            let [u, v] = candidate.edge.0;
+            let [u, v] = candidate.edge;
             if [u, v].map(|w| self.versions[w as usize]) != candidate.versions {
                 continue;
             }
             let (replacement, cost) = match self.admissible(&candidate, places.get(candidate.place as usize).copied()) {
                 Ok(found) => found,
                 Err(Rejection::Shape) if usize::from(candidate.stage) + 1 < LIMITS.len() => {
-                    let cost = Reverse((PRICE * f64::from_bits(candidate.cost.0)).to_bits());
-                    heap.push(Candidate { cost, stage: candidate.stage + 1, ..candidate });
+                    heap.push(Candidate { cost: PRICE * candidate.cost, stage: candidate.stage + 1, ..candidate });
                     continue;
                 }
                 Err(_) => {
@@ -129,9 +152,9 @@ impl<'a> Simplifier<'a> {
             };
             if let Some((_, place)) = replacement.moved
                 && candidate.place == NONE
-                && cost > 1.5 * f64::from_bits(candidate.cost.0)
+                && cost > 1.5 * candidate.cost
             {
-                heap.push(Candidate { cost: Reverse(cost.to_bits()), place: places.len() as u32, ..candidate });
+                heap.push(Candidate { cost, place: places.len() as u32, ..candidate });
                 places.push(place);
                 continue;
             }
@@ -164,8 +187,7 @@ impl<'a> Simplifier<'a> {
     fn propose(&self, edge: [u32; 2], heap: &mut BinaryHeap<Candidate>) {
         let (position, quadric) = self.optimum(edge);
         let versions = edge.map(|x| self.versions[x as usize]);
-        let cost = Reverse(quadric.at(position).to_bits());
-        heap.push(Candidate { cost, edge: Reverse(edge), versions, place: NONE, stage: 0 });
+        heap.push(Candidate { cost: quadric.at(position), edge, versions, place: NONE, stage: 0 });
     }
 
     fn optimum(&self, edge: [u32; 2]) -> (DVec3, Quadric) {
@@ -178,17 +200,18 @@ impl<'a> Simplifier<'a> {
         (if far { middle } else { best }, quadric)
     }
 
-    /// The collapse with a valid position, found from `first` on if given, and its cost there.
+    /// The collapse with a valid position for its vertex, found from `first` on if given, and its
+    /// cost there.
     fn admissible(&self, candidate: &Candidate, first: Option<DVec3>) -> Result<(FaceReplacement, f64), Rejection> {
         let limits = LIMITS[usize::from(candidate.stage)];
-        let [u, v] = candidate.edge.0;
+        let [u, v] = candidate.edge;
         let mesh = &self.mesh;
         let (ring_u, ring_v) = (mesh.ring(u), mesh.ring(v));
         let common: Vec<u32> = ring_u.iter().filter(|w| ring_v.binary_search(w).is_ok()).copied().collect();
         if common.len() != 2 || common.iter().any(|&w| mesh.around[w as usize].len() < 4) {
             return Err(Rejection::Validity);
         }
-        let (best, quadric) = self.optimum(candidate.edge.0);
+        let (best, quadric) = self.optimum(candidate.edge);
         let mut kept = Vec::new();
         let mut removed = Vec::new();
         for &f in &mesh.around[u as usize] {
