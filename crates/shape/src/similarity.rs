@@ -75,8 +75,8 @@ impl Similarity {
         }
         let rotation = up.map_or_else(|| nearest_rotation(covariance), |up| turn_about(up, covariance));
         let trace = trace(covariance * rotation.transpose());
-        let scale = if size > 0.0 && trace > 0.0 { trace / size } else { 1.0 };
-        let scale = scale.max(least).min(most);
+        let unfitted = if least > 0.0 { least } else { 1.0 };
+        let scale = if size > 0.0 && trace > 0.0 { (trace / size).max(least).min(most) } else { unfitted };
         Some(Self { rotation, scale, translation: to - scale * (rotation * from) })
     }
 
