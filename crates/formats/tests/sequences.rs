@@ -94,7 +94,7 @@ fn names_with_hash_signs_and_of_one_number_are_refused_in_words() {
     {
         let folder = shot(names, 1);
         match open(folder.path()) {
-            Ok(reader) => assert_eq!(numbers(&*reader), [0.0, 1.0], "{names:?}"),
+            Ok(reader) => assert_eq!(numbers(&*reader).len(), names.len(), "{names:?}"),
             Err(error) => assert!(error.to_string().contains("several sequences"), "{error}"),
         }
     }
