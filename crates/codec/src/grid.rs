@@ -27,6 +27,12 @@ impl Grid {
             .then_some(Self { origin: low, step })
     }
 
+    /// As [`Self::new`], through 0, so that multiples of the step stay what they are.
+    pub(crate) fn of_multiples(points: &[Point], step: f64) -> Option<Self> {
+        let grid = Self::new(points, step)?;
+        Some(Self { origin: grid.origin.map(|x| (x / step).floor() * step), ..grid })
+    }
+
     /// The nearest position of the grid.
     pub fn nearest(&self, point: Point) -> Point {
         self.position(self.steps(point))

@@ -22,6 +22,7 @@ mod open_edges;
 mod parallelograms;
 mod prediction_weights;
 mod residual;
+mod surface;
 mod trajectories;
 mod vertex_order;
 mod walk;
@@ -35,6 +36,7 @@ pub use gram_rounding::GramRounding;
 pub use grid::{Grid, decode_positions, encode_positions};
 pub use hierarchy::Hierarchy;
 pub use mesh::CodedMesh;
+pub use surface::{decode_face_order, decode_surface, encode_face_order, encode_surface};
 pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
 
 /// Most positions, points times frames, of a group: memory of decoding follows from it.

@@ -4,6 +4,7 @@
 pub mod linalg;
 pub mod mesh;
 pub mod spatial;
+pub mod surface;
 pub mod topology;
 pub mod units;
 pub mod vector;
