@@ -210,6 +210,22 @@ impl<'a> Chosen<'a> {
         })
     }
 
+    /// The faces to write, and what lies on them among the options: in the order of the source where the file says it.
+    fn take_surface(&mut self, bound: &BoundModel) -> Result<Polygons, DecodeError> {
+        if let Some((_, model)) = self.what.model {
+            self.options.surface = model.surface.clone();
+            return Ok(model.faces.clone());
+        }
+        match self.container.surface() {
+            Ok(Some((surface, faces))) => {
+                self.options.surface = surface;
+                Ok(faces)
+            }
+            Err(container::Error::Corrupt { .. }) if self.what.salvage => Ok(bound.rest.faces.clone()),
+            found => found.map(|_| bound.rest.faces.clone()).map_err(|cause| DecodeError::container(self.path, cause)),
+        }
+    }
+
     fn memory(&self) -> Memory {
         self.what.memory.unwrap_or_else(Memory::half_of_free)
     }
@@ -296,7 +312,8 @@ pub fn decode(
     let bound = chosen.bind()?;
     let (points, frames) = (bound.rest.points.len(), chosen.wanted.len());
     chosen.options.morphs = chosen.morphs(chosen.what.morphs, &bound.rest)?;
-    let mut writer = create_frames(output, points, frames, &bound.rest.faces, &chosen.options)?;
+    let faces = chosen.take_surface(&bound)?;
+    let mut writer = create_frames(output, points, frames, &faces, &chosen.options)?;
     chosen.write(&bound, &mut writer, progress)?;
     let mut notes = writer.notes();
     notes.extend(units::notes(&path, chosen.options.units, chosen.what.units));

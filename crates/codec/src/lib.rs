@@ -36,8 +36,8 @@ pub use gram_rounding::GramRounding;
 pub use grid::{Grid, decode_positions, encode_positions};
 pub use hierarchy::Hierarchy;
 pub use mesh::CodedMesh;
-pub use surface::{decode_face_order, decode_surface, encode_face_order, encode_surface};
 pub use residual::{Residual, ResidualGroup, encode_residual, estimate_residual};
+pub use surface::CodedSurface;
 
 /// Most positions, points times frames, of a group: memory of decoding follows from it.
 pub const MAX_POSITIONS: usize = 1 << 26;

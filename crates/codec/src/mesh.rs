@@ -3,6 +3,7 @@
 use crate::connectivity::{WalkedFaces, decode_faces};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, decode_positions, encode_positions};
+use crate::surface::CodedSurface;
 use cager_geometry::mesh::{Model, Point, Polygons};
 
 /// A mesh as bytes, and what they decode to: the same polygons in another order.
@@ -14,6 +15,8 @@ pub struct CodedMesh {
     pub faces: Vec<u8>,
     /// The positions, for [`decode_positions`].
     pub positions: Vec<u8>,
+    /// What lies on the faces, where anything does.
+    pub surface: Option<CodedSurface>,
 }
 
 impl CodedMesh {
@@ -26,21 +29,28 @@ impl CodedMesh {
         let mut walked = WalkedFaces::new(&mesh.faces, mesh.points.len());
         let ordered = std::mem::take(&mut walked.faces);
         let (faces, positions) = rayon::join(|| walked.into_bytes(), || encode_positions(grid, &ordered, &mesh.points));
-        Ok(Self::of(mesh, grid, ordered, faces, positions))
+        let surface = CodedSurface::new(mesh, &ordered);
+        Ok(Self::of(mesh, grid, ordered, (faces, positions, surface)))
     }
 
     /// The same mesh with positions in other steps.
     pub fn in_steps(&self, mesh: &Model, step: f64) -> Result<Self> {
         let grid = Self::grid(mesh, step)?;
         let positions = encode_positions(grid, &self.mesh.faces, &mesh.points);
-        Ok(Self::of(mesh, grid, self.mesh.faces.clone(), self.faces.clone(), positions))
+        let kept = (self.faces.clone(), positions, self.surface.clone());
+        Ok(Self::of(mesh, grid, self.mesh.faces.clone(), kept))
     }
 
     fn grid(mesh: &Model, step: f64) -> Result<Grid> {
         Grid::new(&mesh.points, step).ok_or(Error::Unsuitable("positions too far apart for this step"))
     }
 
-    fn of(mesh: &Model, grid: Grid, ordered: Polygons, faces: Vec<u8>, positions: Vec<u8>) -> Self {
+    fn of(
+        mesh: &Model,
+        grid: Grid,
+        ordered: Polygons,
+        (faces, positions, surface): (Vec<u8>, Vec<u8>, Option<CodedSurface>),
+    ) -> Self {
         let points: Vec<Point> = mesh.points.iter().map(|&point| grid.nearest(point)).collect();
         let count = points.len();
         debug_assert_eq!(decode_faces(&faces, count, ordered.len(), ordered.indices().len()), Ok(ordered.clone()));
@@ -49,11 +59,12 @@ impl CodedMesh {
             mesh: Model { points, faces: ordered, colors: mesh.colors.clone(), ..Model::default() },
             faces,
             positions,
+            surface,
         }
     }
 
-    /// Bytes that its polygons and positions take; colours are not coded.
+    /// Bytes that its polygons, its positions and what lies on its faces take; colours of points are not coded.
     pub fn bytes(&self) -> usize {
-        self.faces.len() + self.positions.len()
+        self.faces.len() + self.positions.len() + self.surface.as_ref().map_or(0, |surface| surface.bytes.len())
     }
 }

@@ -2,6 +2,7 @@
 
 mod ears;
 
+use crate::surface::Surface;
 pub use crate::vector::Point;
 use crate::vector::{cross, dot, norm, sub};
 use glam::DVec3;
@@ -103,6 +104,8 @@ pub struct Model {
     pub colors: Vec<[u8; 3]>,
     /// Normals of the points of a cloud, as they were read; otherwise empty.
     pub normals: Vec<Point>,
+    /// What lies on the faces; empty where the file says nothing but points and faces.
+    pub surface: Surface,
 }
 
 /// A triangle mesh: the form a cage has.

@@ -1,13 +1,20 @@
 //! What lies on the faces of a model beside its points: named parts, texture coordinates, colours, hard edges, creases and materials.
 
+mod normals;
+
+pub use normals::{SharedNormals, numbered};
+
 use crate::mesh::Polygons;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::ops::Range;
 
 /// Of a face without a material.
 pub const NO_MATERIAL: u32 = u32::MAX;
 
 /// The parts of a model and the materials that they share.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(default)]
 pub struct Surface {
     /// One after another: their points and faces are those of the model in order.
     pub parts: Vec<Part>,
@@ -16,7 +23,8 @@ pub struct Surface {
 }
 
 /// One mesh of a scene.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(default)]
 pub struct Part {
     /// Names from the root of the scene down to the mesh with `/` between them; empty where there are none.
     pub path: String,
@@ -30,12 +38,14 @@ pub struct Part {
     pub color_sets: Vec<CornerSet<4>>,
     /// A number for each corner: where two faces meet, corners of a point that have the same number share a normal,
     /// and the edge is hard where they do not. Empty where the file has no normals.
+    #[serde(skip)]
     pub normals: Vec<u32>,
     /// How the mesh is to be subdivided.
     pub subdivision: Subdivision,
     /// Edges that a subdivision keeps sharp.
     pub creases: Vec<Crease>,
     /// The material of each face, [`NO_MATERIAL`] for none; empty where no face has one.
+    #[serde(skip)]
     pub materials: Vec<u32>,
     /// Named sets of faces that are not materials.
     pub groups: Vec<FaceGroup>,
@@ -44,18 +54,21 @@ pub struct Part {
 }
 
 /// Values by corner, where corners share them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct CornerSet<const N: usize> {
     /// What the file calls them.
     pub name: String,
     /// The values.
+    #[serde(skip)]
     pub values: Vec<[f32; N]>,
     /// Which value each corner has, faces one after another.
+    #[serde(skip)]
     pub corners: Vec<u32>,
 }
 
 /// A scheme of subdivision.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Subdivision {
     /// Polygons as they are.
     #[default]
@@ -69,7 +82,7 @@ pub enum Subdivision {
 }
 
 /// An edge that a subdivision keeps sharp.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Crease {
     /// Points of the part, the smaller one first.
     pub edge: [u32; 2],
@@ -78,16 +91,19 @@ pub struct Crease {
 }
 
 /// A named set of faces.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(default)]
 pub struct FaceGroup {
     /// Its name.
     pub name: String,
     /// Faces of the part, ascending.
+    #[serde(skip)]
     pub faces: Vec<u32>,
 }
 
 /// What a surface looks like: the part of it that MTL, UsdPreviewSurface, glTF and FBX have in common.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(default)]
 pub struct Material {
     /// Its name.
     pub name: String,
@@ -117,7 +133,7 @@ impl Default for Material {
 }
 
 /// A picture that a material names.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Texture {
     /// What it is for.
     pub channel: Channel,
@@ -126,7 +142,8 @@ pub struct Texture {
 }
 
 /// What a picture says of a material.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// Base colour, in sRGB.
     BaseColor,
@@ -211,6 +228,12 @@ impl PartRange {
 }
 
 impl Part {
+    /// Whether somewhere corners of one point have other normals; `corners` are those of its faces.
+    pub fn has_hard_edges(&self, corners: &[u32]) -> bool {
+        let mut first = HashMap::new();
+        corners.iter().zip(&self.normals).any(|(point, normal)| first.entry(point).or_insert(normal) != &normal)
+    }
+
     fn check(&self, range: &PartRange, faces: &Polygons, materials: usize) -> Result<(), String> {
         let (first, end) = (range.points.start as u32, range.points.end as u32);
         let corners = faces.indices().get(range.corners.clone()).ok_or("it has faces that the model lacks")?;

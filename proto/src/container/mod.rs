@@ -14,6 +14,7 @@ mod model;
 mod reader;
 mod rewrite;
 mod section;
+mod surface;
 mod units;
 mod writer;
 
@@ -117,6 +118,7 @@ pub(crate) mod tag {
         REST_POINTS = b"RPTS";
         REST_FACES = b"RFAC";
         REST_COLORS = b"rcol";
+        SURFACE = b"surf";
         CAGE_VERTICES = b"CVTX";
         CAGE_FACES = b"CTRI";
         ELEMENTS = b"ELEM";

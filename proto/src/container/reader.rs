@@ -160,6 +160,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.cage()?;
         self.layers()?;
         self.colors()?;
+        self.surface()?;
         self.elements()?;
         self.report()?;
         let mut cage = Vec::new();

@@ -6,7 +6,7 @@ use super::{CHUNK_FRAMES, Error, Header, MAX_HEADER_BYTES, counted_from_zero, ta
 use crate::le::f32_bytes;
 use crate::report::Report;
 use crate::wire;
-use cager_codec::{CodedMesh, encode_errors};
+use cager_codec::{CodedMesh, CodedSurface, encode_errors};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::units::Units;
 use std::io::Write;
@@ -81,6 +81,11 @@ impl<W: Write> ContainerWriter<W> {
         if !rest.colors.is_empty() {
             writer.section(tag::REST_COLORS, rest.colors.as_flattened())?;
         }
+        let surface = match coded_rest {
+            Some(coded) => coded.surface.clone(),
+            None => CodedSurface::new(rest, &rest.faces),
+        };
+        surface.map_or(Ok(()), |surface| writer.write_surface(&surface))?;
         writer.positions(tag::CAGE_VERTICES, &cage.vertices, coded_cage)?;
         writer.faces(tag::CAGE_FACES, cage.triangles.as_flattened(), coded_cage)?;
         Ok(writer)

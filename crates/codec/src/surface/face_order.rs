@@ -1,6 +1,6 @@
 //! The order of faces, and the corner that each begins with, as the source has them: [`decode_faces`](crate::decode_faces) gives them as the walk came by.
 
-use crate::entropy::{Coder, Decoder, Encoder, Integers};
+use crate::entropy::{Coder, Decoder, Encoder, Integers, Models};
 use crate::error::{Error, Result};
 use crate::vertex_order::{MAX_FAR_POINTS, code_order};
 use cager_geometry::mesh::Polygons;
@@ -10,9 +10,9 @@ use std::collections::HashMap;
 /// Faces of more corners share a context.
 const ARITIES: usize = 8;
 
-/// The bytes by which [`decode_face_order`] makes `source` of `coded`: none where they are the same. `None` where the
+/// The bytes by which [`decode`] makes `source` of `coded`: none where they are the same. `None` where the
 /// lists do not have the same faces.
-pub fn encode_face_order(source: &Polygons, coded: &Polygons) -> Option<Vec<u8>> {
+pub(super) fn encode(source: &Polygons, coded: &Polygons) -> Option<Vec<u8>> {
     if source == coded {
         return Some(Vec::new());
     }
@@ -40,7 +40,7 @@ pub fn encode_face_order(source: &Polygons, coded: &Polygons) -> Option<Vec<u8>>
 ///
 /// # Errors
 /// Bytes that the encoder did not write.
-pub fn decode_face_order(bytes: &[u8], coded: &Polygons) -> Result<Polygons> {
+pub(super) fn decode(bytes: &[u8], coded: &Polygons) -> Result<Polygons> {
     if bytes.is_empty() {
         return Ok(coded.clone());
     }
@@ -117,11 +117,11 @@ mod tests {
                 faces.push(&(0..random.usize(3..6)).map(|_| random.u32(..points)).collect::<Vec<_>>());
             }
             let coded = WalkedFaces::new(&faces, points as usize).faces;
-            let bytes = encode_face_order(&faces, &coded).unwrap();
-            assert_eq!(decode_face_order(&bytes, &coded).unwrap(), faces);
+            let bytes = encode(&faces, &coded).unwrap();
+            assert_eq!(decode(&bytes, &coded).unwrap(), faces);
             let damaged: Vec<u8> = (0..4 * random.usize(1..9)).map(|_| random.u8(..)).collect();
-            if let Ok(other) = decode_face_order(&damaged, &coded) {
-                assert!(encode_face_order(&other, &coded).is_some());
+            if let Ok(other) = decode(&damaged, &coded) {
+                assert!(encode(&other, &coded).is_some());
             }
         }
     }
@@ -135,7 +135,7 @@ mod tests {
             faces.push(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
         }
         let coded = WalkedFaces::new(&faces, (side * side) as usize).faces;
-        let bytes = encode_face_order(&faces, &coded).unwrap();
+        let bytes = encode(&faces, &coded).unwrap();
         assert!(8 * bytes.len() < faces.len(), "{} bytes of {} faces", bytes.len(), faces.len());
     }
 }

@@ -1,6 +1,6 @@
 //! One number for each face, mostly that of a face beside it.
 
-use crate::entropy::{BinaryModel, Coder, Decoder, Encoder, Integers};
+use crate::entropy::{BinaryModel, Coder, Decoder, Encoder, Integers, Models};
 use crate::error::Result;
 use cager_geometry::mesh::Polygons;
 use std::collections::HashMap;

@@ -7,11 +7,9 @@ mod sharing;
 mod values;
 
 use crate::error::{Error, Result};
-use cager_geometry::mesh::Polygons;
-use cager_geometry::surface::{CornerSet, FaceGroup, NO_MATERIAL, Part, Surface};
+use cager_geometry::mesh::{Model, Polygons};
+use cager_geometry::surface::{CornerSet, Part, Surface, numbered};
 use values::{decode_values, encode_values};
-
-pub use face_order::{decode_face_order, encode_face_order};
 
 /// Half of it is the error of texture coordinates: a quarter of a texel of a picture of 8,192.
 const UV_STEP: f64 = 1.0 / 16_384.0;
@@ -19,11 +17,68 @@ const UV_STEP: f64 = 1.0 / 16_384.0;
 const COLOR_STEP: f64 = 1.0 / 1_020.0;
 /// Most corner sets and groups of all parts together.
 const MAX_STREAMS: usize = 1 << 16;
+/// Numbers that are decoded at the most for each face and corner, and for each byte.
+const NUMBERS_OF_CORNERS: usize = 64;
+const NUMBERS_OF_BYTES: usize = 16;
 
 const CUT: Error = Error::Damaged("what lies on the faces is cut");
+const TOO_MANY: Error = Error::Damaged("more lies on the faces than a file of this size holds");
 
-/// Codes all numbers of a surface; names and what a part has are for the caller to keep.
-pub fn encode_surface(surface: &Surface, faces: &Polygons) -> Vec<u8> {
+/// What lies on the faces of a mesh, as bytes.
+#[derive(Clone, Debug)]
+pub struct CodedSurface {
+    /// The parts with their sizes, and the names of all sets and groups, without numbers by corner or face.
+    pub outline: Surface,
+    /// The order of the faces behind its length, then a stream for each set.
+    pub bytes: Vec<u8>,
+}
+
+impl CodedSurface {
+    /// Of a mesh whose faces are decoded in the order of `coded`. `None` where nothing lies on its faces.
+    pub fn new(mesh: &Model, coded: &Polygons) -> Option<Self> {
+        if mesh.surface.is_empty() {
+            return None;
+        }
+        let order = face_order::encode(&mesh.faces, coded)?;
+        let mut bytes = (order.len() as u32).to_le_bytes().to_vec();
+        bytes.extend(order);
+        bytes.extend(encode_parts(&mesh.surface, &mesh.faces));
+        Some(Self { outline: outline(mesh.surface.clone()), bytes })
+    }
+
+    /// The surface, and the faces in the order of the source that it is of.
+    ///
+    /// # Errors
+    /// Bytes that the encoder did not write for these faces of so many points.
+    pub fn decode(self, coded: &Polygons, points: usize) -> Result<(Surface, Polygons)> {
+        let (length, rest) = self.bytes.split_first_chunk::<4>().ok_or(CUT)?;
+        let (order, streams) = rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or(CUT)?;
+        let parts = &self.outline.parts;
+        let sum = |of: fn(&Part) -> usize| parts.iter().try_fold(0, |sum: usize, part| sum.checked_add(of(part)));
+        if (sum(|part| part.points), sum(|part| part.faces)) != (Some(points), Some(coded.len())) {
+            return Err(Error::Damaged("parts are not those of the mesh"));
+        }
+        let faces = face_order::decode(order, coded)?;
+        let most = NUMBERS_OF_CORNERS * (coded.len() + coded.indices().len()) + NUMBERS_OF_BYTES * streams.len();
+        let streams = Streams { bytes: streams, numbers_left: most, streams_left: MAX_STREAMS };
+        let surface = decode_parts(streams, self.outline, &faces)?;
+        surface.check(points, &faces).map_err(|_| Error::Damaged("what lies on the faces does not fit them"))?;
+        Ok((surface, faces))
+    }
+}
+
+/// Without what the streams hold.
+fn outline(mut surface: Surface) -> Surface {
+    for part in &mut surface.parts {
+        part.uv_sets.iter_mut().for_each(|set| (set.values, set.corners) = (Vec::new(), Vec::new()));
+        part.color_sets.iter_mut().for_each(|set| (set.values, set.corners) = (Vec::new(), Vec::new()));
+        (part.normals, part.materials) = (Vec::new(), Vec::new());
+        part.groups.iter_mut().for_each(|group| group.faces = Vec::new());
+    }
+    surface
+}
+
+fn encode_parts(surface: &Surface, faces: &Polygons) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (part, range) in surface.ranges(faces) {
         let local = range.local(faces);
@@ -44,24 +99,15 @@ pub fn encode_surface(surface: &Surface, faces: &Polygons) -> Vec<u8> {
     bytes
 }
 
-/// Fills in the numbers of [`encode_surface`]: `outline` has the parts with their sizes, and the names of all sets and
-/// groups. At most `most_numbers` are read.
-///
-/// # Errors
-/// Bytes that the encoder did not write for this outline and these faces.
-pub fn decode_surface(bytes: &[u8], outline: Surface, faces: &Polygons, most_numbers: usize) -> Result<Surface> {
-    let mut surface = Surface { materials: outline.materials.clone(), parts: Vec::new() };
-    let mut streams = Streams { bytes, numbers_left: most_numbers, streams_left: MAX_STREAMS };
+fn decode_parts(mut streams: Streams<'_>, outline: Surface, faces: &Polygons) -> Result<Surface> {
+    let mut parts = Vec::with_capacity(outline.parts.len());
     for (part, range) in outline.ranges(faces) {
-        if range.faces.end > faces.len() {
-            return Err(Error::Damaged("parts have more faces than there are"));
-        }
         let local = range.local(faces);
         if local.indices().iter().any(|&point| point as usize >= part.points) {
             return Err(Error::Damaged("a face has corners in two parts"));
         }
         let corners = local.indices().len();
-        let mut filled = Part { normals: Vec::new(), materials: Vec::new(), ..part.clone() };
+        let mut filled = part.clone();
         for set in &mut filled.uv_sets {
             decode_set(streams.next(5 * corners)?, set, &local, part.points)?;
         }
@@ -74,21 +120,19 @@ pub fn decode_surface(bytes: &[u8], outline: Surface, faces: &Polygons, most_num
         }
         let materials = streams.next(part.faces)?;
         if !materials.is_empty() {
-            let labels = labels::decode(materials, &local)?;
-            filled.materials = labels.into_iter().map(|k| k.wrapping_sub(1)).collect();
-            let count = outline.materials.len();
-            if filled.materials.iter().any(|&k| k != NO_MATERIAL && k as usize >= count) {
-                return Err(Error::Damaged("a face has a material that is not there"));
-            }
+            filled.materials = labels::decode(materials, &local)?.into_iter().map(|k| k.wrapping_sub(1)).collect();
         }
         for group in &mut filled.groups {
-            *group = FaceGroup { name: std::mem::take(&mut group.name), faces: Vec::new() };
             let inside = labels::decode(streams.next(part.faces)?, &local)?;
-            group.faces.extend((0..part.faces as u32).filter(|&face| inside[face as usize] == 1));
+            group.faces = (0..part.faces as u32).filter(|&face| inside[face as usize] == 1).collect();
         }
-        surface.parts.push(filled);
+        parts.push(filled);
     }
-    if streams.bytes.is_empty() { Ok(surface) } else { Err(Error::Damaged("more lies on the faces than is named")) }
+    if streams.bytes.is_empty() {
+        Ok(Surface { parts, materials: outline.materials })
+    } else {
+        Err(Error::Damaged("more lies on the faces than is named"))
+    }
 }
 
 /// Streams one after another, each behind its length.
@@ -101,14 +145,11 @@ struct Streams<'a> {
 impl<'a> Streams<'a> {
     /// The next one, which decodes to so many numbers at the most.
     fn next(&mut self, numbers: usize) -> Result<&'a [u8]> {
-        let too_many = Error::Damaged("more lies on the faces than a file of this size holds");
-        self.streams_left = self.streams_left.checked_sub(1).ok_or(too_many)?;
+        self.streams_left = self.streams_left.checked_sub(1).ok_or(TOO_MANY)?;
         let (length, rest) = self.bytes.split_first_chunk::<4>().ok_or(CUT)?;
         let (stream, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or(CUT)?;
         self.bytes = rest;
-        if !stream.is_empty() {
-            self.numbers_left = self.numbers_left.checked_sub(numbers).ok_or(CUT)?;
-        }
+        self.numbers_left = self.numbers_left.checked_sub(numbers).ok_or(TOO_MANY)?;
         Ok(stream)
     }
 }
@@ -116,7 +157,7 @@ impl<'a> Streams<'a> {
 /// A corner set: how its values are shared behind the length of that, then the values.
 fn encode_set<const N: usize>(set: &CornerSet<N>, faces: &Polygons, points: usize, step: f64) -> Vec<u8> {
     let sharing = sharing::encode(faces, points, &set.corners);
-    let (corners, firsts) = sharing::numbered(faces, points, &set.corners);
+    let (corners, firsts) = numbered(faces, &set.corners);
     let values: Vec<[f32; N]> = firsts.iter().map(|&corner| set.values[set.corners[corner] as usize]).collect();
     let mut bytes = (sharing.len() as u32).to_le_bytes().to_vec();
     bytes.extend(sharing);
@@ -148,7 +189,10 @@ fn renamed(faces: &Polygons, corners: &[u32]) -> Polygons {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cager_geometry::surface::Material;
+    use crate::connectivity::WalkedFaces;
+    use cager_geometry::surface::{FaceGroup, Material, NO_MATERIAL};
+
+    const POINTS: usize = 981;
 
     /// A part of `side` × `side` points whose texture is cut in the middle.
     fn part(side: u32, first: u32, faces: &mut Polygons) -> Part {
@@ -193,33 +237,25 @@ mod tests {
         set.corners.iter().map(|&k| set.values[k as usize]).collect()
     }
 
-    fn outline(surface: &Surface) -> Surface {
-        let mut outline = surface.clone();
-        for part in &mut outline.parts {
-            part.uv_sets.iter_mut().for_each(|set| (set.values, set.corners) = (Vec::new(), Vec::new()));
-            part.color_sets.iter_mut().for_each(|set| (set.values, set.corners) = (Vec::new(), Vec::new()));
-            (part.normals, part.materials) = (Vec::new(), Vec::new());
-            part.groups.iter_mut().for_each(|group| group.faces = Vec::new());
-        }
-        outline
-    }
-
-    fn two_parts() -> (Surface, Polygons) {
+    fn two_parts() -> Model {
         let mut faces = Polygons::new();
         let parts = vec![part(9, 0, &mut faces), part(30, 81, &mut faces)];
         let named = |name: &str| Material { name: name.to_owned(), ..Material::default() };
-        (Surface { parts, materials: vec![named("skin"), named("cloth")] }, faces)
+        let surface = Surface { parts, materials: vec![named("skin"), named("cloth")] };
+        Model { points: vec![[0.0; 3]; POINTS], faces, surface, ..Model::default() }
     }
 
     #[test]
     fn everything_on_the_faces_comes_back_within_its_step() {
-        let (surface, faces) = two_parts();
-        surface.check(981, &faces).unwrap();
-        let bytes = encode_surface(&surface, &faces);
-        assert!(bytes.len() < 1_800, "{}", bytes.len());
-        let back = decode_surface(&bytes, outline(&surface), &faces, 1 << 20).unwrap();
-        back.check(981, &faces).unwrap();
-        for (a, b) in surface.parts.iter().zip(&back.parts) {
+        let mesh = two_parts();
+        mesh.surface.check(POINTS, &mesh.faces).unwrap();
+        let walked = WalkedFaces::new(&mesh.faces, POINTS).faces;
+        assert_ne!(walked, mesh.faces);
+        let coded = CodedSurface::new(&mesh, &walked).unwrap();
+        assert!(coded.bytes.len() < 1_800, "{}", coded.bytes.len());
+        let (back, faces) = coded.decode(&walked, POINTS).unwrap();
+        assert_eq!(faces, mesh.faces);
+        for (a, b) in mesh.surface.parts.iter().zip(&back.parts) {
             for (x, y) in by_corner(&a.uv_sets[0]).iter().zip(by_corner(&b.uv_sets[0])) {
                 assert!((0..2).all(|k| (x[k] - y[k]).abs() <= 1.0 / 32_768.0 + 1e-6));
             }
@@ -236,20 +272,22 @@ mod tests {
 
     #[test]
     fn damage_is_an_error_or_a_surface_that_fits() {
-        let (surface, faces) = two_parts();
-        let bytes = encode_surface(&surface, &faces);
+        let mesh = two_parts();
+        let coded = CodedSurface::new(&mesh, &mesh.faces).unwrap();
         let mut random = fastrand::Rng::with_seed(11);
         for _ in 0..300 {
-            let mut damaged = bytes.clone();
+            let mut damaged = coded.clone();
             for _ in 0..random.usize(1..5) {
-                let at = random.usize(..damaged.len());
-                damaged[at] = random.u8(..);
+                let at = random.usize(..damaged.bytes.len());
+                damaged.bytes[at] = random.u8(..);
             }
-            damaged.truncate(random.usize(..2 * damaged.len()).min(bytes.len()));
-            if let Ok(back) = decode_surface(&damaged, outline(&surface), &faces, 1 << 20) {
-                back.check(981, &faces).unwrap();
+            damaged.bytes.truncate(random.usize(..2 * coded.bytes.len()).max(1));
+            if let Ok((back, faces)) = damaged.decode(&mesh.faces, POINTS) {
+                back.check(POINTS, &faces).unwrap();
             }
         }
-        assert!(decode_surface(&bytes, outline(&surface), &faces, 1_000).is_err());
+        let mut other = coded;
+        other.outline.parts[0].points = usize::MAX;
+        assert!(other.decode(&mesh.faces, POINTS).is_err());
     }
 }

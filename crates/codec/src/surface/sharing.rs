@@ -1,6 +1,6 @@
 //! Which corners of a point share a value. Across an edge both ends are mostly shared, or, at a seam, neither is.
 
-use crate::entropy::{BinaryModel, Coder, Decoder, Encoder, Integers};
+use crate::entropy::{BinaryModel, Coder, Decoder, Encoder, Integers, Models};
 use crate::error::{Error, Result};
 use cager_geometry::mesh::Polygons;
 use std::collections::HashMap;
@@ -20,20 +20,6 @@ pub(super) fn decode(bytes: &[u8], faces: &Polygons, points: usize) -> Result<(V
         code(&mut coder, faces, points, None).ok_or(Error::Damaged("corners share what is not there"))?;
     coder.check()?;
     Ok((corners, count))
-}
-
-/// The numbers that [`decode`] gives, and the first corner of each.
-pub(super) fn numbered(faces: &Polygons, points: usize, given: &[u32]) -> (Vec<u32>, Vec<usize>) {
-    let mut at = ValuesOfPoints::new(points);
-    let mut firsts = Vec::new();
-    let corners = faces.indices().iter().zip(given).enumerate().map(|(corner, (&point, &value))| {
-        at.find(point, value).unwrap_or_else(|| {
-            firsts.push(corner);
-            at.add(point, value)
-        })
-    });
-    let corners = corners.collect();
-    (corners, firsts)
 }
 
 /// The values of each point, newest first, with the numbers that they are given.
@@ -57,7 +43,7 @@ impl ValuesOfPoints {
         number
     }
 
-    fn iter(&self, point: u32) -> impl Iterator<Item = u32> + Clone {
+    fn iter(&self, point: u32) -> impl Iterator<Item = u32> {
         let known = |number: u32| (number != NONE).then_some(number);
         std::iter::successors(known(self.newest[point as usize]), move |&k| known(self.older[k as usize]))
     }
@@ -75,12 +61,7 @@ struct Across {
     other_end: usize,
 }
 
-fn code(
-    coder: &mut impl Coder,
-    faces: &Polygons,
-    points: usize,
-    given: Option<&[u32]>,
-) -> Option<(Vec<u32>, usize)> {
+fn code(coder: &mut impl Coder, faces: &Polygons, points: usize, given: Option<&[u32]>) -> Option<(Vec<u32>, usize)> {
     let mut values = ValuesOfPoints::new(points);
     let mut corners: Vec<u32> = Vec::with_capacity(faces.indices().len());
     // For each directed edge of the faces so far the numbers at its ends.
@@ -123,14 +104,14 @@ fn code(
                 continue;
             }
             // 0 for a new one, or the place among those that were not ruled out.
-            let mut rest = values.iter(point).filter(|&number| number != guess && Some(number) != other);
-            let place = known.flatten().and_then(|number| rest.clone().position(|k| k == number));
+            let rest = || values.iter(point).filter(|&number| number != guess && Some(number) != other);
+            let place = known.flatten().and_then(|number| rest().position(|k| k == number));
             let place = places.natural(coder, 0, place.map_or(0, |place| place as u32 + 1));
-            let number = match place.checked_sub(1) {
-                None => values.add(point, given.map_or(0, |given| given[begin + k])),
-                Some(place) => rest.nth(place as usize)?,
+            let old = match place.checked_sub(1) {
+                None => None,
+                Some(place) => Some(rest().nth(place as usize)?),
             };
-            corners.push(number);
+            corners.push(old.unwrap_or_else(|| values.add(point, given.map_or(0, |given| given[begin + k]))));
         }
         for (k, &point) in face.iter().enumerate() {
             let after = (k + 1) % face.len();

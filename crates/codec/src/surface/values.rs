@@ -39,11 +39,7 @@ pub(super) fn encode_values<const N: usize>(torn: &Polygons, values: &[[f32; N]]
 }
 
 /// The values of [`encode_values`].
-pub(super) fn decode_values<const N: usize>(
-    mut bytes: &[u8],
-    torn: &Polygons,
-    count: usize,
-) -> Result<Vec<[f32; N]>> {
+pub(super) fn decode_values<const N: usize>(mut bytes: &[u8], torn: &Polygons, count: usize) -> Result<Vec<[f32; N]>> {
     const CUT: Error = Error::Damaged("values at corners are cut");
     let mut values = vec![[1.0; N]; count];
     if count == 0 {

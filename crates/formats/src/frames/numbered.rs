@@ -54,6 +54,12 @@ impl NumberedNames {
         format!("{}{}{}", self.before, padded(number, self.digits), self.after)
     }
 
+    /// The name of the file of materials that all of them share.
+    pub(super) fn library(&self) -> String {
+        let name = self.before.trim_end_matches(|c: char| !c.is_alphanumeric());
+        format!("{}.mtl", if name.is_empty() { "materials" } else { name })
+    }
+
     /// The glob pattern of such names, and of others with something else in place of the number.
     pub(super) fn glob(&self) -> String {
         format!("{}*{}", glob::Pattern::escape(&self.before), glob::Pattern::escape(&self.after))

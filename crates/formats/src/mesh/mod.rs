@@ -24,9 +24,10 @@ use crate::signature::Signature;
 use crate::text::{Lines, quoted};
 use crate::usd;
 
+pub(crate) use obj::{ObjText, materials_text, write_obj_faces};
 use parsed::Parsed;
 pub use write::{model_bytes, obj_bytes, write_model};
-pub(crate) use write::{write_obj_faces, write_off, write_ply, write_stl};
+pub(crate) use write::{write_off, write_ply, write_stl};
 
 /// A mesh file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -127,7 +128,7 @@ pub struct ReadModel {
 
 impl ReadModel {
     fn of(parsed: Parsed, path: &Path) -> Self {
-        let Parsed { model, left_out, units, dropped } = parsed;
+        let Parsed { model, left_out, units, dropped, .. } = parsed;
         let faces = if left_out == 1 { "face" } else { "faces" };
         let note =
             format!("{}: left out {left_out} {faces} of fewer than three corners, which have no area", path.display());
@@ -222,7 +223,9 @@ fn parse_file(path: &Path, prim: Option<&str>) -> Result<Parsed, Error> {
         return read_scene(format, path, file, length, (prim, path.parent()));
     }
     let (format, bytes) = read_named(path)?;
-    read_bytes(format, path, &bytes, Contents::PointsAndFaces, prim)
+    let mut parsed = read_bytes(format, path, &bytes, Contents::PointsAndFaces, prim)?;
+    obj::read_materials(&mut parsed, path);
+    Ok(parsed)
 }
 
 fn read_scene(
@@ -245,7 +248,7 @@ fn read_scene(
         usd::open(source, length, prim, Some(&mut dropped))
     };
     let (model, left_out, units) = opened.map_err(|failure| failure.at(name))?.into_model(name)?;
-    Ok(Parsed { model, left_out, units, dropped })
+    Ok(Parsed { left_out, units, dropped, ..Parsed::from(model) })
 }
 
 fn read_bytes(

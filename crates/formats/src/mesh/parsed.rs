@@ -11,6 +11,8 @@ pub(super) struct Parsed {
     /// Faces of fewer than three corners, which are edges and points.
     pub(super) left_out: usize,
     pub(super) units: Units,
+    /// Files of materials that it names.
+    pub(super) libraries: Vec<String>,
     /// What else the file has.
     pub(super) dropped: Dropped,
 }
@@ -32,6 +34,6 @@ impl Parsed {
 
 impl From<Model> for Parsed {
     fn from(model: Model) -> Self {
-        Self { model, left_out: 0, units: Units::UNKNOWN, dropped: Dropped::default() }
+        Self { model, left_out: 0, units: Units::UNKNOWN, libraries: Vec::new(), dropped: Dropped::default() }
     }
 }

@@ -3,8 +3,9 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use cager_geometry::mesh::{Model, Polygons};
+use cager_geometry::mesh::Model;
 
+use super::obj::{ObjText, write_obj_faces};
 use super::{MeshFormat, extensions};
 use crate::atomic::AtomicFile;
 use crate::error::{Error, Fault};
@@ -68,28 +69,21 @@ pub fn obj_bytes(model: &Model) -> Vec<u8> {
 }
 
 fn write_obj<W: Write>(out: &mut W, model: &Model) -> io::Result<()> {
-    for (k, [x, y, z]) in model.points.iter().enumerate() {
+    let vertex = |out: &mut W, k: usize| {
+        let [x, y, z] = model.points[k];
         match model.colors.get(k) {
             Some(color) => {
                 let [red, green, blue] = color.map(|x| f64::from(x) / 255.0);
-                writeln!(out, "v {x:?} {y:?} {z:?} {red:.4} {green:.4} {blue:.4}")?;
+                writeln!(out, "v {x:?} {y:?} {z:?} {red:.4} {green:.4} {blue:.4}")
             }
-            None => writeln!(out, "v {x:?} {y:?} {z:?}")?,
+            None => writeln!(out, "v {x:?} {y:?} {z:?}"),
         }
+    };
+    if model.surface.is_empty() {
+        (0..model.points.len()).try_for_each(|k| vertex(out, k))?;
+        return write_obj_faces(out, &model.faces);
     }
-    write_obj_faces(out, &model.faces)
-}
-
-/// The `f` lines of an OBJ file.
-pub(crate) fn write_obj_faces(out: &mut impl Write, faces: &Polygons) -> io::Result<()> {
-    for face in faces.iter() {
-        out.write_all(b"f")?;
-        for &index in face {
-            write!(out, " {}", u64::from(index) + 1)?;
-        }
-        out.write_all(b"\n")?;
-    }
-    Ok(())
+    ObjText::new(&model.faces, &model.surface, None).write(out, vertex, |k| model.points[k])
 }
 
 pub(crate) fn write_off(out: &mut impl Write, model: &Model) -> io::Result<()> {

@@ -9,15 +9,19 @@ use cager_geometry::vector::add;
 
 use super::output::{Announced, FrameOptions, check_precision};
 use crate::error::{Error, Fault};
-use crate::mesh::{MeshFormat, write_obj_faces, write_off, write_ply, write_stl};
+use crate::mesh::{MeshFormat, ObjText, materials_text, write_obj_faces, write_off, write_ply, write_stl};
 
 /// A mesh format that frames are written in, with what is the same in all of them.
 pub(super) struct FrameMesh {
     pub(super) format: MeshFormat,
     /// The mesh; its points change.
     model: Model,
-    /// The `f` lines of `.obj`.
+    /// The `f` lines of `.obj` without anything on its faces.
     faces: Vec<u8>,
+    /// Of `.obj` whose faces have something on them.
+    text: Option<ObjText>,
+    /// The materials, and the name of their file.
+    pub(super) library: Option<(String, Vec<u8>)>,
     /// What is added to all positions, in double precision.
     origin: Option<Point>,
 }
@@ -33,6 +37,7 @@ impl FrameMesh {
         announced: &Announced,
         faces: &Polygons,
         options: &FrameOptions,
+        library: &str,
     ) -> Result<Self, Error> {
         let path = &announced.path;
         if let Some(&index) = faces.indices().iter().find(|&&index| index as usize >= announced.points) {
@@ -42,9 +47,16 @@ impl FrameMesh {
             ))
             .at(path));
         }
-        let mut text = Vec::new();
+        let (mut lines, surface) = (Vec::new(), &options.surface);
+        let (mut text, mut of_materials) = (None, None);
         match format {
-            MeshFormat::Obj => write_obj_faces(&mut text, faces).map_err(|cause| Error::write(path, cause))?,
+            MeshFormat::Obj if !surface.is_empty() => {
+                let has_materials = !surface.materials.is_empty();
+                of_materials =
+                    has_materials.then(|| (library.to_owned(), materials_text(&surface.materials).into_bytes()));
+                text = Some(ObjText::new(faces, surface, has_materials.then_some(library)));
+            }
+            MeshFormat::Obj => write_obj_faces(&mut lines, faces).map_err(|cause| Error::write(path, cause))?,
             MeshFormat::Stl if faces.is_empty() => {
                 let what = "cannot be .stl, which holds triangles alone, and there are only points; write .ply instead";
                 return Err(Fault::unsupported(what).at(path));
@@ -53,7 +65,7 @@ impl FrameMesh {
             _ => {}
         }
         let model = Model { faces: faces.clone(), ..Model::default() };
-        Ok(Self { format, model, faces: text, origin: options.origin })
+        Ok(Self { format, model, faces: lines, text, library: of_materials, origin: options.origin })
     }
 
     /// Writes the mesh of a frame.
@@ -62,17 +74,21 @@ impl FrameMesh {
     }
 
     fn write_points(&mut self, out: &mut impl Write, positions: &[f32]) -> io::Result<()> {
-        let (points, origin) = (positions.as_chunks().0, self.origin);
-        if self.format == MeshFormat::Obj {
-            for point in points {
-                match origin {
-                    Some(origin) => write_vertex(out, &add(point.map(f64::from), origin))?,
-                    None => write_vertex(out, point)?,
-                }
-            }
-            return out.write_all(&self.faces);
-        }
+        let (points, origin): (&[[f32; 3]], _) = (positions.as_chunks().0, self.origin);
         let place = |p: &[f32; 3]| origin.map_or(p.map(f64::from), |origin| add(p.map(f64::from), origin));
+        if self.format == MeshFormat::Obj {
+            let vertex = |out: &mut _, k: usize| match origin {
+                Some(_) => write_vertex(out, &place(&points[k])),
+                None => write_vertex(out, &points[k]),
+            };
+            return match &self.text {
+                Some(text) => text.write(out, vertex, |k| points[k].map(f64::from)),
+                None => {
+                    (0..points.len()).try_for_each(|k| vertex(out, k))?;
+                    out.write_all(&self.faces)
+                }
+            };
+        }
         self.model.points.clear();
         self.model.points.extend(points.iter().map(place));
         match self.format {

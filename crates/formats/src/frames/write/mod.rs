@@ -96,7 +96,7 @@ pub fn create_frames(
         return Err(Fault::unsupported("is not written with a cage; write .usdc or .usdz").at(path));
     }
     let output = begin(&all, target, faces, options)?;
-    Ok(FrameWriter::new(all, output))
+    Ok(FrameWriter::new(all, output, &options.surface))
 }
 
 fn begin(all: &Announced, target: &Target, faces: &Polygons, options: &FrameOptions) -> Result<Box<dyn Output>, Error> {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::{Point, Polygons};
+use cager_geometry::surface::{Part, Surface};
 use cager_geometry::units::{Change, Units};
 
 use crate::error::{Error, Fault};
@@ -12,11 +13,14 @@ use crate::frames::RATES;
 pub struct FrameWriter {
     announced: Announced,
     output: Box<dyn Output>,
+    /// What the format has no place for.
+    lost: Option<String>,
 }
 
 impl FrameWriter {
-    pub(super) fn new(announced: Announced, output: Box<dyn Output>) -> Self {
-        Self { announced, output }
+    pub(super) fn new(announced: Announced, output: Box<dyn Output>, surface: &Surface) -> Self {
+        let lost = lost(surface, output.keeps_surface());
+        Self { announced, output, lost }
     }
 
     /// Writes the next frame, 3 × points coordinates `x y z x y z …`.
@@ -53,7 +57,12 @@ impl FrameWriter {
 
     /// What the user should know of the output, once all frames are written.
     pub fn notes(&self) -> Vec<String> {
-        self.output.notes().iter().map(|note| format!("{}: {note}", self.announced.path.display())).collect()
+        self.output
+            .notes()
+            .iter()
+            .chain(&self.lost)
+            .map(|note| format!("{}: {note}", self.announced.path.display()))
+            .collect()
     }
 
     /// Makes the frames durable and gives the output its name.
@@ -65,6 +74,24 @@ impl FrameWriter {
         self.announced.check_complete()?;
         self.output.finish(&self.announced)
     }
+}
+
+/// What a file lacks that has no place for it, in words; of those that have one, what they keep of several.
+fn lost(surface: &Surface, is_kept: bool) -> Option<String> {
+    let any = |has: fn(&Part) -> bool| surface.parts.iter().any(has);
+    let kinds: [(&str, bool); 6] = [
+        ("further sets of texture coordinates", is_kept && any(|part| part.uv_sets.len() > 1)),
+        ("texture coordinates", !is_kept && any(|part| !part.uv_sets.is_empty())),
+        ("colours of corners", any(|part| !part.color_sets.is_empty())),
+        ("materials", !is_kept && any(|part| !part.materials.is_empty())),
+        ("groups of faces", !is_kept && any(|part| !part.groups.is_empty())),
+        ("hard edges", !is_kept && any(|part| !part.normals.is_empty())),
+    ];
+    let names: Vec<&str> = kinds.iter().filter(|(_, is_lost)| *is_lost).map(|(name, _)| *name).collect();
+    let (last, others) = names.split_last()?;
+    let all = if others.is_empty() { (*last).to_owned() } else { format!("{} and {last}", others.join(", ")) };
+    let way = if is_kept { "" } else { "; write .obj files for them" };
+    Some(format!("has no place for {all}, which the capture has{way}"))
 }
 
 /// A format of frames, of which each was checked before it is written.
@@ -95,6 +122,11 @@ pub(super) trait Output: Send {
         &[]
     }
 
+    /// Whether texture coordinates, materials, groups and hard edges are written.
+    fn keeps_surface(&self) -> bool {
+        false
+    }
+
     fn finish(self: Box<Self>, announced: &Announced) -> Result<(), Error>;
 }
 
@@ -115,6 +147,8 @@ pub struct FrameOptions {
     pub cage: Option<CageMesh>,
     /// How `.glb` and `.gltf` hold the frames.
     pub morphs: MorphOptions,
+    /// What lies on the faces; what a format has no place for is left out, and a note says so.
+    pub surface: Surface,
 }
 
 /// A cage that is written as a second mesh, which programs show as a guide and do not render.
@@ -171,6 +205,7 @@ impl Default for FrameOptions {
             units: Units::UNKNOWN,
             cage: None,
             morphs: MorphOptions::default(),
+            surface: Surface::default(),
         }
     }
 }

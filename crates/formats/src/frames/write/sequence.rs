@@ -47,14 +47,22 @@ impl SequenceWriter {
         options: &FrameOptions,
     ) -> Result<Self, Error> {
         let format = if names.extension_is("ply") { MeshFormat::Ply } else { MeshFormat::Obj };
-        let mesh = FrameMesh::new(format, announced, faces, options)?;
-        let (path, is_frame) = (&announced.path, |name: &str| names.number(name).is_some());
-        let place = if shares_folder(target.path()) {
-            let new = (0..announced.frames).map(|frame| names.name(options.number(frame))).collect();
+        let library = names.library();
+        let mesh = FrameMesh::new(format, announced, faces, options, &library)?;
+        let is_frame = |name: &str| names.number(name).is_some() || mesh.library.is_some() && name == library;
+        let path = &announced.path;
+        let mut place = if shares_folder(target.path()) {
+            let frames = (0..announced.frames).map(|frame| names.name(options.number(frame)));
+            let new = frames.chain(mesh.library.is_some().then(|| library.clone())).collect();
             Place::Shared(AtomicGroup::create(path, target.replaces(), &new, is_frame)?)
         } else {
             Place::Own(AtomicDir::create(path, |name| target.replaces() && is_frame(name))?)
         };
+        if let Some((name, text)) = &mesh.library {
+            let path = path.join(name);
+            let mut file = place.create_file(name, &path)?;
+            file.write_all(text).map_err(|cause| Error::write(&path, cause))?;
+        }
         Ok(Self { place, mesh, names, options: options.clone() })
     }
 }
@@ -77,8 +85,12 @@ impl Output for SequenceWriter {
     ) -> Result<(), Error> {
         announced.points = points;
         announced.check(&self.options).map_err(|fault| fault.at(&announced.path))?;
-        self.mesh = FrameMesh::new(self.mesh.format, announced, faces, options)?;
+        self.mesh = FrameMesh::new(self.mesh.format, announced, faces, options, &self.names.library())?;
         Ok(())
+    }
+
+    fn keeps_surface(&self) -> bool {
+        self.mesh.format == MeshFormat::Obj
     }
 
     fn finish(self: Box<Self>, _: &Announced) -> Result<(), Error> {

@@ -6,12 +6,14 @@ use cager_geometry::mesh::Polygons;
 
 use super::mesh::FrameMesh;
 use super::output::{Announced, FrameOptions, Output};
-use crate::atomic::{AtomicFile, Target};
+use crate::atomic::{AtomicFile, Target, commit_together};
 use crate::error::{Error, Fault};
 use crate::mesh::MeshFormat;
 
 pub(super) struct SingleWriter {
     file: AtomicFile,
+    /// The materials, beside it.
+    library: Option<AtomicFile>,
     mesh: FrameMesh,
 }
 
@@ -33,8 +35,19 @@ impl SingleWriter {
             ))
             .at(&announced.path));
         }
-        let mesh = FrameMesh::new(format, announced, faces, options)?;
-        Ok(Self { file: AtomicFile::create(target)?, mesh })
+        let beside = target.beside("mtl");
+        let name = beside.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mesh = FrameMesh::new(format, announced, faces, options, &name)?;
+        let library = match &mesh.library {
+            Some((_, text)) => {
+                let path = beside.path().to_owned();
+                let mut file = AtomicFile::create(beside)?;
+                file.write_all(text).map_err(|cause| Error::write(&path, cause))?;
+                Some(file)
+            }
+            None => None,
+        };
+        Ok(Self { file: AtomicFile::create(target)?, library, mesh })
     }
 }
 
@@ -45,7 +58,11 @@ impl Output for SingleWriter {
         out.flush().map_err(|cause| Error::write(&announced.path, cause))
     }
 
+    fn keeps_surface(&self) -> bool {
+        self.mesh.format == MeshFormat::Obj
+    }
+
     fn finish(self: Box<Self>, _: &Announced) -> Result<(), Error> {
-        self.file.commit()
+        commit_together([self.file].into_iter().chain(self.library).collect())
     }
 }

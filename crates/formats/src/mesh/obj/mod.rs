@@ -1,6 +1,16 @@
-//! Wavefront OBJ: `v`, `vn` and `f` lines, without faces that are edges or points.
+//! Wavefront OBJ: points, faces and what lies on these, without faces that are edges or points.
+
+mod mtl;
+mod surface;
+mod write;
+
+use std::path::Path;
 
 use cager_geometry::mesh::Model;
+
+pub(crate) use mtl::materials_text;
+use surface::SurfaceLines;
+pub(crate) use write::{ObjText, write_obj_faces};
 
 use super::parsed::Parsed;
 use super::unread::Unread;
@@ -8,6 +18,9 @@ use crate::colors::{Colors, Scale};
 use crate::error::Fault;
 use crate::faces::{Contents, no_such_vertex};
 use crate::text::{self, Lines, damaged, integer, point, quoted, words};
+
+/// Bytes of a file of materials.
+const LARGEST_LIBRARY: u64 = 64 << 20;
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
     let parsed = scan(bytes, contents, None)?;
@@ -23,7 +36,7 @@ pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
 /// One pass over the file; with `points`, stops at the first face that names a later vertex.
 fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parsed, Fault> {
     let (mut model, mut colors, mut left_out) = (Model::default(), Colors::default(), 0);
-    let (mut face, mut unread) = (Vec::new(), Unread::default());
+    let (mut face, mut unread, mut on_faces) = (Vec::new(), Unread::default(), SurfaceLines::default());
     let mut colored = 0;
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next() {
@@ -38,7 +51,9 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
             if keyword == b"vn" && model.faces.is_empty() {
                 model.normals.extend(point(&mut words(&line[keyword.len()..]), String::new).ok());
             }
-            unread.note(keyword, line);
+            if !on_faces.take(keyword, line[keyword.len()..].trim_ascii(), model.points.len()) {
+                unread.note(keyword, line);
+            }
             continue;
         }
         let joined;
@@ -64,7 +79,9 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
             face.clear();
             for word in words {
                 face.push(corner(word, model.points.len(), points, number)?);
+                on_faces.corner(word);
             }
+            on_faces.face(face.len(), face.len() >= 3);
             if face.len() >= 3 {
                 model.faces.push(&face);
             } else if lines.is_cut() {
@@ -78,7 +95,9 @@ fn scan(bytes: &[u8], contents: Contents, points: Option<usize>) -> Result<Parse
         model.normals.clear();
     }
     model.colors = colors.finish(model.points.len(), Scale::Unsaid);
-    let mut parsed = Parsed { left_out, ..model.into() };
+    let libraries = std::mem::take(&mut on_faces.libraries);
+    on_faces.finish(&mut model);
+    let mut parsed = Parsed { left_out, libraries, ..model.into() };
     if colored > 0 && parsed.model.colors.is_empty() {
         parsed.dropped.add("vertex colours, which not all points have");
     }
@@ -110,4 +129,18 @@ fn corner(word: &[u8], before: usize, points: Option<usize>, line: usize) -> Res
     }
     // No file has as many points, so that the check at the end finds this one.
     Ok(u32::try_from(from_zero).unwrap_or(u32::MAX))
+}
+
+/// Fills in the materials of a model from the files beside it that it names; what cannot be read is left as it is.
+pub(super) fn read_materials(parsed: &mut Parsed, path: &Path) {
+    for library in &parsed.libraries {
+        let file = path.with_file_name("").join(library);
+        let is_small = file.metadata().is_ok_and(|found| found.is_file() && found.len() <= LARGEST_LIBRARY);
+        let Some(bytes) = is_small.then(|| std::fs::read(&file).ok()).flatten() else { continue };
+        for found in mtl::read(&bytes) {
+            if let Some(material) = parsed.model.surface.materials.iter_mut().find(|m| m.name == found.name) {
+                *material = found;
+            }
+        }
+    }
 }

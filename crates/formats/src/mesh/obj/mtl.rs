@@ -79,7 +79,7 @@ fn file_of(line: &[u8]) -> String {
 }
 
 /// Materials as a file.
-pub(super) fn to_text(materials: &[Material]) -> String {
+pub(crate) fn materials_text(materials: &[Material]) -> String {
     let mut text = String::new();
     for material in materials {
         let [red, green, blue] = material.base_color;
@@ -121,6 +121,6 @@ mod tests {
         let paths: Vec<(Channel, &str)> = gold.textures.iter().map(|t| (t.channel, t.path.as_str())).collect();
         assert_eq!(paths, [(Channel::BaseColor, "../tex/gold base.png"), (Channel::Normal, "n.png")]);
         assert_eq!((read_back[1].roughness, read_back[1].opacity), (0.5, 0.75));
-        assert_eq!(read(to_text(&read_back).as_bytes()), read_back);
+        assert_eq!(read(materials_text(&read_back).as_bytes()), read_back);
     }
 }

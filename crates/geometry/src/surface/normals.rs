@@ -1,0 +1,82 @@
+//! Normals of corners, computed anew where a surface was deformed.
+
+use crate::mesh::{Point, Polygons};
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// Corners of a point that have the same of these numbers as one: a new number for each corner, counted from 0 as they
+/// come, and the first corner of each.
+pub fn numbered(faces: &Polygons, given: &[u32]) -> (Vec<u32>, Vec<usize>) {
+    let mut known: HashMap<(u32, u32), u32> = HashMap::with_capacity(given.len());
+    let mut firsts = Vec::new();
+    let corners = faces.indices().iter().zip(given).enumerate().map(|(corner, (&point, &number))| {
+        *known.entry((point, number)).or_insert_with(|| {
+            firsts.push(corner);
+            firsts.len() as u32 - 1
+        })
+    });
+    let corners = corners.collect();
+    (corners, firsts)
+}
+
+/// Which corners share a normal: see [`Part::normals`](super::Part::normals).
+#[derive(Clone, Debug)]
+pub struct SharedNormals {
+    faces: Polygons,
+    /// The normal of each corner.
+    pub corners: Vec<u32>,
+    /// How many normals there are.
+    pub count: usize,
+}
+
+impl SharedNormals {
+    /// Of faces and the numbers of their corners.
+    pub fn new(faces: Polygons, given: &[u32]) -> Self {
+        let (corners, firsts) = numbered(&faces, given);
+        Self { faces, corners, count: firsts.len() }
+    }
+
+    /// The unit normals where points are, faces weighted by their angles (Thürmer and Wüthrich 1998); zero where no face
+    /// has an area.
+    pub fn at(&self, point: impl Fn(u32) -> Point) -> Vec<Point> {
+        let mut sums = vec![DVec3::ZERO; self.count];
+        let mut begin = 0;
+        for face in self.faces.iter() {
+            let places: Vec<DVec3> = face.iter().map(|&p| point(p).into()).collect();
+            let count = places.len();
+            // Newell's normal, of polygons that are not flat too.
+            let center = places.iter().sum::<DVec3>() / count as f64;
+            let area = |k: usize| (places[k] - center).cross(places[(k + 1) % count] - center);
+            let normal = (0..count).map(area).sum::<DVec3>().normalize_or_zero();
+            for k in 0..count {
+                let [before, after] = [(k + count - 1) % count, (k + 1) % count].map(|j| places[j] - places[k]);
+                let angle = before.cross(after).length().atan2(before.dot(after));
+                sums[self.corners[begin + k] as usize] += normal * angle;
+            }
+            begin += count;
+        }
+        sums.into_iter().map(|sum| sum.normalize_or_zero().to_array()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_is_hard_where_its_corners_do_not_share() {
+        let mut faces = Polygons::new();
+        faces.push(&[0, 1, 2, 3]);
+        faces.push(&[0, 3, 4]);
+        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let at = |point: u32| points[point as usize];
+        let smooth = SharedNormals::new(faces.clone(), &[0; 7]);
+        assert_eq!((smooth.count, smooth.corners.clone()), (5, vec![0, 1, 2, 3, 0, 3, 4]));
+        let normals = smooth.at(at);
+        assert_eq!(normals[1], [0.0, 0.0, 1.0]);
+        assert!((normals[0][2] - 0.5f64.sqrt()).abs() < 1e-12 && normals[0][1] == 0.0, "{:?}", normals[0]);
+        let hard = SharedNormals::new(faces, &[0, 0, 0, 0, 1, 1, 1]);
+        assert_eq!(hard.count, 7);
+        assert_eq!(hard.at(at)[4..], [[1.0, 0.0, 0.0]; 3]);
+    }
+}
