@@ -1,7 +1,7 @@
 //! Cages from files, with what is wrong with them told in the words of the command line.
 
 use super::checks::explained_cage;
-use super::{dropped, is_container, warning};
+use super::{is_container, warning};
 use anyhow::Result;
 use cager_capture::cage_file;
 use cager_client::MeshFile;
@@ -30,7 +30,7 @@ pub(super) fn read_cage_like(path: &Path, units: Units) -> Result<Model> {
 /// What is lost of a cage that is written anew; what is wrong with it is told where it is read.
 pub(super) fn dropped_of_cage(path: &Path) -> Option<String> {
     let read = cager_formats::read_mesh(path, None).ok().filter(|_| !is_container(path))?;
-    dropped(path, &read)
+    read.dropped_with_appearance().sentence(path, false)
 }
 
 /// A cage for a service, in the units and axes of its model.

@@ -93,7 +93,8 @@ pub(super) fn run(args: &ExploreArgs) -> Result<()> {
     let faces = &poses.model.faces;
     let origin = own_origin(&poses.model.points);
     let rounding = MAX_ROUNDING_ERROR * diagonal(&poses.model.points);
-    let options = FrameOptions { origin, rounding, units: poses.units, ..FrameOptions::default() };
+    let surface = poses.model.surface.clone();
+    let options = FrameOptions { origin, rounding, units: poses.units, surface, ..FrameOptions::default() };
     let mut writer = create_frames(output, poses.model.points.len(), count, faces, &options)?;
     let bar = progress::frames("shaping", count);
     let shapes = shapes(args, &triangles, points, bound.as_ref()).map_err(|error| named(error, 0))?;

@@ -156,7 +156,7 @@ fn read_whole(path: &Path, prim: Option<&str>) -> Result<ReadModel, cager_format
     Ok(read)
 }
 
-/// What of a mesh an output loses that has points and faces alone.
+/// What of a mesh an output loses that has no colours; of what lies on the faces its format says what it loses.
 fn dropped(path: &Path, read: &ReadModel) -> Option<String> {
     read.dropped_with_colors().sentence(path, false)
 }

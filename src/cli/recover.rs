@@ -188,7 +188,7 @@ fn frames(args: &RecoverArgs) -> Result<MeshSequence> {
 /// an option, and their normals are followed.
 fn dropped_of_first(files: &MeshSequence) -> Option<String> {
     let path = files.files.first()?;
-    let dropped = read_mesh(path, None).ok()?.dropped.appearance();
+    let dropped = read_mesh(path, None).ok()?.dropped_with_appearance().appearance();
     let frames = if files.files.len() > 1 { ", nor those of other frames" } else { "" };
     dropped.sentence(path, false).map(|sentence| sentence + frames)
 }

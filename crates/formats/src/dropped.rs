@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use cager_geometry::mesh::Model;
+use cager_geometry::surface::{Part, Surface};
+
 /// Names that a list shows, and characters of each.
 const LISTED: usize = 4;
 const SHOWN: usize = 40;
@@ -44,17 +47,24 @@ impl Dropped {
     }
 
     /// The colours of points, for outputs that have none.
-    pub fn add_colors(&mut self) {
-        self.add("vertex colours");
+    pub(crate) fn add_colors(&mut self, model: &Model) {
+        if !model.colors.is_empty() {
+            self.add("vertex colours");
+        }
+    }
+
+    /// All that lies on the faces, for outputs that have none of it.
+    pub(crate) fn add_surface(&mut self, surface: &Surface) {
+        phrases_of(surface, false).into_iter().for_each(|phrase| self.add_on_faces(phrase));
     }
 
     /// `rest.obj: texture coordinates (vt) are not kept`; none where nothing is lost.
     /// `is_reordered` where faces are in an order of their own, so that what belongs to them cannot
     /// be put back by numbers.
     pub fn sentence(&self, path: &Path, is_reordered: bool) -> Option<String> {
-        let (last, others) = self.phrases.split_last()?;
-        let all = if others.is_empty() { last.clone() } else { format!("{} and {last}", others.join(", ")) };
-        let is_one = others.is_empty() && ["1 ", "its "].iter().any(|start| last.starts_with(start));
+        let all = joined(&self.phrases)?;
+        let last = &self.phrases[0];
+        let is_one = self.phrases.len() == 1 && ["1 ", "its "].iter().any(|start| last.starts_with(start));
         let are = if is_one { "is" } else { "are" };
         let order = if is_reordered && self.is_on_faces {
             ", nor is the order of faces and of their corners; --exact-rest keeps that order, for putting them back"
@@ -63,6 +73,47 @@ impl Dropped {
         };
         Some(format!("{}: {all} {are} not kept{order}", path.display()))
     }
+}
+
+/// What lies on the faces, in words; where a format keeps most of it, what it still leaves out.
+pub(crate) fn phrases_of(surface: &Surface, is_kept: bool) -> Vec<String> {
+    let parts = &surface.parts;
+    let most = |count: fn(&Part) -> usize| parts.iter().map(count).max().unwrap_or(0);
+    let mut phrases = Vec::new();
+    let uv_sets = most(|part| part.uv_sets.len());
+    if uv_sets > 1 {
+        phrases
+            .push(format!("{uv_sets} sets of texture coordinates{}", if is_kept { ", but for the first" } else { "" }));
+    } else if uv_sets == 1 && !is_kept {
+        phrases.push("texture coordinates".to_owned());
+    }
+    if most(|part| part.color_sets.len()) > 0 {
+        phrases.push("colours of corners".to_owned());
+    }
+    if is_kept {
+        return phrases;
+    }
+    if parts.len() > 1 {
+        let names = parts.iter().map(|part| part.path.rsplit('/').next().unwrap_or_default().as_bytes());
+        phrases.push(format!("{} ({})", counted(parts.len(), "part"), listed(names)));
+    }
+    if !surface.materials.is_empty() {
+        phrases.push(counted(surface.materials.len(), "material"));
+    }
+    if most(|part| part.normals.len()) > 0 {
+        phrases.push("normals".to_owned());
+    }
+    let groups = parts.iter().flat_map(|part| &part.groups).map(|group| group.name.as_bytes());
+    if groups.clone().next().is_some() {
+        phrases.push(format!("{} ({})", counted(groups.clone().count(), "group"), listed(groups)));
+    }
+    phrases
+}
+
+/// Phrases as one: `a, b and c`.
+pub(crate) fn joined(phrases: &[String]) -> Option<String> {
+    let (last, others) = phrases.split_last()?;
+    Some(if others.is_empty() { last.clone() } else { format!("{} and {last}", others.join(", ")) })
 }
 
 /// `1 material`, `3 materials`.

@@ -139,9 +139,15 @@ impl ReadModel {
     #[must_use]
     pub fn dropped_with_colors(&self) -> Dropped {
         let mut dropped = self.dropped.clone();
-        if !self.model.colors.is_empty() {
-            dropped.add_colors();
-        }
+        dropped.add_colors(&self.model);
+        dropped
+    }
+
+    /// What an output loses that has points and faces alone.
+    #[must_use]
+    pub fn dropped_with_appearance(&self) -> Dropped {
+        let mut dropped = self.dropped_with_colors();
+        dropped.add_surface(&self.model.surface);
         dropped
     }
 }

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::{Point, Polygons};
-use cager_geometry::surface::{Part, Surface};
+use cager_geometry::surface::Surface;
 use cager_geometry::units::{Change, Units};
 
+use crate::dropped::{joined, phrases_of};
 use crate::error::{Error, Fault};
 use crate::frames::RATES;
 
@@ -76,22 +77,11 @@ impl FrameWriter {
     }
 }
 
-/// What a file lacks that has no place for it, in words; of those that have one, what they keep of several.
+/// What a format has no place for, in words.
 fn lost(surface: &Surface, is_kept: bool) -> Option<String> {
-    let any = |has: fn(&Part) -> bool| surface.parts.iter().any(has);
-    let kinds: [(&str, bool); 6] = [
-        ("further sets of texture coordinates", is_kept && any(|part| part.uv_sets.len() > 1)),
-        ("texture coordinates", !is_kept && any(|part| !part.uv_sets.is_empty())),
-        ("colours of corners", any(|part| !part.color_sets.is_empty())),
-        ("materials", !is_kept && any(|part| !part.materials.is_empty())),
-        ("groups of faces", !is_kept && any(|part| !part.groups.is_empty())),
-        ("hard edges", !is_kept && any(|part| !part.normals.is_empty())),
-    ];
-    let names: Vec<&str> = kinds.iter().filter(|(_, is_lost)| *is_lost).map(|(name, _)| *name).collect();
-    let (last, others) = names.split_last()?;
-    let all = if others.is_empty() { (*last).to_owned() } else { format!("{} and {last}", others.join(", ")) };
+    let all = joined(&phrases_of(surface, is_kept))?;
     let way = if is_kept { "" } else { "; write .obj files for them" };
-    Some(format!("has no place for {all}, which the capture has{way}"))
+    Some(format!("has no place for {all} of the model{way}"))
 }
 
 /// A format of frames, of which each was checked before it is written.
