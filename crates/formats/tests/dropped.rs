@@ -26,15 +26,22 @@ fn a_plain_mesh_loses_nothing() {
 }
 
 #[test]
-fn texture_coordinates_materials_normals_and_groups_of_an_obj_are_told() {
-    let text = "o body\ng left\ng right\nv 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl red\ns off\nf 1/1/1 2/1/1 3/1/1\nusemtl blue\no hat\ns 2\nf 1/1/1 3/1/1 2/1/1\nusemtl red\nl 1 2\n#MRGB ff\n";
+fn what_is_not_kept_of_an_obj_is_told() {
+    let text = "v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\ns off\nf 1 2 3\ns 2\nf 1 3 2\nl 1 2\n#MRGB ff\n";
     assert_eq!(
         told("rest.obj", text),
-        "rest.obj: vertex colours, which not all points have, texture coordinates (vt), 2 materials (usemtl), normals (vn), 2 groups (g left and right), 2 objects (o body and hat), smoothing groups (s), 1 line (l) and painted colours (#MRGB) are not kept"
+        "rest.obj: vertex colours, which not all points have, smoothing groups (s), 1 line (l) and painted colours (#MRGB) are not kept"
     );
     let path = Path::new("rest.obj");
     let read = read_mesh_bytes(MeshFormat::Obj, path, text.as_bytes()).unwrap();
     assert!(read.dropped.sentence(path, true).unwrap().contains("nor is the order of faces and of their corners"));
+    let text = "o body\ng left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl red\nf 1/1 2/1 3/1\ng right\nusemtl blue\nf 1/1 3/1 2/1\n";
+    let read = read_mesh_bytes(MeshFormat::Obj, path, text.as_bytes()).unwrap();
+    assert_eq!(read.dropped.sentence(path, false), None);
+    assert_eq!(
+        read.dropped_with_appearance().sentence(path, false).unwrap(),
+        "rest.obj: texture coordinates, 2 materials and 2 groups (left and right) are not kept"
+    );
 }
 
 #[test]

@@ -13,5 +13,6 @@ mod numpy;
 mod one_file_each;
 mod origin;
 mod pointers;
+mod surface;
 mod turns;
 mod words;
