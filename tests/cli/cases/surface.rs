@@ -41,8 +41,8 @@ fn texture_coordinates_materials_and_the_order_of_faces_come_back() {
         }
         assert!(found.has_hard_edges(back.faces.indices()));
     }
-    let said = dir.cager("decode out.cager -o frames.npy").succeeds().stderr;
-    assert!(said.contains("frames.npy: has no place for texture coordinates, 2 materials and normals"), "{said}");
+    let said = dir.cager("decode out.cager -o flat.npy").succeeds().stderr;
+    assert!(said.contains("flat.npy: has no place for texture coordinates, 2 materials and normals"), "{said}");
     // The model is enough to dress another one's motion.
     assert_eq!(dir.cager("decode out.cager --model dressed.obj -o moved/ --frames-range 0-2").succeeds().stderr, "");
     assert!(dir.path("moved/frame.mtl").exists());
