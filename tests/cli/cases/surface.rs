@@ -41,10 +41,10 @@ fn texture_coordinates_materials_and_the_order_of_faces_come_back() {
         }
         assert!(found.has_hard_edges(back.faces.indices()));
     }
-    let said = dir.cager("decode out.cager -o flat.npy").succeeds().stderr;
+    let said = dir.cager("decode out.cager -o flat.npy").succeeds().stdout;
     assert!(said.contains("flat.npy: has no place for texture coordinates, 2 materials and normals"), "{said}");
     // The model is enough to dress another one's motion.
-    assert_eq!(dir.cager("decode out.cager --model dressed.obj -o moved/ --frames-range 0-2").succeeds().stderr, "");
+    assert_eq!(dir.cager("decode out.cager --model dressed.obj -o moved/ --range 0-2").succeeds().stderr, "");
     assert!(dir.path("moved/frame.mtl").exists());
 }
 
