@@ -165,7 +165,14 @@ impl OpenOptions {
         (files.path, files.points, files.rest_units) = (frames.to_owned(), rest.points.len(), units);
         files.selection.no_frames = [path].into_iter().chain(cage_path).map(Path::to_path_buf).collect();
         if weld {
+            let had_surface = !rest.surface.is_empty();
             files.weld(&mut rest);
+            if had_surface && rest.surface.is_empty() {
+                warnings.push(format!(
+                    "{}: texture coordinates, materials, groups and hard edges are not kept where vertices are merged",
+                    path.display()
+                ));
+            }
         }
         files.take_origin(&mut rest);
         let cage = match cage_path {
