@@ -41,9 +41,9 @@ struct CageReport {
 pub(super) fn run(args: &CageArgs) -> Result<()> {
     let clock = Instant::now();
     let targets = Targets::new(args)?;
-    let prim = args.checks.prim.as_deref();
+    let prims = &args.checks.prim;
     let read: Vec<(Model, Units)> =
-        args.rest.iter().map(|path| read_with_units(path, prim)).collect::<Result<_, _>>()?;
+        args.rest.iter().map(|path| read_with_units(path, prims)).collect::<Result<_, _>>()?;
     let units = read[0].1;
     let models: Vec<Model> = read.into_iter().map(|(model, _)| model).collect();
     if models.len() > 1 && args.general.is_none() {

@@ -29,7 +29,7 @@ pub(super) fn read_cage_like(path: &Path, units: Units) -> Result<Model> {
 
 /// What is lost of a cage that is written anew; what is wrong with it is told where it is read.
 pub(super) fn dropped_of_cage(path: &Path) -> Option<String> {
-    let read = cager_formats::read_mesh(path, None).ok().filter(|_| !is_container(path))?;
+    let read = cager_formats::read_mesh(path, &[]).ok().filter(|_| !is_container(path))?;
     read.dropped_with_appearance().sentence(path, false)
 }
 

@@ -36,10 +36,10 @@ pub(crate) struct CaptureArgs {
 /// What is accepted of a capture.
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
-    /// The mesh to take of Alembic archives, USD files and glTF (rest pose and capture) with several: its path, such as /walk/body, or its name. An only mesh is taken
-    /// whatever it is called, and of glTF all meshes as one where nothing is said. Of .npz with several arrays that fit, the name of one.
-    #[arg(long, value_name = "PATH")]
-    pub(super) prim: Option<String>,
+    /// The meshes to take of Alembic archives, USD files and glTF (rest pose and capture): paths, such as /walk/body, names, or globs of these, such as '/walk/**/eye*';
+    /// may be given several times [default: all that are rendered]. An only mesh is taken whatever it is called. Of .npz with several arrays that fit, the name of one.
+    #[arg(long, value_name = "PATH", hide_default_value = true)]
+    pub(super) prim: Vec<String>,
 
     /// Frames to take for each second of an animated .glb or .gltf, which has keys instead of frames [default: those at its keys].
     #[arg(long, value_name = "F", value_parser = rate, allow_negative_numbers = true, hide_default_value = true)]
@@ -116,7 +116,7 @@ pub(super) fn unnamed_files(args: &CheckArgs) -> CaptureFiles {
         allow_gaps: args.allow_gaps,
         selection: FrameSelection {
             join_sequences: args.all_files,
-            prim: args.prim.clone(),
+            prims: args.prim.clone(),
             rate: args.sample_rate,
             animation: args.animation.clone(),
             ..FrameSelection::default()

@@ -104,7 +104,7 @@ pub(super) fn run(
         // A service reads a rest pose as it is, with the doubles along seams, and where it is; of an archive it would get all meshes and all frames.
         rest: if args.capture.weld
             || files.origin.is_some()
-            || args.capture.checks.prim.is_some()
+            || !args.capture.checks.prim.is_empty()
             || is_scene(&args.rest)
         {
             MeshFile::new("rest.obj", obj_bytes(rest))

@@ -136,22 +136,22 @@ fn print(text: &str) -> anyhow::Result<()> {
 
 /// Reads a model, and tells what is left out of it.
 fn read_model(path: &Path) -> Result<Model, cager_formats::Error> {
-    read_prim(path, None)
+    read_prims(path, &[])
 }
 
-/// As [`read_model`], of a scene the mesh that `prim` names.
-fn read_prim(path: &Path, prim: Option<&str>) -> Result<Model, cager_formats::Error> {
-    read_with_units(path, prim).map(|(model, _)| model)
+/// As [`read_model`], of a scene the meshes that are named.
+fn read_prims(path: &Path, prims: &[String]) -> Result<Model, cager_formats::Error> {
+    read_with_units(path, prims).map(|(model, _)| model)
 }
 
-/// As [`read_prim`], with what the file says of its coordinates.
-fn read_with_units(path: &Path, prim: Option<&str>) -> Result<(Model, Units), cager_formats::Error> {
-    read_whole(path, prim).map(|read| (read.model, read.units))
+/// As [`read_prims`], with what the file says of its coordinates.
+fn read_with_units(path: &Path, prims: &[String]) -> Result<(Model, Units), cager_formats::Error> {
+    read_whole(path, prims).map(|read| (read.model, read.units))
 }
 
-/// As [`read_prim`], with all that is known of the file; commands whose outputs do without what is dropped tell it.
-fn read_whole(path: &Path, prim: Option<&str>) -> Result<ReadModel, cager_formats::Error> {
-    let read = cager_formats::read_mesh(path, prim)?;
+/// As [`read_prims`], with all that is known of the file; commands whose outputs do without what is dropped tell it.
+fn read_whole(path: &Path, prims: &[String]) -> Result<ReadModel, cager_formats::Error> {
+    let read = cager_formats::read_mesh(path, prims)?;
     warn(read.note.as_slice());
     Ok(read)
 }
@@ -163,7 +163,7 @@ fn dropped(path: &Path, read: &ReadModel) -> Option<String> {
 
 /// A mesh whose points alone are moved, in the units and axes of another one where both say theirs.
 fn read_like(path: &Path, units: Units) -> Result<Model, cager_formats::Error> {
-    let mut read = read_whole(path, None)?;
+    let mut read = read_whole(path, &[])?;
     warn(dropped(path, &read).as_slice());
     read.units.change_to(units).apply_to(&mut read.model.points);
     Ok(read.model)

@@ -48,7 +48,7 @@ impl PoseFile {
     fn model(&self, is_first: bool) -> Result<(Model, Units)> {
         let (path, frame) = match self {
             Self::Mesh(path) => {
-                let read = read_whole(path, None)?;
+                let read = read_whole(path, &[])?;
                 // All have the faces of the first one, and what belongs to them.
                 warn(dropped(path, &read).filter(|_| is_first).as_slice());
                 return Ok((read.model, read.units));

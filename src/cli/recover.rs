@@ -121,7 +121,7 @@ fn refuse_several(args: &RecoverArgs) -> Result<()> {
 
 /// A template, checked, its origin, and what its positions mean where it is not brought to those of the frames.
 fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Units)> {
-    let ReadModel { model: mut template, units: said, dropped, .. } = read_whole(path, None)?;
+    let ReadModel { model: mut template, units: said, dropped, .. } = read_whole(path, &[])?;
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", path.display());
     }
@@ -188,7 +188,7 @@ fn frames(args: &RecoverArgs) -> Result<MeshSequence> {
 /// an option, and their normals are followed.
 fn dropped_of_first(files: &MeshSequence) -> Option<String> {
     let path = files.files.first()?;
-    let dropped = read_mesh(path, None).ok()?.dropped_with_appearance().appearance();
+    let dropped = read_mesh(path, &[]).ok()?.dropped_with_appearance().appearance();
     let frames = if files.files.len() > 1 { ", nor those of other frames" } else { "" };
     dropped.sentence(path, false).map(|sentence| sentence + frames)
 }

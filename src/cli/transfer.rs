@@ -35,7 +35,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let method = args.method()?;
     let (align, matrix) = args.alignment()?;
     let align = words::align(align, matrix).unwrap_or(AlignBy::Surfaces);
-    let ReadModel { model: mut target, units: said, dropped, .. } = read_whole(&args.target, None)?;
+    let ReadModel { model: mut target, units: said, dropped, .. } = read_whole(&args.target, &[])?;
     let units = said.or(args.coding.units());
     let origin = own_origin(&target.points);
     move_to(origin, &mut target.points);

@@ -36,7 +36,7 @@ pub(super) fn run(
             options.frame_rate = frames.frame_rate();
             options.start = Some(frames.number(0));
             TransferSource::Files([
-                model_file(rest, args.checks.prim.as_deref())?,
+                model_file(rest, &args.checks.prim)?,
                 MeshFile::new("frames.npy", array(frames.as_mut())?),
             ])
         }
@@ -47,7 +47,7 @@ pub(super) fn run(
     let cage = args.cage.as_ref().map(|path| cage_file(path, units)).transpose()?;
     // Whatever it is called here.
     let pairs = args.pairs.as_ref().map(file).transpose()?.map(|pairs| MeshFile::new("pairs.txt", pairs.bytes));
-    let new = NewTransfer { cage, pairs, options, ..NewTransfer::new(sent, model_file(&args.target, None)?) };
+    let new = NewTransfer { cage, pairs, options, ..NewTransfer::new(sent, model_file(&args.target, &[])?) };
     let mut outputs = vec![("capture.cager", &mut container)];
     outputs.extend(report.as_mut().map(|file| ("report", file)));
     let token = args.service.token();
@@ -79,12 +79,12 @@ pub(super) fn run(
     ))
 }
 
-/// A model for a service, which would get all meshes and all frames of a scene: of those, the mesh alone that `prim` names.
-fn model_file(path: &Path, prim: Option<&str>) -> Result<MeshFile> {
-    if !is_scene(path) && prim.is_none() {
+/// A model for a service, which would get all meshes and all frames of a scene: of those, the meshes alone that are named.
+fn model_file(path: &Path, prims: &[String]) -> Result<MeshFile> {
+    if !is_scene(path) && prims.is_empty() {
         return Ok(mesh_file(path)?);
     }
-    let model = read_mesh(path, prim)?.model;
+    let model = read_mesh(path, prims)?.model;
     let name = path.with_extension("obj");
     Ok(MeshFile::new(name.file_name().unwrap_or_default().to_string_lossy(), obj_bytes(&model)))
 }

@@ -37,7 +37,7 @@ impl MotionSource {
         let (Some(rest_path), Some(frames)) = (&args.source_rest, &args.source_frames) else {
             bail!("--source-rest and --source-frames, or --source, say what is moved; give them");
         };
-        let (rest, units) = read_with_units(rest_path, args.checks.prim.as_deref())?;
+        let (rest, units) = read_with_units(rest_path, &args.checks.prim)?;
         let no_frames = [rest_path, &args.target].into_iter().chain(&args.cage);
         let mut files = checked_files(&args.checks, frames, rest.points.len(), no_frames);
         files.timing = timing;

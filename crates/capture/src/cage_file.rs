@@ -61,7 +61,7 @@ pub fn read_welded_cage(path: &Path, units: Units, warnings: &mut Vec<String>) -
 /// A file that cannot be read.
 pub fn read_cage_mesh(path: &Path, warnings: &mut Vec<String>) -> Result<(Model, Units), EncodeError> {
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("cager")) {
-        let read = read_mesh(path, None)?;
+        let read = read_mesh(path, &[])?;
         warnings.extend(read.note);
         return Ok((read.model, read.units));
     }

@@ -24,6 +24,7 @@ pub fn check_frames(
     let opened = files.open().map_err(EncodeError::from);
     let frames = opened.and_then(|mut reader| {
         warnings.extend(reader.notes());
+        files.shown = reader.shown();
         sample_frames(reader.as_mut(), mismatch::FRAMES, false)
     });
     let frames = frames.map_err(|error| explained(error, (path, rest)))?;

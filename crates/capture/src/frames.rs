@@ -8,6 +8,7 @@ use cager_cages::diagnosis::weld;
 use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
 use cager_geometry::mesh::Model;
 use cager_geometry::units::{Change, Units, Up};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,6 +34,9 @@ pub struct CaptureFiles {
     pub weld: Option<Vec<u32>>,
     /// Frame rate and number of the first frame, where they are given.
     pub timing: Timing,
+    /// Frames in which each part is shown, once the frames were compared with the rest pose: see
+    /// [`FrameReader::shown`].
+    pub shown: Vec<Option<Vec<Range<u32>>>>,
     /// What is subtracted from all positions, where the rest pose lies far away.
     pub origin: Option<[f64; 3]>,
     /// What every frame is compared with as it is read, if anything.
@@ -196,6 +200,10 @@ impl FrameReader for Adapted {
 
     fn units(&self) -> Units {
         self.units
+    }
+
+    fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
+        self.inner.shown()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

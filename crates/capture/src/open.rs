@@ -160,7 +160,7 @@ impl OpenOptions {
         warnings: &mut Vec<String>,
     ) -> Result<Opened, EncodeError> {
         let Self { mut files, weld, flip_cage, allow_mismatch } = self;
-        let ReadModel { model: mut rest, units, note, dropped } = read_mesh(path, files.selection.prim.as_deref())?;
+        let ReadModel { model: mut rest, units, note, dropped } = read_mesh(path, &files.selection.prims)?;
         warnings.extend(note);
         (files.path, files.points, files.rest_units) = (frames.to_owned(), rest.points.len(), units);
         files.selection.no_frames = [path].into_iter().chain(cage_path).map(Path::to_path_buf).collect();
@@ -180,6 +180,9 @@ impl OpenOptions {
             None => None,
         };
         check_frames(&mut files, (path, &rest), allow_mismatch, warnings)?;
+        for (part, shown) in rest.surface.parts.iter_mut().zip(std::mem::take(&mut files.shown)) {
+            part.shown = shown;
+        }
         if let (Some(path), Some(cage)) = (cage_path, &cage) {
             check_cage((path, cage.mesh()), &rest, allow_mismatch, warnings)?;
         }

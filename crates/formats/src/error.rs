@@ -186,6 +186,17 @@ impl Fault {
         Self::Invalid(what.into())
     }
 
+    /// Of something in a file.
+    pub(crate) fn within(self, place: &str) -> Self {
+        let named = |what: String| format!("{place}: {what}");
+        match self {
+            Self::Io(cause) => Self::Io(cause),
+            Self::Damaged(what) => Self::Damaged(named(what)),
+            Self::Unsupported(what) => Self::Unsupported(named(what)),
+            Self::Invalid(what) => Self::Invalid(named(what)),
+        }
+    }
+
     pub(crate) fn at(self, path: &Path) -> Error {
         let path = path.to_owned();
         match self {

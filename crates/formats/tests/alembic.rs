@@ -76,7 +76,7 @@ fn archives_come_back_as_they_were_written() {
 fn the_mesh_is_called_as_the_file_and_lies_below_a_transform() {
     let (_folder, path) = written(&rising(1), &polygons(&[&[0, 1, 2]]), &FrameOptions::default());
     for prim in ["/my_walk/my_walkShape", "my_walk", "my_walkShape", "/my_walk"] {
-        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 3, "{prim}");
+        assert_eq!(read_mesh(&path, &[prim.to_owned()]).unwrap().model.points.len(), 3, "{prim}");
     }
 }
 
@@ -129,7 +129,7 @@ fn double_precision_and_subdivision_surfaces_are_read() {
 fn faces_are_turned_counterclockwise_and_edges_left_out() {
     let faces: &[&[i32]] = &[&[2, 1, 0], &[0, 1], &[0, 1, 2, 1], &[]];
     let (_folder, path) = saved(&archive("", &[EVEN], &[mesh("m", positions(&rising(1)), faces)]));
-    let ReadModel { model, note, .. } = read_mesh(&path, None).unwrap();
+    let ReadModel { model, note, .. } = read_mesh(&path, &[]).unwrap();
     assert_eq!(model.faces, polygons(&[&[0, 1, 2], &[1, 2, 1, 0]]));
     assert!(note.unwrap().contains("left out 2 faces"));
     let mirror = transform("mirror", &[0x00], 0, &[vec![-1.0, 1.0, 1.0]], vec![triangle(1)]);
@@ -272,11 +272,11 @@ fn what_is_not_read_of_a_mesh_is_named() {
     };
     node.children = vec![set];
     let (_folder, path) = saved(&archive("", &[EVEN], &[node]));
-    let sentence = read_mesh(&path, None).unwrap().dropped.sentence(&path, false).unwrap();
+    let sentence = read_mesh(&path, &[]).unwrap().dropped.sentence(&path, false).unwrap();
     let what = "texture coordinates (uv), normals (N), velocities and 1 set of faces (skin) are not kept";
     assert!(sentence.ends_with(what), "{sentence}");
     let (_folder, path) = written(&rising(1), &polygons(&[&[0, 1, 2]]), &FrameOptions::default());
-    assert_eq!(read_mesh(&path, None).unwrap().dropped.sentence(&path, false), None);
+    assert_eq!(read_mesh(&path, &[]).unwrap().dropped.sentence(&path, false), None);
 }
 
 #[test]
@@ -414,7 +414,7 @@ fn the_only_mesh_is_taken_whatever_it_is_called() {
     // As of a rest pose beside a capture of several meshes.
     let (_folder, path) = saved(&archive("", &[EVEN], &[triangle(1)]));
     for prim in ["body", "/walk/body"] {
-        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 3, "{prim}");
+        assert_eq!(read_mesh(&path, &[prim.to_owned()]).unwrap().model.points.len(), 3, "{prim}");
     }
 }
 
@@ -480,12 +480,12 @@ fn one_of_several_meshes_is_chosen_by_path_or_name() {
         "{error}"
     );
     let take = |prim: &str, points| {
-        let selection = FrameSelection { prim: Some(prim.to_owned()), ..FrameSelection::default() };
+        let selection = FrameSelection { prims: vec![prim.to_owned()], ..FrameSelection::default() };
         open_selected_frames(&path, points, &selection).map(|mut reader| all(&mut *reader))
     };
     for prim in ["/skin/body", "skin/body/", "skin", "/skin"] {
         assert_eq!(take(prim, 2).unwrap(), [vec![5.0; 6]], "{prim}");
-        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 2, "{prim}");
+        assert_eq!(read_mesh(&path, &[prim.to_owned()]).unwrap().model.points.len(), 2, "{prim}");
     }
     assert!(message(take("body", 2)).contains("holds 2 meshes, /coat/body (3 points) and /skin/body (2 points)"));
     for prim in ["hat", "/hat/body", "/body", "ody", "/coat/body/body"] {

@@ -228,14 +228,14 @@ fn of_several_meshes_all_or_the_chosen_one_are_read() {
     let path = folder.path().join("a.glb");
     fs::write(&path, &bytes).unwrap();
     for prim in ["eyes", "/eyes", "mesh_1", "/eyes/mesh_1"] {
-        let selection = FrameSelection { prim: Some(prim.to_owned()), ..FrameSelection::default() };
+        let selection = FrameSelection { prims: vec![prim.to_owned()], ..FrameSelection::default() };
         let frames = all(&mut *open_selected_frames(&path, 2, &selection).unwrap());
         assert_eq!(frames, [[5.0, 0.0, 0.0, 6.0, 0.0, 0.0], [5.0, 3.0, 0.0, 6.0, 3.0, 0.0]]);
-        assert_eq!(read_mesh(&path, Some(prim)).unwrap().model.points.len(), 2);
+        assert_eq!(read_mesh(&path, &[prim.to_owned()]).unwrap().model.points.len(), 2);
     }
-    let still = FrameSelection { prim: Some("skin".to_owned()), ..FrameSelection::default() };
+    let still = FrameSelection { prims: vec!["skin".to_owned()], ..FrameSelection::default() };
     assert_eq!(open_selected_frames(&path, 4, &still).unwrap().frames(), 1);
-    assert!(message(read_mesh(&path, Some("hat"))).contains("holds no mesh hat, but /body/skin"));
+    assert!(message(read_mesh(&path, &["hat".to_owned()])).contains("holds no mesh hat, but /body/skin"));
 }
 
 #[test]

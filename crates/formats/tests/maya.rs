@@ -108,7 +108,7 @@ fn frame_of_maya(is_wide: bool, tick: i32, value: f32) -> Vec<u8> {
 
 #[test]
 fn caches_with_a_file_for_each_frame_are_read_by_the_frames_and_ticks_of_their_names() {
-    let prim = FrameSelection { prim: Some("hatShape".to_owned()), ..FrameSelection::default() };
+    let prim = FrameSelection { prims: vec!["hatShape".to_owned()], ..FrameSelection::default() };
     for extension in ["mcx", "mc"] {
         let folder = tempdir().unwrap();
         let text =
@@ -213,7 +213,7 @@ fn files_of_maya_are_read_one_channel_of_several() {
         );
         // Times that are uneven are kept at the rate that the text says.
         fs::write(folder.path().join("a.xml"), "<cacheTimePerFrame TimePerFrame=\"125\"/>").unwrap();
-        let selection = FrameSelection { prim: Some("hatShape".to_owned()), ..FrameSelection::default() };
+        let selection = FrameSelection { prims: vec!["hatShape".to_owned()], ..FrameSelection::default() };
         let mut reader = open_selected_frames(&path, 2, &selection).unwrap();
         assert_eq!((reader.frame_rate(), numbers(&*reader)), (Some(48.0), vec![2.0, 3.0, 5.0]));
         assert_eq!(all(&mut *reader)[0], [100.0, 101.0, 102.0, 103.0, 104.0, 105.0]);

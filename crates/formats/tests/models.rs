@@ -150,7 +150,7 @@ fn edges_and_points_among_faces_are_left_out_and_counted() {
     for (name, text) in [("a.ply", ply), ("a.off", off), ("a.obj", edges)] {
         let path = dir.join(name);
         std::fs::write(&path, text).unwrap();
-        let ReadModel { model, note, .. } = read_mesh(&path, None).unwrap();
+        let ReadModel { model, note, .. } = read_mesh(&path, &[]).unwrap();
         assert_eq!(model, tetrahedron(), "{name}");
         assert!(
             note.unwrap().ends_with(": left out 2 faces of fewer than three corners, which have no area"),
@@ -158,7 +158,7 @@ fn edges_and_points_among_faces_are_left_out_and_counted() {
         );
     }
     std::fs::write(dir.join("b.obj"), obj()).unwrap();
-    assert_eq!(read_mesh(&dir.join("b.obj"), None).unwrap().note, None);
+    assert_eq!(read_mesh(&dir.join("b.obj"), &[]).unwrap().note, None);
     std::fs::remove_dir_all(dir).unwrap();
 }
 

@@ -149,7 +149,7 @@ fn arrays(names: &[&str]) -> Vec<u8> {
 #[test]
 fn one_array_of_several_is_taken_by_its_name() {
     let folder = tempdir().unwrap();
-    let prim = |name: &str| FrameSelection { prim: Some(name.to_owned()), ..FrameSelection::default() };
+    let prim = |name: &str| FrameSelection { prims: vec![name.to_owned()], ..FrameSelection::default() };
     let path = folder.path().join("body.1.npz");
     fs::write(&path, arrays(&["vertices", "v_template"])).unwrap();
     for k in 2..4 {

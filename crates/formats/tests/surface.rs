@@ -44,7 +44,7 @@ const MTL: &str = "newmtl tiles\nKd 0.5 0.25 0.125\nPr 0.75\nmap_Kd tiles.png\nn
 fn house(folder: &Path) -> Model {
     fs::write(folder.join("house.obj"), OBJ).unwrap();
     fs::write(folder.join("house.mtl"), MTL).unwrap();
-    read_mesh(&folder.join("house.obj"), None).unwrap().model
+    read_mesh(&folder.join("house.obj"), &[]).unwrap().model
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn an_obj_that_is_written_has_what_was_read() {
         writer.write_frame(&positions).unwrap();
         assert_eq!(writer.notes(), Vec::<String>::new());
         writer.finish().unwrap();
-        let back = read_mesh(&folder.path().join(file), None).unwrap();
+        let back = read_mesh(&folder.path().join(file), &[]).unwrap();
         assert_eq!(back.dropped, Default::default());
         assert_eq!(back.model, model, "{name}");
         // A second time in place of the first.
@@ -122,7 +122,7 @@ fn what_does_not_fit_the_faces_is_left_out() {
     // Texture coordinates that are not there, a normal without a corner, an object that shares its points, an empty group.
     let text = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 1\ng\nf 1/9/1 2/-1 3/1/\no b\nusemtl\nf 2 3 4\nf 1 2\n";
     fs::write(&path, text).unwrap();
-    let read = read_mesh(&path, None).unwrap();
+    let read = read_mesh(&path, &[]).unwrap();
     let surface = read.model.surface;
     surface.check(4, &read.model.faces).unwrap();
     assert_eq!(surface.parts.len(), 1);
@@ -130,5 +130,5 @@ fn what_does_not_fit_the_faces_is_left_out() {
     assert!(surface.parts[0].normals.is_empty());
     // Nothing but names is nothing.
     fs::write(&path, "mtllib no.mtl\no a\ns 1\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n").unwrap();
-    assert!(read_mesh(&path, None).unwrap().model.surface.is_empty());
+    assert!(read_mesh(&path, &[]).unwrap().model.surface.is_empty());
 }

@@ -32,7 +32,7 @@ fn read(path: &Path) -> (Vec<Vec<f64>>, Units) {
     while reader.read_next(&mut values).unwrap() {
         frames.push(values.clone());
     }
-    let ReadModel { model, units, .. } = read_mesh(path, None).unwrap();
+    let ReadModel { model, units, .. } = read_mesh(path, &[]).unwrap();
     assert_eq!(reader.units(), units, "{}", path.display());
     let [model, first]: [&[f64]; 2] = [model.points.as_flattened(), &frames[0]];
     assert!(model.iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-5 * b.abs().max(1.0)));

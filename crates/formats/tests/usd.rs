@@ -56,7 +56,7 @@ fn files_come_back_as_they_were_written() {
         assert!(!reader.numbers_are_times());
         assert_eq!(all(&mut *reader), wide(&frames));
         assert_eq!(reader.mesh().unwrap(), (path.as_path(), &faces()));
-        let ReadModel { model, units: found, .. } = read_mesh(&path, None).unwrap();
+        let ReadModel { model, units: found, .. } = read_mesh(&path, &[]).unwrap();
         assert_eq!((model.points.as_flattened(), model.faces), (&wide(&frames)[0][..], faces()));
         assert_eq!(found, units);
     }
@@ -126,7 +126,7 @@ fn a_cage_is_kept_beside_the_mesh_and_read_where_it_is_asked_for() {
         let mut reader = open_frames(&path, 4).unwrap();
         assert_eq!(reader.mesh().unwrap().1, &faces());
         assert_eq!(all(&mut *reader), wide(&moving(5)));
-        let selection = FrameSelection { prim: Some("cage".to_owned()), ..FrameSelection::default() };
+        let selection = FrameSelection { prims: vec!["cage".to_owned()], ..FrameSelection::default() };
         let mut reader = open_selected_frames(&path, 3, &selection).unwrap();
         assert_eq!(reader.mesh().unwrap().1, &cage().faces);
         assert_eq!(all(&mut *reader), wide(&cage_frames(5)));
@@ -220,7 +220,8 @@ fn made(name: &str) -> PathBuf {
 }
 
 fn take(name: &str, kind: &str, prim: Option<&str>) -> Result<Box<dyn FrameReader>, Error> {
-    let selection = FrameSelection { prim: prim.map(str::to_owned), ..FrameSelection::default() };
+    let selection =
+        FrameSelection { prims: prim.map(str::to_owned).into_iter().collect(), ..FrameSelection::default() };
     open_selected_frames(made(name).with_extension(kind), 3, &selection)
 }
 
@@ -380,7 +381,7 @@ fn files_of_the_library_read_back_to_their_truth() {
     let data = data();
     for (name, capture, every, count) in [("arm", "supercages-arm", 10, 13), ("horse", "horse-gallop", 1, 12)] {
         let path = data.join("studio").join(name).with_extension("usdc");
-        let ReadModel { model: rest, units, .. } = read_mesh(&path, None).unwrap();
+        let ReadModel { model: rest, units, .. } = read_mesh(&path, &[]).unwrap();
         let turned = |points: &[f64]| {
             points
                 .as_chunks()

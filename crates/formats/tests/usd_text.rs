@@ -267,7 +267,7 @@ fn texts_of_the_library_hold_what_its_binary_files_do() {
     for (name, every) in [("arm", 1), ("horse", 2)] {
         let path = data().join("studio").join(name);
         let [ReadModel { model: text, units, .. }, ReadModel { model, units: told, .. }] =
-            ["usda", "usdc"].map(|kind| read_mesh(&path.with_extension(kind), None).unwrap());
+            ["usda", "usdc"].map(|kind| read_mesh(&path.with_extension(kind), &[]).unwrap());
         assert_eq!((&text.points, &text.faces, units), (&model.points, &model.faces, told));
         let open = |kind| open_frames(path.with_extension(kind), model.points.len()).unwrap();
         let (mut text, mut binary) = (open("usda"), open("usdc"));

@@ -2,7 +2,7 @@
 
 mod normals;
 
-pub use normals::{SharedNormals, numbered};
+pub use normals::{SharedNormals, numbered, sharing};
 
 use crate::mesh::Polygons;
 use serde::{Deserialize, Serialize};

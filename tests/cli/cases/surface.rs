@@ -18,7 +18,7 @@ fn dressed() -> (Dir, Model) {
     }
     dir.write("dressed.obj", text);
     dir.write("rest.mtl", "newmtl skin\nKd 0.5 0.25 0.25\nmap_Kd skin.png\n");
-    let model = read_mesh(&dir.path("dressed.obj"), None).expect("a mesh").model;
+    let model = read_mesh(&dir.path("dressed.obj"), &[]).expect("a mesh").model;
     (dir, model)
 }
 
@@ -29,7 +29,7 @@ fn texture_coordinates_materials_and_the_order_of_faces_come_back() {
     for options in ["", " --max-error 0.001", " --max-error 0.001 --exact-rest", " --coordinates green"] {
         assert_eq!(dir.cager(&format!("{line}{options}")).succeeds().stderr, "", "{options}");
         assert_eq!(dir.cager("decode out.cager -o back.obj --frame 3 --overwrite").succeeds().stderr, "");
-        let back = read_mesh(&dir.path("back.obj"), None).expect("a mesh").model;
+        let back = read_mesh(&dir.path("back.obj"), &[]).expect("a mesh").model;
         assert_eq!(back.faces, model.faces, "{options}");
         let (found, given) = (&back.surface.parts[0], &model.surface.parts[0]);
         assert_eq!((&found.materials, &back.surface.materials), (&given.materials, &model.surface.materials));

@@ -1,90 +1,148 @@
-//! What an archive says of one polygon mesh and the transforms above it.
+//! What an archive says of polygon meshes and the transforms above them.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::io::{Read, Seek};
 
 use super::objects::{Archive, Kind as ObjectKind};
+use super::ogawa::DOUBLES;
 use super::properties::{BOOL, F32, F64, I32, Kind, Property, U8, U32, find};
 use super::sampling::{Sampling, timing};
 use super::unread;
 use crate::dropped::Dropped;
 use crate::error::Fault;
-use crate::frames::Scalar;
 use crate::scene::{
-    Chain, MOST_OPERATIONS, MeshTracks, MovingMesh, Operation, Timeline, Tree, Values, ancestry, check_held, choose,
-    damaged, no_points, shown, shown_path, union,
+    Chain, MOST_OPERATIONS, MeshTracks, MovingScene, Operation, SceneTracks, Steps, Timeline, Tree, Wanted, ancestry,
+    check_held, choose, damaged, named, no_points, path, shown, shown_path, union,
 };
 
 /// Bytes of the path of what an instance is of.
 const LONGEST_PATH: u64 = 4096;
+/// Of what is shown or hidden as what is above it.
+const DEFERRED: i8 = -1;
 /// Frames per second where an archive does not say them.
 const USUAL_RATE: f64 = 24.0;
 /// Shares of the mean distance of two samples within which two times are one.
 const NEAR: f64 = 1e-6;
 
-/// Opens the mesh that `prim` names, or the only one; tells what is not read of it where that is
-/// wanted.
+/// Opens the meshes that are wanted; tells what lies on their faces, and what is not read of them,
+/// where that is wanted.
 pub(crate) fn open<'a>(
     source: impl Read + Seek + Send + 'a,
     length: u64,
-    prim: Option<&str>,
+    wanted: Wanted<'_>,
     dropped: Option<&mut Dropped>,
-) -> Result<MovingMesh<'a>, Fault> {
+) -> Result<MovingScene<'a>, Fault> {
     let mut archive = Archive::open(Box::new(source), length)?;
-    let object = find_mesh(&mut archive, prim)?;
-    archive.container.allow(4);
-    let (positions, scalar) = positions(&mut archive, object)?;
-    archive.container.scalar = scalar;
+    let (objects, note) = find_meshes(&mut archive, wanted)?;
+    let mut tracks = SceneTracks { notes: note.into_iter().collect(), ..SceneTracks::default() };
+    let (mut moving, mut held, several) = (Vec::new(), Vec::new(), objects.len() > 1);
+    for &object in &objects {
+        let name = path(archive.nodes(), object);
+        let named = |fault: Fault| if several { fault.within(&name) } else { fault };
+        archive.container.allow(4);
+        let (mesh, positions) = read_mesh(&mut archive, object, &mut moving).map_err(named)?;
+        held.push(positions);
+        tracks.meshes.push(mesh);
+    }
+    tracks.timeline = timeline(&mut archive, &held, &tracks.meshes, moving)?;
+    let is_sparse = tracks.meshes.iter().any(|mesh| mesh.chain.moving().next().is_some());
+    tracks.notes.extend(sparse(&tracks.timeline.at, archive.frame_rate).filter(|_| is_sparse));
+    if let Some(dropped) = dropped {
+        for &object in &objects {
+            archive.container.allow(4);
+            // What cannot be named is no reason to refuse a mesh.
+            unread::add(&mut archive, object, dropped).unwrap_or_default();
+        }
+    }
+    MovingScene::new(Box::new(archive.container), tracks)
+}
+
+/// A mesh, and its positions; adds the tables of times of what moves it.
+fn read_mesh(
+    archive: &mut Archive<'_>,
+    object: usize,
+    moving: &mut Vec<usize>,
+) -> Result<(MeshTracks, Property), Fault> {
+    let positions = positions(archive, object)?;
     let properties = archive.schema(object, ".geom")?;
     let parts = [array(&properties, ".faceCounts")?, array(&properties, ".faceIndices")?];
     if parts.iter().any(|faces| !matches!(faces.number, I32 | U32)) {
         return Err(damaged("its faces are not whole numbers of four bytes"));
     }
     let mut tracks = MeshTracks { is_clockwise: true, ..MeshTracks::default() };
-    let mut moving: Vec<usize> = Some(positions.sampling).filter(|_| !positions.is_constant()).into_iter().collect();
+    moving.extend(Some(positions.sampling).filter(|_| !positions.is_constant()));
     for above in ancestry(archive.nodes(), object).skip(1).collect::<Vec<_>>() {
         if archive.objects[above].kind == ObjectKind::Transform
-            && !add_transform(&mut archive, above, &mut tracks.chain, &mut moving)?
+            && !add_transform(archive, above, &mut tracks.chain, moving)?
         {
             break;
         }
     }
     tracks.positions = archive.track(&positions)?;
-    tracks.faces = [archive.track(&parts[0])?, archive.track(&parts[1])?];
-    tracks.timeline = timeline(&mut archive, &positions, &tracks, moving)?;
-    let is_sparse = tracks.chain.moving().next().is_some();
-    tracks.notes.extend(sparse(&tracks.timeline.at, archive.frame_rate).filter(|_| is_sparse));
-    tracks.notes.extend(unread::visibility(&mut archive, object).unwrap_or_default());
-    if let Some(dropped) = dropped {
-        archive.container.allow(4);
-        // What cannot be named is no reason to refuse a mesh.
-        unread::add(&mut archive, object, dropped).unwrap_or_default();
+    if positions.number == F64 {
+        let all = tracks.positions.values.iter_mut().chain(&mut tracks.positions.default);
+        all.for_each(|value| value.0 |= DOUBLES);
     }
-    MovingMesh::new(Box::new(archive.container), tracks)
+    tracks.faces = [archive.track(&parts[0])?, archive.track(&parts[1])?];
+    tracks.shown = visible(archive, object)?;
+    tracks.part.path = path(archive.nodes(), object);
+    Ok((tracks, positions))
 }
 
-fn find_mesh(archive: &mut Archive<'_>, prim: Option<&str>) -> Result<usize, Fault> {
-    let is_candidate = |k: &usize| matches!(archive.objects[*k].kind, ObjectKind::Mesh | ObjectKind::Instance);
-    let all: Vec<usize> = (0..archive.objects.len()).filter(is_candidate).collect();
-    if all.is_empty() {
+/// The meshes that are wanted, and what the user should know of others.
+fn find_meshes(archive: &mut Archive<'_>, wanted: Wanted<'_>) -> Result<(Vec<usize>, Option<String>), Fault> {
+    let of_kind = |archive: &Archive<'_>, kind| -> Vec<usize> {
+        (0..archive.objects.len()).filter(|&k| archive.objects[k].kind == kind).collect()
+    };
+    let (meshes, instances) = (of_kind(archive, ObjectKind::Mesh), of_kind(archive, ObjectKind::Instance));
+    if let Some(&instance) = instances.first() {
+        let properties = archive.top_properties(instance)?;
+        let source = match find(&properties, ".instanceSource", Kind::Scalar) {
+            Some(told) => {
+                let bytes = told.small(&mut archive.container, LONGEST_PATH)?;
+                shown(String::from_utf8_lossy(&bytes).trim_end_matches('\0'))
+            }
+            None => "another object".to_owned(),
+        };
+        let path = shown_path(archive.nodes(), instance);
+        let what =
+            format!("{path} is an instance of {source}, which is not read; make instances real where it is exported");
+        let is_named = wanted.prims.iter().any(|prim| !named(archive.nodes(), &instances, prim).is_empty());
+        if is_named || meshes.is_empty() {
+            return Err(Fault::unsupported(format!("{what}, or export {source} alone")));
+        }
+        return Ok((choose(archive, &meshes, wanted)?, Some(what)));
+    }
+    if meshes.is_empty() {
         return Err(Fault::unsupported("holds no polygon mesh; export the mesh itself as Alembic"));
     }
-    let chosen = choose(archive, &all, prim)?;
-    if archive.objects[chosen].kind == ObjectKind::Mesh {
-        return Ok(chosen);
-    }
-    let properties = archive.top_properties(chosen)?;
-    let source = match find(&properties, ".instanceSource", Kind::Scalar) {
-        Some(told) => {
-            let bytes = told.small(&mut archive.container, LONGEST_PATH)?;
-            shown(String::from_utf8_lossy(&bytes).trim_end_matches('\0'))
+    Ok((choose(archive, &meshes, wanted)?, None))
+}
+
+/// When an object is shown: what is hidden hides what is below it, unless that says otherwise.
+fn visible(archive: &mut Archive<'_>, object: usize) -> Result<Steps, Fault> {
+    let mut tracks = Vec::new();
+    for object in ancestry(&archive.nodes, object).collect::<Vec<_>>() {
+        let properties = archive.top_properties(object)?;
+        let Some(told) = find(&properties, "visible", Kind::Scalar).filter(|told| told.samples > 0) else { continue };
+        let track = archive.track(told)?;
+        let mut values = HashMap::new();
+        for value in track.values.iter().chain(&track.default) {
+            if let Entry::Vacant(place) = values.entry(value.0) {
+                place.insert(
+                    archive.container.small(*value, 8, "visible")?.first().map_or(DEFERRED, |&byte| byte as i8),
+                );
+            }
         }
-        None => "another object".to_owned(),
+        tracks.push((track, values));
+    }
+    let times = tracks.iter().flat_map(|(track, _)| track.times.iter().copied().chain(track.default.map(|_| 0.0)));
+    let is_shown = |time| {
+        let said = tracks.iter().map(|(track, values)| track.at(time).map_or(DEFERRED, |(value, ..)| values[&value.0]));
+        Ok(said.into_iter().find(|&said| said != DEFERRED) != Some(0))
     };
-    let path = shown_path(archive.nodes(), chosen);
-    let what = format!(
-        "{path} is an instance of {source}, which is not read; make instances real where it is exported, or export {source} alone"
-    );
-    Err(Fault::unsupported(what))
+    Steps::of(times.collect(), is_shown)
 }
 
 impl Tree for Archive<'_> {
@@ -92,16 +150,11 @@ impl Tree for Archive<'_> {
         &self.nodes
     }
 
-    fn describe(&mut self, mesh: usize) -> String {
-        if self.objects[mesh].kind == ObjectKind::Instance {
-            return "an instance".to_owned();
-        }
-        let points = positions(self, mesh).and_then(|(positions, scalar)| {
-            self.container.scalar = scalar;
-            let first = positions.first(&mut self.container)?;
-            self.container.points(first)
-        });
-        points.map_or_else(|_| "unreadable".to_owned(), |points| format!("{} points", points.count))
+    fn points(&mut self, mesh: usize) -> Option<u64> {
+        let positions = positions(self, mesh).ok()?;
+        let first = positions.first(&mut self.container).ok()?;
+        let size = if positions.number == F64 { 24 } else { 12 };
+        Some(self.container.sample(first).ok()?.length / size)
     }
 }
 
@@ -110,18 +163,13 @@ fn array(properties: &[Property], name: &str) -> Result<Property, Fault> {
     found.cloned().ok_or_else(|| Fault::invalid(format!("has a mesh without samples of {name}; export it again")))
 }
 
-/// The positions of a mesh, and how they are stored.
-fn positions(archive: &mut Archive<'_>, object: usize) -> Result<(Property, Scalar), Fault> {
+fn positions(archive: &mut Archive<'_>, object: usize) -> Result<Property, Fault> {
     let positions = array(&archive.schema(object, ".geom")?, "P")?;
-    let scalar = match (positions.extent, positions.number) {
-        (3, F32) => Scalar::F32Little,
-        (3, F64) => Scalar::F64Little,
-        _ => {
-            let what = "has positions that are not three numbers of single or double precision; export it again";
-            return Err(Fault::unsupported(what));
-        }
-    };
-    Ok((positions, scalar))
+    if positions.extent != 3 || !matches!(positions.number, F32 | F64) {
+        let what = "has positions that are not three numbers of single or double precision; export it again";
+        return Err(Fault::unsupported(what));
+    }
+    Ok(positions)
 }
 
 /// Adds a transform, and its times where it moves; gives whether what is above it moves it too.
@@ -171,28 +219,36 @@ fn operation(kind: u8, count: usize) -> Result<Operation, Fault> {
 /// A frame at each sample of all that moves, `moving` the tables of its times, or of positions.
 fn timeline(
     archive: &mut Archive<'_>,
-    positions: &Property,
-    tracks: &MeshTracks,
+    positions: &[Property],
+    meshes: &[MeshTracks],
     mut moving: Vec<usize>,
 ) -> Result<Timeline, Fault> {
-    let length = archive.container.source.length;
-    let first = positions.first(&mut archive.container)?;
-    let bytes = archive.container.sample(first)?.length;
+    let (length, mut bytes) = (archive.container.source.length, 0_u64);
+    for positions in positions {
+        let first = positions.first(&mut archive.container)?;
+        bytes = bytes.saturating_add(archive.container.sample(first)?.length);
+    }
     if bytes == 0 {
         return Err(no_points());
     }
     let is_held = |frames: usize| check_held(frames, bytes.saturating_mul(frames as u64) / 2 <= length);
-    let moved = tracks.chain.moving().flatten();
-    let mut samples: Vec<f64> = tracks.positions.times.iter().chain(moved).copied().collect();
+    let of_mesh = |mesh: &'_ MeshTracks| {
+        let moved = mesh.chain.moving().flatten();
+        mesh.positions.times.iter().chain(moved).copied().collect::<Vec<f64>>()
+    };
+    let mut samples: Vec<f64> = meshes.iter().flat_map(of_mesh).collect();
     if samples.is_empty() {
-        is_held(positions.samples)?;
-        moving = vec![positions.sampling];
-        samples = archive.samplings[positions.sampling].times(positions.samples)?;
+        let longest = positions.iter().max_by_key(|positions| positions.samples);
+        if let Some(positions) = longest {
+            is_held(positions.samples)?;
+            moving = vec![positions.sampling];
+            samples = archive.samplings[positions.sampling].times(positions.samples)?;
+        }
     }
-    check_held(samples.len(), (samples.len() as u64).saturating_mul(4) <= length)?;
     let [low, high] = [f64::min, f64::max].map(|pick| samples.iter().copied().reduce(pick).unwrap_or_default());
     let near = NEAR * (high - low) / samples.len() as f64;
     let at = union(samples, near);
+    check_held(at.len(), (at.len() as u64).saturating_mul(4) <= length)?;
     moving.sort_unstable();
     moving.dedup();
     is_held(at.len())?;

@@ -9,6 +9,8 @@ use crate::signature::Signature;
 
 /// Set in the offset of a block of data, clear in that of a group.
 pub(super) const DATA: u64 = 1 << 63;
+/// Set in the value of positions of double precision, beyond all offsets.
+pub(super) const DOUBLES: u64 = 1 << 62;
 /// What an archive begins with: its name, whether it was closed, and the version of the container.
 pub(super) const MAGIC: &[u8; 5] = b"Ogawa";
 pub(super) const CLOSED: u8 = 0xff;
@@ -27,7 +29,6 @@ pub(super) struct Block {
 
 pub(super) struct Container<'a> {
     pub(super) source: Source<'a>,
-    pub(super) scalar: Scalar,
 }
 
 impl<'a> Container<'a> {
@@ -54,7 +55,7 @@ impl<'a> Container<'a> {
         }
         let [.., a, b, c, d, e, f, g, h] = *header;
         let root = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
-        Ok((Self { source: Source::new(source, length, length), scalar: Scalar::F32Little }, root))
+        Ok((Self { source: Source::new(source, length, length) }, root))
     }
 
     /// Lets as many bytes of tables be read as the file has, `times` over.
@@ -141,13 +142,14 @@ impl Values for Container<'_> {
     }
 
     fn points(&mut self, value: Value) -> Result<Points, Fault> {
-        let Block { start, length } = self.sample(value)?;
-        let size = 3 * self.scalar.size() as u64;
+        let scalar = if value.0 & DOUBLES == 0 { Scalar::F32Little } else { Scalar::F64Little };
+        let Block { start, length } = self.sample(Value(value.0 & !DOUBLES))?;
+        let size = 3 * scalar.size() as u64;
         if length % size != 0 {
             return Err(damaged("its positions end within a point"));
         }
         let count = usize::try_from(length / size).unwrap_or(usize::MAX);
-        Ok(Points { start, count, scalar: self.scalar })
+        Ok(Points { start, count, scalar })
     }
 
     fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Fault> {

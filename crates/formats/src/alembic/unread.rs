@@ -1,10 +1,9 @@
 //! What a mesh of an archive has that is not read.
 
 use super::objects::{Archive, Kind as ObjectKind};
-use super::properties::{Kind, Property, find};
+use super::properties::{Kind, Property};
 use crate::dropped::{Dropped, counted, listed};
 use crate::error::Fault;
-use crate::scene::ancestry;
 
 /// Adds what a mesh has beside points and faces.
 pub(super) fn add(archive: &mut Archive<'_>, mesh: usize, dropped: &mut Dropped) -> Result<(), Fault> {
@@ -44,15 +43,4 @@ pub(super) fn add(archive: &mut Archive<'_>, mesh: usize, dropped: &mut Dropped)
         dropped.add_on_faces(format!("{} of faces ({names})", counted(sets.len(), "set")));
     }
     Ok(())
-}
-
-/// A note of a mesh that is hidden in some frames.
-pub(super) fn visibility(archive: &mut Archive<'_>, mesh: usize) -> Result<Option<String>, Fault> {
-    for object in ancestry(&archive.nodes, mesh).collect::<Vec<_>>() {
-        let properties = archive.top_properties(object)?;
-        if find(&properties, "visible", Kind::Scalar).is_some_and(|visible| !visible.is_constant()) {
-            return Ok(Some("its visibility is animated, which is not kept".to_owned()));
-        }
-    }
-    Ok(None)
 }

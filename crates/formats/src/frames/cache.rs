@@ -10,7 +10,7 @@ use super::{CacheFormat, FrameReader, FrameSelection, maya, mdd, npy, pc2};
 use crate::alembic;
 use crate::error::{Error, Fault};
 use crate::glb;
-use crate::scene::{self, MovingMesh};
+use crate::scene::{self, MovingScene, Wanted};
 use crate::signature::Signature;
 use crate::usd;
 
@@ -25,7 +25,8 @@ pub(super) fn open<'a>(
     selection: &FrameSelection,
     folder: Option<&Path>,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
-    let prim = selection.prim.as_deref();
+    let prim = selection.prim();
+    let wanted = Wanted { prims: &selection.prims, points: Some(expected_points) };
     let read = |cause| Error::read(path, cause);
     let mut head = Vec::new();
     source.by_ref().take(LONGEST_HEADER as u64).read_to_end(&mut head).map_err(read)?;
@@ -39,13 +40,13 @@ pub(super) fn open<'a>(
         CacheFormat::Mdd => mdd::layout(&head),
         CacheFormat::Mcx | CacheFormat::Mc => return maya::open(path, source, length, expected_points, (prim, folder)),
         CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usda | CacheFormat::Usd => {
-            return open_scene(path, usd::open(source, length, prim, None), expected_points);
+            return open_scene(path, usd::open(source, length, wanted, None), expected_points);
         }
         CacheFormat::Glb | CacheFormat::Gltf => {
             let kind = glb::Source { is_text: format == CacheFormat::Gltf, folder };
             return glb::open_frames(path, (source, length), &kind, expected_points, selection);
         }
-        CacheFormat::Abc => return open_scene(path, alembic::open(source, length, prim, None), expected_points),
+        CacheFormat::Abc => return open_scene(path, alembic::open(source, length, wanted, None), expected_points),
     };
     let mut layout = layout.map_err(|fault| fault.at(path))?;
     if format == CacheFormat::Mdd && layout.check(length, expected_points, path).is_ok() {
@@ -59,7 +60,7 @@ pub(super) fn open<'a>(
 
 fn open_scene<'a>(
     path: &Path,
-    opened: Result<MovingMesh<'a>, Fault>,
+    opened: Result<MovingScene<'a>, Fault>,
     expected_points: usize,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     scene::open(path, opened.map_err(|failure| failure.at(path))?, expected_points)

@@ -28,6 +28,7 @@ mod times;
 mod widen;
 mod write;
 
+use std::ops::Range;
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
@@ -84,6 +85,12 @@ pub trait FrameReader: Send {
     /// What the coordinates mean, as far as the source says; they are given as they are stored.
     fn units(&self) -> Units {
         Units::UNKNOWN
+    }
+
+    /// Frames in which each part of the mesh is shown, counted from 0; `None` for a part that always
+    /// is, and nothing where no part is ever hidden, or the source does not say.
+    fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
+        Vec::new()
     }
 
     /// The file that the last frame was read from and the faces in it, where it has any.

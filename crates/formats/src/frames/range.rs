@@ -1,6 +1,7 @@
 //! Ranges of frames: from one to another, with a step.
 
 use std::fmt;
+use std::ops::Range;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -9,6 +10,7 @@ use cager_geometry::units::Units;
 
 use super::FrameReader;
 use crate::error::{Error, Fault};
+use crate::scene::ranges;
 
 /// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of
 /// their source. Written `A-B` or `A-BxSTEP`.
@@ -223,6 +225,13 @@ impl FrameReader for RangeReader {
 
     fn units(&self) -> Units {
         self.reader.units()
+    }
+
+    fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
+        let frames = || (0..self.range.count()).map(|place| self.range.frame(place) as u32);
+        let taken =
+            |shown: Vec<Range<u32>>| ranges(frames().map(|frame| shown.iter().any(|range| range.contains(&frame))));
+        self.reader.shown().into_iter().map(|shown| shown.and_then(taken)).collect()
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {

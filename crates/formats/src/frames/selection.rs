@@ -11,12 +11,20 @@ pub struct FrameSelection {
     pub range: Option<FrameRange>,
     /// The rest pose, the cage: files that are no frames, unless they are called as frames are.
     pub no_frames: Vec<PathBuf>,
-    /// The mesh of a scene that has several, by its path or name; the array of an `.npz` file.
-    pub prim: Option<String>,
+    /// Meshes of a scene that has several, by paths, names or globs of these, all where there are
+    /// none; the array of an `.npz` file, the cache of a Maya file.
+    pub prims: Vec<String>,
     /// The animation of glTF, by its name or number; by default the first that moves the mesh.
     pub animation: Option<String>,
     /// Frames per second to take of glTF; by default frames are at the times of its keys.
     pub rate: Option<f64>,
     /// Whether files of several sequences are taken in natural order, instead of refused.
     pub join_sequences: bool,
+}
+
+impl FrameSelection {
+    /// The one name, for files whose arrays are not put together.
+    pub(super) fn prim(&self) -> Option<&str> {
+        self.prims.first().map(String::as_str)
+    }
 }

@@ -16,8 +16,8 @@ pub(super) struct SequenceReader {
     sequence: Sequence,
     points: usize,
     notes: Vec<String>,
-    /// The array or the mesh that is read of each file, where it has several.
-    prim: Option<String>,
+    /// The array or the meshes that are read of each file, where it has several.
+    prims: Vec<String>,
     /// Whether that is an array of the first file, so that each has one.
     is_array_named: bool,
     /// What the first file says of all.
@@ -33,18 +33,18 @@ pub(super) struct SequenceReader {
 
 impl SequenceReader {
     /// `notes` are what the user should know of the choice of these files.
-    pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>, prim: Option<&str>) -> Self {
-        let first = sequence.files.first();
+    pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>, prims: &[String]) -> Self {
+        let (first, prim) = (sequence.files.first(), prims.first().map(String::as_str));
         // Each file has the array that is read of the first.
         let unnamed = first.filter(|path| single::is_array(path) && !prim.is_some_and(|name| npz::holds(path, name)));
         let read_first = unnamed.and_then(|path| npz::array_read(path, points));
-        let prim = read_first.or_else(|| prim.map(str::to_owned));
+        let prims = read_first.map_or_else(|| prims.to_vec(), |array| vec![array]);
         let (faces, merged) = (FrameFaces::default(), Merged::default());
         let (frame_rate, units) = (None, Units::UNKNOWN);
-        let is_array_named = first.zip(prim.as_deref()).is_some_and(|(path, name)| npz::holds(path, name));
+        let is_array_named = first.zip(prims.first()).is_some_and(|(path, name)| npz::holds(path, name));
         let (next, before) = (0, None);
         let mut opened =
-            Self { sequence, points, notes, prim, is_array_named, frame_rate, units, next, before, faces, merged };
+            Self { sequence, points, notes, prims, is_array_named, frame_rate, units, next, before, faces, merged };
         let first = opened.sequence.files.first();
         // All files are of one format. What is wrong with one is said when it is read.
         match first.map(|path| (MeshFormat::guess(path), opened.open(path))) {
@@ -57,7 +57,7 @@ impl SequenceReader {
 
     /// Opens a file that is no mesh.
     fn open(&self, path: &Path) -> Result<Box<dyn FrameReader>, Error> {
-        let selection = FrameSelection { prim: self.prim.clone(), ..FrameSelection::default() };
+        let selection = FrameSelection { prims: self.prims.clone(), ..FrameSelection::default() };
         single::open_cache(path, self.points, &selection, true)
     }
 
@@ -70,7 +70,7 @@ impl SequenceReader {
             Error::NonFinite { path, point, .. } => Error::NonFinite { path, frame, point },
             other => other.in_frame(frame),
         };
-        if let Some(name) = self.prim.as_deref().filter(|name| self.is_array_named && !npz::holds(path, name)) {
+        if let Some(name) = self.prims.first().filter(|name| self.is_array_named && !npz::holds(path, name)) {
             let first = self.sequence.files[0].display();
             let own = npz::array_read(path, self.points);
             let own = own.map_or_else(String::new, |own| format!(" and is read there, but {own:?}"));

@@ -38,7 +38,7 @@ pub(super) fn open_cache(
     is_frame: bool,
 ) -> Result<Box<dyn FrameReader>, Error> {
     if is_archive(path) {
-        return npz::open(path, expected_points, selection.prim.as_deref(), is_frame);
+        return npz::open(path, expected_points, selection.prim(), is_frame);
     }
     let Some(format) = CacheFormat::from_path(path) else { return Err(unknown(path)) };
     let read = |cause| Error::read(path, cause);

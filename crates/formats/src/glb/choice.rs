@@ -9,17 +9,18 @@ use gltf::json::validation::Checked;
 
 use super::scene::Scene;
 use crate::error::Fault;
-use crate::scene::{Node, Tree, choose as choose_mesh, list};
+use crate::scene::{Node, Tree, Wanted, choose as choose_meshes, list};
 
-/// The placements that are read: the one that `prim` names, or all as one mesh.
-pub(super) fn choose(root: &Root, scene: &Scene, prim: Option<&str>) -> Result<Range<usize>, Fault> {
+/// The placements that are read: those that are named, or all as one mesh.
+pub(super) fn choose(root: &Root, scene: &Scene, prims: &[String]) -> Result<Range<usize>, Fault> {
     let all = 0..scene.placements.len();
-    if prim.is_none() || all.is_empty() {
+    if prims.is_empty() || all.is_empty() {
         return Ok(all);
     }
     let (mut tree, meshes) = Meshes::of(root, scene);
-    let chosen = choose_mesh(&mut tree, &meshes, prim)? - root.nodes.len();
-    Ok(chosen..chosen + 1)
+    let chosen = choose_meshes(&mut tree, &meshes, Wanted { prims, points: None })?;
+    let [first, last] = [chosen[0], chosen[chosen.len() - 1]].map(|mesh| mesh - root.nodes.len());
+    Ok(first..last + 1)
 }
 
 /// All meshes with their points, as messages have them.
@@ -63,13 +64,13 @@ impl Tree for Meshes<'_> {
         &self.nodes
     }
 
-    fn describe(&mut self, mesh: usize) -> String {
+    fn points(&mut self, mesh: usize) -> Option<u64> {
         let placement = &self.scene.placements[mesh - self.root.nodes.len()];
         let positions = placement.mesh_in(self.root).into_iter().flat_map(|mesh| &mesh.primitives);
         let positions =
             positions.filter_map(|primitive| primitive.attributes.get(&Checked::Valid(Semantic::Positions)));
         let distinct: HashSet<usize> = positions.map(gltf::json::Index::value).collect();
         let counts = distinct.iter().filter_map(|&index| self.root.accessors.get(index));
-        format!("{} points", counts.fold(0_u64, |sum, accessor| sum.saturating_add(accessor.count.0)))
+        Some(counts.fold(0_u64, |sum, accessor| sum.saturating_add(accessor.count.0)))
     }
 }

@@ -75,7 +75,7 @@ impl MeshFrames {
     ) -> Result<Self, Fault> {
         let buffers = Buffers::open(bytes, source)?;
         let scene = Scene::of(&buffers.root)?;
-        let chosen = choose(&buffers.root, &scene, selection.prim.as_deref())?;
+        let chosen = choose(&buffers.root, &scene, &selection.prims)?;
         let rest = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen.clone()])?;
         let points = rest.points.len();
         if points == 0 {
@@ -97,7 +97,15 @@ impl MeshFrames {
         let is_smooth = clip.as_ref().is_some_and(Clip::moves_between_keys);
         let Timeline { times, at } = timeline(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
         let notes = clip.as_ref().and_then(|clip| clip.note.clone()).into_iter().collect();
-        let info = MeshInfo { points, frames: at.len(), times, faces: rest.faces, units: Units::METRES, notes };
+        let info = MeshInfo {
+            points,
+            frames: at.len(),
+            times,
+            faces: rest.faces,
+            units: Units::METRES,
+            notes,
+            shown: Vec::new(),
+        };
         Ok(Self { buffers, chosen, clip, at, info })
     }
 }

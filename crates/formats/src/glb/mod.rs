@@ -32,11 +32,11 @@ pub(crate) use frames::{is_animated, open_frames};
 use scene::Scene;
 pub(crate) use write::{MOST_FRAMES, Morphs, Scene as MorphScene, Wanted, write_head};
 
-/// The meshes of the default scene at rest as one, or the one of several that `prim` names.
-pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prim: Option<&str>) -> Result<(Model, Dropped), Fault> {
+/// The meshes of the default scene at rest as one, or those of several that are named.
+pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prims: &[String]) -> Result<(Model, Dropped), Fault> {
     let buffers = Buffers::open(bytes, source)?;
     let scene = Scene::of(&buffers.root)?;
-    let chosen = choice::choose(&buffers.root, &scene, prim)?;
+    let chosen = choice::choose(&buffers.root, &scene, prims)?;
     let placements = &scene.placements[chosen];
     let model = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(placements)?;
     let dropped = unread::of(&buffers.root, placements, !model.colors.is_empty());

@@ -20,6 +20,7 @@ use crate::dropped::Dropped;
 use crate::error::{Error, Fault};
 use crate::faces::Contents;
 use crate::glb;
+use crate::scene::Wanted;
 use crate::signature::Signature;
 use crate::text::{Lines, quoted};
 use crate::usd;
@@ -152,12 +153,13 @@ impl ReadModel {
     }
 }
 
-/// Reads a model from a file, of a scene the mesh that `prim` names by its path or name.
+/// Reads a model from a file, of a scene all meshes or those that `prims` name by paths, names or
+/// globs of these.
 ///
 /// # Errors
-/// As [`read_model`]; no such mesh, or several of that name.
-pub fn read_mesh(path: &Path, prim: Option<&str>) -> Result<ReadModel, Error> {
-    parse_file(path, prim).map(|parsed| ReadModel::of(parsed, path))
+/// As [`read_model`]; a name of no mesh.
+pub fn read_mesh(path: &Path, prims: &[String]) -> Result<ReadModel, Error> {
+    parse_file(path, prims).map(|parsed| ReadModel::of(parsed, path))
 }
 
 /// As [`read_model_bytes`], with what is to be known of it.
@@ -165,7 +167,7 @@ pub fn read_mesh(path: &Path, prim: Option<&str>) -> Result<ReadModel, Error> {
 /// # Errors
 /// As [`read_model_bytes`].
 pub fn read_mesh_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<ReadModel, Error> {
-    read_bytes(format, name, bytes, Contents::PointsAndFaces, None).map(|parsed| ReadModel::of(parsed, name))
+    read_bytes(format, name, bytes, Contents::PointsAndFaces, &[]).map(|parsed| ReadModel::of(parsed, name))
 }
 
 /// Reads a model from a file, its points in the order of the file and its polygons as they are.
@@ -173,7 +175,7 @@ pub fn read_mesh_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<
 /// # Errors
 /// As [`read_model_bytes`], and [`Error::Io`] where the file cannot be read.
 pub fn read_model(path: &Path) -> Result<Model, Error> {
-    parse_file(path, None).map(|parsed| parsed.model)
+    parse_file(path, &[]).map(|parsed| parsed.model)
 }
 
 /// Reads a model from the bytes of a file; `name` is the path in error messages.
@@ -188,7 +190,7 @@ pub fn read_model(path: &Path) -> Result<Model, Error> {
 /// is not finite, a face with a vertex that does not exist, and a file without points. Faces of
 /// fewer than three corners are left out.
 pub fn read_model_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<Model, Error> {
-    read_bytes(format, name, bytes, Contents::PointsAndFaces, None).map(|parsed| parsed.model)
+    read_bytes(format, name, bytes, Contents::PointsAndFaces, &[]).map(|parsed| parsed.model)
 }
 
 /// The faces of a frame and their text: most frames have the same, which are then not parsed again.
@@ -204,7 +206,7 @@ pub(crate) struct FrameFaces {
 /// again.
 pub(crate) fn read_frame_file(path: &Path, known: &mut FrameFaces) -> Result<Model, Error> {
     let (format, bytes) = read_named(path)?;
-    let read = |contents| read_bytes(format, path, &bytes, contents, None).map(|parsed| parsed.model);
+    let read = |contents| read_bytes(format, path, &bytes, contents, &[]).map(|parsed| parsed.model);
     if !known.text.is_empty() && bytes.ends_with(&known.text) {
         return Ok(Model { faces: std::mem::take(&mut known.faces), ..read(Contents::Points)? });
     }
@@ -219,17 +221,17 @@ fn read_named(path: &Path) -> Result<(MeshFormat, Vec<u8>), Error> {
     Ok((format, fs::read(path).map_err(|cause| Error::read(path, cause))?))
 }
 
-fn parse_file(path: &Path, prim: Option<&str>) -> Result<Parsed, Error> {
+fn parse_file(path: &Path, prims: &[String]) -> Result<Parsed, Error> {
     let format = MeshFormat::from_path(path)?;
     if format.is_scene() {
         // Of which all but the first frame is left where it is.
         let read = |cause| Error::read(path, cause);
         let file = File::open(path).map_err(read)?;
         let length = file.metadata().map_err(read)?.len();
-        return read_scene(format, path, file, length, (prim, path.parent()));
+        return read_scene(format, path, file, length, (prims, path.parent()));
     }
     let (format, bytes) = read_named(path)?;
-    let mut parsed = read_bytes(format, path, &bytes, Contents::PointsAndFaces, prim)?;
+    let mut parsed = read_bytes(format, path, &bytes, Contents::PointsAndFaces, prims)?;
     obj::read_materials(&mut parsed, path);
     Ok(parsed)
 }
@@ -239,19 +241,20 @@ fn read_scene(
     name: &Path,
     mut source: impl Read + Seek + Send,
     length: u64,
-    (prim, folder): (Option<&str>, Option<&Path>),
+    (prims, folder): (&[String], Option<&Path>),
 ) -> Result<Parsed, Error> {
     if format == MeshFormat::Gltf {
         let mut bytes = Vec::new();
         source.read_to_end(&mut bytes).map_err(|cause| Error::read(name, cause))?;
         let kind = glb::Source { is_text: true, folder };
-        return finished(format, name, &bytes, glb::read(&bytes, &kind, prim).map(Parsed::of_gltf));
+        return finished(format, name, &bytes, glb::read(&bytes, &kind, prims).map(Parsed::of_gltf));
     }
     let mut dropped = Dropped::default();
+    let wanted = Wanted { prims, points: None };
     let opened = if format == MeshFormat::Abc {
-        alembic::open(source, length, prim, Some(&mut dropped))
+        alembic::open(source, length, wanted, Some(&mut dropped))
     } else {
-        usd::open(source, length, prim, Some(&mut dropped))
+        usd::open(source, length, wanted, Some(&mut dropped))
     };
     let (model, left_out, units) = opened.map_err(|failure| failure.at(name))?.into_model(name)?;
     Ok(Parsed { left_out, units, dropped, ..Parsed::from(model) })
@@ -262,7 +265,7 @@ fn read_bytes(
     name: &Path,
     bytes: &[u8],
     contents: Contents,
-    prim: Option<&str>,
+    prims: &[String],
 ) -> Result<Parsed, Error> {
     let parsed = if bytes.is_empty() {
         Err(Fault::damaged("is empty; export the mesh or copy the file again"))
@@ -272,8 +275,8 @@ fn read_bytes(
             MeshFormat::Ply => ply::read(bytes, contents),
             MeshFormat::Off => off::read(bytes, contents),
             MeshFormat::Stl => stl::read(bytes),
-            MeshFormat::Glb => glb::read(bytes, &glb::Source::default(), prim).map(Parsed::of_gltf),
-            scene => return read_scene(scene, name, Cursor::new(bytes), bytes.len() as u64, (prim, None)),
+            MeshFormat::Glb => glb::read(bytes, &glb::Source::default(), prims).map(Parsed::of_gltf),
+            scene => return read_scene(scene, name, Cursor::new(bytes), bytes.len() as u64, (prims, None)),
         }
     };
     finished(format, name, bytes, parsed)

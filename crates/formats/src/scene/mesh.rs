@@ -1,15 +1,14 @@
-//! The frames of one mesh of a scene, whatever file it is in.
+//! One mesh of a scene, whatever file it is in: its points and faces at any time.
 
-use std::path::Path;
-
-use cager_geometry::mesh::{Model, Polygons};
-use cager_geometry::units::Units;
+use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::Part;
 
 use super::faces::{faces, most_corners, topology_changes};
-use super::reader::{Animation, MeshInfo, open};
-use super::track::{MOST_REPEATED, Timeline, Track, Value, Values};
+use super::shown::Steps;
+use super::surface::arranged;
+use super::track::{MOST_REPEATED, Track, Value, Values};
 use super::transform::{Chain, place};
-use crate::error::{Error, Fault};
+use crate::error::Fault;
 
 /// What a parser finds of a mesh.
 #[derive(Default)]
@@ -19,22 +18,22 @@ pub(crate) struct MeshTracks {
     pub(crate) faces: [Track; 2],
     pub(crate) is_clockwise: bool,
     pub(crate) chain: Chain,
-    pub(crate) timeline: Timeline,
-    pub(crate) units: Units,
-    /// What the user should know of how it is read.
-    pub(crate) notes: Vec<String>,
+    pub(crate) shown: Steps,
+    /// The path; where a model is read, what lies on the faces too, of all faces and their corners
+    /// in the order of the file. Numbers of points and faces are not looked at.
+    pub(crate) part: Part,
 }
 
-pub(crate) struct MovingMesh<'a> {
-    source: Box<dyn Values + 'a>,
+pub(super) struct MovingMesh {
     tracks: MeshTracks,
     /// Whether faces are turned around as they are read.
     turned: bool,
     /// Where faces are stored that are equal to these, the last ones first.
     equal: [[Option<Value>; 2]; 2],
-    info: MeshInfo,
+    pub(super) points: usize,
+    pub(super) faces: Polygons,
     /// Faces of fewer than three corners.
-    left_out: usize,
+    pub(super) left_out: usize,
     /// The points of the next sample, where a frame lies between two.
     next: Vec<f64>,
 }
@@ -49,106 +48,92 @@ pub(crate) fn bounds(positions: &[f32]) -> [[f32; 3]; 2] {
     )
 }
 
-/// The fault of a mesh that begins with nothing.
-pub(crate) fn no_points() -> Fault {
-    Fault::invalid("has a mesh without points in its first frame; export it with its points")
-}
-
-impl<'a> MovingMesh<'a> {
-    pub(crate) fn new(mut source: Box<dyn Values + 'a>, mut tracks: MeshTracks) -> Result<Self, Fault> {
-        let points = match tracks.positions.at(tracks.timeline.at[0]) {
+impl MovingMesh {
+    /// At the times of frames; none where it has no points in the first.
+    pub(super) fn new(source: &mut dyn Values, tracks: MeshTracks, at: &[f64]) -> Result<Option<Self>, Fault> {
+        let points = match tracks.positions.at(at[0]) {
             Some((first, ..)) => source.points(first)?.count,
             None => 0,
         };
         if points == 0 {
-            return Err(no_points());
+            return Ok(None);
         }
         let mut turned = tracks.is_clockwise;
         // What is not there yet is often scaled to nothing.
-        for &time in tracks.timeline.at.iter().take(MOST_REPEATED) {
-            let matrix = tracks.chain.matrix(source.as_mut(), time)?;
-            let scale = matrix.map_or(1.0, |matrix| matrix.matrix3.determinant());
+        for &time in at.iter().take(MOST_REPEATED) {
+            let scale = tracks.chain.matrix(source, time)?.map_or(1.0, |matrix| matrix.matrix3.determinant());
             if scale != 0.0 {
                 turned ^= scale < 0.0;
                 break;
             }
         }
-        let info = MeshInfo {
-            points,
-            frames: tracks.timeline.at.len(),
-            times: std::mem::take(&mut tracks.timeline.times),
-            units: tracks.units,
-            notes: std::mem::take(&mut tracks.notes),
-            faces: Polygons::new(),
-        };
-        let (equal, next) = ([[None; 2]; 2], Vec::new());
-        let mut mesh = Self { source, tracks, turned, equal, info, left_out: 0, next };
-        let places = mesh.places(0);
-        (mesh.info.faces, mesh.left_out) = mesh.read_faces(places)?;
+        let (faces, next) = (Polygons::new(), Vec::new());
+        let mut mesh = Self { tracks, turned, equal: [[None; 2]; 2], points, faces, left_out: 0, next };
+        let places = mesh.places(at[0]);
+        let arities = mesh.arities(source, places)?;
+        (mesh.faces, mesh.left_out) = mesh.read_faces(source, places)?;
         mesh.equal = [places; 2];
-        Ok(mesh)
+        let part = std::mem::take(&mut mesh.tracks.part);
+        mesh.tracks.part = Part { points, faces: mesh.faces.len(), ..arranged(part, &arities, turned) };
+        Ok(Some(mesh))
     }
 
-    /// The first frame, and how many faces were left out that have fewer than three corners.
-    pub(crate) fn into_model(self, path: &Path) -> Result<(Model, usize, Units), Error> {
-        let (points, left_out, units, mut values) = (self.info.points, self.left_out, self.info.units, Vec::new());
-        let mut reader = open(path, self, points)?;
-        reader.read_next(&mut values)?;
-        let faces = reader.mesh().map(|(_, faces)| faces.clone()).unwrap_or_default();
-        Ok((Model { points: values.as_chunks().0.to_vec(), faces, ..Model::default() }, left_out, units))
+    pub(super) fn part(&self) -> &Part {
+        &self.tracks.part
     }
 
-    /// Where the faces of a frame are stored.
-    fn places(&self, frame: usize) -> [Option<Value>; 2] {
-        let time = self.tracks.timeline.at[frame];
+    pub(super) fn is_shown(&self, time: f64) -> bool {
+        self.tracks.shown.at(time)
+    }
+
+    /// Where the faces at a time are stored.
+    fn places(&self, time: f64) -> [Option<Value>; 2] {
         self.tracks.faces.each_ref().map(|part| part.at(time).map(|(value, ..)| value))
     }
 
-    fn read_faces(&mut self, places: [Option<Value>; 2]) -> Result<(Polygons, usize), Fault> {
-        let [Some(counts), Some(corners)] = places else { return Ok(Default::default()) };
-        let most = most_corners(self.info.points);
-        let [counts, corners] = [self.source.integers(counts, most)?, self.source.integers(corners, most)?];
-        let [counts, corners] = [counts, corners].map(|numbers| numbers.into_iter().map(|number| number as u32));
-        faces(counts, corners, self.info.points, self.turned)
+    /// How many corners each face of the file has.
+    fn arities(&self, source: &mut dyn Values, [counts, _]: [Option<Value>; 2]) -> Result<Vec<u32>, Fault> {
+        let counts = counts.map_or(Ok(Vec::new()), |counts| source.integers(counts, most_corners(self.points)))?;
+        Ok(counts.into_iter().map(|count| count as u32).collect())
     }
 
-    /// Refuses a frame whose faces are others than those of the first.
-    fn check_faces(&mut self, frame: usize) -> Result<(), Fault> {
-        let places = self.places(frame);
+    fn read_faces(&mut self, source: &mut dyn Values, places: [Option<Value>; 2]) -> Result<(Polygons, usize), Fault> {
+        let [Some(_), Some(corners)] = places else { return Ok(Default::default()) };
+        let counts = self.arities(source, places)?;
+        let corners = source.integers(corners, most_corners(self.points))?;
+        let corners = corners.into_iter().map(|number| number as u32);
+        faces(counts.into_iter(), corners, self.points, self.turned)
+    }
+
+    /// Refuses faces that are others than those of the first frame.
+    fn check_faces(&mut self, source: &mut dyn Values, time: f64) -> Result<(), Fault> {
+        let places = self.places(time);
         if self.equal.contains(&places) {
             return Ok(());
         }
-        if self.read_faces(places)?.0 != self.info.faces {
+        if self.read_faces(source, places)?.0 != self.faces {
             return Err(topology_changes("its faces are not those of frame 0"));
         }
         self.equal = [places, self.equal[0]];
         Ok(())
     }
-}
 
-impl Animation for MovingMesh<'_> {
-    fn info(&self) -> &MeshInfo {
-        &self.info
-    }
-
-    fn read(&mut self, frame: usize, out: &mut Vec<f64>) -> Result<bool, Fault> {
-        let time = self.tracks.timeline.at[frame];
+    /// Reads the points at a time, all of which are overwritten; gives whether all are finite.
+    pub(super) fn read(&mut self, source: &mut dyn Values, time: f64, out: &mut [f64]) -> Result<bool, Fault> {
         let Some((value, next, share)) = self.tracks.positions.at(time) else { return Ok(false) };
-        let points = self.source.points(value)?;
-        if points.count != self.info.points {
-            let what = format!("it has {} points, and {} in frame 0", points.count, self.info.points);
+        let points = source.points(value)?;
+        if points.count != self.points {
+            let what = format!("it has {} points, and {} in frame 0", points.count, self.points);
             return Err(topology_changes(&what));
         }
-        self.check_faces(frame)?;
-        let matrix = self.tracks.chain.matrix(self.source.as_mut(), time)?;
-        // Every value is overwritten below.
-        out.resize(3 * self.info.points, 0.0);
-        let mut finite = self.source.read(points, out)?;
-        let following = if share > 0.0 { Some(self.source.points(next)?) } else { None };
+        self.check_faces(source, time)?;
+        let matrix = self.tracks.chain.matrix(source, time)?;
+        let mut finite = source.read(points, out)?;
+        let following = if share > 0.0 { Some(source.points(next)?) } else { None };
         // Where the number of points changes, those before hold.
-        if let Some(following) = following.filter(|following| following.count == self.info.points) {
+        if let Some(following) = following.filter(|following| following.count == self.points) {
             self.next.resize(out.len(), 0.0);
-            finite &= self.source.read(following, &mut self.next)?;
+            finite &= source.read(following, &mut self.next)?;
             out.iter_mut().zip(&self.next).for_each(|(value, next)| *value += share * (next - *value));
             finite &= out.iter().all(|x| x.is_finite());
         }

@@ -27,33 +27,96 @@ pub(crate) fn ancestry(nodes: &[Node], node: usize) -> impl Iterator<Item = usiz
 pub(crate) trait Tree {
     fn nodes(&self) -> &[Node];
 
-    /// A mesh as a message describes it behind its path, such as `3 points`.
-    fn describe(&mut self, mesh: usize) -> String;
+    /// How many points a mesh has first, where that can be read.
+    fn points(&mut self, mesh: usize) -> Option<u64>;
 }
 
-/// Of `all` meshes, at least one, that which `prim` names by its path, its own name or that of a
-/// node above; the only mesh whatever `prim` is, which the rest pose and the capture share.
-pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], prim: Option<&str>) -> Result<usize, Fault> {
+/// Which meshes of a scene are read.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wanted<'a> {
+    /// Their paths or names; all where there are none.
+    pub(crate) prims: &'a [String],
+    /// Points that they have together, where that is known.
+    pub(crate) points: Option<usize>,
+}
+
+/// Of `all` meshes, at least one, those that are wanted, in the order of the scene. The only mesh
+/// is, whatever its name, which the rest pose and the capture share; so is the only one with the
+/// points that are wanted, where none is named.
+pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], wanted: Wanted<'_>) -> Result<Vec<usize>, Fault> {
     if let &[only] = all {
-        return Ok(only);
+        return Ok(vec![only]);
     }
-    let found = prim.map_or_else(|| all.to_vec(), |prim| named(scene.nodes(), all, prim));
-    let what = match (found.as_slice(), prim) {
-        (&[only], _) => return Ok(only),
-        ([], Some(prim)) => {
-            format!("holds no mesh {}, but {}; give one of these with --prim", shown(prim), list(scene, all))
+    let mut chosen = Vec::new();
+    for prim in wanted.prims {
+        let found = named(scene.nodes(), all, prim);
+        if found.is_empty() {
+            let (prim, all) = (shown(prim), list(scene, all));
+            return Err(Fault::invalid(format!("holds no mesh {prim}, but {all}; give one of these with --prim")));
         }
-        (several, _) => format!(
-            "holds {} meshes, {}; choose one by its path with --prim, where the command has it, or export the one mesh alone",
-            several.len(),
-            list(scene, several)
-        ),
-    };
-    Err(Fault::invalid(what))
+        chosen.extend(found);
+    }
+    if wanted.prims.is_empty() {
+        chosen = all.to_vec();
+    }
+    chosen.sort_unstable();
+    chosen.dedup();
+    let Some(points) = wanted.points else { return Ok(chosen) };
+    let counts: Vec<_> = chosen.iter().map(|&mesh| scene.points(mesh)).collect();
+    let sum = counts.iter().copied().sum::<Option<u64>>();
+    if chosen.len() < 2 || sum.is_none_or(|sum| sum == points as u64) {
+        return Ok(chosen);
+    }
+    let mut fitting = chosen.iter().zip(&counts).filter(|(_, count)| **count == Some(points as u64));
+    match (fitting.next(), fitting.next()) {
+        (Some((&only, _)), None) => Ok(vec![only]),
+        _ => Err(Fault::invalid(format!(
+            "holds {} meshes, {}, which together have {} points, and {points} are expected; choose by paths with --prim, where the command has it, or export those meshes alone",
+            chosen.len(),
+            list(scene, &chosen),
+            sum.unwrap_or_default()
+        ))),
+    }
 }
 
-/// The meshes that a path or a name picks.
+/// The meshes that a path or a name picks, or a glob of them: `*` for some of a name, `**` for any
+/// names.
 pub(crate) fn named(nodes: &[Node], all: &[usize], prim: &str) -> Vec<usize> {
+    let found = literally_named(nodes, all, prim);
+    let is_glob = found.is_empty() && prim.contains(['*', '?', '[']);
+    let pattern = if is_glob { glob::Pattern::new(prim.trim_end_matches('/')).ok() } else { None };
+    let Some(pattern) = pattern else { return found };
+    let options = glob::MatchOptions { require_literal_separator: true, ..Default::default() };
+    let of_path = prim.contains('/');
+    let picks = |&mesh: &usize| {
+        ancestry(nodes, mesh).any(|node| {
+            let name =
+                if of_path { path(nodes, node) } else { String::from_utf8_lossy(&nodes[node].name).into_owned() };
+            pattern.matches_with(&name, options)
+        })
+    };
+    all.iter().copied().filter(picks).collect()
+}
+
+/// Bytes of a path that are kept: many nodes may share a long name.
+const LONGEST_PATH: usize = 4096;
+
+/// The names from the top to a node, each after a `/`.
+pub(crate) fn path(nodes: &[Node], node: usize) -> String {
+    let above: Vec<usize> = ancestry(nodes, node).collect();
+    let mut path = String::new();
+    for &node in above.iter().rev() {
+        let name = &nodes[node].name;
+        path.push('/');
+        path.push_str(&String::from_utf8_lossy(&name[..name.len().min(LONGEST_PATH)]).replace('/', "_"));
+        if path.len() > LONGEST_PATH {
+            break;
+        }
+    }
+    path
+}
+
+fn literally_named(nodes: &[Node], all: &[usize], prim: &str) -> Vec<usize> {
     let those = |picks: &dyn Fn(usize) -> bool| -> Vec<usize> { all.iter().copied().filter(|&k| picks(k)).collect() };
     let (exactly, below) = if prim.contains('/') {
         let names = || prim.trim_matches('/').rsplit('/').map(str::as_bytes);
@@ -73,7 +136,10 @@ pub(crate) fn named(nodes: &[Node], all: &[usize], prim: &str) -> Vec<usize> {
 
 /// Meshes with their points, as far as a message has room.
 pub(crate) fn list(scene: &mut impl Tree, meshes: &[usize]) -> String {
-    let describe = |&mesh: &usize| format!("{} ({})", shown_path(scene.nodes(), mesh), scene.describe(mesh));
+    let describe = |&mesh: &usize| {
+        let points = scene.points(mesh).map_or_else(|| "unreadable".to_owned(), |points| format!("{points} points"));
+        format!("{} ({points})", shown_path(scene.nodes(), mesh))
+    };
     let mut words: Vec<String> = meshes.iter().take(LISTED).map(describe).collect();
     if meshes.len() > LISTED {
         words.push(format!("{} more", meshes.len() - LISTED));

@@ -1,5 +1,6 @@
-//! The frames of one mesh of a scene.
+//! The frames of the meshes of a scene as a capture.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::Polygons;
@@ -18,6 +19,8 @@ pub(crate) struct MeshInfo {
     pub(crate) units: Units,
     /// What the user should know of how it is read, beside its times.
     pub(crate) notes: Vec<String>,
+    /// Frames in which each part is shown; `None` where it always is.
+    pub(crate) shown: Vec<Option<Vec<Range<u32>>>>,
 }
 
 pub(crate) trait Animation: Send {
@@ -76,6 +79,10 @@ impl<A: Animation> FrameReader for Reader<A> {
 
     fn units(&self) -> Units {
         self.mesh.info().units
+    }
+
+    fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
+        self.mesh.info().shown.clone()
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {

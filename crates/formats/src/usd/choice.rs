@@ -1,11 +1,11 @@
-//! Which mesh of a layer is meant.
+//! Which meshes of a layer are meant.
 
 use super::layer::{Kind, Layer, Prim, composed};
 use crate::error::Fault;
-use crate::scene::{Node, Tree, ancestry, choose as choose_mesh, named, shown_path};
+use crate::scene::{Node, Tree, Wanted, ancestry, choose as choose_meshes, list, named, shown_path};
 
-/// The mesh that `prim` names, or the only one, and what the user should know of others.
-pub(super) fn choose(layer: &mut Layer<'_>, prim: Option<&str>) -> Result<(usize, Option<String>), Fault> {
+/// The meshes that are wanted, and what the user should know of others.
+pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<usize>, Vec<String>), Fault> {
     let is_there = |&k: &usize| ancestry(&layer.nodes, k).all(|k| layer.prims[k].is_there);
     let there: Vec<usize> = (0..layer.prims.len()).filter(is_there).collect();
     let is_a = |k: usize, kind: Kind| layer.prims[k].kind == kind;
@@ -15,8 +15,13 @@ pub(super) fn choose(layer: &mut Layer<'_>, prim: Option<&str>) -> Result<(usize
     let mut meshes: Vec<usize> = there.iter().copied().filter(|&k| is_a(k, Kind::Mesh)).collect();
     let is_none = meshes.is_empty();
     meshes.retain(is_placed);
-    if prim.is_none() && meshes.len() > 1 {
-        meshes = shown(layer, meshes)?;
+    let mut notes = Vec::new();
+    if wanted.prims.is_empty() && meshes.len() > 1 {
+        let (rendered, others) = shown(layer, &meshes)?;
+        if !others.is_empty() {
+            notes.push(format!("left out what is hidden or a guide: {}; --prim reads it too", list(layer, &others)));
+        }
+        meshes = rendered;
     }
     let first_composed = |prims: &[Prim], among: &[usize]| among.iter().find_map(|&k| Some((k, prims[k].composed?)));
     if meshes.is_empty() {
@@ -29,25 +34,26 @@ pub(super) fn choose(layer: &mut Layer<'_>, prim: Option<&str>) -> Result<(usize
             _ => Fault::unsupported("holds no polygon mesh; export the mesh itself as USD"),
         });
     }
-    let chosen = choose_mesh(layer, &meshes, prim)?;
-    // What else is composed may be the mesh that is meant, unless this one was named.
-    let is_named = prim.is_some_and(|prim| !named(&layer.nodes, &[chosen], prim).is_empty());
-    let above: Vec<usize> = ancestry(&layer.nodes, chosen).collect();
+    let chosen = choose_meshes(layer, &meshes, wanted)?;
+    // What else is composed may be a mesh that is meant, unless all were named.
+    let is_named =
+        !wanted.prims.is_empty() && wanted.prims.iter().all(|prim| !named(&layer.nodes, &chosen, prim).is_empty());
+    let above: Vec<usize> = chosen.iter().flat_map(|&mesh| ancestry(&layer.nodes, mesh)).collect();
     let looked_at = if is_named { above } else { there };
     if let Some((prim, of)) = first_composed(&layer.prims, &looked_at) {
         return Err(composed(&shown_path(&layer.nodes, prim), of));
     }
-    let note = instancer.map(|instancer| {
+    notes.extend(instancer.map(|instancer| {
         format!("the instances of {}, a PointInstancer, are not read", shown_path(&layer.nodes, instancer))
-    });
-    Ok((chosen, note))
+    }));
+    Ok((chosen, notes))
 }
 
-/// Meshes that are rendered, where there are any: cages and other helpers say that they are guides
-/// or proxies, and what is switched off is invisible.
-fn shown(layer: &mut Layer<'_>, meshes: Vec<usize>) -> Result<Vec<usize>, Fault> {
-    let mut rendered = Vec::new();
-    for &mesh in &meshes {
+/// Meshes that are rendered, where there are any, and others: cages and other helpers say that they
+/// are guides or proxies, and what is switched off is invisible.
+fn shown(layer: &mut Layer<'_>, meshes: &[usize]) -> Result<(Vec<usize>, Vec<usize>), Fault> {
+    let (mut rendered, mut others) = (Vec::new(), Vec::new());
+    for &mesh in meshes {
         let (mut purpose, mut is_hidden) = (None, false);
         for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
             // The innermost purpose counts.
@@ -57,11 +63,10 @@ fn shown(layer: &mut Layer<'_>, meshes: Vec<usize>) -> Result<Vec<usize>, Fault>
             };
             is_hidden = is_hidden || constant(layer, prim, "visibility")?.as_deref() == Some("invisible");
         }
-        if !is_hidden && !matches!(purpose.as_deref(), Some("guide" | "proxy")) {
-            rendered.push(mesh);
-        }
+        let is_rendered = !is_hidden && !matches!(purpose.as_deref(), Some("guide" | "proxy"));
+        if is_rendered { rendered.push(mesh) } else { others.push(mesh) }
     }
-    Ok(if rendered.is_empty() { meshes } else { rendered })
+    Ok(if rendered.is_empty() { (others, rendered) } else { (rendered, others) })
 }
 
 /// The token that an attribute of a prim is at all times.
@@ -76,11 +81,10 @@ impl Tree for Layer<'_> {
         &self.nodes
     }
 
-    fn describe(&mut self, mesh: usize) -> String {
-        let points = self.attribute(mesh, "points").and_then(|points| match points.still() {
-            Some(points) => self.source.points(points).map(|points| points.count),
-            None => Ok(0),
-        });
-        points.map_or_else(|_| "unreadable".to_owned(), |points| format!("{points} points"))
+    fn points(&mut self, mesh: usize) -> Option<u64> {
+        match self.attribute(mesh, "points").ok()?.still() {
+            Some(points) => self.source.points(points).ok().map(|points| points.count as u64),
+            None => Some(0),
+        }
     }
 }

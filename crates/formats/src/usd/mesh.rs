@@ -1,5 +1,8 @@
-//! What a layer says of one mesh and the transforms above it.
+//! What a layer says of meshes and the transforms above them.
 
+use std::collections::HashSet;
+
+use cager_geometry::surface::Part;
 use cager_geometry::units::{Units, Up};
 
 use super::choice::choose;
@@ -8,42 +11,80 @@ use super::timing::timeline;
 use super::{transform, unread};
 use crate::dropped::Dropped;
 use crate::error::Fault;
-use crate::scene::{MeshTracks, MovingMesh};
+use crate::scene::{MeshTracks, MovingScene, SceneTracks, Steps, Track, Wanted, ancestry, path};
 
 /// The unit of layers that do not say theirs: a centimetre.
 const USUAL_UNIT: f64 = 0.01;
 
-/// Opens the mesh that `prim` names, or the only one; of its first frame alone, whatever moves it,
-/// where what is not read is to be told.
+/// Opens the meshes that are wanted; of their first frame alone, whatever moves them, where what is
+/// not read is to be told.
 pub(super) fn open<'a>(
     mut layer: Layer<'a>,
-    prim: Option<&str>,
+    wanted: Wanted<'_>,
     dropped: Option<&mut Dropped>,
-) -> Result<MovingMesh<'a>, Fault> {
-    let (mesh, note) = choose(&mut layer, prim)?;
-    let notes = note.into_iter().chain(unread::visibility(&mut layer, mesh).unwrap_or_default()).collect();
-    let mut attribute = |name| layer.attribute(mesh, name);
+) -> Result<MovingScene<'a>, Fault> {
+    let (prims, notes) = choose(&mut layer, wanted)?;
+    let mut tracks = SceneTracks { notes, units: units(&layer.stage), ..SceneTracks::default() };
+    for &prim in &prims {
+        let name = path(&layer.nodes, prim);
+        let named = |fault: Fault| if prims.len() > 1 { fault.within(&name) } else { fault };
+        tracks.meshes.push(read_mesh(&mut layer, prim, dropped.is_some()).map_err(named)?);
+    }
+    let of_mesh = |mesh: &MeshTracks| {
+        let moved = mesh.chain.moving().flatten();
+        mesh.positions.times.iter().chain(moved).copied().collect::<Vec<f64>>()
+    };
+    tracks.timeline = timeline(&layer.stage, tracks.meshes.iter().flat_map(of_mesh).collect())?;
+    if let Some(dropped) = dropped {
+        tracks.timeline.at.truncate(1);
+        for &prim in &prims {
+            // What cannot be named is no reason to refuse a mesh.
+            unread::add(&mut layer, prim, dropped).unwrap_or_default();
+        }
+    }
+    MovingScene::new(layer.source, tracks)
+}
+
+fn read_mesh(layer: &mut Layer<'_>, prim: usize, is_still: bool) -> Result<MeshTracks, Fault> {
+    let mut attribute = |name| layer.attribute(prim, name);
     let positions = attribute("points")?;
     let faces = [attribute("faceVertexCounts")?, attribute("faceVertexIndices")?];
     for (name, mover) in [("primvars:skel:jointIndices", "a skeleton moves"), ("skel:blendShapes", "blend shapes move")]
     {
-        if dropped.is_none() && positions.times.is_empty() && !attribute(name)?.is_empty() {
+        if !is_still && positions.times.is_empty() && !attribute(name)?.is_empty() {
             let what =
                 format!("has a mesh that {mover}, which is not read; export it with its points baked, or as Alembic");
             return Err(Fault::unsupported(what));
         }
     }
-    let chain = transform::above(&mut layer, mesh)?;
-    let samples = positions.times.iter().chain(chain.moving().flatten()).copied().collect();
-    let mut timeline = timeline(&layer.stage, samples)?;
-    let is_clockwise = layer.tokens(mesh, "orientation", 1)?.is_some_and(|told| told == ["leftHanded"]);
-    if let Some(dropped) = dropped {
-        timeline.at.truncate(1);
-        // What cannot be named is no reason to refuse a mesh.
-        unread::add(&mut layer, mesh, dropped).unwrap_or_default();
+    let chain = transform::above(layer, prim)?;
+    let is_clockwise = layer.tokens(prim, "orientation", 1)?.is_some_and(|told| told == ["leftHanded"]);
+    let part = Part { path: path(&layer.nodes, prim), ..Part::default() };
+    Ok(MeshTracks { positions, faces, is_clockwise, chain, shown: visible(layer, prim)?, part })
+}
+
+/// When a prim is shown: what is invisible hides all below it.
+fn visible(layer: &mut Layer<'_>, prim: usize) -> Result<Steps, Fault> {
+    let mut tracks = Vec::new();
+    for prim in ancestry(&layer.nodes, prim).collect::<Vec<_>>() {
+        let track = layer.attribute(prim, "visibility")?;
+        let mut hidden = HashSet::new();
+        for value in track.values.iter().chain(&track.default) {
+            if layer.source.tokens(*value, 1)? == ["invisible"] {
+                hidden.insert(value.0);
+            }
+        }
+        if !hidden.is_empty() {
+            tracks.push((track, hidden));
+        }
     }
-    let units = units(&layer.stage);
-    MovingMesh::new(layer.source, MeshTracks { positions, faces, is_clockwise, chain, timeline, units, notes })
+    let times = tracks.iter().flat_map(|(track, _)| track.times.iter().copied().chain(track.default.map(|_| 0.0)));
+    Steps::of(times.collect(), |time| {
+        let is_hidden = |(track, hidden): &(Track, HashSet<u64>)| {
+            track.at(time).is_some_and(|(value, ..)| hidden.contains(&value.0))
+        };
+        Ok(!tracks.iter().any(is_hidden))
+    })
 }
 
 fn units(stage: &Stage) -> Units {

@@ -1,7 +1,7 @@
-//! Universal Scene Description: one polygon mesh that moves, read and written frame by frame.
+//! Universal Scene Description: polygon meshes that move, read and written frame by frame.
 //!
 //! One layer is read, binary, as text, or the first in a package; what it is composed of beside
-//! itself is refused. Positions are those of the layer, moved by the transforms above the mesh,
+//! itself is refused. Positions are those of the layer, moved by the transforms above a mesh,
 //! with the unit and the upward axis that the layer says.
 
 mod binary;
@@ -19,22 +19,21 @@ use std::io::{Read, Seek};
 
 use crate::dropped::Dropped;
 use crate::error::Fault;
-use crate::scene::{MovingMesh, Reader};
+use crate::scene::{MovingScene, Reader, Wanted};
 use crate::signature::Signature;
 use binary::Binary;
 use layer::Layer;
 use text::Text;
 pub(crate) use write::{MeshWriter, Scene};
 
-/// Opens the mesh that `prim` names, or the only one; of its first frame alone where what is not
-/// read is to be told.
+/// Opens the meshes that are wanted; of their first frame alone where what is not read is to be told.
 pub(crate) fn open<'a>(
     source: impl Read + Seek + Send + 'a,
     length: u64,
-    prim: Option<&str>,
+    wanted: Wanted<'_>,
     dropped: Option<&mut Dropped>,
-) -> Result<MovingMesh<'a>, Fault> {
-    mesh::open(open_layer(Box::new(source), length)?, prim, dropped)
+) -> Result<MovingScene<'a>, Fault> {
+    mesh::open(open_layer(Box::new(source), length)?, wanted, dropped)
 }
 
 /// The layer that a file is, or the first one in a package, whatever its name.

@@ -67,18 +67,3 @@ fn kind(name: &str, type_name: &str) -> Option<&'static str> {
         plain => plain.map(|_| "primvars"),
     }
 }
-
-/// A note of a mesh that is hidden in some frames.
-pub(super) fn visibility(layer: &mut Layer<'_>, mesh: usize) -> Result<Option<String>, Fault> {
-    for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
-        let said = layer.attribute(prim, "visibility")?;
-        let mut tokens = Vec::new();
-        for value in said.values {
-            tokens.extend(layer.source.tokens(value, 1)?);
-        }
-        if tokens.windows(2).any(|pair| pair[0] != pair[1]) {
-            return Ok(Some("its visibility is animated, which is not kept".to_owned()));
-        }
-    }
-    Ok(None)
-}

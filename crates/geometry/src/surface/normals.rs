@@ -1,7 +1,7 @@
 //! Normals of corners, computed anew where a surface was deformed.
 
 use crate::mesh::{Point, Polygons};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
 /// Corners of a point that have the same of these numbers as one: a new number for each corner, counted from 0 as they
@@ -17,6 +17,28 @@ pub fn numbered(faces: &Polygons, given: &[u32]) -> (Vec<u32>, Vec<usize>) {
     });
     let corners = corners.collect();
     (corners, firsts)
+}
+
+/// Cosine of the angle within which normals of a point are one: rounding and averages of programs
+/// are within it, and nobody sees such an edge.
+const ONE: f32 = 0.9994;
+
+/// Which corners share a normal ([`Part::normals`](super::Part::normals)), by the point of each and
+/// the normal that a file gives it, of any length.
+pub fn sharing(points: &[u32], normals: &[[f32; 3]]) -> Vec<u32> {
+    let mut known: HashMap<u32, Vec<(Vec3, u32)>> = HashMap::with_capacity(points.len());
+    let mut count = 0;
+    let number = |(&point, &normal): (&u32, &[f32; 3])| {
+        let normal = Vec3::from(normal).normalize_or_zero();
+        let of_point = known.entry(point).or_default();
+        let same = of_point.iter().find(|(other, _)| *other == normal || other.dot(normal) > ONE);
+        same.map(|&(_, number)| number).unwrap_or_else(|| {
+            of_point.push((normal, count));
+            count += 1;
+            count - 1
+        })
+    };
+    points.iter().zip(normals).map(number).collect()
 }
 
 /// Which corners share a normal: see [`Part::normals`](super::Part::normals).
@@ -62,6 +84,13 @@ impl SharedNormals {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn normals_of_a_point_that_differ_by_rounding_alone_are_shared() {
+        let turned = |degrees: f32| [degrees.to_radians().sin(), 0.0, 2.0 * degrees.to_radians().cos()];
+        let normals = [turned(0.0), turned(1.0), turned(30.0), turned(0.0), [0.0; 3], [0.0; 3]];
+        assert_eq!(sharing(&[7, 7, 7, 8, 7, 7], &normals), [0, 0, 1, 2, 3, 3]);
+    }
 
     #[test]
     fn an_edge_is_hard_where_its_corners_do_not_share() {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use cager_geometry::mesh::Model;
-use cager_geometry::surface::{CornerSet, FaceGroup, Material, NO_MATERIAL, Part, Surface};
+use cager_geometry::surface::{CornerSet, FaceGroup, Material, NO_MATERIAL, Part, Surface, sharing};
 
 use crate::text::{integer, number, words};
 
@@ -14,7 +14,7 @@ const NONE: u32 = u32::MAX;
 #[derive(Default)]
 pub(super) struct SurfaceLines {
     uvs: Vec<[f32; 2]>,
-    normals: Vec<[u32; 3]>,
+    normals: Vec<[f32; 3]>,
     /// Of each corner of the faces that are kept, then of the face that is read.
     corners: Vec<[u32; 2]>,
     materials: Names,
@@ -62,8 +62,7 @@ impl SurfaceLines {
         let mut next = || numbers.next().unwrap_or(0.0);
         match keyword {
             b"vt" => self.uvs.push([next(), next()]),
-            // Equal ones are one: 0 and −0 too.
-            b"vn" => self.normals.push([next(), next(), next()].map(|x| (x + 0.0).to_bits())),
+            b"vn" => self.normals.push([next(), next(), next()]),
             b"usemtl" => self.material = self.materials.number(rest) + 1,
             b"g" => {
                 let names = words(rest).filter(|name| *name != b"default").map(|name| self.groups.number(name));
@@ -113,7 +112,8 @@ impl SurfaceLines {
         for bound in bounds.windows(2) {
             let faces = bound[0].faces..bound[1].faces;
             let count = model.faces.arities()[faces.clone()].iter().map(|&arity| arity as usize).sum::<usize>();
-            let of_part = &self.corners[first_corner..first_corner + count];
+            let of_corners = first_corner..first_corner + count;
+            let of_part = &self.corners[of_corners.clone()];
             first_corner += count;
             let mut part = Part {
                 path: bound[0].name.clone(),
@@ -123,7 +123,9 @@ impl SurfaceLines {
             };
             part.uv_sets.extend(self.uv_set(of_part));
             if of_part.iter().all(|&[_, normal]| normal != NONE) {
-                part.normals = self.same_normals(of_part);
+                let points = &model.faces.indices()[of_corners];
+                let normals: Vec<_> = of_part.iter().map(|&[_, normal]| self.normals[normal as usize]).collect();
+                part.normals = sharing(points, &normals);
             }
             let materials: Vec<u32> = self.faces[faces.clone()].iter().map(|&(material, _)| material).collect();
             if materials.iter().any(|&material| material > 0) {
@@ -190,16 +192,6 @@ impl SurfaceLines {
             set.corners.push(number);
         }
         Some(set)
-    }
-
-    /// A number for each different normal.
-    fn same_normals(&self, corners: &[[u32; 2]]) -> Vec<u32> {
-        let mut numbers = HashMap::new();
-        let number = |&[_, normal]: &[u32; 2]| {
-            let next = numbers.len() as u32;
-            *numbers.entry(self.normals[normal as usize]).or_insert(next)
-        };
-        corners.iter().map(number).collect()
     }
 
     /// The groups of a part, where its faces are in more than one.
