@@ -129,6 +129,10 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) coding: CodingArgs,
 
+    /// link: the pictures of materials stay the files that the rest pose names; embed: their bytes are taken in, and decode writes them beside its output.
+    #[arg(long, value_enum, value_name = "HOW", default_value = "link")]
+    pub(crate) textures: Textures,
+
     /// Write sizes, errors per frame, spectrum and times as JSON.
     #[arg(long, value_name = "REPORT.json")]
     pub(crate) report: Option<PathBuf>,
@@ -152,6 +156,13 @@ pub(crate) struct EncodeArgs {
     /// Connections to the service that send frames at the same time, where one is slower than the way there.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
     pub(crate) connections: u8,
+}
+
+/// What happens to the pictures of materials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Textures {
+    Link,
+    Embed,
 }
 
 /// How the cage is designed where none is given.
@@ -243,6 +254,10 @@ pub(crate) struct DecodeArgs {
     /// cages: what the cages say alone, fast and coarse; all: with the residual of files that have one.
     #[arg(long, value_enum, value_name = "LAYER", default_value = "all", conflicts_with = "cages")]
     pub(crate) layer: Layer,
+
+    /// Write these parts of the model alone: their paths, names, or globs of these, such as 'eye*'; may be given several times.
+    #[arg(long, value_name = "NAME", conflicts_with = "cages")]
+    pub(crate) part: Vec<String>,
 
     /// Decode what can be of a file that is damaged or was cut: frames that cannot are left out and named.
     #[arg(long, conflicts_with_all = ["cages", "with_cages"])]

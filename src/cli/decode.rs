@@ -91,6 +91,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         salvage: args.salvage,
         morphs: args.morphs.options(),
         with_cage: transfer.with_cage,
+        parts: args.part.clone(),
         units: transfer.meaning.units(),
     };
     let bar = progress::PreparationBar::new("decoding", taken);
@@ -154,6 +155,7 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
         (transfer.cages, "--cages", "each file of a list has a cage of its own"),
         (transfer.with_cage, "--with-cage", "each file of a list has a cage of its own"),
         (transfer.with_cages.is_some(), "--with-cages", "each file of a list has a cage of its own"),
+        (!args.part.is_empty(), "--part", "the files of a list may have parts of their own"),
         (transfer.model.is_some(), "--model", "each file of a list has a cage of its own"),
         (args.salvage, "--salvage", "what a list says holds for whole files"),
     ] {

@@ -1,6 +1,6 @@
 //! `cager encode`.
 
-use super::args::{EncodeArgs, SpectrumArg};
+use super::args::{EncodeArgs, SpectrumArg, Textures};
 use super::checks::{CaptureArgs, explained_with_options, unnamed_files, warn_of_departures};
 use super::coding_args::{Unit, goal};
 use super::dry_run::{read_files, size, tell_dry_run};
@@ -68,7 +68,13 @@ fn opened(args: &EncodeArgs) -> Result<Opened> {
         ..unnamed_files(checks)
     };
     files.selection.range = args.frames_range;
-    let options = OpenOptions { files, weld: *weld, flip_cage: args.flip_cage, allow_mismatch: checks.force };
+    let options = OpenOptions {
+        files,
+        weld: *weld,
+        flip_cage: args.flip_cage,
+        pictures: args.textures == Textures::Embed,
+        allow_mismatch: checks.force,
+    };
     warning(|warnings| options.read(&args.rest, args.cage.as_deref(), &args.frames, warnings))
         .map_err(|error| explained_with_options(error, &args.frames, *up, args.flip_cage))
 }

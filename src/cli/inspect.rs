@@ -7,8 +7,10 @@ use super::{counted, grouped, human_bytes, plain, print, warn};
 use anyhow::Result;
 use cager_capture::decode::{self, Container, DecodeError};
 use cager_formats::missing_frames;
+use cager_geometry::surface::{Part, PartRange};
 use cager_proto::report::Report;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -37,8 +39,24 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
 struct Inspected {
     #[serde(flatten)]
     report: Report,
+    parts: Vec<PartOf>,
     layers: Vec<Layer>,
     sections: Vec<Section>,
+}
+
+/// A part of the model: where its points and faces lie among those of the file, and what lies on them.
+#[derive(Serialize)]
+struct PartOf {
+    path: String,
+    first_point: usize,
+    points: usize,
+    first_face: usize,
+    faces: usize,
+    uv_sets: Vec<String>,
+    color_sets: Vec<String>,
+    materials: Vec<String>,
+    /// Frames in which it is shown, from and to below, counted from 0; null where it always is.
+    shown: Option<Vec<[u32; 2]>>,
 }
 
 /// A layer of edits.
@@ -62,7 +80,8 @@ impl Inspected {
         container.verify().map_err(fail)?;
         let report = container.report().map_err(fail)?;
         let layers = layers(&mut container).map_err(fail)?;
-        Ok(Self { report, layers, sections: sections(&container) })
+        let parts = parts(&mut container).map_err(fail)?;
+        Ok(Self { report, parts, layers, sections: sections(&container) })
     }
 
     fn tell(&self, path: &Path) -> Result<()> {
@@ -71,7 +90,7 @@ impl Inspected {
     }
 
     fn as_text(&self, name: &str) -> Result<String> {
-        let Self { report, layers, sections } = self;
+        let Self { report, parts, layers, sections } = self;
         let mut out = String::new();
         writeln!(out, "{name}: {}, every checksum matches", human_bytes(report.bytes.output))?;
         let (frames, points) = (counted(report.frames, "frame"), counted(report.points, "point"));
@@ -84,6 +103,9 @@ impl Inspected {
         let up = report.up.as_ref().map(|up| format!("{} up", plain(up).to_uppercase()));
         if let Some(units) = unit.into_iter().chain(up).reduce(|unit, up| format!("{unit}, {up}")) {
             writeln!(out, "  units     {units}")?;
+        }
+        for (k, part) in parts.iter().enumerate() {
+            writeln!(out, "  {}{}", if k == 0 { "parts     " } else { "          " }, part.as_text())?;
         }
         let (vertices, faces) = (grouped(report.cage_vertices), grouped(report.cage_faces));
         writeln!(out, "  cage      {vertices} vertices, {faces} faces")?;
@@ -120,6 +142,45 @@ impl Inspected {
         }
         Ok(out)
     }
+}
+
+impl PartOf {
+    fn as_text(&self) -> String {
+        let path = if self.path.is_empty() { "one".to_owned() } else { plain(&self.path) };
+        let mut text = format!("{path}: {} from {}", counted(self.points, "point"), grouped(self.first_point));
+        text += &format!(", {}", counted(self.faces, "face"));
+        let sets =
+            [("texture coordinates", &self.uv_sets), ("colours", &self.color_sets), ("materials", &self.materials)];
+        for (what, names) in sets.into_iter().filter(|(_, names)| !names.is_empty()) {
+            let names: Vec<String> = names.iter().filter(|name| !name.is_empty()).map(|name| plain(name)).collect();
+            text += &format!(", {what}");
+            text += &if names.is_empty() { String::new() } else { format!(" {}", names.join(" ")) };
+        }
+        if self.shown.is_some() {
+            text += ", hidden in some frames";
+        }
+        text
+    }
+}
+
+fn parts(container: &mut Container) -> Result<Vec<PartOf>, cager_proto::container::Error> {
+    let Some((surface, faces)) = container.surface()? else { return Ok(Vec::new()) };
+    let names = |part: &Part| {
+        let used: BTreeSet<u32> = part.materials.iter().copied().collect();
+        used.iter().filter_map(|&k| Some(surface.materials.get(k as usize)?.name.clone())).collect()
+    };
+    let of = |(part, range): (&Part, PartRange)| PartOf {
+        path: part.path.clone(),
+        first_point: range.points.start,
+        points: part.points,
+        first_face: range.faces.start,
+        faces: part.faces,
+        uv_sets: part.uv_sets.iter().map(|set| set.name.clone()).collect(),
+        color_sets: part.color_sets.iter().map(|set| set.name.clone()).collect(),
+        materials: names(part),
+        shown: part.shown.as_ref().map(|shown| shown.iter().map(|range| [range.start, range.end]).collect()),
+    };
+    Ok(surface.ranges(&faces).map(of).collect())
 }
 
 /// All of them; frames by their numbers.

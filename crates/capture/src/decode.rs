@@ -16,10 +16,14 @@ use crate::memory::{Memory, free_bytes};
 use crate::origin::MAX_ROUNDING_ERROR;
 use crate::timing::Timing;
 use cager_core::inversion::BATCH;
-use cager_formats::{CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, create_frames};
+use cager_formats::{
+    CageMesh, FrameOptions, FrameRange, FrameWriter, MorphOptions, Target, chosen_parts, create_frames,
+};
 use cager_geometry::mesh::{Model, Polygons, diagonal};
+use cager_geometry::surface::Surface;
 use cager_geometry::units::{Change, Units};
 use cager_proto::container;
+use std::ops::Range;
 use std::path::Path;
 
 /// What to decode, if not all frames of the container with its own model and cages.
@@ -45,6 +49,9 @@ pub struct Decoding<'a> {
     pub morphs: MorphOptions,
     /// Whether the cage is kept beside the model, which USD alone does.
     pub with_cage: bool,
+    /// Parts of the model that are written, by paths, names or globs of these: all where there are
+    /// none.
+    pub parts: Vec<String>,
     /// Unit and upward axis that positions are brought to; else the container's.
     pub units: Units,
 }
@@ -152,6 +159,8 @@ struct Chosen<'a> {
     change: Change,
     damaged: Vec<usize>,
     numbers_lost: bool,
+    /// The points that are written, where these are not all.
+    points: Option<Vec<Range<usize>>>,
 }
 
 impl<'a> Chosen<'a> {
@@ -192,7 +201,7 @@ impl<'a> Chosen<'a> {
             // Decoding does not need it, but a damaged file is refused wherever the damage is.
             container.report().map_err(fail)?;
         }
-        Ok(Self { container, path, what, wanted, options, change, damaged, numbers_lost })
+        Ok(Self { container, path, what, wanted, options, change, damaged, numbers_lost, points: None })
     }
 
     /// How a `.glb` holds the frames: where nothing is asked, to what a guaranteed error leaves.
@@ -212,18 +221,38 @@ impl<'a> Chosen<'a> {
 
     /// The faces to write, and what lies on them among the options: in the order of the source where the file says it.
     fn take_surface(&mut self, bound: &BoundModel) -> Result<Polygons, DecodeError> {
-        if let Some((_, model)) = self.what.model {
-            self.options.surface = model.surface.clone();
-            return Ok(model.faces.clone());
+        let own = || (Surface::default(), bound.rest.faces.clone());
+        let (mut surface, faces) = match self.what.model {
+            Some((_, model)) => (model.surface.clone(), model.faces.clone()),
+            None => match self.container.surface() {
+                Err(container::Error::Corrupt { .. }) if self.what.salvage => own(),
+                found => found.map_err(|cause| DecodeError::container(self.path, cause))?.unwrap_or_else(own),
+            },
+        };
+        if self.what.model.is_none() && !self.what.salvage {
+            let pictures = self.container.pictures();
+            surface.pictures = pictures.map_err(|cause| DecodeError::container(self.path, cause))?;
         }
-        match self.container.surface() {
-            Ok(Some((surface, faces))) => {
-                self.options.surface = surface;
-                Ok(faces)
-            }
-            Err(container::Error::Corrupt { .. }) if self.what.salvage => Ok(bound.rest.faces.clone()),
-            found => found.map(|_| bound.rest.faces.clone()).map_err(|cause| DecodeError::container(self.path, cause)),
+        if self.what.has_own_frames() {
+            surface.take_frames(&self.wanted);
+        } else {
+            surface.parts.iter_mut().for_each(|part| part.shown = None);
         }
+        if self.what.parts.is_empty() {
+            self.options.surface = surface;
+            return Ok(faces);
+        }
+        let paths: Vec<&str> = surface.parts.iter().map(|part| part.path.as_str()).collect();
+        let chosen = chosen_parts(&paths, &self.what.parts)
+            .map_err(|what| DecodeError::Parts { path: self.path.to_owned(), what })?;
+        let chosen = surface.choose(&faces, |k| chosen[k]);
+        (self.options.surface, self.points) = (chosen.surface, Some(chosen.points));
+        Ok(chosen.faces)
+    }
+
+    /// How many points are written of so many.
+    fn points(&self, all: usize) -> usize {
+        self.points.as_ref().map_or(all, |ranges| ranges.iter().map(ExactSizeIterator::len).sum())
     }
 
     fn memory(&self) -> Memory {
@@ -276,6 +305,14 @@ impl<'a> Chosen<'a> {
                     self.container.add_residual(wanted, &mut positions[..count]).map_err(fail)?;
                 }
                 for frame in &mut positions[..count] {
+                    if let Some(points) = &self.points {
+                        let mut kept = 0;
+                        for points in points {
+                            frame.copy_within(3 * points.start..3 * points.end, kept);
+                            kept += 3 * points.len();
+                        }
+                        frame.truncate(kept);
+                    }
                     units::apply(&self.change, frame);
                     writer.write_frame(frame)?;
                 }
@@ -310,9 +347,9 @@ pub fn decode(
     let path = output.path().to_owned();
     let mut chosen = Chosen::open(input, what)?;
     let bound = chosen.bind()?;
-    let (points, frames) = (bound.rest.points.len(), chosen.wanted.len());
     chosen.options.morphs = chosen.morphs(chosen.what.morphs, &bound.rest)?;
     let faces = chosen.take_surface(&bound)?;
+    let (points, frames) = (chosen.points(bound.rest.points.len()), chosen.wanted.len());
     let mut writer = create_frames(output, points, frames, &faces, &chosen.options)?;
     chosen.write(&bound, &mut writer, progress)?;
     let mut notes = writer.notes();

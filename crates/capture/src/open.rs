@@ -7,10 +7,11 @@ use crate::encode::EncodeError;
 use crate::frames::CaptureFiles;
 use cager_cages::{DesignOptions, Goal, design};
 use cager_core::cage::Cage;
-use cager_formats::{Dropped, ReadModel, read_mesh};
+use cager_formats::{Dropped, ReadModel, read_mesh, take_pictures};
 use cager_geometry::mesh::Model;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A rest pose, its cage, and frames that are read from files.
 #[derive(Clone, Debug)]
@@ -80,6 +81,8 @@ pub struct OpenOptions {
     pub weld: bool,
     /// Turns the faces of the cage around, which point inwards.
     pub flip_cage: bool,
+    /// Takes in the pictures that the materials of the rest pose name.
+    pub pictures: bool,
     /// Goes on, with warnings, where rest pose, cage and frames look as if they did not belong
     /// together.
     pub allow_mismatch: bool,
@@ -159,9 +162,15 @@ impl OpenOptions {
         frames: &Path,
         warnings: &mut Vec<String>,
     ) -> Result<Opened, EncodeError> {
-        let Self { mut files, weld, flip_cage, allow_mismatch } = self;
+        let Self { mut files, weld, flip_cage, pictures, allow_mismatch } = self;
         let ReadModel { model: mut rest, units, note, dropped } = read_mesh(path, &files.selection.prims)?;
         warnings.extend(note);
+        if pictures {
+            warnings.extend(take_pictures(&mut rest.surface, path));
+        } else if !std::mem::take(&mut rest.surface.pictures).is_empty() {
+            warnings
+                .push(format!("{}: the pictures in it are left out; --textures embed takes them in", path.display()));
+        }
         (files.path, files.points, files.rest_units) = (frames.to_owned(), rest.points.len(), units);
         files.selection.no_frames = [path].into_iter().chain(cage_path).map(Path::to_path_buf).collect();
         if weld {
@@ -173,6 +182,9 @@ impl OpenOptions {
                     path.display()
                 ));
             }
+        }
+        if rest.surface.parts.len() > 1 {
+            files.selection.rest = Some(Arc::new(rest.clone()));
         }
         files.take_origin(&mut rest);
         let cage = match cage_path {

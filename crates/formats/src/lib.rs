@@ -18,6 +18,7 @@ mod matrix;
 pub mod mesh;
 mod natural;
 mod normals;
+mod pictures;
 mod scene;
 mod signature;
 mod text;
@@ -40,6 +41,8 @@ pub use mesh::{
     MeshFormat, ReadModel, model_bytes, obj_bytes, read_mesh, read_mesh_bytes, read_model, read_model_bytes,
     write_model,
 };
+pub use pictures::take_pictures;
+pub use scene::chosen_parts;
 pub use signature::Signature;
 
 /// Compiles the examples of the README.

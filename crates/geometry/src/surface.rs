@@ -1,13 +1,16 @@
 //! What lies on the faces of a model beside its points: named parts, texture coordinates, colours, hard edges, creases and materials.
 
 mod normals;
+mod parts;
 
 pub use normals::{SharedNormals, numbered, sharing};
+pub use parts::{Chosen, shown_in};
 
 use crate::mesh::Polygons;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Of a face without a material.
 pub const NO_MATERIAL: u32 = u32::MAX;
@@ -20,6 +23,18 @@ pub struct Surface {
     pub parts: Vec<Part>,
     /// What [`Part::materials`] counts.
     pub materials: Vec<Material>,
+    /// Those that textures name, as far as their bytes are known.
+    #[serde(skip)]
+    pub pictures: Vec<Picture>,
+}
+
+/// The file of a picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// As [`Texture::path`].
+    pub path: String,
+    /// As they are in the file.
+    pub bytes: Arc<[u8]>,
 }
 
 /// One mesh of a scene.
@@ -289,7 +304,7 @@ mod tests {
         faces.push(&[0, 1, 2]);
         faces.push(&[3, 4, 5, 6]);
         let part = |points, faces| Part { points, faces, ..Part::default() };
-        let mut surface = Surface { parts: vec![part(3, 1), part(4, 1)], materials: Vec::new() };
+        let mut surface = Surface { parts: vec![part(3, 1), part(4, 1)], ..Surface::default() };
         surface.check(7, &faces).unwrap();
         let last = surface.ranges(&faces).last().unwrap().1;
         assert_eq!(last, PartRange { points: 3..7, faces: 1..2, corners: 3..7 });

@@ -97,9 +97,17 @@ impl<R: Read + Seek> ContainerReader<R> {
         if h.rest_faces == 0 && h.rest_corners > 0 {
             return Err(Error::corrupt(0, "the header counts corners of a model without faces"));
         }
-        let at_most_one =
-            [tag::ORIGIN, tag::UNITS, tag::REST_COLORS, tag::SURFACE, tag::ELEMENTS, tag::NUMBERS, tag::REPORT]
-                .map(|tag| (tag, 0..=1));
+        let at_most_one = [
+            tag::ORIGIN,
+            tag::UNITS,
+            tag::REST_COLORS,
+            tag::SURFACE,
+            tag::PICTURES,
+            tag::ELEMENTS,
+            tag::NUMBERS,
+            tag::REPORT,
+        ]
+        .map(|tag| (tag, 0..=1));
         let faces = usize::from(h.rest_faces > 0);
         for (tag, expected) in [(tag::REST_FACES, faces..=faces), (tag::CONTENTS, 0..=0)].into_iter().chain(at_most_one)
         {
@@ -123,7 +131,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 tag::ERRORS => (8 * self.frames as u64, &[4]),
                 tag::NUMBERS => (8 * self.frames as u64, &[8]),
                 tag::EDIT => (s.raw_bytes, &[4]),
-                tag::SURFACE | tag::ELEMENTS | tag::RESIDUAL => (s.raw_bytes, &[1]),
+                tag::SURFACE | tag::PICTURES | tag::ELEMENTS | tag::RESIDUAL => (s.raw_bytes, &[1]),
                 _ => (s.raw_bytes, if s.width > 0 { std::slice::from_ref(&s.width) } else { &[] }),
             };
             if raw_bytes != s.raw_bytes || !widths.contains(&s.width) {

@@ -11,6 +11,7 @@ mod frames;
 mod groups;
 mod layers;
 mod model;
+mod pictures;
 mod reader;
 mod rewrite;
 mod section;
@@ -119,6 +120,7 @@ pub(crate) mod tag {
         REST_FACES = b"RFAC";
         REST_COLORS = b"rcol";
         SURFACE = b"surf";
+        PICTURES = b"pict";
         CAGE_VERTICES = b"CVTX";
         CAGE_FACES = b"CTRI";
         ELEMENTS = b"ELEM";

@@ -161,6 +161,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         self.layers()?;
         self.colors()?;
         self.surface()?;
+        self.pictures()?;
         self.elements()?;
         self.report()?;
         let mut cage = Vec::new();

@@ -48,6 +48,14 @@ pub enum DecodeError {
         /// What it needs.
         what: String,
     },
+    /// A part that was asked for is not there.
+    #[error("{}: {what}", .path.display())]
+    Parts {
+        /// The container.
+        path: PathBuf,
+        /// What there is instead.
+        what: String,
+    },
     /// No frame that was asked for is intact.
     #[error("{}: no frame is left: {what}; get the file again", .path.display())]
     Lost {

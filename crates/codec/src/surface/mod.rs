@@ -129,7 +129,7 @@ fn decode_parts(mut streams: Streams<'_>, outline: Surface, faces: &Polygons) ->
         parts.push(filled);
     }
     if streams.bytes.is_empty() {
-        Ok(Surface { parts, materials: outline.materials })
+        Ok(Surface { parts, ..outline })
     } else {
         Err(Error::Damaged("more lies on the faces than is named"))
     }
@@ -241,7 +241,7 @@ mod tests {
         let mut faces = Polygons::new();
         let parts = vec![part(9, 0, &mut faces), part(30, 81, &mut faces)];
         let named = |name: &str| Material { name: name.to_owned(), ..Material::default() };
-        let surface = Surface { parts, materials: vec![named("skin"), named("cloth")] };
+        let surface = Surface { parts, materials: vec![named("skin"), named("cloth")], ..Surface::default() };
         Model { points: vec![[0.0; 3]; POINTS], faces, surface, ..Model::default() }
     }
 

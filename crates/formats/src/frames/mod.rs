@@ -25,6 +25,7 @@ mod several;
 mod single;
 mod source;
 mod times;
+mod vanished;
 mod widen;
 mod write;
 

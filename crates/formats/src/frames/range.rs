@@ -6,11 +6,11 @@ use std::path::Path;
 use std::str::FromStr;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::shown_in;
 use cager_geometry::units::Units;
 
 use super::FrameReader;
 use crate::error::{Error, Fault};
-use crate::scene::ranges;
 
 /// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of
 /// their source. Written `A-B` or `A-BxSTEP`.
@@ -230,7 +230,7 @@ impl FrameReader for RangeReader {
     fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
         let frames = || (0..self.range.count()).map(|place| self.range.frame(place) as u32);
         let taken =
-            |shown: Vec<Range<u32>>| ranges(frames().map(|frame| shown.iter().any(|range| range.contains(&frame))));
+            |shown: Vec<Range<u32>>| shown_in(frames().map(|frame| shown.iter().any(|range| range.contains(&frame))));
         self.reader.shown().into_iter().map(|shown| shown.and_then(taken)).collect()
     }
 

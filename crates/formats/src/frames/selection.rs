@@ -1,6 +1,9 @@
 //! Which of the files and frames of a source are taken.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+
+use cager_geometry::mesh::Model;
 
 use super::FrameRange;
 
@@ -18,6 +21,8 @@ pub struct FrameSelection {
     pub animation: Option<String>,
     /// Frames per second to take of glTF; by default frames are at the times of its keys.
     pub rate: Option<f64>,
+    /// The rest pose, of whose parts files of a frame each may lack some.
+    pub rest: Option<Arc<Model>>,
     /// Whether files of several sequences are taken in natural order, instead of refused.
     pub join_sequences: bool,
 }

@@ -1,12 +1,15 @@
 //! A capture with each frame in a file of its own.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::shown_in;
 use cager_geometry::units::Units;
 
 use super::merged::Merged;
 use super::names::Sequence;
+use super::vanished::Parts;
 use super::{FrameReader, FrameSelection, cut, npz, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{FrameFaces, MeshFormat, read_frame_file};
@@ -29,22 +32,37 @@ pub(super) struct SequenceReader {
     /// Of the frame that was read last; none where its file has none that can be read.
     faces: FrameFaces,
     merged: Merged,
+    /// Of the rest pose, where it has several.
+    parts: Option<Parts>,
 }
 
 impl SequenceReader {
     /// `notes` are what the user should know of the choice of these files.
-    pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>, prims: &[String]) -> Self {
-        let (first, prim) = (sequence.files.first(), prims.first().map(String::as_str));
+    pub(super) fn new(sequence: Sequence, points: usize, notes: Vec<String>, selection: &FrameSelection) -> Self {
+        let (first, prim) = (sequence.files.first(), selection.prim());
         // Each file has the array that is read of the first.
         let unnamed = first.filter(|path| single::is_array(path) && !prim.is_some_and(|name| npz::holds(path, name)));
         let read_first = unnamed.and_then(|path| npz::array_read(path, points));
-        let prims = read_first.map_or_else(|| prims.to_vec(), |array| vec![array]);
+        let prims = read_first.map_or_else(|| selection.prims.clone(), |array| vec![array]);
         let (faces, merged) = (FrameFaces::default(), Merged::default());
         let (frame_rate, units) = (None, Units::UNKNOWN);
         let is_array_named = first.zip(prims.first()).is_some_and(|(path, name)| npz::holds(path, name));
         let (next, before) = (0, None);
-        let mut opened =
-            Self { sequence, points, notes, prims, is_array_named, frame_rate, units, next, before, faces, merged };
+        let parts = Parts::of(selection.rest.as_ref(), points);
+        let mut opened = Self {
+            sequence,
+            points,
+            notes,
+            prims,
+            is_array_named,
+            frame_rate,
+            units,
+            next,
+            before,
+            faces,
+            merged,
+            parts,
+        };
         let first = opened.sequence.files.first();
         // All files are of one format. What is wrong with one is said when it is read.
         match first.map(|path| (MeshFormat::guess(path), opened.open(path))) {
@@ -106,10 +124,15 @@ impl SequenceReader {
 
     fn read_mesh(&mut self, path: &Path, out: &mut Vec<f64>) -> Result<(), Error> {
         let frame = self.next;
-        let model = read_frame_file(path, &mut self.faces)
+        let mut model = read_frame_file(path, &mut self.faces)
             .and_then(|model| self.merged.apply(model, path, &self.sequence.files, self.points))
             .map_err(|error| error.in_frame(frame))?;
         let whole = cut::last_line_ends(path).map_err(|cause| Error::read(path, cause))?;
+        match &mut self.parts {
+            Some(parts) if model.points.len() == self.points => parts.keep(&model.points),
+            Some(parts) => model = parts.complete(path).unwrap_or(model),
+            None => {}
+        }
         let found = model.points.len();
         if found != self.points {
             if found < self.points && whole == Some(false) {
@@ -159,6 +182,20 @@ impl FrameReader for SequenceReader {
 
     fn units(&self) -> Units {
         self.units
+    }
+
+    fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
+        let Some(parts) = &self.parts else { return Vec::new() };
+        let files = &self.sequence.files;
+        if files.first().is_some_and(|path| MeshFormat::guess(path).is_some()) {
+            return parts.shown(files);
+        }
+        let of_file = |path: &PathBuf| self.open(path).map_or_else(|_| Vec::new(), |reader| reader.shown());
+        let of_files: Vec<_> = files.iter().map(of_file).collect();
+        let is_shown = |shown: &Vec<Option<Vec<Range<u32>>>>, part: usize| {
+            shown.get(part).is_none_or(|ranges| ranges.as_ref().is_none_or(|ranges| !ranges.is_empty()))
+        };
+        (0..parts.count()).map(|part| shown_in(of_files.iter().map(|shown| is_shown(shown, part)))).collect()
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {

@@ -142,7 +142,7 @@ pub fn open_raw_frames<'a>(
 fn open_file(path: &Path, expected_points: usize, selection: &FrameSelection) -> Result<Box<dyn FrameReader>, Error> {
     if MeshFormat::guess(path).is_some() && !single::is_animated(path)? {
         let sequence = Sequence::of_all(vec![path.to_owned()]);
-        return Ok(Box::new(SequenceReader::new(sequence, expected_points, Vec::new(), &[])));
+        return Ok(Box::new(SequenceReader::new(sequence, expected_points, Vec::new(), selection)));
     }
     single::open_cache(path, expected_points, selection, false)
 }
@@ -229,7 +229,7 @@ fn open_sequence(
     } else {
         Sequence::of(files).map_err(|what| Error::SeveralSequences { path: source.to_owned(), what })?
     };
-    Ok(Box::new(SequenceReader::new(sequence, expected_points, notes, &selection.prims)))
+    Ok(Box::new(SequenceReader::new(sequence, expected_points, notes, selection)))
 }
 
 /// Files without the rest pose and the cage, however they are spelled, and what to say of it. One

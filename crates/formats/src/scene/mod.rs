@@ -14,7 +14,8 @@ mod transform;
 
 pub(crate) use bytes::{Allowance, Fields, Reader, Source, damaged};
 pub(crate) use mesh::{MeshTracks, bounds};
-pub(crate) use moving::{MovingScene, SceneTracks, no_points, ranges};
+pub(crate) use moving::{MovingScene, SceneTracks, no_points};
+pub use node::chosen_parts;
 pub(crate) use node::{Node, Tree, Wanted, ancestry, choose, list, named, path, shown, shown_path};
 pub(crate) use reader::{Animation, MeshInfo, open};
 pub(crate) use shown::Steps;

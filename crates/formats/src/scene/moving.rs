@@ -1,10 +1,9 @@
 //! The meshes of a scene, one after another, frame by frame.
 
-use std::ops::Range;
 use std::path::Path;
 
 use cager_geometry::mesh::{Model, Polygons};
-use cager_geometry::surface::{Material, Surface};
+use cager_geometry::surface::{Material, Picture, Surface, shown_in};
 use cager_geometry::units::Units;
 
 use super::mesh::{MeshTracks, MovingMesh};
@@ -23,6 +22,8 @@ pub(crate) struct SceneTracks {
     pub(crate) notes: Vec<String>,
     /// Those that parts name, where a model is read.
     pub(crate) materials: Vec<Material>,
+    /// Those that lie in the file itself.
+    pub(crate) pictures: Vec<Picture>,
 }
 
 pub(crate) struct MovingScene<'a> {
@@ -30,6 +31,7 @@ pub(crate) struct MovingScene<'a> {
     meshes: Vec<MovingMesh>,
     at: Vec<f64>,
     materials: Vec<Material>,
+    pictures: Vec<Picture>,
     info: MeshInfo,
 }
 
@@ -40,7 +42,7 @@ pub(crate) fn no_points() -> Fault {
 
 impl<'a> MovingScene<'a> {
     pub(crate) fn new(mut source: Box<dyn Values + 'a>, tracks: SceneTracks) -> Result<Self, Fault> {
-        let SceneTracks { meshes: found, timeline, units, mut notes, materials } = tracks;
+        let SceneTracks { meshes: found, timeline, units, mut notes, materials, pictures } = tracks;
         let (mut meshes, mut faces, mut points) = (Vec::new(), Polygons::new(), 0);
         let several = found.len() > 1;
         for tracks in found {
@@ -66,36 +68,26 @@ impl<'a> MovingScene<'a> {
         if meshes.is_empty() {
             return Err(no_points());
         }
-        let shown = meshes.iter().map(|mesh| ranges(timeline.at.iter().map(|&time| mesh.is_shown(time)))).collect();
+        let shown = meshes.iter().map(|mesh| shown_in(timeline.at.iter().map(|&time| mesh.is_shown(time)))).collect();
         let info = MeshInfo { points, frames: timeline.at.len(), times: timeline.times, faces, units, notes, shown };
-        Ok(Self { source, meshes, at: timeline.at, materials, info })
+        Ok(Self { source, meshes, at: timeline.at, materials, pictures, info })
     }
 
     /// The first frame, and how many faces were left out that have fewer than three corners.
     pub(crate) fn into_model(mut self, path: &Path) -> Result<(Model, usize, Units), Error> {
         let (units, mut values) = (self.info.units, Vec::new());
         let parts = self.meshes.iter().map(|mesh| mesh.part().clone()).collect();
-        let surface = Surface { parts, materials: std::mem::take(&mut self.materials) };
+        let surface = Surface {
+            parts,
+            materials: std::mem::take(&mut self.materials),
+            pictures: std::mem::take(&mut self.pictures),
+        };
         let left_out = self.meshes.iter().map(|mesh| mesh.left_out).sum();
         let (faces, points) = (std::mem::take(&mut self.info.faces), self.info.points);
         open(path, self, points)?.read_next(&mut values)?;
         let points = values.as_chunks().0.to_vec();
         Ok((Model { points, faces, surface, ..Model::default() }, left_out, units))
     }
-}
-
-/// The frames in which something is, where that is not all of them.
-pub(crate) fn ranges(shown: impl Iterator<Item = bool>) -> Option<Vec<Range<u32>>> {
-    let (mut found, mut count): (Vec<Range<u32>>, u32) = (Vec::new(), 0);
-    for (frame, is_shown) in (0..).zip(shown) {
-        count = frame + 1;
-        match found.last_mut() {
-            _ if !is_shown => {}
-            Some(last) if last.end == frame => last.end = count,
-            _ => found.push(frame..count),
-        }
-    }
-    (found != [0..count]).then_some(found)
 }
 
 impl Animation for MovingScene<'_> {
@@ -116,19 +108,5 @@ impl Animation for MovingScene<'_> {
                 .map_err(|fault| if several { fault.within(&mesh.part().path) } else { fault })?;
         }
         Ok(finite)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_in_which_a_part_is_shown_are_ranges() {
-        let of = |text: &str| ranges(text.chars().map(|c| c == '1'));
-        assert_eq!(of("1111"), None);
-        assert_eq!(of("0011"), Some(vec![2..4]));
-        assert_eq!(of("10010"), Some(vec![0..1, 3..4]));
-        assert_eq!(of("00"), Some(Vec::new()));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::dropped::listed;
 use crate::error::Fault;
 
 /// Meshes that a message lists, and characters of the name of each.
@@ -96,6 +97,31 @@ pub(crate) fn named(nodes: &[Node], all: &[usize], prim: &str) -> Vec<usize> {
         })
     };
     all.iter().copied().filter(picks).collect()
+}
+
+/// Which parts of a model the paths, names or globs name: those of each are at least one.
+///
+/// # Errors
+/// A sentence without its subject that says what there is.
+pub fn chosen_parts(paths: &[&str], wanted: &[String]) -> Result<Vec<bool>, String> {
+    let (mut nodes, mut meshes): (Vec<Node>, Vec<usize>) = (Vec::new(), Vec::new());
+    for path in paths {
+        for (above, name) in path.trim_start_matches('/').split('/').enumerate() {
+            let parent = (above > 0).then(|| nodes.len() - 1);
+            nodes.push(Node { name: name.as_bytes().into(), parent, depth: above + 1 });
+        }
+        meshes.push(nodes.len() - 1);
+    }
+    let mut chosen = vec![wanted.is_empty(); paths.len()];
+    for name in wanted {
+        let found = named(&nodes, &meshes, name);
+        if found.is_empty() {
+            let all = meshes.iter().map(|&mesh| nodes[mesh].name.as_ref());
+            return Err(format!("has no part {}, but {}; give one of these with --part", shown(name), listed(all)));
+        }
+        meshes.iter().zip(&mut chosen).for_each(|(mesh, chosen)| *chosen |= found.contains(mesh));
+    }
+    Ok(chosen)
 }
 
 /// Bytes of a path that are kept: many nodes may share a long name.

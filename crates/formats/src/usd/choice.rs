@@ -17,7 +17,11 @@ pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<u
     meshes.retain(is_placed);
     let mut notes = Vec::new();
     if wanted.prims.is_empty() && meshes.len() > 1 {
-        let (rendered, others) = shown(layer, &meshes)?;
+        let (mut rendered, mut others) = shown(layer, &meshes)?;
+        // A part of the rest pose may be hidden in the file of a frame.
+        if wanted.points.is_some_and(|points| count(layer, &rendered) != points && count(layer, &meshes) == points) {
+            (rendered, others) = (meshes, Vec::new());
+        }
         if !others.is_empty() {
             notes.push(format!("left out what is hidden or a guide: {}; --prim reads it too", list(layer, &others)));
         }
@@ -47,6 +51,11 @@ pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<u
         format!("the instances of {}, a PointInstancer, are not read", shown_path(&layer.nodes, instancer))
     }));
     Ok((chosen, notes))
+}
+
+/// How many points meshes have together.
+fn count(layer: &mut Layer<'_>, meshes: &[usize]) -> usize {
+    meshes.iter().map(|&mesh| layer.points(mesh).unwrap_or(0) as usize).sum()
 }
 
 /// Meshes that are rendered, where there are any, and others: cages and other helpers say that they

@@ -21,6 +21,7 @@ use super::times::nominal;
 use crate::atomic::Target;
 use crate::error::{Error, Fault};
 use crate::mesh::MeshFormat;
+use crate::pictures::Beside;
 use cache::CacheWriter;
 use mesh::FrameMesh;
 use morphs::MorphWriter;
@@ -95,8 +96,24 @@ pub fn create_frames(
     if options.cage.is_some() && (pattern.is_some() || !keeps_cages) {
         return Err(Fault::unsupported("is not written with a cage; write .usdc or .usdz").at(path));
     }
+    let mut surface = options.surface.clone();
+    let beside = names_pictures(target).then(|| Beside::of(&mut surface, target));
+    let options = &FrameOptions { surface, ..options.clone() };
     let output = begin(&all, target, faces, options)?;
-    Ok(FrameWriter::new(all, output, &options.surface))
+    Ok(FrameWriter::new(all, output, &options.surface, beside))
+}
+
+/// Whether the files of an output name pictures, and do not hold them.
+fn names_pictures(target: &Target) -> bool {
+    let path = target.path();
+    let is_named = match CacheFormat::from_path(path) {
+        Some(format) => matches!(format, CacheFormat::Usdc | CacheFormat::Usd | CacheFormat::Gltf | CacheFormat::Glb),
+        None => {
+            let extension = path.extension().map(|found| found.to_ascii_lowercase());
+            extension.is_none_or(|found| found == "obj")
+        }
+    };
+    is_named && *target != Target::StandardOutput
 }
 
 fn begin(all: &Announced, target: &Target, faces: &Polygons, options: &FrameOptions) -> Result<Box<dyn Output>, Error> {

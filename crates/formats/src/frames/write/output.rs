@@ -9,6 +9,7 @@ use cager_geometry::units::{Change, Units};
 use crate::dropped::{joined, phrases_of};
 use crate::error::{Error, Fault};
 use crate::frames::RATES;
+use crate::pictures::Beside;
 
 /// An output of frames; dropped before [`FrameWriter::finish`] it leaves nothing.
 pub struct FrameWriter {
@@ -16,12 +17,18 @@ pub struct FrameWriter {
     output: Box<dyn Output>,
     /// What the format has no place for.
     lost: Option<String>,
+    pictures: Option<Beside>,
 }
 
 impl FrameWriter {
-    pub(super) fn new(announced: Announced, output: Box<dyn Output>, surface: &Surface) -> Self {
+    pub(super) fn new(
+        announced: Announced,
+        output: Box<dyn Output>,
+        surface: &Surface,
+        pictures: Option<Beside>,
+    ) -> Self {
         let lost = lost(surface, output.keeps_surface());
-        Self { announced, output, lost }
+        Self { announced, output, lost, pictures }
     }
 
     /// Writes the next frame, 3 × points coordinates `x y z x y z …`.
@@ -73,6 +80,7 @@ impl FrameWriter {
     /// output is then not created.
     pub fn finish(self) -> Result<(), Error> {
         self.announced.check_complete()?;
+        self.pictures.map_or(Ok(()), |pictures| pictures.write())?;
         self.output.finish(&self.announced)
     }
 }
