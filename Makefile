@@ -104,7 +104,7 @@ blender-pictures: $(BLENDER) blender-extension ## the picture of docs/BLENDER.md
 	$(BLENDER) blender/pictures.py cager-demo/capture.cager docs/pictures/blender-editing.png
 
 alembic: $(ALEMBIC) ## written archives through the Alembic library; installs alembic3d
-	CAGER_ALEMBIC_PYTHON=$(abspath $(ALEMBIC)) $(CARGO) test --workspace --locked --test alembic library -- --nocapture
+	CAGER_ALEMBIC_PYTHON=$(abspath $(ALEMBIC)) $(CARGO) test --workspace --locked --test alembic --test alembic_surface library -- --nocapture
 
 $(ALEMBIC): Makefile
 	$(PYTHON) -m venv target/alembic

@@ -1,4 +1,4 @@
-//! Alembic archives in the Ogawa container: one polygon mesh that moves, read and written.
+//! Alembic archives in the Ogawa container: meshes that move, read and written.
 //!
 //! An archive is a tree of objects; a mesh is a `PolyMesh` or a `SubD`, and lies below transforms,
 //! which are applied. Alembic winds faces clockwise; they are turned around on the way in and out.
@@ -13,4 +13,4 @@ mod unread;
 mod write;
 
 pub(crate) use mesh::open;
-pub(crate) use write::{MeshWriter, Schedule};
+pub(crate) use write::{MeshWriter, Scene, Schedule};

@@ -8,10 +8,12 @@ use crate::scene::{Fields, Track, Value, check_held, damaged};
 /// Types of numbers, as headers tell them.
 pub(super) const BOOL: u8 = 0;
 pub(super) const U8: u8 = 1;
+pub(super) const I8: u8 = 2;
 pub(super) const U32: u8 = 5;
 pub(super) const I32: u8 = 6;
 pub(super) const F32: u8 = 10;
 pub(super) const F64: u8 = 11;
+pub(super) const TEXT: u8 = 12;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {

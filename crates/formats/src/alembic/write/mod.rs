@@ -1,24 +1,26 @@
-//! Writes an archive of one polygon mesh below one transform, frame by frame.
+//! Writes an archive of a mesh, or of the parts of one, below transforms, frame by frame.
 
 mod ogawa;
+mod parameter;
+mod part;
 mod tables;
+mod tree;
 
 use std::io::{self, Seek, Write};
 
 use cager_geometry::mesh::{Point, Polygons};
+use cager_geometry::surface::{Part, Surface};
 
 use super::ogawa::DATA;
-use super::properties::{BOOL, F32, F64, I32, Kind, U8};
+use super::properties::{BOOL, F64, I8, Kind, U8};
 use super::sampling::ACYCLIC;
-use crate::scene::bounds;
 use ogawa::Sink;
-use tables::{Compound, Metadata, Values, write_object};
+use part::PartWriter;
+use tables::{Child, Compound, Metadata, Values, Written, write_object};
+use tree::{Node, transforms};
 
 /// Version 1.8.8 of the library whose files these are like.
 const LIBRARY: i32 = 10808;
-const MESH: &str = "schema=AbcGeom_PolyMesh_v1;schemaBaseType=AbcGeom_GeomBase_v1";
-const MESH_OBJECT: &str =
-    "schema=AbcGeom_PolyMesh_v1;schemaBaseType=AbcGeom_GeomBase_v1;schemaObjTitle=AbcGeom_PolyMesh_v1:.geom";
 const TRANSFORM: &str = "schema=AbcGeom_Xform_v3";
 const TRANSFORM_OBJECT: &str = "schema=AbcGeom_Xform_v3;schemaObjTitle=AbcGeom_Xform_v3:.xform";
 /// A translation, among the operations of a transform.
@@ -36,99 +38,122 @@ pub(crate) struct Schedule {
     pub(crate) step: Option<f64>,
 }
 
-/// A mesh that is being written. Memory does not grow with the frames but by 24 bytes for each.
+/// What is the same in all frames.
+pub(crate) struct Scene<'a> {
+    /// Name of the transform above what has no path.
+    pub(crate) name: &'a str,
+    pub(crate) points: usize,
+    pub(crate) faces: &'a Polygons,
+    /// What lies on these.
+    pub(crate) surface: &'a Surface,
+    pub(crate) schedule: Schedule,
+    /// The translation above what lies far away, to keep it exact.
+    pub(crate) origin: Option<Point>,
+}
+
+/// Meshes that are being written. Memory grows with the frames by a few bytes for each part.
 pub(crate) struct MeshWriter<W> {
     sink: Sink<W>,
     schedule: Schedule,
-    /// Name of the transform; that of the mesh has `Shape` behind it.
-    name: String,
     origin: Option<Point>,
-    /// Samples of what is the same in all frames: corners of all faces, and numbers of corners.
-    faces: [u64; 2],
-    positions: Vec<u64>,
-    bounds: Vec<u64>,
+    nodes: Vec<Node>,
+    parts: Vec<PartWriter>,
+    /// When each part is shown.
+    shown: Vec<Option<Vec<std::ops::Range<u32>>>>,
+    frames: u32,
     bytes: Vec<u8>,
 }
 
 impl<W: Write + Seek> MeshWriter<W> {
-    /// Begins an archive; `origin` is the translation above what lies far away, to keep it exact.
-    pub(crate) fn new(
-        out: W,
-        name: &str,
-        faces: &Polygons,
-        schedule: Schedule,
-        origin: Option<Point>,
-    ) -> io::Result<Self> {
+    /// Begins an archive.
+    pub(crate) fn new(out: W, scene: Scene<'_>) -> io::Result<Self> {
+        let Scene { name, points, faces, surface, schedule, origin } = scene;
+        let whole = Part { points, faces: faces.len(), ..Part::default() };
+        let whole = Surface { parts: vec![whole], ..Surface::default() };
+        let surface = if surface.is_empty() { &whole } else { surface };
         let mut sink = Sink::new(out)?;
-        let corners: Vec<u8> = faces.iter().flat_map(|face| face.iter().rev()).flat_map(|k| k.to_le_bytes()).collect();
-        let counts: Vec<u8> = faces.arities().iter().flat_map(|count| count.to_le_bytes()).collect();
-        let faces = [sink.sample(&corners)?, sink.sample(&counts)?];
-        let (positions, bounds, bytes) = (Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { sink, schedule, name: name.to_owned(), origin, faces, positions, bounds, bytes })
+        let parts = surface.ranges(faces).map(|part| PartWriter::new(&mut sink, part, faces, surface));
+        let parts = parts.collect::<io::Result<_>>()?;
+        let nodes = transforms(&surface.parts, name);
+        let shown = surface.parts.iter().map(|part| part.shown.clone()).collect();
+        Ok(Self { sink, schedule, origin, nodes, parts, shown, frames: 0, bytes: Vec::new() })
     }
 
     /// Writes a frame, `x y z x y z …`.
     pub(crate) fn write_frame(&mut self, positions: &[f32]) -> io::Result<()> {
-        self.bytes.clear();
-        self.bytes.extend(positions.iter().flat_map(|x| x.to_le_bytes()));
-        // Arrays have their sizes beside them, where these are not those of a list.
-        self.positions.extend([self.sink.sample(&self.bytes)?, DATA]);
-        let bounds: Vec<u8> =
-            bounds(positions).as_flattened().iter().flat_map(|&x| f64::from(x).to_le_bytes()).collect();
-        self.bounds.push(self.sink.sample(&bounds)?);
-        Ok(())
+        self.frames += 1;
+        let points = positions.as_chunks().0;
+        self.parts.iter_mut().try_for_each(|part| part.write_frame(&mut self.sink, points, &mut self.bytes))
     }
 
     /// Writes what says where the frames are; gives the file back.
     pub(crate) fn finish(mut self) -> io::Result<W> {
-        let frames = self.bounds.len() as u32;
-        let (sink, mut metadata) = (&mut self.sink, Metadata::default());
-        let moving = |kind, number, extent| Values { kind, number, extent, sampling: FRAMES };
-        let still = |kind, number, extent| Values { kind, number, extent, sampling: 0 };
-
-        let mut geometry = Compound::default();
-        let bounds = (".selfBnds", "interpretation=box");
-        geometry.add(sink, &mut metadata, bounds, &self.bounds, &moving(Kind::Scalar, F64, 6))?;
-        let positions = ("P", "geoScope=vtx;interpretation=point");
-        geometry.add(sink, &mut metadata, positions, &self.positions, &moving(Kind::Array, F32, 3))?;
-        for (name, sample) in [".faceIndices", ".faceCounts"].into_iter().zip(self.faces) {
-            geometry.add(sink, &mut metadata, (name, ""), &[sample, DATA], &still(Kind::Array, I32, 1))?;
+        let mut metadata = Metadata::default();
+        // What lies below each transform and, behind these, at the top; the last ones first.
+        let mut below: Vec<Vec<Child>> = (0..=self.nodes.len()).map(|_| Vec::new()).collect();
+        for (k, node) in std::mem::take(&mut self.nodes).into_iter().enumerate().rev() {
+            let mut own = Compound::default();
+            if let Some((part, name)) = node.mesh {
+                let mut properties = Compound::default();
+                // What is hidden hides what lies below it.
+                let carrier = if node.has_others { &mut properties } else { &mut own };
+                self.add_visibility(&mut metadata, carrier, part)?;
+                below[k].push(self.parts[part].finish(&mut self.sink, &mut metadata, name, properties)?);
+            }
+            let transform = self.transform(&mut metadata, own, node.parent.is_none())?;
+            below[k].reverse();
+            let object = write_object(&mut self.sink, &mut metadata, &transform, &below[k])?;
+            let above = node.parent.unwrap_or(below.len() - 1);
+            below[above].push((node.name, TRANSFORM_OBJECT, object));
         }
-        let geometry = geometry.write(sink)?;
-        let mut properties = Compound::default();
-        properties.add_compound(&mut metadata, (".geom", MESH), &geometry);
-        let properties = properties.write(sink)?;
-        let mesh = write_object(sink, &mut metadata, &properties, None)?;
-
-        // Maya shows no mesh without one above it.
-        let mut transform = Compound::default();
-        if let Some(origin) = self.origin {
-            let sample = sink.sample(&[TRANSLATE])?;
-            transform.add(sink, &mut metadata, (".ops", ""), &[sample], &still(Kind::Scalar, U8, 1))?;
-            let sample = sink.sample(origin.map(f64::to_le_bytes).as_flattened())?;
-            transform.add(sink, &mut metadata, (".vals", ""), &[sample], &still(Kind::Scalar, F64, 3))?;
-        }
-        let sample = sink.sample(&[1])?;
-        transform.add(sink, &mut metadata, (".inherits", ""), &[sample], &still(Kind::Scalar, BOOL, 1))?;
-        let transform = transform.write(sink)?;
-        let mut properties = Compound::default();
-        properties.add_compound(&mut metadata, (".xform", TRANSFORM), &transform);
-        let properties = properties.write(sink)?;
-        let shape = format!("{}Shape", self.name);
-        let transform = write_object(sink, &mut metadata, &properties, Some(((&shape, MESH_OBJECT), &mesh)))?;
+        let sink = &mut self.sink;
         let none = Compound::default().write(sink)?;
-        let title = (self.name.as_str(), TRANSFORM_OBJECT);
-        let top = write_object(sink, &mut metadata, &none, Some((title, &transform)))?;
+        let mut tops = below.pop().unwrap_or_default();
+        tops.reverse();
+        let top = write_object(sink, &mut metadata, &none, &tops)?;
 
         let version = sink.data(&[&0_i32.to_le_bytes()])?;
         let library = sink.data(&[&LIBRARY.to_le_bytes()])?;
         let told =
             format!("_ai_AlembicVersion=Alembic 1.8.8;_ai_Application=cager;_ai_DCC_FPS={:?}", self.schedule.fps);
         let told = sink.data(&[told.as_bytes()])?;
-        let times = sink.data(&[&self.schedule.table(frames)])?;
+        let times = sink.data(&[&self.schedule.table(self.frames)])?;
         let metadata = sink.data(&[&metadata.table()])?;
         let root = sink.group(&[version, library, top.group, told, times, metadata])?;
         self.sink.close(root)
+    }
+
+    /// Writes the properties of a transform, which `own` ends: Maya shows no mesh without one above it.
+    fn transform(&mut self, metadata: &mut Metadata, own: Compound, is_top: bool) -> io::Result<Written> {
+        let sink = &mut self.sink;
+        let still = |number, extent| Values { kind: Kind::Scalar, number, extent, sampling: 0 };
+        let mut transform = Compound::default();
+        if let Some(origin) = self.origin.filter(|_| is_top) {
+            let sample = sink.sample(&[TRANSLATE])?;
+            transform.add(sink, metadata, (".ops", ""), &[sample], &still(U8, 1))?;
+            let sample = sink.sample(origin.map(f64::to_le_bytes).as_flattened())?;
+            transform.add(sink, metadata, (".vals", ""), &[sample], &still(F64, 3))?;
+        }
+        let sample = sink.sample(&[1])?;
+        transform.add(sink, metadata, (".inherits", ""), &[sample], &still(BOOL, 1))?;
+        let transform = transform.write(sink)?;
+        let mut properties = own;
+        properties.add_compound(metadata, (".xform", TRANSFORM), &transform);
+        properties.write(sink)
+    }
+
+    /// Adds whether a part is shown in each frame, where that changes.
+    fn add_visibility(&mut self, metadata: &mut Metadata, properties: &mut Compound, part: usize) -> io::Result<()> {
+        let Some(shown) = &self.shown[part] else { return Ok(()) };
+        let samples = [self.sink.sample(&[0])?, self.sink.sample(&[1])?];
+        let mut later = shown.iter().peekable();
+        let in_frame = |frame: u32| {
+            while later.next_if(|range| range.end <= frame).is_some() {}
+            samples[usize::from(later.peek().is_some_and(|range| range.contains(&frame)))]
+        };
+        let stored: Vec<u64> = (0..self.frames).map(in_frame).collect();
+        let values = Values { kind: Kind::Scalar, number: I8, extent: 1, sampling: FRAMES };
+        properties.add(&mut self.sink, metadata, ("visible", ""), &stored, &values)
     }
 }
 

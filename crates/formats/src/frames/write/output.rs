@@ -27,7 +27,7 @@ impl FrameWriter {
         surface: &Surface,
         pictures: Option<Beside>,
     ) -> Self {
-        let lost = lost(surface, output.keeps_surface());
+        let lost = lost(output.as_ref(), surface);
         Self { announced, output, lost, pictures }
     }
 
@@ -86,9 +86,9 @@ impl FrameWriter {
 }
 
 /// What a format has no place for, in words.
-fn lost(surface: &Surface, is_kept: bool) -> Option<String> {
-    let all = joined(&phrases_of(surface, is_kept))?;
-    let way = if is_kept { "" } else { "; write .obj files for them" };
+fn lost(output: &dyn Output, surface: &Surface) -> Option<String> {
+    let all = joined(&output.lost(surface))?;
+    let way = if output.keeps_surface() { "" } else { "; write .obj files for them" };
     Some(format!("has no place for {all} of the model{way}"))
 }
 
@@ -123,6 +123,11 @@ pub(super) trait Output: Send {
     /// Whether texture coordinates, materials, groups and hard edges are written.
     fn keeps_surface(&self) -> bool {
         false
+    }
+
+    /// What of it is not, in words.
+    fn lost(&self, surface: &Surface) -> Vec<String> {
+        phrases_of(surface, self.keeps_surface())
     }
 
     fn finish(self: Box<Self>, announced: &Announced) -> Result<(), Error>;

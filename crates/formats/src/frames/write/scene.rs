@@ -3,14 +3,16 @@
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::{Material, Surface};
 
 use super::super::CacheFormat;
 use super::output::{Announced, CageMesh, FrameOptions, Output, no_cage};
 use crate::alembic::{self, Schedule};
 use crate::atomic::{AtomicFile, Target};
+use crate::dropped::{counted, phrases_of};
 use crate::error::{Error, Fault};
 use crate::faces::check_faces;
-use crate::usd::{self, Scene};
+use crate::usd;
 
 /// Bytes that a package may have.
 const LONGEST_PACKAGE: usize = 0xf000_0000;
@@ -35,14 +37,14 @@ impl SceneWriter {
         options: &FrameOptions,
     ) -> Result<Self, Error> {
         let path = &announced.path;
-        check(announced, format, faces).map_err(|fault| fault.at(path))?;
+        check(announced, format, faces, &options.surface).map_err(|fault| fault.at(path))?;
         let (name, write) = (name(path), |cause| Error::write(path, cause));
         if let Some(cage) = &options.cage {
             check_cage(cage).map_err(|fault| fault.at(path))?;
         }
         let file = AtomicFile::create(target)?;
         if format != CacheFormat::Abc {
-            let scene = Scene {
+            let scene = usd::Scene {
                 name,
                 fps: options.fps,
                 codes: (0..announced.frames).map(|frame| options.number(frame)).collect(),
@@ -58,12 +60,14 @@ impl SceneWriter {
         let step = options.even_step();
         let numbers = if step.is_some() { vec![options.number(0)] } else { options.numbers.clone() };
         let schedule = Schedule { fps: options.fps, numbers, step };
-        let mesh = alembic::MeshWriter::new(file, &name, faces, schedule, options.origin).map_err(write)?;
+        let (points, surface, origin) = (announced.points, &options.surface, options.origin);
+        let scene = alembic::Scene { name: &name, points, faces, surface, schedule, origin };
+        let mesh = alembic::MeshWriter::new(file, scene).map_err(write)?;
         Ok(Self { mesh: Mesh::Alembic(mesh), cage: None })
     }
 }
 
-fn check(announced: &Announced, format: CacheFormat, faces: &Polygons) -> Result<(), Fault> {
+fn check(announced: &Announced, format: CacheFormat, faces: &Polygons, surface: &Surface) -> Result<(), Fault> {
     let most = i32::MAX as usize;
     if announced.points > most || announced.frames > most || faces.indices().len() > most {
         let what = format!("cannot count more than {most} frames, points or corners; write .npy instead");
@@ -75,7 +79,9 @@ fn check(announced: &Announced, format: CacheFormat, faces: &Polygons) -> Result
             "cannot hold more than 4 GiB, as packages have no room for more; write .usdc instead",
         ));
     }
-    check_faces(faces, announced.points, "")
+    check_faces(faces, announced.points, "")?;
+    let what = |what| Fault::invalid(format!("cannot have what lies on the faces ({what}); give that of this mesh"));
+    surface.check(announced.points, faces).map_err(what)
 }
 
 fn check_cage(cage: &CageMesh) -> Result<(), Fault> {
@@ -111,6 +117,20 @@ impl Output for SceneWriter {
         mesh.write_frame(positions, true).map_err(|cause| Error::write(&announced.path, cause))?;
         cage.written += 1;
         Ok(())
+    }
+
+    fn keeps_surface(&self) -> bool {
+        matches!(self.mesh, Mesh::Alembic(_))
+    }
+
+    fn lost(&self, surface: &Surface) -> Vec<String> {
+        if !self.keeps_surface() {
+            return phrases_of(surface, false);
+        }
+        // Archives have the names of materials alone, those of sets of faces.
+        let is_lost = |found: &&Material| **found != Material { name: found.name.clone(), ..Material::default() };
+        let count = surface.materials.iter().filter(is_lost).count();
+        (count > 0).then(|| format!("the values and pictures of {}", counted(count, "material"))).into_iter().collect()
     }
 
     fn finish(self: Box<Self>, announced: &Announced) -> Result<(), Error> {
