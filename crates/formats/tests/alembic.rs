@@ -273,7 +273,7 @@ fn what_is_not_read_of_a_mesh_is_named() {
     node.children = vec![set];
     let (_folder, path) = saved(&archive("", &[EVEN], &[node]));
     let sentence = read_mesh(&path, &[]).unwrap().dropped.sentence(&path, false).unwrap();
-    let what = "texture coordinates (uv), normals (N), velocities and 1 set of faces (skin) are not kept";
+    let what = "texture coordinates (uv), normals (N) and velocities are not kept";
     assert!(sentence.ends_with(what), "{sentence}");
     let (_folder, path) = written(&rising(1), &polygons(&[&[0, 1, 2]]), &FrameOptions::default());
     assert_eq!(read_mesh(&path, &[]).unwrap().dropped.sentence(&path, false), None);

@@ -23,7 +23,7 @@ fn scene() -> (Surface, Polygons, Vec<Vec<f32>>) {
         corners: corners.to_vec(),
     };
     let roof = Part {
-        path: "/house/top/roof".to_owned(),
+        path: "/house/top/roof/roof_mesh".to_owned(),
         points: 6,
         faces: 2,
         uv_sets: vec![
@@ -50,7 +50,8 @@ fn scene() -> (Surface, Polygons, Vec<Vec<f32>>) {
         shown: Some(vec![1..2]),
         ..Part::default()
     };
-    let bare = Part { points: 3, faces: 1, subdivision: Subdivision::Loop, ..Part::default() };
+    let bare =
+        Part { shown: Some(vec![0..1, 2..3]), points: 3, faces: 1, subdivision: Subdivision::Loop, ..Part::default() };
     let named = |name: &str| Material { name: name.to_owned(), ..Material::default() };
     let picture = Texture { channel: Channel::BaseColor, path: "tiles.png".to_owned() };
     let materials = vec![named("glass"), Material { textures: vec![picture], ..named("tiles") }];
@@ -74,7 +75,7 @@ fn scene() -> (Surface, Polygons, Vec<Vec<f32>>) {
 }
 
 const READ: &str = "\
-/house/top/roof/roofShape IPolyMesh
+/house/top/roof/roof_mesh IPolyMesh
 faces 4 4 : 3 2 1 0 5 4 2 3
 uv UV_Map kFacevaryingScope 0 0.5 1 0.5 1 0 0 0 0 0.5 1 0.5 1 0 0 0
 normals kFacevaryingScope 0 -0.707 0.707 0 -0.707 0.707 0 -0.707 0.707 0 -0.707 0.707 0 0.707 0.707 0 0.707 0.707 0 0.707 0.707 0 0.707 0.707
@@ -86,9 +87,10 @@ set glass kFaceSetExclusive 1
 set tiles kFaceSetExclusive 0
 set tiles_1 kFaceSetNonExclusive 0 1
 /house/top/roof/flag shown 0 1 0
-/house/top/roof/flag/flagShape ISubD
+/house/top/roof/flag ISubD
 faces 3 : 2 1 0
 creases catmull-clark 0 2 1 2 : 2 2 : 2.5 10
+/house_fire shown 1 0 1
 /house_fire/house_fireShape ISubD
 faces 3 : 2 1 0
 creases loop : :

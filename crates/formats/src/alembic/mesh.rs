@@ -4,11 +4,13 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::io::{Read, Seek};
 
+use cager_geometry::surface::Part;
+
 use super::objects::{Archive, Kind as ObjectKind};
 use super::ogawa::DOUBLES;
 use super::properties::{BOOL, F32, F64, I32, Kind, Property, U8, U32, find};
 use super::sampling::{Sampling, timing};
-use super::unread;
+use super::surface::{self, Materials};
 use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::scene::{
@@ -49,11 +51,18 @@ pub(crate) fn open<'a>(
     let is_sparse = tracks.meshes.iter().any(|mesh| mesh.chain.moving().next().is_some());
     tracks.notes.extend(sparse(&tracks.timeline.at, archive.frame_rate).filter(|_| is_sparse));
     if let Some(dropped) = dropped {
-        for &object in &objects {
-            archive.container.allow(4);
-            // What cannot be named is no reason to refuse a mesh.
-            unread::add(&mut archive, object, dropped).unwrap_or_default();
+        // What lies on faces is held, so that samples that meshes share are not free.
+        archive.container.allow(8);
+        let mut materials = Materials::default();
+        for (mesh, &object) in tracks.meshes.iter_mut().zip(&objects) {
+            match surface::read(&mut archive, object, &mut materials, dropped) {
+                Ok(part) => mesh.part = Part { path: std::mem::take(&mut mesh.part.path), ..part },
+                // That is no reason to refuse a mesh.
+                Err(_) => dropped.add_on_faces("what lies on faces, as it is damaged or too large"),
+            }
         }
+        tracks.materials = materials.list;
+        archive.container.allow(4);
     }
     MovingScene::new(Box::new(archive.container), tracks)
 }
@@ -92,10 +101,11 @@ fn read_mesh(
 
 /// The meshes that are wanted, and what the user should know of others.
 fn find_meshes(archive: &mut Archive<'_>, wanted: Wanted<'_>) -> Result<(Vec<usize>, Option<String>), Fault> {
-    let of_kind = |archive: &Archive<'_>, kind| -> Vec<usize> {
-        (0..archive.objects.len()).filter(|&k| archive.objects[k].kind == kind).collect()
+    let of_kind = |archive: &Archive<'_>, kinds: &[ObjectKind]| -> Vec<usize> {
+        (0..archive.objects.len()).filter(|&k| kinds.contains(&archive.objects[k].kind)).collect()
     };
-    let (meshes, instances) = (of_kind(archive, ObjectKind::Mesh), of_kind(archive, ObjectKind::Instance));
+    let meshes = of_kind(archive, &[ObjectKind::Mesh, ObjectKind::Subdivision]);
+    let instances = of_kind(archive, &[ObjectKind::Instance]);
     if let Some(&instance) = instances.first() {
         let properties = archive.top_properties(instance)?;
         let source = match find(&properties, ".instanceSource", Kind::Scalar) {
@@ -158,7 +168,7 @@ impl Tree for Archive<'_> {
     }
 }
 
-fn array(properties: &[Property], name: &str) -> Result<Property, Fault> {
+pub(super) fn array(properties: &[Property], name: &str) -> Result<Property, Fault> {
     let found = find(properties, name, Kind::Array).filter(|property| property.samples > 0);
     found.cloned().ok_or_else(|| Fault::invalid(format!("has a mesh without samples of {name}; export it again")))
 }

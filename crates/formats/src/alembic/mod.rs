@@ -7,8 +7,10 @@
 mod mesh;
 mod objects;
 mod ogawa;
+mod parameters;
 mod properties;
 mod sampling;
+mod surface;
 mod unread;
 mod write;
 

@@ -18,8 +18,10 @@ pub(super) const INLINE: usize = 0xff;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// A polygon mesh, or the control mesh of a subdivision surface.
+    /// A polygon mesh.
     Mesh,
+    /// The control mesh of a subdivision surface.
+    Subdivision,
     Transform,
     /// Another object once more.
     Instance,
@@ -30,19 +32,21 @@ pub(super) enum Kind {
 
 impl Kind {
     fn of(metadata: &[u8]) -> Self {
-        let value = |key: &[u8]| {
-            let mut entries = metadata.split(|&b| b == b';');
-            entries.find_map(|entry| entry.strip_prefix(key)?.strip_prefix(b"="))
-        };
-        let schema = value(b"schema").unwrap_or_default();
+        let schema = told(metadata, b"schema").unwrap_or_default();
         match schema {
-            _ if value(b"isInstance") == Some(b"1") => Self::Instance,
-            _ if schema.starts_with(b"AbcGeom_PolyMesh_") || schema.starts_with(b"AbcGeom_SubD_") => Self::Mesh,
+            _ if told(metadata, b"isInstance") == Some(b"1") => Self::Instance,
+            _ if schema.starts_with(b"AbcGeom_PolyMesh_") => Self::Mesh,
+            _ if schema.starts_with(b"AbcGeom_SubD_") => Self::Subdivision,
             _ if schema.starts_with(b"AbcGeom_Xform_") => Self::Transform,
             _ if schema.starts_with(b"AbcGeom_FaceSet_") => Self::FaceSet,
             _ => Self::Other,
         }
     }
+}
+
+/// What metadata `key=value;key=value` say of a key.
+pub(super) fn told<'a>(metadata: &'a [u8], key: &[u8]) -> Option<&'a [u8]> {
+    metadata.split(|&b| b == b';').find_map(|entry| entry.strip_prefix(key)?.strip_prefix(b"="))
 }
 
 #[derive(Debug)]
@@ -55,6 +59,8 @@ pub(super) struct Object {
 pub(super) struct Archive<'a> {
     pub(super) container: Container<'a>,
     pub(super) samplings: Vec<Sampling>,
+    /// What headers say by an index, the first of which says that there are none.
+    pub(super) metadata: Vec<Arc<[u8]>>,
     /// Frames per second of the program that wrote it.
     pub(super) frame_rate: Option<f64>,
     /// Each comes before what lies below it, and that before its next sibling.
@@ -72,7 +78,8 @@ impl<'a> Archive<'a> {
         let frame_rate = frame_rate(&container.contents(information)?);
         let samplings = Sampling::table(&container.contents(times)?)?;
         let metadata = container.contents(metadata)?;
-        let kinds = kinds(&metadata)?;
+        let metadata = texts(&metadata)?;
+        let kinds: Vec<Kind> = metadata.iter().map(|text| Kind::of(text)).collect();
         let (mut nodes, mut objects) = (Vec::new(), Vec::new());
         // Objects that are yet to be entered, the next one last.
         let mut waiting = children_of(&mut container, (top, None, 1), &kinds)?;
@@ -89,7 +96,13 @@ impl<'a> Archive<'a> {
         }
         // What follows reads the properties of some objects, some of them twice.
         container.allow(4);
-        Ok(Self { container, samplings, frame_rate, nodes, objects })
+        Ok(Self { container, samplings, metadata, frame_rate, nodes, objects })
+    }
+
+    /// The sets of faces of a mesh.
+    pub(super) fn sets(&self, mesh: usize) -> Vec<usize> {
+        let below = (mesh + 1..self.nodes.len()).take_while(|&k| self.nodes[k].depth > self.nodes[mesh].depth);
+        below.filter(|&k| self.objects[k].kind == Kind::FaceSet && self.nodes[k].parent == Some(mesh)).collect()
     }
 }
 
@@ -131,13 +144,13 @@ fn children_of(
     Ok(objects)
 }
 
-/// What objects are by the index of their metadata; the first index says that there are none.
-fn kinds(table: &[u8]) -> Result<Vec<Kind>, Fault> {
-    let (mut fields, mut kinds) = (Fields(table), vec![Kind::Other]);
+/// The texts of a table of metadata, behind an empty one.
+fn texts(table: &[u8]) -> Result<Vec<Arc<[u8]>>, Fault> {
+    let (mut fields, mut texts) = (Fields(table), vec![Arc::default()]);
     while !fields.0.is_empty() {
-        kinds.push(Kind::of(fields.sized(0)?));
+        texts.push(Arc::from(fields.sized(0)?));
     }
-    Ok(kinds)
+    Ok(texts)
 }
 
 /// What programs write beside each other as `key=value;key=value`.

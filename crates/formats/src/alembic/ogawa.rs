@@ -115,6 +115,14 @@ impl<'a> Container<'a> {
         Ok(Block { start: start + digest, length: length - digest })
     }
 
+    /// The values of a sample, of `N` numbers each.
+    pub(super) fn vectors<const N: usize>(&mut self, value: Value) -> Result<Vec<[f32; N]>, Fault> {
+        let block = self.sample(value)?;
+        let bytes = self.table(block)?;
+        let numbers: Vec<f32> = bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        Ok(numbers.as_chunks().0.to_vec())
+    }
+
     /// The bytes of a small sample, at most `most`. They are free, as every frame reads some.
     pub(super) fn small(&mut self, value: Value, most: u64, name: &str) -> Result<Vec<u8>, Fault> {
         let block = self.sample(value)?;

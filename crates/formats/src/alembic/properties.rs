@@ -1,5 +1,7 @@
 //! Properties of an object: what their headers say, and where their samples lie.
 
+use std::sync::Arc;
+
 use super::objects::{Archive, INLINE};
 use super::ogawa::{Container, DATA};
 use crate::error::Fault;
@@ -29,6 +31,7 @@ pub(super) enum Kind {
 pub(super) struct Property {
     pub(super) name: Vec<u8>,
     pub(super) kind: Kind,
+    pub(super) metadata: Arc<[u8]>,
     pub(super) number: u8,
     /// Numbers of a value.
     pub(super) extent: u8,
@@ -38,7 +41,7 @@ pub(super) struct Property {
     last: usize,
     /// Index of the times of its samples.
     pub(super) sampling: usize,
-    group: u64,
+    pub(super) group: u64,
 }
 
 impl Property {
@@ -106,7 +109,7 @@ impl Archive<'_> {
         find(all, name, Kind::Compound).map_or(Ok(Vec::new()), |compound| self.properties(compound.group))
     }
 
-    fn properties(&mut self, group: u64) -> Result<Vec<Property>, Fault> {
+    pub(super) fn properties(&mut self, group: u64) -> Result<Vec<Property>, Fault> {
         let children = self.container.children(group)?;
         let Some((&headers, groups)) = children.split_last() else { return Ok(Vec::new()) };
         let headers = self.container.contents(headers)?;
@@ -144,10 +147,11 @@ impl Archive<'_> {
             }
         }
         let name = fields.sized(width)?.to_vec();
-        if bits >> 20 & 0xff == INLINE {
-            fields.sized(width)?;
-        }
+        let metadata = match bits >> 20 & 0xff {
+            INLINE => Arc::from(fields.sized(width)?),
+            index => self.metadata.get(index).cloned().unwrap_or_default(),
+        };
         let (number, extent) = ((bits >> 4 & 15) as u8, (bits >> 12 & 0xff) as u8);
-        Ok(Property { name, kind, number, extent, samples, first, last, sampling, group })
+        Ok(Property { name, kind, metadata, number, extent, samples, first, last, sampling, group })
     }
 }

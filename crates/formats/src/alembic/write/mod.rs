@@ -93,11 +93,11 @@ impl<W: Write + Seek> MeshWriter<W> {
         let mut below: Vec<Vec<Child>> = (0..=self.nodes.len()).map(|_| Vec::new()).collect();
         for (k, node) in std::mem::take(&mut self.nodes).into_iter().enumerate().rev() {
             let mut own = Compound::default();
-            if let Some((part, name)) = node.mesh {
+            // What is hidden hides what lies below it.
+            let is_alone = node.meshes.len() == 1 && !node.has_others;
+            for (part, name) in node.meshes.into_iter().rev() {
                 let mut properties = Compound::default();
-                // What is hidden hides what lies below it.
-                let carrier = if node.has_others { &mut properties } else { &mut own };
-                self.add_visibility(&mut metadata, carrier, part)?;
+                self.add_visibility(&mut metadata, if is_alone { &mut own } else { &mut properties }, part)?;
                 below[k].push(self.parts[part].finish(&mut self.sink, &mut metadata, name, properties)?);
             }
             let transform = self.transform(&mut metadata, own, node.parent.is_none())?;

@@ -12,8 +12,8 @@ pub(super) struct Node {
     pub(super) name: String,
     /// Index of the transform above it, which comes before it; none for those at the top.
     pub(super) parent: Option<usize>,
-    /// The part whose mesh lies below it, and the name of that.
-    pub(super) mesh: Option<(usize, String)>,
+    /// The parts whose meshes lie below it, and the names of these.
+    pub(super) meshes: Vec<(usize, String)>,
     /// Whether other transforms lie below it.
     pub(super) has_others: bool,
 }
@@ -37,7 +37,8 @@ impl Names {
     }
 }
 
-/// The transforms of parts; `name` is that of a part without a path.
+/// The transforms of parts: the last name of a path is that of the mesh. One without others, or
+/// `name` where there is none, is that of a transform, and the mesh has `Shape` behind it.
 pub(super) fn transforms(parts: &[Part], name: &str) -> Vec<Node> {
     let (mut nodes, mut names) = (Vec::<Node>::new(), Names::default());
     for (k, part) in parts.iter().enumerate() {
@@ -45,22 +46,23 @@ pub(super) fn transforms(parts: &[Part], name: &str) -> Vec<Node> {
         if path.is_empty() {
             path.push(name);
         }
+        let shape = match path.as_slice() {
+            [only] => format!("{only}Shape"),
+            _ => path.pop().unwrap_or_default().to_owned(),
+        };
         let mut above = None;
-        for (depth, name) in path.iter().enumerate().skip(path.len().saturating_sub(DEEPEST)) {
+        for name in &path[path.len().saturating_sub(DEEPEST)..] {
             let known = names.0.get(&(above, (*name).to_owned())).and_then(|&(_, node)| node);
-            let is_last = depth + 1 == path.len();
-            above = known.filter(|&node| !is_last || nodes[node].mesh.is_none()).or_else(|| {
+            above = known.or_else(|| {
                 let name = names.unique(above, name);
                 names.0.insert((above, name.clone()), (0, Some(nodes.len())));
                 above.into_iter().for_each(|parent| nodes[parent].has_others = true);
-                nodes.push(Node { name, parent: above, mesh: None, has_others: false });
+                nodes.push(Node { name, parent: above, meshes: Vec::new(), has_others: false });
                 Some(nodes.len() - 1)
             });
         }
-        if let Some(node) = above {
-            let shape = names.unique(above, &format!("{}Shape", nodes[node].name));
-            nodes[node].mesh = Some((k, shape));
-        }
+        let shape = names.unique(above, &shape);
+        above.into_iter().for_each(|node| nodes[node].meshes.push((k, shape.clone())));
     }
     nodes
 }
@@ -72,25 +74,25 @@ mod tests {
     #[test]
     fn paths_become_transforms_and_no_two_siblings_share_a_name() {
         let part = |path: &str| Part { path: path.to_owned(), ..Part::default() };
-        let paths = ["/robin/rig/body", "/robin/rig", "/robin/rig/body", "", "/robin/rig/bodyShape", "robin/rig/body"];
+        let paths = ["/robin/rig/body", "/robin/rig", "/robin/rig/body", "", "/hat", "robin/rig/body/eye", "/hat"];
         let nodes = transforms(&paths.map(part), "walk");
         let above = |node: usize| std::iter::successors(Some(node), |&k| nodes[k].parent);
         let path = |node: usize| above(node).map(|k| nodes[k].name.as_str()).collect::<Vec<_>>().join(" < ");
-        let meshes = nodes.iter().enumerate().filter_map(|(k, node)| Some((node.mesh.as_ref()?, path(k))));
-        let mut found: Vec<_> = meshes.map(|((part, shape), path)| format!("{part}: {shape} < {path}")).collect();
+        let meshes = (0..nodes.len()).flat_map(|k| nodes[k].meshes.iter().map(move |mesh| (k, mesh)));
+        let mut found: Vec<_> = meshes.map(|(k, (part, shape))| format!("{part}: {shape} < {}", path(k))).collect();
         found.sort();
         let expected = [
-            "0: bodyShape < body < rig < robin",
-            "1: rigShape < rig < robin",
-            "2: body_1Shape < body_1 < rig < robin",
+            "0: body < rig < robin",
+            "1: rig_1 < robin",
+            "2: body_1 < rig < robin",
             "3: walkShape < walk",
-            "4: bodyShapeShape < bodyShape < rig < robin",
-            "5: body_2Shape < body_2 < rig < robin",
+            "4: hatShape < hat",
+            "5: eye < body_2 < rig < robin",
+            "6: hatShape_1 < hat",
         ];
         assert_eq!(found, expected);
-        // A transform that would be called as the mesh beside it; a path deeper than readers go.
-        let nodes = transforms(&[part("/a"), part("/a/aShape"), part(&"/b".repeat(1000))], "walk");
-        assert_eq!((nodes[0].mesh.as_ref().unwrap().1.as_str(), nodes[1].name.as_str()), ("aShape", "aShape_1"));
-        assert!(nodes[0].has_others && nodes.len() == 102);
+        // A path deeper than readers go.
+        let nodes = transforms(&[part(&"/b".repeat(1000))], "walk");
+        assert_eq!((nodes.len(), nodes[98].has_others, nodes[99].meshes.len()), (100, true, 1));
     }
 }
