@@ -31,6 +31,7 @@ fn try_mesh(name: &str, bytes: &[u8]) -> bool {
             assert!(model.points.as_flattened().iter().all(|x| x.is_finite()));
             assert!(model.faces.indices().iter().all(|&index| (index as usize) < model.points.len()));
             assert!(model.faces.arities().iter().all(|&corners| corners >= 3));
+            assert_eq!(model.surface.check(model.points.len(), &model.faces), Ok(()));
             true
         }
         Err(error) => {
@@ -74,7 +75,8 @@ fn samples() -> Vec<(&'static str, Vec<u8>, Try)> {
     let meshes = meshes().into_iter().map(|(name, bytes)| (name, bytes, try_mesh as Try));
     let caches = caches().into_iter().map(|(name, bytes)| (name, bytes, try_cache as Try));
     let animated = ("a.glb", animated_glb(), try_cache as Try);
-    meshes.chain(caches).chain([animated]).collect()
+    let with_surface = ("a.abc", archive::with_surface(), try_mesh as Try);
+    meshes.chain(caches).chain([animated, with_surface]).collect()
 }
 
 #[test]

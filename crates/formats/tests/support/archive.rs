@@ -7,11 +7,13 @@ use std::collections::BTreeMap;
 pub const DATA: u64 = 1 << 63;
 pub const MESH: &str = "schema=AbcGeom_PolyMesh_v1";
 pub const SUBDIVISION: &str = "schema=AbcGeom_SubD_v1";
+pub const FACE_SET: &str = "schema=AbcGeom_FaceSet_v1";
 pub const TRANSFORM: &str = "schema=AbcGeom_Xform_v3";
 
 /// Types of numbers.
 pub const BOOL: u32 = 0;
 pub const U8: u32 = 1;
+pub const U32: u32 = 5;
 pub const I32: u32 = 6;
 pub const F32: u32 = 10;
 pub const F64: u32 = 11;
@@ -21,6 +23,7 @@ pub const TEXT: u32 = 12;
 #[derive(Clone)]
 pub struct Property {
     pub name: &'static str,
+    pub metadata: &'static str,
     /// 0 a compound, 1 a scalar, 2 an array.
     pub kind: u32,
     pub number: u32,
@@ -29,6 +32,8 @@ pub struct Property {
     /// How many samples there are, and the first and last that differ, where those stored are not all.
     pub changes: Option<[u32; 3]>,
     pub sampling: u32,
+    /// What a compound has.
+    pub inner: Vec<Property>,
 }
 
 /// An object, its properties in a compound of this name, and what lies below it.
@@ -49,7 +54,64 @@ pub fn array<const N: usize, T: Copy>(
     bytes: impl Fn(T) -> [u8; N],
 ) -> Property {
     let samples = samples.iter().map(|sample| sample.iter().flat_map(|&x| bytes(x)).collect()).collect();
-    Property { name, kind: 2, number, extent, samples, changes: None, sampling }
+    Property { name, metadata: "a=b", kind: 2, number, extent, samples, changes: None, sampling, inner: vec![] }
+}
+
+/// Values that are the same in all frames, and what is said of them.
+pub fn parameter(name: &'static str, metadata: &'static str, extent: u32, values: &[f32]) -> Property {
+    Property { metadata, ..array(name, (F32, extent), 0, &[values.to_vec()], f32::to_le_bytes) }
+}
+
+pub fn compound(name: &'static str, metadata: &'static str, inner: Vec<Property>) -> Property {
+    let none = array(name, (0, 0), 0, &[Vec::<u8>::new(); 0], u8::to_le_bytes);
+    Property { metadata, kind: 0, inner, ..none }
+}
+
+pub fn integers(name: &'static str, values: &[i32]) -> Property {
+    array(name, (I32, 1), 0, &[values.to_vec()], i32::to_le_bytes)
+}
+
+pub fn face_set(name: &'static str, faces: &[i32]) -> Node {
+    let (properties, children) = (vec![integers(".faces", faces)], vec![]);
+    Node { name, metadata: FACE_SET, compound: ".faceset", properties, children }
+}
+
+/// A quad, an edge and a triangle of five points as programs other than this one write them, with
+/// something of everything that lies on faces.
+pub fn with_surface() -> Vec<u8> {
+    let points = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 1.0];
+    let mut node = mesh("cloth", positions(&[points.to_vec()]), &[&[3, 2, 1, 0], &[0, 1], &[2, 4, 1]]);
+    node.metadata = SUBDIVISION;
+    let indices = array(".indices", (U32, 1), 0, &[vec![0_u32, 1, 2, 3, 0, 0, 1, 2, 3]], u32::to_le_bytes);
+    let values = parameter(".vals", "", 2, &[0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
+    let up = [0.0, 0.0, 2.0].repeat(6);
+    let normals = [&up[..], &[0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0]].concat();
+    let scheme = array(".scheme", (TEXT, 1), 0, &[b"bilinear\0".to_vec()], u8::to_le_bytes);
+    let sharp = array(".creaseSharpnesses", (F32, 1), 0, &[vec![3.0_f32, 4.0]], f32::to_le_bytes);
+    node.properties.extend([
+        compound("uv", "geoScope=fvr;sourceName=map1", vec![values, indices]),
+        parameter("N", "geoScope=fvr;interpretation=normal", 3, &normals),
+        compound(
+            ".arbGeomParams",
+            "",
+            vec![
+                parameter("map2", "geoScope=var", 2, &[0.0, 0.0, 0.1, 0.0, 0.2, 0.0, 0.3, 0.0, 0.4, 0.0]),
+                parameter("tint", "geoScope=uni;interpretation=rgb", 3, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0]),
+                parameter("all", "geoScope=con;interpretation=rgba", 4, &[0.25, 0.5, 0.75, 1.0]),
+                parameter("short", "geoScope=fvr;interpretation=rgb", 3, &[1.0, 0.0, 0.0]),
+                parameter("pair", "geoScope=vtx;notUV=1", 2, &[0.0; 10]),
+                parameter("Pref", "geoScope=vtx;interpretation=vector", 3, &points),
+            ],
+        ),
+        Property { kind: 1, ..scheme },
+        // A chain of three points, and one that leads out of the mesh.
+        integers(".creaseIndices", &[2, 1, 0, 1, 9]),
+        integers(".creaseLengths", &[3, 2]),
+        sharp,
+        integers(".holes", &[1]),
+    ]);
+    node.children = vec![face_set("linen", &[0]), face_set("patch", &[0, 2, 7]), face_set("silk", &[2])];
+    archive("", &[(1.0 / 24.0, &[1.0 / 24.0])], &[node])
 }
 
 pub fn positions(samples: &[Vec<f32>]) -> Property {
@@ -164,6 +226,9 @@ impl Out {
     fn compound(&mut self, properties: &[Property]) -> u64 {
         let (mut children, mut headers) = (Vec::new(), Vec::new());
         for property in properties {
+            if property.kind == 0 {
+                children.push(self.compound(&property.inner));
+            }
             // As programs do, what is the same is written once.
             let (mut samples, mut written) = (Vec::new(), BTreeMap::new());
             for sample in &property.samples {
@@ -173,7 +238,9 @@ impl Out {
                     samples.push(DATA);
                 }
             }
-            children.push(self.group(&samples));
+            if property.kind > 0 {
+                children.push(self.group(&samples));
+            }
             let count = property.samples.len() as u32;
             // Numbers of four bytes; metadata of the properties themselves are told inline.
             let bits = property.kind | 2 << 2 | property.number << 4 | 1 << 8 | property.extent << 12 | 0xff << 20;
@@ -187,8 +254,8 @@ impl Out {
             }
             headers.extend((property.name.len() as u32).to_le_bytes());
             headers.extend(property.name.bytes());
-            headers.extend(3_u32.to_le_bytes());
-            headers.extend(b"a=b");
+            headers.extend((property.metadata.len() as u32).to_le_bytes());
+            headers.extend(property.metadata.bytes());
         }
         if !headers.is_empty() {
             children.push(self.data(&headers));
