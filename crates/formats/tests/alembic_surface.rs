@@ -75,7 +75,7 @@ fn scene() -> (Surface, Polygons, Vec<Vec<f32>>) {
     ];
     // The roof is turned over by and by.
     let frames = [1.0, 0.0, -1.0].map(|lift| rest.iter().flat_map(|&[x, y, z]| [x, y, z * lift]).collect());
-    (Surface { parts: vec![roof, flag, bare], materials }, faces, frames.to_vec())
+    (Surface { parts: vec![roof, flag, bare], materials, ..Surface::default() }, faces, frames.to_vec())
 }
 
 const READ: &str = "\
