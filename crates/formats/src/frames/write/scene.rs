@@ -9,7 +9,7 @@ use super::super::CacheFormat;
 use super::output::{Announced, CageMesh, FrameOptions, Output, no_cage};
 use crate::alembic::{self, Schedule};
 use crate::atomic::{AtomicFile, Target};
-use crate::dropped::{counted, phrases_of};
+use crate::dropped::counted;
 use crate::error::{Error, Fault};
 use crate::faces::check_faces;
 use crate::usd;
@@ -51,9 +51,14 @@ impl SceneWriter {
                 units: options.units,
                 origin: options.origin,
                 is_packed: format == CacheFormat::Usdz,
+                surface: options.surface.clone(),
             };
             let cage = options.cage.as_ref();
-            let mesh = usd::MeshWriter::new(file, faces, cage.map(|cage| &cage.faces), scene).map_err(write)?;
+            let of_cage = cage.map(|cage| (cage.points, &cage.faces));
+            let mesh = usd::MeshWriter::new(file, (announced.points, faces), of_cage, scene).map_err(write)?;
+            if format == CacheFormat::Usdz && announced.frames.saturating_mul(mesh.frame_size()) > LONGEST_PACKAGE {
+                return Err(too_long().at(path));
+            }
             let cage = cage.map(|cage| Announced { points: cage.points, path: path.clone(), ..*announced });
             return Ok(Self { mesh: Mesh::Usd(mesh), cage });
         }
@@ -75,13 +80,15 @@ fn check(announced: &Announced, format: CacheFormat, faces: &Polygons, surface: 
     }
     let bytes = announced.frames.saturating_mul(12 * announced.points + 64).saturating_add(8 * faces.indices().len());
     if format == CacheFormat::Usdz && bytes > LONGEST_PACKAGE {
-        return Err(Fault::unsupported(
-            "cannot hold more than 4 GiB, as packages have no room for more; write .usdc instead",
-        ));
+        return Err(too_long());
     }
     check_faces(faces, announced.points, "")?;
     let what = |what| Fault::invalid(format!("cannot have what lies on the faces ({what}); give that of this mesh"));
     surface.check(announced.points, faces).map_err(what)
+}
+
+fn too_long() -> Fault {
+    Fault::unsupported("cannot hold more than 4 GiB, as packages have no room for more; write .usdc instead")
 }
 
 fn check_cage(cage: &CageMesh) -> Result<(), Fault> {
@@ -120,12 +127,12 @@ impl Output for SceneWriter {
     }
 
     fn keeps_surface(&self) -> bool {
-        matches!(self.mesh, Mesh::Alembic(_))
+        true
     }
 
     fn lost(&self, surface: &Surface) -> Vec<String> {
-        if !self.keeps_surface() {
-            return phrases_of(surface, false);
+        if matches!(self.mesh, Mesh::Usd(_)) {
+            return Vec::new();
         }
         // Archives have the names of materials alone, those of sets of faces.
         let is_lost = |found: &&Material| **found != Material { name: found.name.clone(), ..Material::default() };

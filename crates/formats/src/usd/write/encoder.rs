@@ -1,0 +1,267 @@
+//! Values of a layer, and the prims and properties that have them.
+
+use std::io::{self, Seek, Write};
+
+use super::sink::Sink;
+use super::tables::{Tables, integers};
+use crate::usd::binary::{ATTRIBUTE, MAGIC, PRIM, RELATIONSHIP, kind};
+
+const VERSION: [u8; 3] = [0, 8, 0];
+/// Bits of a value: an array, one that is in place of its offset, one that is packed.
+const ARRAY: u64 = 1 << 63;
+const INLINED: u64 = 1 << 62;
+const PACKED: u64 = 1 << 61;
+/// Shorter arrays of whole numbers are not packed, nor longer ones, which LZ4 has in pieces.
+const PACKED_FROM: usize = 16;
+const PACKED_TO: usize = 1 << 28;
+/// Prepended items of a list.
+const PREPENDED: u8 = 1 << 5;
+
+/// Something that is defined, with all that lies below it.
+#[derive(Default)]
+pub(super) struct Prim {
+    pub(super) name: String,
+    pub(super) type_name: &'static str,
+    /// Whether it says of what material it is.
+    pub(super) is_bound: bool,
+    pub(super) properties: Vec<Property>,
+    pub(super) children: Vec<Prim>,
+}
+
+/// An attribute, or a relationship where it has no type.
+pub(super) struct Property {
+    name: String,
+    type_name: &'static str,
+    is_uniform: bool,
+    fields: Vec<(&'static str, Said)>,
+    target: Option<String>,
+}
+
+/// What a field says.
+pub(super) enum Said {
+    Value(u64),
+    Token(String),
+}
+
+impl Property {
+    pub(super) fn new(type_name: &'static str, name: impl Into<String>) -> Self {
+        Self { name: name.into(), type_name, is_uniform: false, fields: Vec::new(), target: None }
+    }
+
+    /// A token that does not change.
+    pub(super) fn fixed(name: impl Into<String>, token: impl Into<String>) -> Self {
+        Self::new("token", name).uniform().token(token)
+    }
+
+    /// A relationship to what has this path.
+    pub(super) fn to(name: &str, path: String) -> Self {
+        Self::new("", name).uniform().from(path)
+    }
+
+    pub(super) fn is_relationship(&self) -> bool {
+        self.type_name.is_empty()
+    }
+
+    pub(super) fn uniform(self) -> Self {
+        Self { is_uniform: true, ..self }
+    }
+
+    pub(super) fn value(self, value: u64) -> Self {
+        self.with("default", Said::Value(value))
+    }
+
+    pub(super) fn token(self, token: impl Into<String>) -> Self {
+        self.with("default", Said::Token(token.into()))
+    }
+
+    pub(super) fn samples(self, samples: u64) -> Self {
+        self.with("timeSamples", Said::Value(samples))
+    }
+
+    /// What its elements belong to, such as corners.
+    pub(super) fn by(self, interpolation: &str) -> Self {
+        self.with("interpolation", Said::Token(interpolation.to_owned()))
+    }
+
+    /// It has the value of the attribute of this path.
+    pub(super) fn from(self, path: String) -> Self {
+        Self { target: Some(path), ..self }
+    }
+
+    fn with(mut self, field: &'static str, said: Said) -> Self {
+        self.fields.push((field, said));
+        self
+    }
+}
+
+/// A layer that is being written.
+pub(super) struct Encoder<W> {
+    pub(super) sink: Sink<W>,
+    pub(super) tables: Tables,
+    bytes: Vec<u8>,
+}
+
+impl<W: Write + Seek> Encoder<W> {
+    pub(super) fn new(sink: Sink<W>) -> Self {
+        let mut tables = Tables::default();
+        // A first name that no property has, as its negative would be no other number.
+        tables.token(";-)");
+        Self { sink, tables, bytes: Vec::new() }
+    }
+
+    /// Writes the tables, and what a layer begins with; gives the file back.
+    pub(super) fn close(mut self) -> io::Result<W> {
+        let contents = self.tables.write(&mut self.sink)?;
+        let head = [&MAGIC[..], &VERSION, &[0; 5], &contents.to_le_bytes()].concat();
+        self.sink.close(&head)
+    }
+
+    /// Writes a prim and what lies below it.
+    pub(super) fn prim(&mut self, prim: &Prim) -> io::Result<()> {
+        let properties: Vec<&str> = prim.properties.iter().map(|property| property.name.as_str()).collect();
+        let children: Vec<&str> = prim.children.iter().map(|child| child.name.as_str()).collect();
+        self.begin(&prim.name, (prim.type_name, prim.is_bound), &properties, &children)?;
+        for property in prim.properties.iter().filter(|property| !property.is_relationship()) {
+            self.tables.token(property.type_name);
+        }
+        prim.properties.iter().for_each(|property| self.property(property));
+        prim.children.iter().try_for_each(|child| self.prim(child))?;
+        self.tables.end();
+        Ok(())
+    }
+
+    /// Begins a prim of a type, with a material or not; its properties follow, then the prims below
+    /// it, then the end.
+    pub(super) fn begin(
+        &mut self,
+        name: &str,
+        (type_name, is_bound): (&str, bool),
+        properties: &[&str],
+        children: &[&str],
+    ) -> io::Result<()> {
+        let mut fields = vec![("specifier", INLINED | value(kind::SPECIFIER, 0))];
+        for (field, names) in [("properties", properties), ("primChildren", children)] {
+            if !names.is_empty() {
+                fields.push((field, self.tokens(names)?));
+            }
+        }
+        if is_bound {
+            let schema = self.tables.token("MaterialBindingAPI");
+            let list = [&[PREPENDED][..], &1_u64.to_le_bytes(), &schema.to_le_bytes()].concat();
+            fields.push(("apiSchemas", value(kind::TOKEN_LIST, self.sink.put(&list)?)));
+        }
+        fields.insert(1, ("typeName", self.token(type_name)));
+        self.tables.begin(PRIM, name, &fields);
+        Ok(())
+    }
+
+    pub(super) fn property(&mut self, property: &Property) {
+        let (kind, field) = match property.is_relationship() {
+            false => (ATTRIBUTE, "connectionPaths"),
+            true => (RELATIONSHIP, "targetPaths"),
+        };
+        let mut fields = Vec::new();
+        if kind == ATTRIBUTE {
+            fields.push(("typeName", self.token(property.type_name)));
+        }
+        if property.is_uniform {
+            fields.push(("variability", INLINED | value(kind::VARIABILITY, 1)));
+        }
+        for (field, said) in &property.fields {
+            let value = match said {
+                Said::Value(value) => *value,
+                Said::Token(token) => self.token(token),
+            };
+            fields.push((field, value));
+        }
+        self.tables.property(kind, &property.name, &fields, property.target.clone().map(|path| (field, path)));
+    }
+
+    pub(super) fn token(&mut self, text: &str) -> u64 {
+        INLINED | value(kind::TOKEN, self.tables.token(text).into())
+    }
+
+    pub(super) fn string(&mut self, text: &str) -> u64 {
+        INLINED | value(kind::STRING, self.tables.string(text).into())
+    }
+
+    /// The path of a file.
+    pub(super) fn asset(&mut self, path: &str) -> u64 {
+        INLINED | value(kind::ASSET, self.tables.token(path).into())
+    }
+
+    pub(super) fn float(&mut self, number: f32) -> u64 {
+        INLINED | value(kind::FLOAT, number.to_bits().into())
+    }
+
+    pub(super) fn double(&mut self, number: f64) -> io::Result<u64> {
+        if f64::from(number as f32) == number {
+            return Ok(INLINED | value(kind::DOUBLE, (number as f32).to_bits().into()));
+        }
+        self.put(kind::DOUBLE, &number.to_le_bytes())
+    }
+
+    /// A value that is not in place of its offset.
+    pub(super) fn put(&mut self, kind: u8, bytes: &[u8]) -> io::Result<u64> {
+        self.sink.align()?;
+        Ok(value(kind, self.sink.put(bytes)?))
+    }
+
+    /// Some elements behind how many they are.
+    fn list(&mut self, kind: u8, count: usize, bytes: &[u8]) -> io::Result<u64> {
+        let list = self.put(kind, &(count as u64).to_le_bytes())?;
+        self.sink.put(bytes)?;
+        Ok(list)
+    }
+
+    /// An array of elements of some numbers each.
+    pub(super) fn floats<const N: usize>(&mut self, numbers: &[[f32; N]]) -> io::Result<u64> {
+        let mut bytes = std::mem::take(&mut self.bytes);
+        bytes.clear();
+        bytes.extend(numbers.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+        let array = self.list([kind::FLOAT, kind::VEC2F, kind::VEC3F, kind::VEC4F][N - 1], numbers.len(), &bytes);
+        self.bytes = bytes;
+        Ok(ARRAY | array?)
+    }
+
+    pub(super) fn integers(&mut self, numbers: &[i32]) -> io::Result<u64> {
+        if !(PACKED_FROM..=PACKED_TO).contains(&numbers.len()) {
+            let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+            return Ok(ARRAY | self.list(kind::INT, numbers.len(), &bytes)?);
+        }
+        let bytes = integers(numbers);
+        let sized = [&(bytes.len() as u64).to_le_bytes()[..], &bytes].concat();
+        Ok(ARRAY | PACKED | self.list(kind::INT, numbers.len(), &sized)?)
+    }
+
+    /// Names that a field lists.
+    pub(super) fn tokens(&mut self, names: &[&str]) -> io::Result<u64> {
+        let bytes: Vec<u8> = names.iter().flat_map(|name| self.tables.token(name).to_le_bytes()).collect();
+        self.list(kind::TOKENS, names.len(), &bytes)
+    }
+
+    /// An array of names.
+    pub(super) fn token_array(&mut self, names: &[&str]) -> io::Result<u64> {
+        let bytes: Vec<u8> = names.iter().flat_map(|name| self.tables.token(name).to_le_bytes()).collect();
+        Ok(ARRAY | self.list(kind::TOKEN, names.len(), &bytes)?)
+    }
+
+    /// Times that samples have.
+    pub(super) fn times(&mut self, codes: &[f64]) -> io::Result<u64> {
+        let bytes: Vec<u8> = codes.iter().flat_map(|code| code.to_le_bytes()).collect();
+        self.list(kind::DOUBLES, codes.len(), &bytes)
+    }
+
+    /// Values at times: where the value of these is, counted from there, and where the others are.
+    pub(super) fn samples(&mut self, times: u64, values: &[u64]) -> io::Result<u64> {
+        let samples = self.put(kind::TIME_SAMPLES, &8_u64.to_le_bytes())?;
+        let head = [times, 8, values.len() as u64];
+        let bytes: Vec<u8> = head.iter().chain(values).flat_map(|number| number.to_le_bytes()).collect();
+        self.sink.put(&bytes)?;
+        Ok(samples)
+    }
+}
+
+fn value(kind: u8, payload: u64) -> u64 {
+    u64::from(kind) << 48 | payload
+}

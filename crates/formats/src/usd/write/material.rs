@@ -1,0 +1,122 @@
+//! Materials of a layer: UsdPreviewSurface, with pictures as the specification has them.
+
+use std::io::{self, Seek, Write};
+
+use cager_geometry::surface::{Channel, Material, Surface};
+
+use super::encoder::{Encoder, Prim, Property};
+use super::faces::uv_names;
+use super::tree::{Names, identifier};
+use crate::usd::binary::kind;
+
+/// The group of all materials.
+pub(super) const GROUP: &str = "_materials";
+/// Where the texture coordinates are read, and the shader of the surface.
+const READER: &str = "uvs";
+const SHADER: &str = "surface";
+/// Texture coordinates that have no name.
+pub(super) const USUAL_UVS: &str = "st";
+
+/// The materials below a root of this path, and the path of each.
+pub(super) fn materials<W: Write + Seek>(
+    encoder: &mut Encoder<W>,
+    surface: &Surface,
+    root: &str,
+) -> io::Result<(Prim, Vec<String>)> {
+    let mut group = Prim { name: GROUP.to_owned(), type_name: "Scope", ..Prim::default() };
+    let (mut names, mut paths) = (Names::default(), Vec::new());
+    for (k, material) in (0..).zip(&surface.materials) {
+        let name = names.add(identifier(&material.name));
+        let path = format!("{root}/{GROUP}/{name}");
+        let of = surface.parts.iter().find(|part| !part.uv_sets.is_empty() && part.materials.contains(&k));
+        let uvs = of.map_or_else(|| USUAL_UVS.to_owned(), |part| uv_names(part).remove(0));
+        let children = shaders(encoder, material, &path, &uvs)?;
+        let output = Property::new("token", "outputs:surface").from(format!("{path}/{SHADER}.outputs:surface"));
+        group.children.push(Prim {
+            name,
+            type_name: "Material",
+            properties: vec![output],
+            children,
+            ..Prim::default()
+        });
+        paths.push(path);
+    }
+    Ok((group, paths))
+}
+
+fn shaders<W: Write + Seek>(
+    encoder: &mut Encoder<W>,
+    material: &Material,
+    path: &str,
+    uvs: &str,
+) -> io::Result<Vec<Prim>> {
+    let bytes = |numbers: &[f32]| -> Vec<u8> { numbers.iter().flat_map(|x| x.to_le_bytes()).collect() };
+    let base_color = encoder.put(kind::VEC3F, &bytes(&material.base_color))?;
+    let mut inputs = vec![
+        (Channel::BaseColor, Property::new("color3f", "inputs:diffuseColor").value(base_color)),
+        (Channel::Opacity, Property::new("float", "inputs:opacity").value(encoder.float(material.opacity))),
+        (Channel::Roughness, Property::new("float", "inputs:roughness").value(encoder.float(material.roughness))),
+        (Channel::Metalness, Property::new("float", "inputs:metallic").value(encoder.float(material.metalness))),
+    ];
+    let file_of = |channel| material.textures.iter().find(|t| t.channel == channel).map(|t| t.path.as_str());
+    for (channel, type_name, name) in
+        [(Channel::Normal, "normal3f", "inputs:normal"), (Channel::Emission, "color3f", "inputs:emissiveColor")]
+    {
+        inputs.extend(file_of(channel).map(|_| (channel, Property::new(type_name, name))));
+    }
+    let mut properties = vec![Property::fixed("info:id", "UsdPreviewSurface")];
+    let mut pictures = Vec::new();
+    for (channel, mut input) in inputs {
+        if let Some(file) = file_of(channel) {
+            let is_packed = |other| material.textures.iter().any(|t| t.channel == other && t.path == file);
+            let output = match channel {
+                Channel::BaseColor | Channel::Normal | Channel::Emission => "rgb",
+                Channel::Opacity if is_packed(Channel::BaseColor) => "a",
+                // As glTF has roughness and metalness in one picture.
+                Channel::Roughness if is_packed(Channel::Metalness) => "g",
+                Channel::Metalness if is_packed(Channel::Roughness) => "b",
+                Channel::Opacity | Channel::Roughness | Channel::Metalness => "r",
+            };
+            let name = format!("{channel:?}");
+            let output_type = if output == "rgb" { "float3" } else { "float" };
+            let output = format!("outputs:{output}");
+            input = input.from(format!("{path}/{name}.{output}"));
+            let is_color = matches!(channel, Channel::BaseColor | Channel::Emission);
+            let mut picture = vec![
+                Property::fixed("info:id", "UsdUVTexture"),
+                Property::new("asset", "inputs:file").value(encoder.asset(&one_line(file))),
+                Property::new("token", "inputs:sourceColorSpace").token(if is_color { "sRGB" } else { "raw" }),
+                Property::new("token", "inputs:wrapS").token("repeat"),
+                Property::new("token", "inputs:wrapT").token("repeat"),
+                Property::new("float2", "inputs:st").from(format!("{path}/{READER}.outputs:result")),
+                Property::new(output_type, output),
+            ];
+            if channel == Channel::Normal {
+                // From 0 … 1 to −1 … 1.
+                let scale = encoder.put(kind::VEC4F, &bytes(&[2.0, 2.0, 2.0, 1.0]))?;
+                let bias = encoder.put(kind::VEC4F, &bytes(&[-1.0, -1.0, -1.0, 0.0]))?;
+                picture.push(Property::new("float4", "inputs:scale").value(scale));
+                picture.push(Property::new("float4", "inputs:bias").value(bias));
+            }
+            pictures.push(Prim { name, type_name: "Shader", properties: picture, ..Prim::default() });
+        }
+        properties.push(input);
+    }
+    properties.push(Property::new("token", "outputs:surface"));
+    let mut all = vec![Prim { name: SHADER.to_owned(), type_name: "Shader", properties, ..Prim::default() }];
+    if !pictures.is_empty() {
+        all.append(&mut pictures);
+        let properties = vec![
+            Property::fixed("info:id", "UsdPrimvarReader_float2"),
+            Property::new("string", "inputs:varname").value(encoder.string(uvs)),
+            Property::new("float2", "outputs:result"),
+        ];
+        all.push(Prim { name: READER.to_owned(), type_name: "Shader", properties, ..Prim::default() });
+    }
+    Ok(all)
+}
+
+/// A path as tables of names have it.
+fn one_line(path: &str) -> String {
+    path.chars().map(|c| if c.is_control() { '_' } else { c }).collect()
+}
