@@ -25,6 +25,8 @@ pub(super) enum Kind {
     Mesh,
     /// Faces of a mesh, for a material of their own.
     Subset,
+    /// A material or what it is made of.
+    Shading,
     /// What shows the prims below it many times, and not where they are.
     PointInstancer,
     Other,
@@ -35,6 +37,7 @@ impl Kind {
         match type_name {
             b"Mesh" => Self::Mesh,
             b"GeomSubset" => Self::Subset,
+            b"Material" | b"Shader" | b"NodeGraph" => Self::Shading,
             b"PointInstancer" => Self::PointInstancer,
             _ => Self::Other,
         }
@@ -75,6 +78,12 @@ impl Layer<'_> {
         self.source.attribute(prim, name)
     }
 
+    /// The first value of an attribute of a prim.
+    pub(super) fn first(&mut self, prim: usize, name: &str) -> Result<Option<Value>, Fault> {
+        let track = self.attribute(prim, name)?;
+        Ok(track.values.first().copied().or(track.default))
+    }
+
     /// The tokens that an attribute of a prim is at all times, or first.
     pub(super) fn tokens(&mut self, prim: usize, name: &str, most: usize) -> Result<Option<Vec<String>>, Fault> {
         let value = self.attribute(prim, name)?.still();
@@ -89,7 +98,19 @@ pub(super) trait Attributes: Values {
     /// The names and types of what a mesh has beside its faces, and of the materials of any prim.
     fn properties(&self, prim: usize) -> Vec<(String, String)>;
 
-    /// A list of at most so many names, or one.
+    /// What the elements of an attribute belong to, such as corners; empty where it is not said.
+    fn interpolation(&mut self, prim: usize, name: &str) -> Result<String, Fault>;
+
+    /// What an attribute or a relationship leads to: the first prim, and its attribute.
+    fn target(&mut self, prim: usize, name: &str) -> Result<Option<(usize, String)>, Fault>;
+
+    /// The numbers of vectors of `width` numbers, of which there are at most so many, or of one.
+    fn floats(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f32>, Fault>;
+
+    /// Refuses more memory than such a file should take.
+    fn reserve(&mut self, count: u64, size: u64) -> Result<(), Fault>;
+
+    /// A list of at most so many names, or one, or the path of a file.
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault>;
 }
 

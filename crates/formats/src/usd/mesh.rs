@@ -7,9 +7,10 @@ use cager_geometry::units::{Units, Up};
 
 use super::choice::choose;
 use super::layer::{Layer, Stage};
+use super::materials::Materials;
 use super::timing::timeline;
-use super::{transform, unread};
-use crate::dropped::Dropped;
+use super::{surface, transform, unread};
+use crate::dropped::{Dropped, counted};
 use crate::error::Fault;
 use crate::scene::{MeshTracks, MovingScene, SceneTracks, Steps, Track, Wanted, ancestry, path};
 
@@ -37,10 +38,16 @@ pub(super) fn open<'a>(
     tracks.timeline = timeline(&layer.stage, tracks.meshes.iter().flat_map(of_mesh).collect())?;
     if let Some(dropped) = dropped {
         tracks.timeline.at.truncate(1);
-        for &prim in &prims {
-            // What cannot be named is no reason to refuse a mesh.
-            unread::add(&mut layer, prim, dropped).unwrap_or_default();
+        let mut materials = Materials::new(&layer);
+        for (&prim, mesh) in prims.iter().zip(&mut tracks.meshes) {
+            // What cannot be read or named is no reason to refuse a mesh.
+            let read = surface::read(&mut layer, prim, &mut materials, &mut mesh.part).unwrap_or_default();
+            unread::add(&mut layer, prim, &mesh.part, &read, dropped);
         }
+        if materials.names_alone > 0 {
+            dropped.add(format!("the values of {} (no UsdPreviewSurface)", counted(materials.names_alone, "material")));
+        }
+        tracks.materials = materials.list;
     }
     MovingScene::new(layer.source, tracks)
 }

@@ -7,8 +7,10 @@
 mod binary;
 mod choice;
 mod layer;
+mod materials;
 mod mesh;
 mod package;
+mod surface;
 mod text;
 mod timing;
 mod transform;

@@ -1,16 +1,18 @@
 //! What a mesh of a layer has that is not read.
 
-use super::layer::{Kind, Layer};
-use crate::dropped::{Dropped, counted, listed};
-use crate::error::Fault;
-use crate::scene::ancestry;
+use std::collections::HashSet;
+
+use cager_geometry::surface::Part;
+
+use super::layer::Layer;
+use crate::dropped::{Dropped, listed};
 
 /// Attributes beside points and faces, and what they are.
 const KINDS: [(&str, &str); 9] = [
     ("velocities", "velocities"),
     ("accelerations", "velocities"),
-    ("cornerIndices", "creases"),
-    ("cornerSharpnesses", "creases"),
+    ("cornerIndices", "sharp corners"),
+    ("cornerSharpnesses", "sharp corners"),
     ("creaseIndices", "creases"),
     ("creaseSharpnesses", "creases"),
     ("creaseLengths", "creases"),
@@ -18,17 +20,17 @@ const KINDS: [(&str, &str); 9] = [
     ("skel:blendShapes", "blend shapes"),
 ];
 
-/// Adds what a mesh has beside points and faces.
-pub(super) fn add(layer: &mut Layer<'_>, mesh: usize, dropped: &mut Dropped) -> Result<(), Fault> {
+/// Adds what a mesh has beside the properties that were read.
+pub(super) fn add(layer: &mut Layer<'_>, mesh: usize, part: &Part, read: &HashSet<String>, dropped: &mut Dropped) {
     let mut properties = layer.source.properties(mesh);
+    properties.retain(|(name, _)| !read.contains(name));
     properties.sort_unstable();
     properties.dedup();
-    let told = |what: &str, names: &[&str]| format!("{what} ({})", listed(names.iter().map(|name| name.as_bytes())));
     for what in ["texture coordinates", "normals", "colours", "a skin", "primvars"] {
         let of_kind = properties.iter().filter(|(name, type_name)| kind(name, type_name) == Some(what));
-        let names: Vec<&str> = of_kind.map(|(name, _)| name.as_str()).collect();
+        let names: Vec<&[u8]> = of_kind.map(|(name, _)| name.as_bytes()).collect();
         if !names.is_empty() {
-            dropped.add_on_faces(told(what, &names));
+            dropped.add_on_faces(format!("{what} ({})", listed(names)));
         }
     }
     for (name, what) in KINDS {
@@ -36,26 +38,13 @@ pub(super) fn add(layer: &mut Layer<'_>, mesh: usize, dropped: &mut Dropped) -> 
             dropped.add(what);
         }
     }
-    if let Some(scheme) = layer.tokens(mesh, "subdivisionScheme", 1)? {
-        let scheme = scheme.concat();
-        if scheme != "none" {
-            dropped.add(told("the subdivision scheme", &[&scheme]));
-        }
-    }
-    let is_subset = |k: &usize| layer.prims[*k].kind == Kind::Subset && layer.nodes[*k].parent == Some(mesh);
-    let subsets: Vec<usize> = (0..layer.prims.len()).filter(is_subset).collect();
-    let bound = |k: usize| layer.source.properties(k).iter().any(|(name, _)| name.starts_with("material:binding"));
-    if subsets.iter().copied().chain(ancestry(&layer.nodes, mesh)).any(bound) {
+    if part.materials.is_empty() && properties.iter().any(|(name, _)| name.starts_with("material:binding")) {
         dropped.add_on_faces("materials (material:binding)");
     }
-    if !subsets.is_empty() {
-        dropped.add_on_faces(format!("{} (GeomSubset)", counted(subsets.len(), "set") + " of faces"));
-    }
-    Ok(())
 }
 
 /// What corners or points have in an attribute.
-fn kind(name: &str, type_name: &str) -> Option<&'static str> {
+pub(super) fn kind(name: &str, type_name: &str) -> Option<&'static str> {
     let plain = name.strip_prefix("primvars:");
     let is_of = |types: &[&str]| plain.is_some() && types.iter().any(|start| type_name.starts_with(start));
     match plain {

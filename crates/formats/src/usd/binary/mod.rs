@@ -16,12 +16,15 @@ pub(super) use file::MAGIC;
 use file::{File, Rep};
 use pack::integers;
 pub(super) use sections::{CHILD_ONLY, LAST, SIBLING};
-use sections::{Sections, Spec};
+use sections::{Path, Sections, Spec};
 
 pub(super) const ATTRIBUTE: u32 = 1;
 pub(super) const PRIM: u32 = 6;
 pub(super) const ROOT: u32 = 7;
 pub(super) const RELATIONSHIP: u32 = 8;
+
+/// Lists of paths that are there: explicit, added, prepended or appended.
+const FILLED: u8 = 0b0110_0110;
 
 /// Versions 0.4.0 to 0.13.0 of the format are read: before them tables were not packed.
 const VERSIONS: std::ops::RangeInclusive<u8> = 4..=13;
@@ -192,10 +195,40 @@ impl Attributes for Binary<'_> {
         self.below(prim).map(|(name, spec)| (text(name), type_name(spec))).collect()
     }
 
+    fn interpolation(&mut self, prim: usize, name: &str) -> Result<String, Fault> {
+        let Some(spec) = self.find(prim, name) else { return Ok(String::new()) };
+        let told = self.sections.field(spec, "interpolation")?;
+        Ok(told.map_or(Ok(Vec::new()), |told| self.tokens(Value(told.0), 1))?.concat())
+    }
+
+    fn target(&mut self, prim: usize, name: &str) -> Result<Option<(usize, String)>, Fault> {
+        let Some(spec) = self.find(prim, name) else { return Ok(None) };
+        let field = if spec.kind == RELATIONSHIP { "targetPaths" } else { "connectionPaths" };
+        let Some(list) = self.sections.field(spec, field)? else { return Ok(None) };
+        // Which lists follow, each behind how many paths it has: the first is of those that are there.
+        let [head] = self.file.source.array(list.offset())?;
+        if list.kind() != kind::PATH_LIST || head & FILLED == 0 || self.file.source.number(list.offset() + 1)? == 0 {
+            return Ok(None);
+        }
+        let path = u32::from_le_bytes(self.file.source.array(list.offset() + 9)?);
+        let of = |path: u32| self.paths.binary_search(&path).ok();
+        let Some(&Path { parent, name, .. }) = self.sections.paths.get(path as usize) else { return Ok(None) };
+        let property = || Some((of(parent)?, String::from_utf8_lossy(self.sections.token(name)).into_owned()));
+        Ok(of(path).map(|prim| (prim, String::new())).or_else(property))
+    }
+
+    fn floats(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f32>, Fault> {
+        self.file.floats(Rep(value.0), width, most)
+    }
+
+    fn reserve(&mut self, count: u64, size: u64) -> Result<(), Fault> {
+        self.file.source.allowance.take(count, size).map(|_| ())
+    }
+
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
         let rep = Rep(value.0);
         let text = |index: u32| String::from_utf8_lossy(self.sections.token(index)).into_owned();
-        if rep.kind() == kind::TOKEN && rep.is_inlined() && !rep.is_array() {
+        if matches!(rep.kind(), kind::TOKEN | kind::ASSET) && rep.is_inlined() && !rep.is_array() {
             return Ok(vec![text(u32::from_le_bytes(rep.inlined()))]);
         }
         let (start, count) = match rep.kind() {

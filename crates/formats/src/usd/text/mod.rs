@@ -3,10 +3,12 @@
 mod parser;
 mod scanner;
 
+use std::collections::HashMap;
+
 use super::layer::{Attributes, Layer, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
-use crate::scene::{Points, Reader, Track, Value, Values, damaged};
+use crate::scene::{Allowance, Node, Points, Reader, Track, Value, Values, damaged};
 use parser::{Contents, Parser, Stored};
 use scanner::Scanner;
 
@@ -19,6 +21,9 @@ const KEPT: usize = 2;
 pub(super) struct Text<'a> {
     scanner: Scanner<'a>,
     contents: Contents,
+    /// Where attributes and relationships lead.
+    targets: HashMap<(usize, String), (usize, String)>,
+    allowance: Allowance,
     /// Where points were read from, and these; the last ones first.
     read: Vec<(u64, Vec<f64>)>,
 }
@@ -30,7 +35,10 @@ impl<'a> Text<'a> {
         let mut contents = Parser::parse(&mut scanner)?;
         let (nodes, prims) = (std::mem::take(&mut contents.nodes), std::mem::take(&mut contents.prims));
         let stage = std::mem::take(&mut contents.stage);
-        Ok(Layer { stage, nodes, prims, source: Box::new(Self { scanner, contents, read: Vec::new() }) })
+        let targets = targets(&nodes, std::mem::take(&mut contents.targets));
+        let allowance = Allowance(scanner.at.saturating_mul(64).saturating_add(1 << 16));
+        let text = Self { scanner, contents, targets, allowance, read: Vec::new() };
+        Ok(Layer { stage, nodes, prims, source: Box::new(text) })
     }
 
     fn enter(&mut self, value: Value) -> Result<Stored, Fault> {
@@ -67,6 +75,21 @@ impl<'a> Text<'a> {
     }
 }
 
+/// The prims of paths, and their attributes.
+fn targets(nodes: &[Node], paths: HashMap<(usize, String), String>) -> HashMap<(usize, String), (usize, String)> {
+    let places: HashMap<(Option<usize>, &[u8]), usize> =
+        nodes.iter().enumerate().map(|(k, node)| ((node.parent, &*node.name), k)).collect();
+    let find = |path: &str| {
+        let (names, attribute) = path.split_once('.').unwrap_or((path, ""));
+        let mut prim = None;
+        for name in names.strip_prefix('/')?.split('/') {
+            prim = Some(*places.get(&(prim, name.as_bytes()))?);
+        }
+        Some((prim?, attribute.to_owned()))
+    };
+    paths.into_iter().filter_map(|(key, path)| Some((key, find(&path)?))).collect()
+}
+
 /// As a type that is not of double precision holds it.
 fn rounded(number: f64, is_double: bool) -> f64 {
     if is_double { number } else { f64::from(number as f32) }
@@ -85,8 +108,49 @@ impl Attributes for Text<'_> {
         self.contents.properties.get(&prim).cloned().unwrap_or_default()
     }
 
+    fn interpolation(&mut self, prim: usize, name: &str) -> Result<String, Fault> {
+        Ok(self.contents.interpolations.get(&(prim, name.to_owned())).cloned().unwrap_or_default())
+    }
+
+    fn target(&mut self, prim: usize, name: &str) -> Result<Option<(usize, String)>, Fault> {
+        Ok(self.targets.get(&(prim, name.to_owned())).cloned())
+    }
+
+    fn floats(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f32>, Fault> {
+        let count = self.enter(value)?.count;
+        if count as u64 > most {
+            return Err(damaged(&format!("it has {count} vectors where {most} are the most")));
+        }
+        self.reserve((count * width) as u64, 4)?;
+        let is_list = self.scanner.has(b'[')?;
+        let mut numbers = Vec::new();
+        while !is_list || self.follows()? {
+            let is_vector = self.scanner.has(b'(')?;
+            for k in 0..width {
+                if k > 0 {
+                    self.scanner.expect(b',')?;
+                }
+                numbers.push(self.scanner.number()? as f32);
+            }
+            if is_vector {
+                self.scanner.expect(b')')?;
+            }
+            if !is_list {
+                break;
+            }
+        }
+        Ok(numbers)
+    }
+
+    fn reserve(&mut self, count: u64, size: u64) -> Result<(), Fault> {
+        self.allowance.take(count, size).map(|_| ())
+    }
+
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
         self.enter(value)?;
+        if self.scanner.solid()? == Some(b'@') {
+            return Ok(vec![self.scanner.enclosed()?]);
+        }
         if !self.scanner.has(b'[')? {
             return Ok(vec![self.scanner.string()?]);
         }

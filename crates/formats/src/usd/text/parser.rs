@@ -11,7 +11,7 @@ use crate::usd::layer::{COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep
 const MODIFIERS: [&str; 9] =
     ["custom", "uniform", "varying", "config", "add", "append", "prepend", "delete", "reorder"];
 
-/// Attributes that are asked for, beside the operations of transforms.
+/// Attributes that are asked for of all prims, beside the operations of transforms.
 const WANTED: [&str; 9] = [
     "subdivisionScheme",
     "points",
@@ -23,6 +23,16 @@ const WANTED: [&str; 9] = [
     "primvars:skel:jointIndices",
     "skel:blendShapes",
 ];
+
+/// Whether an attribute or a relationship of a prim is asked for.
+fn is_wanted(kind: Kind, name: &str) -> bool {
+    let of_kind = match kind {
+        Kind::Mesh => name == "normals" || ["primvars:", "crease"].iter().any(|start| name.starts_with(start)),
+        Kind::Subset | Kind::Shading => true,
+        Kind::PointInstancer | Kind::Other => false,
+    };
+    of_kind || WANTED.contains(&name) || ["xformOp", "material:binding"].iter().any(|start| name.starts_with(start))
+}
 
 /// A value: its place, how many values it has within it, and what they are.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +51,10 @@ pub(super) struct Contents {
     pub(super) nodes: Vec<Node>,
     pub(super) values: Vec<Stored>,
     pub(super) attributes: HashMap<(usize, String), Track>,
+    /// What the elements of attributes belong to.
+    pub(super) interpolations: HashMap<(usize, String), String>,
+    /// The paths to which attributes and relationships lead.
+    pub(super) targets: HashMap<(usize, String), String>,
     /// Of meshes their names and types, of others those of materials.
     pub(super) properties: HashMap<usize, Vec<(String, String)>>,
     pub(super) splines: HashSet<(usize, String)>,
@@ -54,11 +68,10 @@ pub(super) struct Parser<'a, 'b> {
 }
 
 /// What fields in brackets belong to.
-#[derive(Clone, Copy)]
 enum Owner {
     Layer,
     Prim(usize),
-    Property,
+    Property(String),
 }
 
 impl<'a, 'b> Parser<'a, 'b> {
@@ -137,10 +150,16 @@ impl<'a, 'b> Parser<'a, 'b> {
             }
             let key = self.key()?;
             self.scanner.expect(b'=')?;
-            match owner {
-                Owner::Layer => self.layer_field(&key)?,
-                Owner::Prim(prim) => self.prim_field(prim, &key)?,
-                Owner::Property => {
+            match (&owner, self.open.last()) {
+                (Owner::Layer, _) => self.layer_field(&key)?,
+                (Owner::Prim(prim), _) => self.prim_field(*prim, &key)?,
+                (Owner::Property(name), Some(&prim)) if key == "interpolation" => {
+                    let value = self.short()?;
+                    if is_wanted(self.contents.prims[prim].kind, name) {
+                        self.contents.interpolations.insert((prim, name.clone()), value);
+                    }
+                }
+                (Owner::Property(_), _) => {
                     self.scanner.pass()?;
                 }
             }
@@ -210,19 +229,24 @@ impl<'a, 'b> Parser<'a, 'b> {
             self.value(type_name, &name)?;
         }
         if self.scanner.solid()? == Some(b'(') {
-            self.fields(Owner::Property)?;
+            self.fields(Owner::Property(name))?;
         }
         Ok(())
     }
 
     fn value(&mut self, type_name: &str, full: &str) -> Result<(), Fault> {
         let (name, part) = full.split_once('.').unwrap_or((full, ""));
-        let is_wanted = WANTED.contains(&name) || name.starts_with("xformOp");
-        let Some(&prim) = self.open.last().filter(|_| is_wanted) else {
+        let prims = &self.contents.prims;
+        let Some(&prim) = self.open.last().filter(|&&prim| is_wanted(prims[prim].kind, name)) else {
             return self.scanner.pass().map(|_| ());
         };
         let key = (prim, name.to_owned());
         match part {
+            _ if type_name == "rel" || part == "connect" => {
+                if let Some(path) = self.first_path()? {
+                    self.contents.targets.insert(key, path);
+                }
+            }
             "" => {
                 let value = self.stored(type_name)?;
                 let is_blocked = self.contents.values[value.0 as usize].is_blocked;
@@ -241,6 +265,18 @@ impl<'a, 'b> Parser<'a, 'b> {
             }
         }
         Ok(())
+    }
+
+    /// The first path of a value, which is passed over.
+    fn first_path(&mut self) -> Result<Option<String>, Fault> {
+        self.scanner.solid()?;
+        let start = self.scanner.place();
+        self.scanner.has(b'[')?;
+        let is_path = self.scanner.solid()? == Some(b'<');
+        let path = if is_path { Some(self.scanner.enclosed()?) } else { None };
+        self.scanner.go(start)?;
+        self.scanner.pass()?;
+        Ok(path)
     }
 
     fn stored(&mut self, type_name: &str) -> Result<Value, Fault> {

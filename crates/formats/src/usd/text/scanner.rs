@@ -20,7 +20,7 @@ pub(super) struct Place {
 pub(super) struct Scanner<'a> {
     source: BufReader<Reader<'a>>,
     /// The place of the next byte.
-    at: u64,
+    pub(super) at: u64,
     line: u64,
     word: Vec<u8>,
 }
@@ -236,6 +236,20 @@ impl<'a> Scanner<'a> {
         }
         let is_none = first.is_some_and(is_letter) && self.word == b"None";
         Ok(Passed { place, count, is_none })
+    }
+
+    /// What is between `<` and `>`, or `@` and `@`; empty where it is longer than programs write.
+    pub(super) fn enclosed(&mut self) -> Result<String, Fault> {
+        self.solid()?;
+        let start = self.place();
+        self.pass()?;
+        let length = self.at - start.offset;
+        if length > LONGEST as u64 {
+            return Ok(String::new());
+        }
+        self.go(start)?;
+        let bytes = (0..length).map(|_| self.next()).collect::<Result<Vec<u8>, Fault>>()?;
+        Ok(String::from_utf8_lossy(&bytes).trim_matches(['<', '>', '@']).to_owned())
     }
 
     fn pass_asset(&mut self) -> Result<(), Fault> {

@@ -1,0 +1,163 @@
+//! Materials of faces: what is bound to meshes, to what lies above them and to subsets of faces.
+
+use std::collections::HashMap;
+
+use cager_geometry::surface::{Channel, FaceGroup, Material, NO_MATERIAL, Part, Texture};
+
+use super::layer::{Kind, Layer};
+use super::surface::Faces;
+use crate::error::Fault;
+use crate::scene::ancestry;
+
+/// Relationships to a material; what is for previews before what is for rendering alone.
+const BINDINGS: [&str; 3] = ["material:binding", "material:binding:preview", "material:binding:full"];
+/// Connections from an input to where its value is; programs write two or three.
+const MOST_CONNECTIONS: usize = 16;
+/// Inputs of a surface, of which pictures may be.
+const INPUTS: [(&str, Channel); 6] = [
+    ("inputs:diffuseColor", Channel::BaseColor),
+    ("inputs:opacity", Channel::Opacity),
+    ("inputs:roughness", Channel::Roughness),
+    ("inputs:metallic", Channel::Metalness),
+    ("inputs:normal", Channel::Normal),
+    ("inputs:emissiveColor", Channel::Emission),
+];
+
+/// The materials of a layer that are in use.
+pub(super) struct Materials {
+    pub(super) list: Vec<Material>,
+    /// Those that are kept by name alone.
+    pub(super) names_alone: usize,
+    numbers: HashMap<usize, u32>,
+    /// The subsets of each mesh.
+    subsets: HashMap<usize, Vec<usize>>,
+}
+
+impl Materials {
+    pub(super) fn new(layer: &Layer<'_>) -> Self {
+        let mut subsets: HashMap<usize, Vec<usize>> = HashMap::new();
+        for (k, _) in layer.prims.iter().enumerate().filter(|(_, prim)| prim.kind == Kind::Subset && prim.is_there) {
+            if let Some(mesh) = layer.nodes[k].parent {
+                subsets.entry(mesh).or_default().push(k);
+            }
+        }
+        Self { list: Vec::new(), names_alone: 0, numbers: HashMap::new(), subsets }
+    }
+
+    /// The materials and the groups of the faces of a mesh.
+    pub(super) fn read(
+        &mut self,
+        layer: &mut Layer<'_>,
+        mesh: usize,
+        faces: &Faces,
+        part: &mut Part,
+    ) -> Result<(), Fault> {
+        let count = faces.arities.len();
+        let mut whole = NO_MATERIAL;
+        for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
+            if let Some(material) = self.bound(layer, prim)? {
+                whole = material;
+                break;
+            }
+        }
+        layer.source.reserve(count as u64, 4)?;
+        let mut materials = vec![whole; count];
+        for subset in self.subsets.remove(&mesh).unwrap_or_default() {
+            let Some(indices) = layer.first(subset, "indices")? else { continue };
+            let indices = layer.source.integers(indices, faces.most())?;
+            let inside = |&face: &i32| usize::try_from(face).ok().filter(|&face| face < count);
+            let elements = layer.tokens(subset, "elementType", 1)?.unwrap_or_default().concat();
+            if !matches!(elements.as_str(), "" | "face") {
+                continue;
+            }
+            match self.bound(layer, subset)? {
+                Some(material) => indices.iter().filter_map(inside).for_each(|face| materials[face] = material),
+                None => part.groups.push(FaceGroup {
+                    name: String::from_utf8_lossy(&layer.nodes[subset].name).into_owned(),
+                    faces: indices.iter().filter_map(inside).map(|face| face as u32).collect(),
+                }),
+            }
+        }
+        if materials.iter().any(|&material| material != NO_MATERIAL) {
+            part.materials = materials;
+        }
+        Ok(())
+    }
+
+    /// The material that a prim itself is bound to.
+    fn bound(&mut self, layer: &mut Layer<'_>, prim: usize) -> Result<Option<u32>, Fault> {
+        for name in BINDINGS {
+            if let Some((material, _)) = layer.source.target(prim, name)? {
+                return Ok(Some(self.number(layer, material)));
+            }
+        }
+        Ok(None)
+    }
+
+    fn number(&mut self, layer: &mut Layer<'_>, prim: usize) -> u32 {
+        if let Some(&number) = self.numbers.get(&prim) {
+            return number;
+        }
+        let name = String::from_utf8_lossy(&layer.nodes[prim].name).into_owned();
+        // What cannot be read has a name at least.
+        let read = read_material(layer, prim).unwrap_or_default();
+        self.names_alone += usize::from(read.is_none());
+        let number = self.list.len() as u32;
+        self.list.push(Material { name, ..read.unwrap_or_default() });
+        self.numbers.insert(prim, number);
+        number
+    }
+}
+
+/// Where the value of an attribute is: over connections, of which some lead through materials.
+fn source(layer: &mut Layer<'_>, prim: usize, name: &str) -> Result<(usize, String), Fault> {
+    let mut at = (prim, name.to_owned());
+    for _ in 0..MOST_CONNECTIONS {
+        match layer.source.target(at.0, &at.1)? {
+            Some(next) => at = next,
+            None => break,
+        }
+    }
+    Ok(at)
+}
+
+/// A material whose surface is a UsdPreviewSurface.
+fn read_material(layer: &mut Layer<'_>, prim: usize) -> Result<Option<Material>, Fault> {
+    let (shader, output) = source(layer, prim, "outputs:surface")?;
+    let is_a = |layer: &mut Layer<'_>, prim: usize, id: &str| -> Result<bool, Fault> {
+        Ok(layer.tokens(prim, "info:id", 1)?.is_some_and(|told| told == [id]))
+    };
+    if output.is_empty() || !is_a(layer, shader, "UsdPreviewSurface")? {
+        return Ok(None);
+    }
+    let mut material = Material::default();
+    for (name, channel) in INPUTS {
+        let (prim, attribute) = source(layer, shader, name)?;
+        if attribute.starts_with("outputs:") && is_a(layer, prim, "UsdUVTexture")? {
+            let (prim, file) = source(layer, prim, "inputs:file")?;
+            let path = layer.first(prim, &file)?.map(|value| layer.source.tokens(value, 1)).transpose()?;
+            let path = path.unwrap_or_default().concat().replace('\\', "/");
+            let path = path.strip_prefix("./").unwrap_or(&path).to_owned();
+            if !path.is_empty() {
+                material.textures.push(Texture { channel, path });
+            }
+        }
+        // The value of the surface itself, where a picture takes its place.
+        let at = if attribute.starts_with("outputs:") { (shader, name) } else { (prim, attribute.as_str()) };
+        let numbers = match layer.first(at.0, at.1)? {
+            Some(value) => layer.source.numbers(value)?,
+            None => Vec::new(),
+        };
+        let numbers: Vec<f32> = numbers.into_iter().map(|x| x as f32).filter(|x| x.is_finite()).collect();
+        match (channel, numbers.as_slice()) {
+            (Channel::BaseColor, &[red, green, blue]) => material.base_color = [red, green, blue],
+            // Of the specification.
+            (Channel::BaseColor, []) if material.textures.is_empty() => material.base_color = [0.18; 3],
+            (Channel::Opacity, &[opacity]) => material.opacity = opacity,
+            (Channel::Roughness, &[roughness]) => material.roughness = roughness,
+            (Channel::Metalness, &[metalness]) => material.metalness = metalness,
+            _ => {}
+        }
+    }
+    Ok(Some(material))
+}
