@@ -43,7 +43,7 @@ pub(super) fn open<'a>(
             return open_scene(path, usd::open(source, length, wanted, None), expected_points);
         }
         CacheFormat::Glb | CacheFormat::Gltf => {
-            let kind = glb::Source { is_text: format == CacheFormat::Gltf, folder };
+            let kind = glb::Source { is_text: format == CacheFormat::Gltf, folder, is_split: false };
             return glb::open_frames(path, (source, length), &kind, expected_points, selection);
         }
         CacheFormat::Abc => return open_scene(path, alembic::open(source, length, wanted, None), expected_points),

@@ -4,11 +4,17 @@ use cager_geometry::mesh::Point;
 use gltf::json::Accessor;
 use gltf::json::accessor::ComponentType::{self, F32, I8, I16, U8, U16, U32};
 use gltf::json::accessor::{GenericComponentType, IndexComponentType, Type};
+use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::buffers::{Buffers, outside};
 use super::faults::{damaged, item, too_large};
 use crate::error::Fault;
+
+/// The accessor of an attribute of points.
+pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<usize> {
+    primitive.attributes.get(&Checked::Valid(semantic)).map(gltf::json::Index::value)
+}
 
 impl Buffers<'_> {
     /// The first `N` numbers of each element of an accessor, which must be what is wanted, and no
@@ -128,6 +134,8 @@ const INDICES: Wanted = Wanted("indices", &[Type::Scalar], &[U8, U16, U32], Some
 pub(super) const JOINTS: Wanted = Wanted("joints", &[Type::Vec4], &[U8, U16, U32], Some(false));
 pub(super) const WEIGHTS: Wanted = Wanted("weights", &[Type::Vec4], &[I8, U8, I16, U16, U32, F32], Some(true));
 pub(super) const MATRICES: Wanted = Wanted("matrices", &[Type::Mat4], &[F32], None);
+pub(super) const NORMALS: Wanted = Wanted("normals", &[Type::Vec3], &[I8, I16, F32], None);
+pub(super) const UVS: Wanted = Wanted("texture coordinates", &[Type::Vec2], &[I8, U8, I16, U16, F32], None);
 /// Not all files say that they are fractions, but nothing else has a meaning.
 pub(super) const COLORS: Wanted = Wanted("colours", &[Type::Vec3, Type::Vec4], &[U8, U16, F32], Some(true));
 

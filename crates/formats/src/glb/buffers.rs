@@ -14,8 +14,9 @@ use gltf::json::Root;
 use percent_encoding::percent_decode_str;
 
 use super::container::split;
-use super::document::document;
+use super::document::{Document, document};
 use super::faults::{damaged, item, too_large};
+use super::materials::Look;
 use super::meshopt::Packed;
 use crate::error::Fault;
 use crate::text::quoted;
@@ -46,6 +47,7 @@ pub(super) struct Buffers<'a> {
     taken: Cell<usize>,
     /// The number of the frame at 0 s and frames per second, where the file says them.
     pub(super) frame_numbers: Option<[f64; 2]>,
+    pub(super) materials: Vec<Look>,
     file: usize,
 }
 
@@ -54,7 +56,7 @@ impl<'a> Buffers<'a> {
     pub(super) fn open(bytes: impl Into<Cow<'a, [u8]>>, source: &Source<'_>) -> Result<Self, Fault> {
         let bytes: Cow<'a, [u8]> = bytes.into();
         let (json, binary) = if source.is_text { (&*bytes, 0..0) } else { split(&bytes)? };
-        let (root, frame_numbers) = document(json)?;
+        let Document { root, frame_numbers, materials } = document(json)?;
         let others = match source.folder {
             Some(folder) => others(&root, folder)?,
             None => Vec::new(),
@@ -68,6 +70,7 @@ impl<'a> Buffers<'a> {
             binary,
             taken: Cell::new(0),
             frame_numbers,
+            materials,
             file,
         };
         others.into_iter().for_each(|(k, bytes)| drop(buffers.decoded[k].set(bytes)));
@@ -147,6 +150,8 @@ pub(crate) struct Source<'a> {
     pub(crate) is_text: bool,
     /// Where other files lie that may be read.
     pub(crate) folder: Option<&'a Path>,
+    /// Whether points along seams are read as often as they are stored.
+    pub(crate) is_split: bool,
 }
 
 /// What is in other files, by the numbers of buffers.

@@ -7,7 +7,8 @@ use cager_geometry::vector::along;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-use super::accessor::{COLORS, POSITIONS};
+use super::accessor::{COLORS, POSITIONS, attribute};
+use super::alike::Block;
 use super::buffers::Buffers;
 use super::document::{DRACO, draco};
 use super::faults::{damaged, too_large};
@@ -18,7 +19,7 @@ use crate::error::Fault;
 use crate::faces::{Contents, check_face};
 
 /// Bytes of a point with its colour, and of a corner with its share of a face.
-const POINT_BYTES: usize = 36;
+pub(super) const POINT_BYTES: usize = 36;
 const CORNER_BYTES: usize = 8;
 /// What counts for a primitive, a joint and a point that a target moves: time more than memory.
 const PRIMITIVE_BYTES: usize = 256;
@@ -27,22 +28,43 @@ const MOVED_BYTES: usize = 4;
 
 /// Puts meshes together, one placement after another.
 pub(super) struct Builder<'a, 'b> {
-    buffers: &'a Buffers<'b>,
-    scene: &'a Scene,
+    pub(super) buffers: &'a Buffers<'b>,
+    pub(super) scene: &'a Scene,
     contents: Contents,
-    model: Model,
+    pub(super) is_split: bool,
+    pub(super) model: Model,
+    /// By point as it is stored, as the numbers of those that are kept are.
     colors: Colors,
+    pub(super) kept: Vec<u32>,
+    /// How many points were stored.
+    pub(super) stored: usize,
+    /// The numbers of materials among those that are used.
+    pub(super) materials: HashMap<usize, u32>,
     /// Bytes that may still be taken, beside those of points and corners.
     most: usize,
 }
 
+/// What placements gave.
+pub(super) struct Built {
+    pub(super) model: Model,
+    /// The points that are kept of those that are stored, where these are more; the others are one with them.
+    pub(super) kept: Option<Vec<u32>>,
+    /// How many are stored.
+    pub(super) stored: usize,
+}
+
 /// A mesh that is being placed.
-struct Placed<'a> {
-    placement: &'a Placement,
-    joints: Option<Joints>,
-    /// The first point and how many there are by accessor, as primitives that differ by their
-    /// material alone often share their points.
-    points: HashMap<usize, (usize, usize)>,
+pub(super) struct Placed<'a> {
+    pub(super) placement: &'a Placement,
+    pub(super) joints: Option<Joints>,
+    /// By accessor which of the blocks they are, as primitives that differ by their material alone often share their
+    /// points.
+    points: HashMap<usize, usize>,
+    pub(super) blocks: Vec<Block<'a>>,
+    /// Primitives with faces: the number of their block, and how many corners they have.
+    pub(super) drawn: Vec<(&'a Primitive, usize, usize)>,
+    /// Those of all, three of each face.
+    pub(super) corners: Vec<u32>,
 }
 
 impl Placed<'_> {
@@ -52,22 +74,34 @@ impl Placed<'_> {
 }
 
 impl<'a, 'b> Builder<'a, 'b> {
-    pub(super) fn new(buffers: &'a Buffers<'b>, scene: &'a Scene, contents: Contents) -> Self {
-        let (model, colors) = (Model::default(), Colors::default());
-        Self { buffers, scene, contents, model, colors, most: buffers.most_bytes() }
+    /// Where `is_split`, points along seams are as many as are stored; without faces they always are.
+    pub(super) fn new(buffers: &'a Buffers<'b>, scene: &'a Scene, contents: Contents, is_split: bool) -> Self {
+        let (model, colors, materials) = (Model::default(), Colors::default(), HashMap::new());
+        let (kept, stored, most) = (Vec::new(), 0, buffers.most_bytes());
+        Self { buffers, scene, contents, is_split, model, colors, kept, stored, materials, most }
     }
 
     /// The meshes of placements in their order, as one.
-    pub(super) fn build(mut self, placements: &[Placement]) -> Result<Model, Fault> {
+    pub(super) fn build(mut self, placements: &[Placement]) -> Result<Built, Fault> {
         placements.iter().try_for_each(|placement| self.place(placement))?;
-        let Self { mut model, colors, .. } = self;
-        model.colors = colors.finish(model.points.len(), Scale::Fractions);
-        Ok(model)
+        self.finish_surface();
+        let Self { mut model, colors, kept, stored, .. } = self;
+        let colors = colors.finish(stored, Scale::Fractions);
+        let is_merged = kept.len() < stored && self.contents == Contents::PointsAndFaces;
+        let kept = is_merged.then_some(kept);
+        model.colors = match &kept {
+            Some(kept) if !colors.is_empty() => kept.iter().map(|&k| colors[k as usize]).collect(),
+            _ => colors,
+        };
+        Ok(Built { model, kept, stored })
     }
 
     fn place(&mut self, placement: &Placement) -> Result<(), Fault> {
-        let mesh = placement.mesh_in(&self.buffers.root)?;
-        let mut placed = Placed { placement, joints: None, points: HashMap::new() };
+        let buffers = self.buffers;
+        let mesh = placement.mesh_in(&buffers.root)?;
+        let (points, blocks, drawn, corners) = (HashMap::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut placed = Placed { placement, joints: None, points, blocks, drawn, corners };
+        let first = self.model.points.len();
         if let Some(skin) = placement.skin {
             let (joints, read) = Joints::of(skin, self.scene, self.buffers, self.most / JOINT_BYTES)?;
             self.take(JOINT_BYTES * read)?;
@@ -79,10 +113,10 @@ impl<'a, 'b> Builder<'a, 'b> {
             let place = format!("mesh {}, primitive {k}", placement.mesh);
             self.primitive(primitive, &mut placed, &place)?;
         }
-        Ok(())
+        if self.contents == Contents::PointsAndFaces { self.finish_part(&placed, first) } else { Ok(()) }
     }
 
-    fn primitive(&mut self, primitive: &Primitive, placed: &mut Placed<'_>, place: &str) -> Result<(), Fault> {
+    fn primitive<'p>(&mut self, primitive: &'p Primitive, placed: &mut Placed<'p>, place: &str) -> Result<(), Fault> {
         let Checked::Valid(mode) = primitive.mode else {
             return Err(damaged(place, "the mode is unknown"));
         };
@@ -98,22 +132,25 @@ impl<'a, 'b> Builder<'a, 'b> {
         if is_draco && self.buffers.root.accessors.get(positions.value()).is_some_and(|a| a.buffer_view.is_none()) {
             return Err(draco());
         }
-        let (base, count) = match placed.points.get(&positions.value()) {
+        let block = match placed.points.get(&positions.value()) {
             Some(&known) => known,
             None => {
-                let added = self.add_points(positions.value(), primitive, placed, place)?;
+                let (first, count) = self.add_points(positions.value(), primitive, placed, place)?;
                 // Of primitives that share their points, the first one's.
-                let colors = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0)));
+                let colors = attribute(primitive, Semantic::Colors(0));
                 if let Some(colors) = colors.filter(|_| self.contents == Contents::PointsAndFaces) {
-                    self.add_colors(colors.value(), added.1, place);
+                    self.add_colors(colors, count, place);
                 }
-                placed.points.insert(positions.value(), added);
-                added
+                placed.points.insert(positions.value(), placed.blocks.len());
+                placed.blocks.push(Block { primitive, first, count, is_cloud: true });
+                placed.blocks.len() - 1
             }
         };
         if mode == Mode::Points || self.contents == Contents::Points {
             return Ok(());
         }
+        placed.blocks[block].is_cloud = false;
+        let (base, count) = (placed.blocks[block].first, placed.blocks[block].count);
         let corners = match primitive.indices {
             Some(index) => self.buffers.indices(index.value(), self.room() / CORNER_BYTES, place)?,
             None => {
@@ -121,7 +158,10 @@ impl<'a, 'b> Builder<'a, 'b> {
                 (0..count as u32).collect()
             }
         };
-        self.add_triangles(&corners, mode, (base, count), placed.is_mirrored(), place)
+        let (before, mirrored) = (placed.corners.len(), placed.is_mirrored());
+        self.add_triangles(&corners, mode, (base, count), mirrored, (&mut placed.corners, place))?;
+        placed.drawn.push((primitive, block, placed.corners.len() - before));
+        Ok(())
     }
 
     fn add_points(
@@ -146,6 +186,7 @@ impl<'a, 'b> Builder<'a, 'b> {
             }
             self.model.points.push(point);
         }
+        self.stored += points.len();
         Ok((base, points.len()))
     }
 
@@ -189,12 +230,12 @@ impl<'a, 'b> Builder<'a, 'b> {
     }
 
     fn add_triangles(
-        &mut self,
+        &self,
         corners: &[u32],
         mode: Mode,
         (base, count): (usize, usize),
         mirrored: bool,
-        place: &str,
+        (added, place): (&mut Vec<u32>, &str),
     ) -> Result<(), Fault> {
         let triangles = match mode {
             Mode::Triangles => corners.len() / 3,
@@ -203,7 +244,7 @@ impl<'a, 'b> Builder<'a, 'b> {
         if mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
             return Err(damaged(place, format!("{} corners do not make whole triangles", corners.len())));
         }
-        self.check_room(triangles.saturating_mul(3 * CORNER_BYTES))?;
+        self.check_room(CORNER_BYTES * added.len() + triangles.saturating_mul(3 * CORNER_BYTES))?;
         for k in 0..triangles {
             let mut face = match mode {
                 Mode::Triangles => [corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]],
@@ -216,7 +257,7 @@ impl<'a, 'b> Builder<'a, 'b> {
                 face.swap(1, 2);
             }
             // `room` keeps all points within `u32`.
-            self.model.faces.push(&face.map(|index| index + base as u32));
+            added.extend(face.map(|index| index + base as u32));
         }
         Ok(())
     }
@@ -229,7 +270,7 @@ impl<'a, 'b> Builder<'a, 'b> {
     }
 
     /// Counts work, and memory that is given back.
-    fn take(&mut self, bytes: usize) -> Result<(), Fault> {
+    pub(super) fn take(&mut self, bytes: usize) -> Result<(), Fault> {
         self.most = self.most.checked_sub(bytes).ok_or_else(too_large)?;
         Ok(())
     }

@@ -39,24 +39,27 @@ struct Meshes<'a> {
 impl<'a> Meshes<'a> {
     /// These, and the indices of the meshes among them.
     fn of(root: &'a Root, scene: &'a Scene) -> (Self, Vec<usize>) {
-        let called = |name: &Option<String>, kind: &str, k: usize| {
-            name.as_ref().map_or_else(|| format!("{kind}_{k}"), String::clone).into_bytes().into()
-        };
         let place = |k: usize| scene.places.get(k).and_then(Option::as_ref);
         let depth = |k: usize| place(k).map_or(0, |place| place.depth);
         let of = |(k, node): (usize, &gltf::json::Node)| {
             let parent = place(k).and_then(|place| place.parent);
-            Node { name: called(&node.name, "node", k), parent, depth: depth(k) }
+            Node { name: called(node.name.as_ref(), "node", k).into_bytes().into(), parent, depth: depth(k) }
         };
         let mut nodes: Vec<Node> = root.nodes.iter().enumerate().map(of).collect();
         let meshes = (nodes.len()..nodes.len() + scene.placements.len()).collect();
         for placement in &scene.placements {
-            let name = root.meshes.get(placement.mesh).and_then(|mesh| mesh.name.clone());
+            let name = root.meshes.get(placement.mesh).and_then(|mesh| mesh.name.as_ref());
+            let name = called(name, "mesh", placement.mesh).into_bytes().into();
             let depth = 1 + placement.node.map_or(0, depth);
-            nodes.push(Node { name: called(&name, "mesh", placement.mesh), parent: placement.node, depth });
+            nodes.push(Node { name, parent: placement.node, depth });
         }
         (Self { root, scene, nodes }, meshes)
     }
+}
+
+/// The name of the item of a list, or one that says which it is.
+pub(super) fn called(name: Option<&String>, kind: &str, k: usize) -> String {
+    name.map_or_else(|| format!("{kind}_{k}"), String::clone)
 }
 
 impl Tree for Meshes<'_> {

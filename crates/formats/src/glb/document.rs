@@ -1,9 +1,10 @@
 //! The JSON of a file as the `gltf` crate's types, without what is not read. These refuse valid
 //! documents too: scenes without nodes, `extras` of any type, channels of no node, whole numbers
-//! written with a decimal point, and whatever is wrong with pictures and cameras.
+//! written with a decimal point, and whatever is wrong with materials, pictures and cameras.
 
 use gltf::json::{Root, Value};
 
+use super::materials::{Look, materials};
 use crate::error::Fault;
 use crate::text::quoted;
 
@@ -12,9 +13,16 @@ use crate::text::quoted;
 const MAX_OBJECTS_OF_ANY_FILE: usize = 100_000;
 const BYTES_PER_OBJECT: usize = 12;
 
-/// Parses the JSON; the indices in it are not checked. Gives the number of the frame at 0 s and
-/// frames per second too, where a program of ours wrote them.
-pub(super) fn document(json: &[u8]) -> Result<(Root, Option<[f64; 2]>), Fault> {
+/// What the JSON says; the indices in it are not checked.
+pub(super) struct Document {
+    pub(super) root: Root,
+    /// The number of the frame at 0 s and frames per second, where a program of ours wrote them.
+    pub(super) frame_numbers: Option<[f64; 2]>,
+    pub(super) materials: Vec<Look>,
+}
+
+/// Parses the JSON.
+pub(super) fn document(json: &[u8]) -> Result<Document, Fault> {
     /// Characters of the reason that are shown.
     const SHOWN: usize = 160;
     // Some programs write a byte order mark, or zeros behind.
@@ -36,8 +44,9 @@ pub(super) fn document(json: &[u8]) -> Result<(Root, Option<[f64; 2]>), Fault> {
     };
     let mut document: Value = gltf::json::deserialize::from_str(text).map_err(wrong)?;
     check_version(&document)?;
-    let numbers = frame_numbers(&document);
+    let frame_numbers = frame_numbers(&document);
     simplify(&mut document);
+    let materials = materials(&document, text.len());
     without_appearance(&mut document);
     for (list, required) in [
         ("scenes", &["nodes"][..]),
@@ -45,7 +54,7 @@ pub(super) fn document(json: &[u8]) -> Result<(Root, Option<[f64; 2]>), Fault> {
         ("skins", &["joints"]),
         ("meshes", &["primitives"]),
     ] {
-        for object in items(&mut document, list).iter_mut().filter_map(Value::as_object_mut) {
+        for object in items_mut(&mut document, list).iter_mut().filter_map(Value::as_object_mut) {
             for key in required {
                 object.entry(*key).or_insert_with(|| Value::Array(Vec::new()));
             }
@@ -61,7 +70,7 @@ pub(super) fn document(json: &[u8]) -> Result<(Root, Option<[f64; 2]>), Fault> {
                 "needs the extension {name}, which is not read; export the mesh without it"
             )))
         }
-        None => Ok((root, numbers)),
+        None => Ok(Document { root, frame_numbers, materials }),
     }
 }
 
@@ -79,7 +88,11 @@ fn check_version(document: &Value) -> Result<(), Fault> {
     Ok(())
 }
 
-fn items<'a>(document: &'a mut Value, list: &str) -> &'a mut [Value] {
+pub(super) fn items<'a>(document: &'a Value, list: &str) -> &'a [Value] {
+    document[list].as_array().map_or(&[], Vec::as_slice)
+}
+
+fn items_mut<'a>(document: &'a mut Value, list: &str) -> &'a mut [Value] {
     document.get_mut(list).and_then(Value::as_array_mut).map_or(&mut [], Vec::as_mut_slice)
 }
 
@@ -107,7 +120,7 @@ fn simplify(value: &mut Value) {
     }
 }
 
-/// Only how many materials and textures there are is told.
+/// Of materials and textures only how many there are is left.
 fn without_appearance(document: &mut Value) {
     if let Some(document) = document.as_object_mut() {
         for list in ["images", "samplers", "cameras"] {
@@ -115,14 +128,14 @@ fn without_appearance(document: &mut Value) {
         }
     }
     for list in ["materials", "textures"] {
-        items(document, list).iter_mut().for_each(|item| *item = Value::Object(Default::default()));
+        items_mut(document, list).iter_mut().for_each(|item| *item = Value::Object(Default::default()));
     }
 }
 
 /// Channels of animations that move no node are left out; what may move the mesh is refused.
 fn without_channels_of_no_node(document: &mut Value) -> Result<(), Fault> {
     let mut moves = false;
-    for animation in items(document, "animations") {
+    for animation in items_mut(document, "animations") {
         let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else { continue };
         channels.retain(|channel| {
             let has_node = channel["target"].get("node").is_some();

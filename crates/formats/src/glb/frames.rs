@@ -7,7 +7,7 @@ use std::path::Path;
 use cager_geometry::units::Units;
 
 use super::buffers::{Buffers, LARGEST, Source, too_long};
-use super::builder::Builder;
+use super::builder::{Builder, Built};
 use super::choice::{choose, listed};
 use super::clip::Clip;
 use super::container::split;
@@ -42,7 +42,7 @@ pub(crate) fn open_frames<'a>(
 /// Whether a file has animations; files that cannot be read have none.
 pub(crate) fn is_animated(bytes: &[u8]) -> bool {
     let document = split(bytes).and_then(|(json, _)| document(json));
-    document.is_ok_and(|(root, _)| !root.animations.is_empty())
+    document.is_ok_and(|document| !document.root.animations.is_empty())
 }
 
 fn read_all(mut source: impl Read + Seek, length: u64) -> Result<Vec<u8>, Fault> {
@@ -60,6 +60,9 @@ struct MeshFrames {
     buffers: Buffers<'static>,
     /// Of the placements in the scene.
     chosen: Range<usize>,
+    /// The points that are taken of those that are stored, where not all are.
+    kept: Option<Vec<u32>>,
+    stored: usize,
     clip: Option<Clip>,
     /// Seconds of each frame.
     at: Vec<f64>,
@@ -76,7 +79,16 @@ impl MeshFrames {
         let buffers = Buffers::open(bytes, source)?;
         let scene = Scene::of(&buffers.root)?;
         let chosen = choose(&buffers.root, &scene, &selection.prims)?;
-        let rest = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(&scene.placements[chosen.clone()])?;
+        let placements = &scene.placements[chosen.clone()];
+        let build = |is_split| {
+            Builder::new(&buffers, &scene, Contents::PointsAndFaces, is_split).build(placements)
+        };
+        let mut rest = build(source.is_split)?;
+        // A rest pose of another file may have them as they are stored.
+        if rest.model.points.len() != expected_points && rest.stored == expected_points && rest.kept.is_some() {
+            rest = build(true)?;
+        }
+        let Built { model: rest, kept, stored } = rest;
         let points = rest.points.len();
         if points == 0 {
             return Err(Fault::invalid("has no points; export the mesh with its vertices"));
@@ -93,7 +105,7 @@ impl MeshFrames {
         let keys = clip.as_ref().map_or_else(Vec::new, Clip::key_times);
         // A byte of the file stands for a few points at the most: weights, or turns of joints.
         let held = buffers.most_zeros().saturating_mul(POINTS_PER_ITEM);
-        let is_held = |frames: usize| frames.saturating_mul(points) <= held;
+        let is_held = |frames: usize| frames.saturating_mul(stored) <= held;
         let is_smooth = clip.as_ref().is_some_and(Clip::moves_between_keys);
         let Timeline { times, at } = timeline(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
         let notes = clip.as_ref().and_then(|clip| clip.note.clone()).into_iter().collect();
@@ -106,7 +118,7 @@ impl MeshFrames {
             notes,
             shown: Vec::new(),
         };
-        Ok(Self { buffers, chosen, clip, at, info })
+        Ok(Self { buffers, chosen, kept, stored, clip, at, info })
     }
 }
 
@@ -121,9 +133,12 @@ impl Animation for MeshFrames {
         }
         let scene = Scene::of(&self.buffers.root)?;
         let placements = &scene.placements[self.chosen.clone()];
-        let model = Builder::new(&self.buffers, &scene, Contents::Points).build(placements)?;
+        let points = Builder::new(&self.buffers, &scene, Contents::Points, true).build(placements)?.model.points;
         out.clear();
-        out.extend_from_slice(model.points.as_flattened());
+        match &self.kept {
+            Some(kept) if points.len() == self.stored => out.extend(kept.iter().flat_map(|&k| points[k as usize])),
+            _ => out.extend_from_slice(points.as_flattened()),
+        }
         Ok(out.len() == 3 * self.info.points)
     }
 }

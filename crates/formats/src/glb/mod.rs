@@ -5,6 +5,7 @@
 //! as the crate's accessors and validation panic on indices out of range.
 
 mod accessor;
+mod alike;
 mod buffers;
 mod builder;
 mod channel;
@@ -14,7 +15,9 @@ mod container;
 mod document;
 mod faults;
 mod frames;
+mod materials;
 mod meshopt;
+mod part;
 mod scene;
 mod skin;
 mod unread;
@@ -38,7 +41,8 @@ pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prims: &[String]) -> Resul
     let scene = Scene::of(&buffers.root)?;
     let chosen = choice::choose(&buffers.root, &scene, prims)?;
     let placements = &scene.placements[chosen];
-    let model = Builder::new(&buffers, &scene, Contents::PointsAndFaces).build(placements)?;
-    let dropped = unread::of(&buffers.root, placements, !model.colors.is_empty());
+    let builder = Builder::new(&buffers, &scene, Contents::PointsAndFaces, source.is_split);
+    let model = builder.build(placements)?.model;
+    let dropped = unread::of(&buffers, placements, &model);
     Ok((model, dropped))
 }

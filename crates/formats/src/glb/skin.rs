@@ -3,16 +3,15 @@
 use cager_geometry::mesh::Point;
 use glam::{DAffine3, DVec3};
 use gltf::json::mesh::{Primitive, Semantic};
-use gltf::json::validation::Checked;
 
-use super::accessor::{JOINTS, MATRICES, WEIGHTS};
+use super::accessor::{JOINTS, MATRICES, WEIGHTS, attribute};
 use super::buffers::Buffers;
 use super::faults::{damaged, item, too_large};
 use super::scene::{Scene, affine, mirrors};
 use crate::error::Fault;
 
 /// Sets of four joints that vertices may have; sets that repeat an accessor then cost little.
-const MAX_SETS: u32 = 8;
+pub(super) const MAX_SETS: u32 = 8;
 
 /// From the space that the mesh was bound in to the world's, for each joint of a skin.
 pub(super) struct Joints(Vec<DAffine3>);
@@ -58,7 +57,7 @@ impl Joints {
         place: &str,
     ) -> Result<(), Fault> {
         let mut moved = vec![(DVec3::ZERO, 0.0); points.len()];
-        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(gltf::json::Index::value);
+        let attribute = |semantic| attribute(primitive, semantic);
         if attribute(Semantic::Joints(MAX_SETS)).is_some() {
             return Err(Fault::unsupported(format!(
                 "{place}: vertices have more than {} joints each; export the mesh with fewer",

@@ -2,16 +2,21 @@
 
 use std::collections::BTreeSet;
 
+use cager_geometry::mesh::Model;
 use gltf::json::animation::Property;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked::{self, Invalid, Valid};
-use gltf::json::{Index, Root};
+use gltf::json::Index;
 
+use super::accessor::attribute;
+use super::buffers::Buffers;
+use super::materials::Look;
 use super::scene::Placement;
 use crate::dropped::{Dropped, counted, listed};
 
-/// Of chosen meshes, where colours of points are kept or not.
-pub(super) fn of(root: &Root, placements: &[Placement], has_colors: bool) -> Dropped {
+/// Of chosen meshes, which gave a model.
+pub(super) fn of(buffers: &Buffers<'_>, placements: &[Placement], model: &Model) -> Dropped {
+    let root = &buffers.root;
     // Targets that an animation drives are the motion, which is read.
     let channels = root.animations.iter().flat_map(|animation| &animation.channels);
     let weights = channels.filter(|channel| channel.target.path == Valid(Property::MorphTargetWeights));
@@ -26,19 +31,26 @@ pub(super) fn of(root: &Root, placements: &[Placement], has_colors: bool) -> Dro
     let targets = still.map(|found| found.targets.as_ref().map_or(0, Vec::len)).max().unwrap_or(0);
 
     let attributes: BTreeSet<&Checked<Semantic>> = faces.iter().flat_map(|found| found.attributes.keys()).collect();
+    let parts = &model.surface.parts;
+    let uv_sets = parts.iter().flat_map(|part| &part.uv_sets).map(|set| &set.name);
+    let color_sets = parts.iter().flat_map(|part| &part.color_sets).map(|set| &set.name);
+    let kept: BTreeSet<&String> = uv_sets.chain(color_sets).collect();
     let sets = |what: &str, is_one: &dyn Fn(&Semantic) -> bool| {
         let is_one = |found: &&&Checked<Semantic>| if let Valid(found) = found { is_one(found) } else { false };
-        let names: Vec<String> = attributes.iter().filter(is_one).map(|found| found.to_string()).collect();
+        let names = attributes.iter().filter(is_one).map(|found| found.to_string());
+        let names: Vec<String> = names.filter(|name| !kept.contains(name)).collect();
         (!names.is_empty()).then(|| format!("{what} ({})", listed(names.iter().map(String::as_bytes))))
     };
     let mut dropped = Dropped::default();
     let coordinates = sets("texture coordinates", &|found| matches!(found, Semantic::TexCoords(_)));
     coordinates.into_iter().for_each(|phrase| dropped.add(phrase));
-    add_materials(&mut dropped, root, &faces);
+    add_materials(&mut dropped, &buffers.materials, &faces);
+    let has_normals = |found: &&Primitive| attribute(found, Semantic::Normals).is_some();
+    let are_mixed = faces.iter().any(has_normals) && !faces.iter().all(has_normals);
     let others = [
-        sets("normals", &|found| *found == Semantic::Normals),
+        are_mixed.then(|| "normals, which not all primitives have (NORMAL)".to_owned()),
         sets("tangents", &|found| *found == Semantic::Tangents),
-        sets("colours", &|found| matches!(found, Semantic::Colors(set) if *set > 0 || !has_colors)),
+        sets("colours", &|found| matches!(found, Semantic::Colors(set) if *set > 0 || model.colors.is_empty())),
         attributes.contains(&Invalid).then(|| "attributes of its own".to_owned()),
         (targets > 0).then(|| counted(targets, "morph target")),
         (!lines.is_empty()).then(|| counted(lines.len(), "primitive") + " of lines"),
@@ -55,18 +67,13 @@ pub(super) fn of(root: &Root, placements: &[Placement], has_colors: bool) -> Dro
     dropped
 }
 
-fn add_materials(dropped: &mut Dropped, root: &Root, faces: &[&Primitive]) {
-    let materials: BTreeSet<Option<usize>> =
-        faces.iter().map(|found| found.material.map(|material| material.value())).collect();
-    let count = materials.iter().flatten().count();
-    if count == 0 {
-        return;
+fn add_materials(dropped: &mut Dropped, materials: &[Look], faces: &[&Primitive]) {
+    let used: BTreeSet<usize> =
+        faces.iter().filter_map(|found| found.material.map(|material| material.value())).collect();
+    let used = || used.iter().filter_map(|&material| materials.get(material));
+    let embedded: BTreeSet<usize> = used().flat_map(|look| look.embedded.iter().copied()).collect();
+    if !embedded.is_empty() {
+        dropped.add(counted(embedded.len(), "texture") + " within the file");
     }
-    let textures = match root.textures.len() {
-        0 => String::new(),
-        textures => format!(" with {}", counted(textures, "texture")),
-    };
-    let phrase = counted(count, "material") + &textures;
-    // One for all is put back without numbers of faces.
-    if materials.len() == 1 { dropped.add(phrase) } else { dropped.add_on_faces(phrase) }
+    used().flat_map(|look| &look.dropped).for_each(|phrase| dropped.add(*phrase));
 }

@@ -246,7 +246,7 @@ fn read_scene(
     if format == MeshFormat::Gltf {
         let mut bytes = Vec::new();
         source.read_to_end(&mut bytes).map_err(|cause| Error::read(name, cause))?;
-        let kind = glb::Source { is_text: true, folder };
+        let kind = glb::Source { is_text: true, folder, ..glb::Source::default() };
         return finished(format, name, &bytes, glb::read(&bytes, &kind, prims).map(Parsed::of_gltf));
     }
     let mut dropped = Dropped::default();
