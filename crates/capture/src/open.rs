@@ -7,7 +7,7 @@ use crate::encode::EncodeError;
 use crate::frames::CaptureFiles;
 use cager_cages::{DesignOptions, Goal, design};
 use cager_core::cage::Cage;
-use cager_formats::{Dropped, ReadModel, read_mesh, take_pictures};
+use cager_formats::{Dropped, ReadModel, read_mesh, read_split_mesh, take_pictures};
 use cager_geometry::mesh::Model;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -100,6 +100,21 @@ pub struct Opened {
     pub dropped: Dropped,
 }
 
+/// A rest pose with its points as often as its file stores them, where the frames have as many.
+fn as_in_frames(rest: ReadModel, path: &Path, files: &CaptureFiles) -> Result<ReadModel, EncodeError> {
+    let points = rest.model.points.len();
+    if rest.model.surface.is_empty() {
+        return Ok(rest);
+    }
+    let Some(split) = read_split_mesh(path, &files.selection.prims)? else { return Ok(rest) };
+    let stored = split.model.points.len();
+    let has = |points| {
+        let files = CaptureFiles { points, ..files.clone() };
+        files.open().and_then(|mut reader| reader.read_next(&mut Vec::new())).is_ok()
+    };
+    Ok(if stored != points && !has(points) && has(stored) { split } else { rest })
+}
+
 impl OpenOptions {
     /// As [`Capture::open`].
     ///
@@ -163,7 +178,10 @@ impl OpenOptions {
         warnings: &mut Vec<String>,
     ) -> Result<Opened, EncodeError> {
         let Self { mut files, weld, flip_cage, pictures, allow_mismatch } = self;
-        let ReadModel { model: mut rest, units, note, dropped } = read_mesh(path, &files.selection.prims)?;
+        (files.path, files.selection.no_frames) =
+            (frames.to_owned(), [path].into_iter().chain(cage_path).map(Path::to_path_buf).collect());
+        let read = read_mesh(path, &files.selection.prims)?;
+        let ReadModel { model: mut rest, units, note, dropped } = as_in_frames(read, path, &files)?;
         warnings.extend(note);
         if pictures {
             warnings.extend(take_pictures(&mut rest.surface, path));
@@ -171,8 +189,7 @@ impl OpenOptions {
             warnings
                 .push(format!("{}: the pictures in it are left out; --textures embed takes them in", path.display()));
         }
-        (files.path, files.points, files.rest_units) = (frames.to_owned(), rest.points.len(), units);
-        files.selection.no_frames = [path].into_iter().chain(cage_path).map(Path::to_path_buf).collect();
+        (files.points, files.rest_units) = (rest.points.len(), units);
         if weld {
             let had_surface = !rest.surface.is_empty();
             files.weld(&mut rest);

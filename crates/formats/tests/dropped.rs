@@ -89,9 +89,11 @@ fn attributes_materials_and_skins_of_a_gltf_are_told() {
         told("a.glb", glb_file(&glb_json(rest).replace(primitive, &changed), &glb_data()))
     };
     let uvs = of(r#","TEXCOORD_0":0,"TEXCOORD_1":0,"NORMAL":0"#, "", "");
-    assert_eq!(uvs, "a.glb: texture coordinates (TEXCOORD_0 and TEXCOORD_1) and normals (NORMAL) are not kept");
-    let look = of(r#","TANGENT":0,"_ID":0"#, r#","material":0"#, r#","materials":[{}],"textures":[{},{}]"#);
-    assert_eq!(look, "a.glb: 1 material with 2 textures, tangents (TANGENT) and attributes of its own are not kept");
+    assert_eq!(uvs, "a.glb: texture coordinates (TEXCOORD_0 and TEXCOORD_1) are not kept");
+    let look = of(r#","TANGENT":0,"_ID":0"#, r#","material":0"#, r#","materials":[{"occlusionTexture":{"index":0}}]"#);
+    assert_eq!(look, "a.glb: textures of occlusion, tangents (TANGENT) and attributes of its own are not kept");
+    let picture = r#","materials":[{"normalTexture":{"index":0}}],"textures":[{"source":0}],"images":[{"bufferView":0}]"#;
+    assert_eq!(of("", r#","material":0"#, picture), "a.glb: 1 texture within the file is not kept");
     let skin = r#","nodes":[{"mesh":0,"skin":0},{}],"skins":[{"joints":[1]}]"#;
     assert_eq!(
         of("", r#","targets":[{"POSITION":0}]"#, skin),

@@ -162,6 +162,26 @@ pub fn read_mesh(path: &Path, prims: &[String]) -> Result<ReadModel, Error> {
     parse_file(path, prims).map(|parsed| ReadModel::of(parsed, path))
 }
 
+/// As [`read_mesh`] of a glTF file, with points as often as it stores them, where seams and hard edges split them;
+/// `None` of other files.
+///
+/// # Errors
+/// As [`read_mesh`].
+pub fn read_split_mesh(path: &Path, prims: &[String]) -> Result<Option<ReadModel>, Error> {
+    let format = MeshFormat::from_path(path)?;
+    if !matches!(format, MeshFormat::Glb | MeshFormat::Gltf) {
+        return Ok(None);
+    }
+    let bytes = fs::read(path).map_err(|cause| Error::read(path, cause))?;
+    Ok(Some(ReadModel::of(read_split(format, path, &bytes, prims)?, path)))
+}
+
+fn read_split(format: MeshFormat, path: &Path, bytes: &[u8], prims: &[String]) -> Result<Parsed, Error> {
+    let is_text = format == MeshFormat::Gltf;
+    let kind = glb::Source { is_text, folder: path.parent().filter(|_| is_text), is_split: true };
+    finished(format, path, bytes, glb::read(bytes, &kind, prims).map(Parsed::of_gltf))
+}
+
 /// As [`read_model_bytes`], with what is to be known of it.
 ///
 /// # Errors
@@ -206,6 +226,10 @@ pub(crate) struct FrameFaces {
 /// again.
 pub(crate) fn read_frame_file(path: &Path, known: &mut FrameFaces) -> Result<Model, Error> {
     let (format, bytes) = read_named(path)?;
+    if format == MeshFormat::Glb {
+        // What is one point at rest may part in a frame, and nothing in these files says which.
+        return read_split(format, path, &bytes, &[]).map(|parsed| parsed.model);
+    }
     let read = |contents| read_bytes(format, path, &bytes, contents, &[]).map(|parsed| parsed.model);
     if !known.text.is_empty() && bytes.ends_with(&known.text) {
         return Ok(Model { faces: std::mem::take(&mut known.faces), ..read(Contents::Points)? });
