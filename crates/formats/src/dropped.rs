@@ -103,11 +103,15 @@ pub(crate) fn phrases_of(surface: &Surface, is_kept: bool) -> Vec<String> {
     if most(|part| part.normals.len()) > 0 {
         phrases.push("normals".to_owned());
     }
-    let groups = parts.iter().flat_map(|part| &part.groups).map(|group| group.name.as_bytes());
-    if groups.clone().next().is_some() {
-        phrases.push(format!("{} ({})", counted(groups.clone().count(), "group"), listed(groups)));
-    }
+    phrases.extend(groups_phrase(surface));
     phrases
+}
+
+/// `2 groups (left and right)`; none without groups.
+pub(crate) fn groups_phrase(surface: &Surface) -> Option<String> {
+    let groups = surface.parts.iter().flat_map(|part| &part.groups).map(|group| group.name.as_bytes());
+    let count = groups.clone().count();
+    (count > 0).then(|| format!("{} ({})", counted(count, "group"), listed(groups)))
 }
 
 /// Phrases as one: `a, b and c`.

@@ -80,9 +80,7 @@ impl MeshFrames {
         let scene = Scene::of(&buffers.root)?;
         let chosen = choose(&buffers.root, &scene, &selection.prims)?;
         let placements = &scene.placements[chosen.clone()];
-        let build = |is_split| {
-            Builder::new(&buffers, &scene, Contents::PointsAndFaces, is_split).build(placements)
-        };
+        let build = |is_split| Builder::new(&buffers, &scene, Contents::PointsAndFaces, is_split).build(placements);
         let mut rest = build(source.is_split)?;
         // A rest pose of another file may have them as they are stored.
         if rest.model.points.len() != expected_points && rest.stored == expected_points && rest.kept.is_some() {

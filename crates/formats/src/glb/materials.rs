@@ -84,7 +84,8 @@ fn look(document: &Value, k: usize, value: &Value, room: &mut usize) -> Look {
         (Channel::Normal, &value["normalTexture"], true),
         (Channel::Emission, &value["emissiveTexture"], shines),
     ] {
-        let Some((path, embedded)) = index(&info["index"]).filter(|_| is_used).and_then(|k| picture(document, k)) else {
+        let Some((path, embedded)) = index(&info["index"]).filter(|_| is_used).and_then(|k| picture(document, k))
+        else {
             continue;
         };
         let Some(left) = room.checked_sub(path.len()) else {

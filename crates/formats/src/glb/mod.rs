@@ -33,7 +33,7 @@ pub(crate) use buffers::Source;
 use builder::Builder;
 pub(crate) use frames::{is_animated, open_frames};
 use scene::Scene;
-pub(crate) use write::{MOST_FRAMES, Morphs, Scene as MorphScene, Wanted, write_head};
+pub(crate) use write::{MOST_FRAMES, Morphs, Piece, Scene as MorphScene, Wanted, lost_pictures, write_head};
 
 /// The meshes of the default scene at rest as one, or those of several that are named.
 pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prims: &[String]) -> Result<(Model, Dropped), Fault> {

@@ -66,7 +66,9 @@ impl Builder<'_, '_> {
     /// The new numbers of points, and those that are kept, where a mesh has what splits points.
     fn merged(&mut self, placed: &Placed<'_>, first: usize) -> Option<(Vec<u32>, Vec<u32>)> {
         let splits = |semantic: &Checked<Semantic>| match semantic {
-            Checked::Valid(Semantic::Positions | Semantic::Joints(_) | Semantic::Weights(_)) | Checked::Invalid => false,
+            Checked::Valid(Semantic::Positions | Semantic::Joints(_) | Semantic::Weights(_)) | Checked::Invalid => {
+                false
+            }
             Checked::Valid(_) => true,
         };
         let has_seams = placed.drawn.iter().any(|(primitive, ..)| primitive.attributes.keys().any(splits))
@@ -119,7 +121,8 @@ impl Builder<'_, '_> {
             let read = |_: &Primitive, index: usize, most| {
                 let is_opaque = buffers.root.accessors.get(index)?.type_ == Checked::Valid(Type::Vec3);
                 let colors = buffers.values(index, &COLORS, most, PLACE).ok()?;
-                let color = |[red, green, blue, alpha]: [f64; 4]| [red, green, blue, if is_opaque { 1.0 } else { alpha }];
+                let color =
+                    |[red, green, blue, alpha]: [f64; 4]| [red, green, blue, if is_opaque { 1.0 } else { alpha }];
                 Some(colors.into_iter().map(|found| color(found).map(|x| x as f32)).collect())
             };
             if let Some(values) = self.by_corner(placed, &name, [1.0; 4], read) {

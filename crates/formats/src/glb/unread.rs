@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use cager_geometry::mesh::Model;
+use gltf::json::Index;
 use gltf::json::animation::Property;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked::{self, Invalid, Valid};
-use gltf::json::Index;
 
 use super::accessor::attribute;
 use super::buffers::Buffers;

@@ -1,8 +1,10 @@
 //! Formats that are written once all frames are known, which are in memory until then.
 
+use cager_geometry::surface::Surface;
 use cager_geometry::units::Change;
 
 use super::output::{Announced, Output};
+use crate::dropped::phrases_of;
 use crate::error::{Error, Fault};
 
 /// Bytes that frames may have.
@@ -12,6 +14,11 @@ pub(super) const MOST_BYTES: usize = 1 << 30;
 pub(super) trait Collection: Send {
     /// Writes all frames; gives what the user should know of them.
     fn write(&mut self, announced: &Announced, frames: &[f32]) -> Result<Option<String>, Error>;
+
+    /// What of a surface has no place, where most of it has.
+    fn lost_of_surface(&self) -> Option<&[String]> {
+        None
+    }
 
     fn commit(self) -> Result<(), Error>;
 }
@@ -54,6 +61,14 @@ impl<C: Collection> Output for Collected<C> {
 
     fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    fn keeps_surface(&self) -> bool {
+        self.output.lost_of_surface().is_some()
+    }
+
+    fn lost_of(&self, surface: &Surface) -> Vec<String> {
+        self.output.lost_of_surface().map_or_else(|| phrases_of(surface, false), <[String]>::to_vec)
     }
 
     fn finish(self: Box<Self>, _: &Announced) -> Result<(), Error> {

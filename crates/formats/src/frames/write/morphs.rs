@@ -3,15 +3,17 @@
 use std::io::{BufWriter, Write};
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::{Subdivision, Surface};
 
 use super::super::CacheFormat;
 use super::collected::{Collected, Collection, MOST_BYTES, check_room};
 use super::output::{Announced, FrameOptions, MorphOptions, check_precision};
 use super::scene::name;
 use crate::atomic::{AtomicFile, Target, commit_together};
+use crate::dropped::groups_phrase;
 use crate::error::{Error, Fault};
 use crate::faces::check_faces;
-use crate::glb::{MOST_FRAMES, MorphScene, Morphs, Wanted};
+use crate::glb::{MOST_FRAMES, MorphScene, Morphs, Piece, Wanted, lost_pictures};
 
 pub(super) struct MorphWriter {
     file: AtomicFile,
@@ -19,6 +21,8 @@ pub(super) struct MorphWriter {
     data: Option<AtomicFile>,
     wanted: Wanted,
     scene: MorphScene,
+    /// What lies on the faces and has no place.
+    lost: Vec<String>,
 }
 
 impl MorphWriter {
@@ -36,19 +40,26 @@ impl MorphWriter {
         let wanted = Wanted { targets, max_error, is_guarantee, diagonal };
         check(announced, faces, &wanted).map_err(|fault| fault.at(path))?;
         let (times, note) = times(announced.frames, options).map_err(|fault| fault.at(path))?;
+        let (name, surface) = (name(path), &options.surface);
+        let pieces = if surface.is_empty() {
+            vec![Piece::bare(&name, announced.points, faces, normals)]
+        } else {
+            Piece::of(surface, faces, &name, normals)
+        };
         let scene = MorphScene {
-            name: name(path),
-            triangles: faces.triangulated(),
+            name,
+            pieces,
+            materials: surface.materials.clone(),
             times,
             numbering: [options.number(0), options.fps],
             origin: change.apply(options.origin.unwrap_or_default()),
             floats,
-            normals,
         };
+        let lost = lost(surface, faces);
         let is_text = CacheFormat::from_path(path) == Some(CacheFormat::Gltf);
         let data = is_text.then(|| AtomicFile::create(target.beside("bin"))).transpose()?;
         let file = AtomicFile::create(target)?;
-        Ok(Collected::new(Self { file, data, wanted, scene }, change, note))
+        Ok(Collected::new(Self { file, data, wanted, scene, lost }, change, note))
     }
 }
 
@@ -79,10 +90,32 @@ impl Collection for MorphWriter {
         }))
     }
 
+    fn lost_of_surface(&self) -> Option<&[String]> {
+        Some(&self.lost)
+    }
+
     fn commit(self) -> Result<(), Error> {
         // The numbers first, as the text says that they are there.
         commit_together(self.data.into_iter().chain([self.file]).collect())
     }
+}
+
+/// What of a surface has no place.
+fn lost(surface: &Surface, faces: &Polygons) -> Vec<String> {
+    let parts = || surface.parts.iter();
+    let mut lost = Vec::new();
+    if parts().any(|part| part.subdivision != Subdivision::None) {
+        lost.push("subdivision".to_owned());
+    }
+    if parts().any(|part| !part.creases.is_empty()) {
+        lost.push("creases".to_owned());
+    }
+    lost.extend(groups_phrase(surface));
+    if !surface.is_empty() && faces.arities().iter().any(|&arity| arity > 3) {
+        lost.push("faces of more than three corners".to_owned());
+    }
+    lost.extend(lost_pictures(&surface.materials).into_iter().map(str::to_owned));
+    lost
 }
 
 fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(), Fault> {

@@ -2,12 +2,15 @@
 
 use std::io::{self, Write};
 
+use cager_geometry::surface::NO_MATERIAL;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
 use super::super::document::{FIRST_FRAME, FRAME_RATE};
+use super::look::Looks;
+use super::nodes::nodes;
 use super::stored::Stored;
-use super::{Morphs, Scene};
+use super::{Morphs, Piece, Scene};
 use crate::error::Fault;
 
 /// Types of numbers, and what views are for, as glTF counts them.
@@ -55,8 +58,9 @@ impl Morphs<'_> {
     fn write_numbers(&self, out: &mut impl Write) -> io::Result<()> {
         self.write_positions(out)?;
         self.write_corners(out)?;
-        let animation = self.scene.times.iter().chain(&self.components.weights);
-        animation.chain(self.normals.as_flattened()).try_for_each(|x| out.write_all(&x.to_le_bytes()))
+        let mut animation = self.scene.times.iter().chain(&self.components.weights);
+        animation.try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+        self.write_others(out)
     }
 
     /// Refuses what the lengths in the file cannot count.
@@ -77,98 +81,135 @@ impl Morphs<'_> {
     }
 
     fn corner_size(&self) -> usize {
-        if self.components.stored.points() <= FEW { 2 } else { 4 }
+        if self.scene.pieces.iter().all(|piece| piece.vertices.len() <= FEW) { 2 } else { 4 }
     }
 
-    fn lengths(&self) -> [usize; 4] {
-        let positions = self.components.stored.parts() * self.components.stored.points() * self.stride();
-        let corners = (3 * self.scene.triangles.len() * self.corner_size()).next_multiple_of(4);
-        let normals = 12 * self.normals.len();
-        [positions, corners, 4 * (self.scene.times.len() + self.components.weights.len()), normals]
+    /// Of positions, corners, times and weights, normals, what else vertices have, and what shows and hides.
+    fn lengths(&self) -> [usize; 6] {
+        let (parts, pieces) = (self.components.stored.parts(), &self.scene.pieces);
+        let vertices =
+            |is_one: fn(&&Piece) -> bool| pieces.iter().filter(is_one).map(|piece| piece.vertices.len()).sum::<usize>();
+        let triangles = pieces.iter().flat_map(|piece| &piece.primitives).map(|(_, triangles)| triangles.len());
+        let corners = (3 * triangles.sum::<usize>() * self.corner_size()).next_multiple_of(4);
+        let other = |piece: &Piece| piece.vertices.len() * (8 * piece.uv_sets.len() + 16 * piece.color_sets.len());
+        let keys = pieces.iter().map(|piece| 16 * self.switches(piece).len());
+        [
+            parts * vertices(|_| true) * self.stride(),
+            corners,
+            4 * (self.scene.times.len() + self.components.weights.len()),
+            12 * parts * vertices(|piece| piece.normals.is_some()),
+            pieces.iter().map(other).sum(),
+            keys.sum(),
+        ]
+    }
+
+    /// Frames from which on a mesh is shown or not; none where it always is.
+    fn switches(&self, piece: &Piece) -> Vec<(usize, bool)> {
+        let Some(shown) = piece.shown.as_ref().filter(|_| !self.scene.times.is_empty()) else { return Vec::new() };
+        let is_shown = |frame: usize| shown.iter().any(|range| range.contains(&(frame as u32)));
+        let all = (0..self.scene.times.len()).map(|frame| (frame, is_shown(frame)));
+        let mut switches: Vec<(usize, bool)> = all.collect();
+        switches.dedup_by_key(|(_, is_shown)| *is_shown);
+        switches
     }
 
     fn write_positions(&self, out: &mut impl Write) -> io::Result<()> {
-        let values = &self.components.stored.values;
-        if self.components.stored.is_float {
-            return values.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
+        let stored = &self.components.stored;
+        for piece in &self.scene.pieces {
+            for part in 0..stored.parts() {
+                for &point in &piece.vertices {
+                    let [x, y, z] = stored.at(part, point);
+                    if stored.is_float {
+                        out.write_all([x, y, z].map(f32::to_le_bytes).as_flattened())?;
+                    } else {
+                        out.write_all([x, y, z, 0.0].map(|x| (x as i16).to_le_bytes()).as_flattened())?;
+                    }
+                }
+            }
         }
-        values.as_chunks().0.iter().try_for_each(|&[x, y, z]: &[f32; 3]| {
-            out.write_all([x, y, z, 0.0].map(|x| (x as i16).to_le_bytes()).as_flattened())
-        })
+        Ok(())
     }
 
     fn write_corners(&self, out: &mut impl Write) -> io::Result<()> {
-        let (corners, small) = (self.scene.triangles.as_flattened(), self.corner_size() == 2);
-        for corner in corners {
+        let (primitives, small) =
+            (self.scene.pieces.iter().flat_map(|piece| &piece.primitives), self.corner_size() == 2);
+        let mut count = 0;
+        for corner in primitives.flat_map(|(_, triangles)| triangles.as_flattened()) {
             let bytes = corner.to_le_bytes();
             out.write_all(if small { &bytes[..2] } else { &bytes })?;
+            count += 1;
         }
-        if small && corners.len() % 2 == 1 {
+        if small && count % 2 == 1 {
             out.write_all(&[0; 2])?;
         }
         Ok(())
     }
 
+    /// Normals of vertices, what else they have, and scales that show and hide meshes behind their times.
+    fn write_others(&self, out: &mut impl Write) -> io::Result<()> {
+        let mut write = |numbers: &[f32]| numbers.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
+        let parts = self.components.stored.parts();
+        let (all, mut first) = (self.normals.len() / parts, 0);
+        for normals in self.scene.pieces.iter().filter_map(|piece| piece.normals.as_ref()) {
+            for part in 0..parts {
+                let of_part = &self.normals[part * all + first..];
+                normals.of_vertices.iter().try_for_each(|&k| write(&of_part[k as usize]))?;
+            }
+            first += normals.count(self.components.stored.points());
+        }
+        for piece in &self.scene.pieces {
+            piece.uv_sets.iter().try_for_each(|set| write(set.as_flattened()))?;
+            piece.color_sets.iter().try_for_each(|set| write(set.as_flattened()))?;
+        }
+        for piece in &self.scene.pieces {
+            let switches = self.switches(piece);
+            switches.iter().try_for_each(|&(frame, _)| write(&[self.scene.times[frame]]))?;
+            let scale = |is_shown: bool| if is_shown { self.components.stored.step } else { 0.0 };
+            switches.iter().try_for_each(|&(_, is_shown)| write(&[scale(is_shown); 3]))?;
+        }
+        Ok(())
+    }
+
     fn json(&self, data: Option<&str>) -> String {
-        let Scene { name, triangles, times, numbering: [first, rate], .. } = self.scene;
-        let (points, targets, stride) =
-            (self.components.stored.points(), self.components.stored.parts() - 1, self.stride());
+        let Scene { name, pieces, materials, times, numbering: [first, rate], .. } = self.scene;
+        let stored = &self.components.stored;
         let mut layout = Layout::default();
-        let [positions, corners, animation, normals] = self.lengths();
-        let view = layout.view(positions, json!({ "byteStride": stride, "target": VERTICES }));
-        let kind = if self.components.stored.is_float { FLOAT } else { SHORT };
-        for part in 0..=targets {
-            let [low, high] = self.components.stored.bounds(part);
-            let rest = json!({ "type": "VEC3", "min": low, "max": high });
-            layout.accessor(view, part * points * stride, kind, points, rest);
-        }
-        let mut primitive = json!({});
-        if triangles.is_empty() {
-            primitive["mode"] = json!(0);
-        } else {
-            let kind = if self.corner_size() == 2 { UNSIGNED_SHORT } else { UNSIGNED_INT };
-            let view = layout.view(corners, json!({ "target": CORNERS }));
-            let rest = json!({ "type": "SCALAR" });
-            primitive["indices"] = json!(layout.accessor(view, 0, kind, 3 * triangles.len(), rest));
-        }
-        let mut document =
-            json!({ "asset": { "version": "2.0", "generator": "cager" }, "scene": 0, "scenes": [{ "nodes": [0] }] });
-        let mut mesh = json!({ "name": name });
+        let lengths = self.lengths();
+        let mut meshes = self.meshes(&mut layout, &lengths);
+        let mut document = json!({ "asset": { "version": "2.0", "generator": "cager" }, "scene": 0 });
+        let (targets, is_moving) = (stored.parts() - 1, !times.is_empty());
+        let (mut channels, mut samplers) = (Vec::new(), Vec::new());
         if let (Some(start), Some(end), true) = (times.first(), times.last(), targets > 0) {
-            let view = layout.view(animation, json!({}));
+            let view = layout.view(lengths[2], json!({}));
             let rest = json!({ "type": "SCALAR", "min": [start], "max": [end] });
             let input = layout.accessor(view, 0, FLOAT, times.len(), rest);
+            let weights = &self.components.weights;
             let rest = json!({ "type": "SCALAR" });
-            let output = layout.accessor(view, 4 * times.len(), FLOAT, self.components.weights.len(), rest);
-            mesh["weights"] = json!(self.components.weights[..targets]);
-            document["animations"] = json!([{
-                "name": name,
-                "extras": { FIRST_FRAME: first, FRAME_RATE: rate },
-                "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }],
-                "samplers": [{ "input": input, "interpolation": "LINEAR", "output": output }],
-            }]);
-        }
-        let mut attributes: Vec<Value> = (0..=targets).map(|part| json!({ "POSITION": part })).collect();
-        if normals > 0 {
-            let view = layout.view(normals, json!({ "byteStride": 12, "target": VERTICES }));
-            for (part, attributes) in attributes.iter_mut().enumerate() {
-                let offset = 12 * part * points;
-                attributes["NORMAL"] = json!(layout.accessor(view, offset, FLOAT, points, json!({ "type": "VEC3" })));
+            let output = layout.accessor(view, 4 * times.len(), FLOAT, weights.len(), rest);
+            samplers.push(json!({ "input": input, "interpolation": "LINEAR", "output": output }));
+            for (node, mesh) in meshes.iter_mut().enumerate() {
+                mesh["weights"] = json!(weights[..targets]);
+                channels.push(json!({ "sampler": 0, "target": { "node": node, "path": "weights" } }));
             }
         }
-        primitive["attributes"] = attributes.remove(0);
-        if targets > 0 {
-            primitive["targets"] = attributes.into();
+        self.put_attributes(&mut meshes, &mut layout, &lengths);
+        if is_moving && lengths[5] > 0 {
+            self.put_switches(&mut channels, &mut samplers, &mut layout, lengths[5]);
         }
-        mesh["primitives"] = json!([primitive]);
-        if !self.components.stored.is_float {
+        if !channels.is_empty() {
+            let extras = json!({ FIRST_FRAME: first, FRAME_RATE: rate });
+            let animation = json!({ "name": name, "extras": extras, "channels": channels, "samplers": samplers });
+            document["animations"] = json!([animation]);
+        }
+        if !stored.is_float {
             document["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
             document["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
         }
-        let (place, scale) =
-            (place(&self.components.stored, self.scene).map(|x| x as f32), [self.components.stored.step; 3]);
-        document["nodes"] = json!([{ "name": name, "mesh": 0, "translation": place, "scale": scale }]);
-        document["meshes"] = json!([mesh]);
+        let (nodes, roots) = nodes(pieces, place(stored, self.scene).map(|x| x as f32), [stored.step; 3]);
+        document["scenes"] = json!([{ "nodes": roots }]);
+        document["nodes"] = nodes.into();
+        document["meshes"] = meshes.into();
+        Looks::of(materials).put(&mut document);
         document["accessors"] = layout.accessors.into();
         document["bufferViews"] = layout.views.into();
         document["buffers"] = json!([{ "byteLength": layout.length }]);
@@ -176,6 +217,102 @@ impl Morphs<'_> {
             document["buffers"][0]["uri"] = utf8_percent_encode(name, &ESCAPED).to_string().into();
         }
         document.to_string()
+    }
+
+    /// The meshes with positions and corners alone.
+    fn meshes(&self, layout: &mut Layout, lengths: &[usize]) -> Vec<Value> {
+        let (stored, pieces) = (&self.components.stored, &self.scene.pieces);
+        let (stride, mut offset) = (self.stride(), 0);
+        let view = layout.view(lengths[0], json!({ "byteStride": stride, "target": VERTICES }));
+        let kind = if stored.is_float { FLOAT } else { SHORT };
+        for piece in pieces {
+            for part in 0..stored.parts() {
+                let [low, high] = stored.bounds(part, &piece.vertices);
+                let rest = json!({ "type": "VEC3", "min": low, "max": high });
+                layout.accessor(view, offset, kind, piece.vertices.len(), rest);
+                offset += piece.vertices.len() * stride;
+            }
+        }
+        let kind = if self.corner_size() == 2 { UNSIGNED_SHORT } else { UNSIGNED_INT };
+        let view = (lengths[1] > 0).then(|| layout.view(lengths[1], json!({ "target": CORNERS })));
+        let (mut meshes, mut offset) = (Vec::new(), 0);
+        for piece in pieces {
+            let mut primitives = Vec::new();
+            for (material, triangles) in &piece.primitives {
+                let (count, rest) = (3 * triangles.len(), json!({ "type": "SCALAR" }));
+                let indices = layout.accessor(view.unwrap_or_default(), offset, kind, count, rest);
+                offset += count * self.corner_size();
+                let mut primitive = json!({ "indices": indices });
+                if *material != NO_MATERIAL {
+                    primitive["material"] = json!(material);
+                }
+                primitives.push(primitive);
+            }
+            if primitives.is_empty() {
+                primitives.push(json!({ "mode": 0 }));
+            }
+            meshes.push(json!({ "name": piece.path.last(), "primitives": primitives }));
+        }
+        meshes
+    }
+
+    /// What vertices have, and targets.
+    fn put_attributes(&self, meshes: &mut [Value], layout: &mut Layout, lengths: &[usize]) {
+        let (parts, pieces) = (self.components.stored.parts(), &self.scene.pieces);
+        let mut all: Vec<Vec<Value>> = Vec::new();
+        for k in 0..pieces.len() {
+            all.push((0..parts).map(|part| json!({ "POSITION": k * parts + part })).collect());
+        }
+        if lengths[3] > 0 {
+            let view = layout.view(lengths[3], json!({ "byteStride": 12, "target": VERTICES }));
+            let mut offset = 0;
+            for (piece, attributes) in pieces.iter().zip(&mut all).filter(|(piece, _)| piece.normals.is_some()) {
+                let count = piece.vertices.len();
+                for attributes in attributes {
+                    attributes["NORMAL"] =
+                        json!(layout.accessor(view, offset, FLOAT, count, json!({ "type": "VEC3" })));
+                    offset += 12 * count;
+                }
+            }
+        }
+        if lengths[4] > 0 {
+            // A view for each set, as it says how far elements are apart.
+            for (piece, attributes) in pieces.iter().zip(&mut all) {
+                let count = piece.vertices.len();
+                let uvs = (0..piece.uv_sets.len()).map(|k| (format!("TEXCOORD_{k}"), "VEC2", 8));
+                let colors = (0..piece.color_sets.len()).map(|k| (format!("COLOR_{k}"), "VEC4", 16));
+                for (name, shape, stride) in uvs.chain(colors) {
+                    let view = layout.view(count * stride, json!({ "byteStride": stride, "target": VERTICES }));
+                    attributes[0][name] = json!(layout.accessor(view, 0, FLOAT, count, json!({ "type": shape })));
+                }
+            }
+        }
+        for (mesh, mut attributes) in meshes.iter_mut().zip(all) {
+            let base = attributes.remove(0);
+            for primitive in mesh["primitives"].as_array_mut().into_iter().flatten() {
+                primitive["attributes"] = base.clone();
+                if parts > 1 {
+                    primitive["targets"] = attributes.clone().into();
+                }
+            }
+        }
+    }
+
+    /// Scales that show and hide meshes.
+    fn put_switches(&self, channels: &mut Vec<Value>, samplers: &mut Vec<Value>, layout: &mut Layout, length: usize) {
+        let (view, mut offset) = (layout.view(length, json!({})), 0);
+        for (node, piece) in self.scene.pieces.iter().enumerate() {
+            let switches = self.switches(piece);
+            let (Some(first), Some(last)) = (switches.first(), switches.last()) else { continue };
+            let [start, end] = [first, last].map(|&(frame, _)| self.scene.times[frame]);
+            let rest = json!({ "type": "SCALAR", "min": [start], "max": [end] });
+            let input = layout.accessor(view, offset, FLOAT, switches.len(), rest);
+            let rest = json!({ "type": "VEC3" });
+            let output = layout.accessor(view, offset + 4 * switches.len(), FLOAT, switches.len(), rest);
+            offset += 16 * switches.len();
+            channels.push(json!({ "sampler": samplers.len(), "target": { "node": node, "path": "scale" } }));
+            samplers.push(json!({ "input": input, "interpolation": "STEP", "output": output }));
+        }
     }
 }
 
@@ -205,4 +342,4 @@ impl Layout {
 }
 
 /// What file names have as they are in addresses, beside letters and digits.
-const ESCAPED: AsciiSet = NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
+pub(super) const ESCAPED: AsciiSet = NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');

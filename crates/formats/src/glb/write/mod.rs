@@ -3,23 +3,31 @@
 mod components;
 mod deviation;
 mod document;
+mod look;
+mod nodes;
 mod normals;
+mod pieces;
 mod stored;
 
 use cager_geometry::mesh::Point;
+use cager_geometry::surface::Material;
 
 use crate::error::Fault;
 use components::{Components, Frames};
 pub(crate) use components::{MOST_FRAMES, Wanted};
 pub(crate) use deviation::Deviation;
 pub(crate) use document::write_head;
+pub(crate) use look::lost_pictures;
 use normals::normals;
+pub(crate) use pieces::Piece;
 
 /// What is written beside the frames.
 pub(crate) struct Scene {
-    /// The name of the node and its mesh.
+    /// The name of the animation.
     pub(crate) name: String,
-    pub(crate) triangles: Vec<[u32; 3]>,
+    /// The meshes.
+    pub(crate) pieces: Vec<Piece>,
+    pub(crate) materials: Vec<Material>,
     /// Seconds of each frame; none where there is but one.
     pub(crate) times: Vec<f32>,
     /// The number of the first frame, and frames per second.
@@ -28,14 +36,13 @@ pub(crate) struct Scene {
     pub(crate) origin: Point,
     /// Whether positions are floats instead of whole numbers of 16 bits.
     pub(crate) floats: bool,
-    pub(crate) normals: bool,
 }
 
 /// A mesh with its morph targets, ready to be written.
 pub(crate) struct Morphs<'a> {
     scene: &'a Scene,
     components: Components,
-    /// Those of the base and of all targets; none where none are wanted.
+    /// Those of the base and of all targets, of each those of all meshes that have some.
     normals: Vec<[f32; 3]>,
 }
 
@@ -50,11 +57,12 @@ impl<'a> Morphs<'a> {
         let rounding = |stored: &stored::Stored| document::place(stored, scene).map(|x| f64::from(x as f32) - x);
         let components = Components::of(&frames, scene.floats, wanted, rounding)?;
         let targets = components.deviation.targets;
-        let normals = if scene.normals && !scene.triangles.is_empty() {
-            normals(values, points, &scene.triangles, &components.weights, targets)
-        } else {
-            Vec::new()
-        };
+        let with_normals = || scene.pieces.iter().filter_map(|piece| piece.normals.as_ref());
+        let of_frame = |positions: &[f32]| with_normals().flat_map(|normals| normals.at(positions)).collect();
+        let count = with_normals().map(|normals| normals.count(points)).sum();
+        let frames = values.chunks_exact(3 * points);
+        let normals =
+            if count > 0 { normals(frames, count, of_frame, &components.weights, targets) } else { Vec::new() };
         let morphs = Self { scene, components, normals };
         morphs.check()?;
         Ok(morphs)

@@ -2,34 +2,34 @@
 
 use rayon::prelude::*;
 
-use crate::normals::{unit, vertex_normals};
+use crate::normals::unit;
 
-/// Normals of the base and each target, of frames of so many points and the weights of targets.
+/// Normals of the base and each target: `of_frame` gives so many of the positions of one of the `frames`, and
+/// `weights` are those of targets.
 ///
 /// Weights of principal components are about orthogonal but for their means, so a least-squares fit
 /// is one product for each target. Programs make the sum of a length of 1, so what is fitted is
 /// normals divided by the length of their mean.
-pub(super) fn normals(
-    frames: &[f32],
+pub(super) fn normals<'a>(
+    frames: impl ExactSizeIterator<Item = &'a [f32]>,
     points: usize,
-    triangles: &[[u32; 3]],
+    of_frame: impl Fn(&[f32]) -> Vec<[f32; 3]>,
     weights: &[f32],
     targets: usize,
 ) -> Vec<[f32; 3]> {
-    let count = frames.len() / (3 * points);
+    let count = frames.len();
     let mut sums = vec![[0.0_f64; 3]; points];
     let mut fitted = vec![[0.0_f32; 3]; targets * points];
-    let mut normals = Vec::new();
-    let of_frame = |frame: usize| &weights[frame * targets..(frame + 1) * targets];
-    let mean_weight = |k: usize| (0..count).map(|frame| f64::from(of_frame(frame)[k])).sum::<f64>() / count as f64;
+    let weights_of = |frame: usize| &weights[frame * targets..(frame + 1) * targets];
+    let mean_weight = |k: usize| (0..count).map(|frame| f64::from(weights_of(frame)[k])).sum::<f64>() / count as f64;
     let means: Vec<f32> = (0..targets).map(|k| mean_weight(k) as f32).collect();
-    for (frame, positions) in frames.chunks_exact(3 * points).enumerate() {
-        vertex_normals(positions, triangles, &mut normals);
+    for (frame, positions) in frames.enumerate() {
+        let normals = of_frame(positions);
         for (sum, normal) in sums.iter_mut().zip(&normals) {
             sum.iter_mut().zip(normal).for_each(|(sum, &x)| *sum += f64::from(x));
         }
         fitted.par_chunks_mut(points).enumerate().for_each(|(k, fitted)| {
-            let weight = of_frame(frame)[k] - means[k];
+            let weight = weights_of(frame)[k] - means[k];
             for (fitted, normal) in fitted.iter_mut().zip(&normals) {
                 fitted.iter_mut().zip(normal).for_each(|(fitted, x)| *fitted += weight * x);
             }
@@ -37,7 +37,7 @@ pub(super) fn normals(
     }
     let length = |sum: &[f64; 3]| sum.iter().map(|x| x * x).sum::<f64>().sqrt() / count as f64;
     fitted.par_chunks_mut(points).enumerate().for_each(|(k, fitted)| {
-        let squares: f32 = (0..count).map(|frame| (of_frame(frame)[k] - means[k]).powi(2)).sum();
+        let squares: f32 = (0..count).map(|frame| (weights_of(frame)[k] - means[k]).powi(2)).sum();
         for (fitted, sum) in fitted.iter_mut().zip(&sums) {
             // Where normals turn all around, their mean says nothing.
             let scale = (squares * (length(sum) as f32).max(SHORTEST)).recip();

@@ -72,9 +72,15 @@ impl Stored {
         self.length / 3
     }
 
-    /// The smallest and the largest numbers of the base (0) or a target.
-    pub(super) fn bounds(&self, part: usize) -> [[f64; 3]; 2] {
-        bounds(self.values[part * self.length..][..self.length].iter().copied().map(f64::from))
+    /// The numbers of a point of the base (0) or a target.
+    pub(super) fn at(&self, part: usize, point: u32) -> [f32; 3] {
+        let first = part * self.length + 3 * point as usize;
+        [self.values[first], self.values[first + 1], self.values[first + 2]]
+    }
+
+    /// The smallest and the largest numbers of points of the base or a target.
+    pub(super) fn bounds(&self, part: usize, points: &[u32]) -> [[f64; 3]; 2] {
+        bounds(points.iter().flat_map(|&point| self.at(part, point)).map(f64::from))
     }
 }
 
