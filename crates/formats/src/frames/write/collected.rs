@@ -67,7 +67,7 @@ impl<C: Collection> Output for Collected<C> {
         self.output.lost_of_surface().is_some()
     }
 
-    fn lost_of(&self, surface: &Surface) -> Vec<String> {
+    fn lost(&self, surface: &Surface) -> Vec<String> {
         self.output.lost_of_surface().map_or_else(|| phrases_of(surface, false), <[String]>::to_vec)
     }
 
