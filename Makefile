@@ -112,7 +112,7 @@ $(ALEMBIC): Makefile
 	@touch $@
 
 usd: $(USD) ## written files of USD through OpenUSD itself; installs usd-core
-	CAGER_USD_PYTHON=$(abspath $(USD)) $(CARGO) test --workspace --locked --test usd library -- --nocapture
+	CAGER_USD_PYTHON=$(abspath $(USD)) $(CARGO) test --workspace --locked --test usd --test usd_surface library -- --nocapture
 
 $(USD): Makefile
 	$(PYTHON) -m venv target/usd

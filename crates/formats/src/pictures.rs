@@ -78,6 +78,35 @@ fn place(output: &Path) -> (PathBuf, String) {
     }
 }
 
+/// Names the pictures of a surface as files in `folder`, and takes their bytes by the names there.
+pub(crate) fn rename(surface: &mut Surface, folder: &str) -> BTreeMap<String, Arc<[u8]>> {
+    let mut names: BTreeMap<String, Arc<[u8]>> = BTreeMap::new();
+    let mut renamed = BTreeMap::new();
+    for Picture { path, bytes } in std::mem::take(&mut surface.pictures) {
+        let name =
+            path.rsplit(['/', '\\']).next().filter(|name| !matches!(*name, "" | "." | "..")).unwrap_or("picture");
+        let name = name.replace(['\0', ':'], "_");
+        let (stem, extension) =
+            name.rsplit_once('.').map_or((name.as_str(), String::new()), |(stem, end)| (stem, format!(".{end}")));
+        let numbered = (1..).map(|k| if k == 1 { name.clone() } else { format!("{stem}_{k}{extension}") });
+        let free = numbered.into_iter().find(|name| names.get(name).is_none_or(|other| *other == bytes));
+        let name = free.unwrap_or_else(|| name.clone());
+        renamed.insert(path, format!("{folder}/{name}"));
+        names.insert(name, bytes);
+    }
+    for texture in surface.materials.iter_mut().flat_map(|material| &mut material.textures) {
+        if let Some(path) = renamed.get(&texture.path) {
+            texture.path.clone_from(path);
+        } else if let Some((before, after)) = texture.path.split_once("<UDIM>")
+            && let Some((_, path)) = renamed.iter().find(|(old, _)| old.starts_with(before) && old.ends_with(after))
+        {
+            let name = format!("{}<UDIM>{after}", before.rsplit('/').next().unwrap_or_default());
+            texture.path = format!("{}/{name}", path.rsplit_once('/').map_or("", |(folder, _)| folder));
+        }
+    }
+    names
+}
+
 /// Files to be written beside an output.
 pub(crate) struct Beside {
     files: Vec<(PathBuf, Arc<[u8]>)>,
@@ -88,30 +117,7 @@ impl Beside {
     /// Names the pictures of a surface as files in a folder beside `output`, and takes their bytes.
     pub(crate) fn of(surface: &mut Surface, target: &Target) -> Self {
         let (place, folder) = place(target.path());
-        let mut names: BTreeMap<String, Arc<[u8]>> = BTreeMap::new();
-        let mut renamed = BTreeMap::new();
-        for Picture { path, bytes } in std::mem::take(&mut surface.pictures) {
-            let name =
-                path.rsplit(['/', '\\']).next().filter(|name| !matches!(*name, "" | "." | "..")).unwrap_or("picture");
-            let name = name.replace(['\0', ':'], "_");
-            let (stem, extension) =
-                name.rsplit_once('.').map_or((name.as_str(), String::new()), |(stem, end)| (stem, format!(".{end}")));
-            let numbered = (1..).map(|k| if k == 1 { name.clone() } else { format!("{stem}_{k}{extension}") });
-            let free = numbered.into_iter().find(|name| names.get(name).is_none_or(|other| *other == bytes));
-            let name = free.unwrap_or_else(|| name.clone());
-            renamed.insert(path, format!("{folder}/{name}"));
-            names.insert(name, bytes);
-        }
-        for texture in surface.materials.iter_mut().flat_map(|material| &mut material.textures) {
-            if let Some(path) = renamed.get(&texture.path) {
-                texture.path.clone_from(path);
-            } else if let Some((before, after)) = texture.path.split_once("<UDIM>")
-                && let Some((_, path)) = renamed.iter().find(|(old, _)| old.starts_with(before) && old.ends_with(after))
-            {
-                let name = format!("{}<UDIM>{after}", before.rsplit('/').next().unwrap_or_default());
-                texture.path = format!("{}/{name}", path.rsplit_once('/').map_or("", |(folder, _)| folder));
-            }
-        }
+        let names = rename(surface, &folder);
         let files = names.into_iter().map(|(name, bytes)| (place.join(name), bytes)).collect();
         Self { files, may_replace: target.replaces() }
     }

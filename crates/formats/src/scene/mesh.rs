@@ -92,8 +92,9 @@ impl MovingMesh {
     }
 
     /// How many corners each face of the file has.
-    fn arities(&self, source: &mut dyn Values, [counts, _]: [Option<Value>; 2]) -> Result<Vec<u32>, Fault> {
-        let counts = counts.map_or(Ok(Vec::new()), |counts| source.integers(counts, most_corners(self.points)))?;
+    fn arities(&self, source: &mut dyn Values, places: [Option<Value>; 2]) -> Result<Vec<u32>, Fault> {
+        let [Some(counts), Some(_)] = places else { return Ok(Vec::new()) };
+        let counts = source.integers(counts, most_corners(self.points))?;
         Ok(counts.into_iter().map(|count| count as u32).collect())
     }
 

@@ -84,6 +84,16 @@ impl Materials {
         Ok(())
     }
 
+    /// Whether one of them names a picture.
+    pub(super) fn names(&self, path: &str) -> bool {
+        let tiles = |named: &str| {
+            let (before, after) = named.split_once("<UDIM>")?;
+            Some(path.starts_with(before) && path.ends_with(after))
+        };
+        let mut textures = self.list.iter().flat_map(|material| &material.textures);
+        textures.any(|texture| tiles(&texture.path).unwrap_or(texture.path == path))
+    }
+
     /// The material that a prim itself is bound to.
     fn bound(&mut self, layer: &mut Layer<'_>, prim: usize) -> Result<Option<u32>, Fault> {
         for name in BINDINGS {

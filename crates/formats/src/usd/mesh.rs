@@ -2,52 +2,52 @@
 
 use std::collections::HashSet;
 
-use cager_geometry::surface::Part;
+use cager_geometry::surface::{Part, Picture};
 use cager_geometry::units::{Units, Up};
 
 use super::choice::choose;
 use super::layer::{Layer, Stage};
 use super::materials::Materials;
 use super::timing::timeline;
-use super::{surface, transform, unread};
-use crate::dropped::{Dropped, counted};
+use super::unread::Unread;
+use super::{surface, transform};
+use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::scene::{MeshTracks, MovingScene, SceneTracks, Steps, Track, Wanted, ancestry, path};
 
 /// The unit of layers that do not say theirs: a centimetre.
 const USUAL_UNIT: f64 = 0.01;
 
-/// Opens the meshes that are wanted; of their first frame alone, whatever moves them, where what is
-/// not read is to be told.
+/// Opens the meshes that are wanted; of their first frame alone, whatever moves them, and with the
+/// `pictures` in the file, where what is not read is to be told.
 pub(super) fn open<'a>(
     mut layer: Layer<'a>,
     wanted: Wanted<'_>,
-    dropped: Option<&mut Dropped>,
+    model: Option<(&mut Dropped, Vec<Picture>)>,
 ) -> Result<MovingScene<'a>, Fault> {
     let (prims, notes) = choose(&mut layer, wanted)?;
     let mut tracks = SceneTracks { notes, units: units(&layer.stage), ..SceneTracks::default() };
     for &prim in &prims {
         let name = path(&layer.nodes, prim);
         let named = |fault: Fault| if prims.len() > 1 { fault.within(&name) } else { fault };
-        tracks.meshes.push(read_mesh(&mut layer, prim, dropped.is_some()).map_err(named)?);
+        tracks.meshes.push(read_mesh(&mut layer, prim, model.is_some()).map_err(named)?);
     }
     let of_mesh = |mesh: &MeshTracks| {
         let moved = mesh.chain.moving().flatten();
         mesh.positions.times.iter().chain(moved).copied().collect::<Vec<f64>>()
     };
     tracks.timeline = timeline(&layer.stage, tracks.meshes.iter().flat_map(of_mesh).collect())?;
-    if let Some(dropped) = dropped {
+    if let Some((dropped, mut pictures)) = model {
         tracks.timeline.at.truncate(1);
-        let mut materials = Materials::new(&layer);
+        let (mut materials, mut unread) = (Materials::new(&layer), Unread::default());
         for (&prim, mesh) in prims.iter().zip(&mut tracks.meshes) {
-            // What cannot be read or named is no reason to refuse a mesh.
+            // What cannot be read is no reason to refuse a mesh.
             let read = surface::read(&mut layer, prim, &mut materials, &mut mesh.part).unwrap_or_default();
-            unread::add(&mut layer, prim, &mesh.part, &read, dropped);
+            unread.take(&mut layer, prim, &mesh.part, &read);
         }
-        if materials.names_alone > 0 {
-            dropped.add(format!("the values of {} (no UsdPreviewSurface)", counted(materials.names_alone, "material")));
-        }
-        tracks.materials = materials.list;
+        unread.tell(materials.names_alone, dropped);
+        pictures.retain(|picture| materials.names(&picture.path));
+        (tracks.materials, tracks.pictures) = (materials.list, pictures);
     }
     MovingScene::new(layer.source, tracks)
 }

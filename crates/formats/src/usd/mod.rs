@@ -19,6 +19,8 @@ mod write;
 
 use std::io::{Read, Seek};
 
+use cager_geometry::surface::Picture;
+
 use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::scene::{MovingScene, Reader, Wanted};
@@ -35,21 +37,26 @@ pub(crate) fn open<'a>(
     wanted: Wanted<'_>,
     dropped: Option<&mut Dropped>,
 ) -> Result<MovingScene<'a>, Fault> {
-    mesh::open(open_layer(Box::new(source), length)?, wanted, dropped)
+    let (layer, pictures) = open_layer(Box::new(source), length, dropped.is_some())?;
+    mesh::open(layer, wanted, dropped.map(|dropped| (dropped, pictures)))
 }
 
-/// The layer that a file is, or the first one in a package, whatever its name.
-fn open_layer(mut source: Reader<'_>, mut length: u64) -> Result<Layer<'_>, Fault> {
-    let mut head = head(&mut source)?;
+/// The layer that a file is, or the first one in a package, whatever its name, and the other files
+/// of a package where they are wanted.
+fn open_layer(mut source: Reader<'_>, mut length: u64, wants_others: bool) -> Result<(Layer<'_>, Vec<Picture>), Fault> {
+    let (mut head, mut others) = (head(&mut source)?, Vec::new());
     if head.starts_with(package::MAGIC) {
+        if wants_others {
+            (source, others) = package::others(source, length)?;
+        }
         (source, length) = package::first(source, length)?;
         head = self::head(&mut source)?;
     }
     if head.starts_with(binary::MAGIC) {
-        return Binary::open(source, length);
+        return Ok((Binary::open(source, length)?, others));
     }
     if head.starts_with(text::MAGIC) {
-        return Text::open(source);
+        return Ok((Text::open(source)?, others));
     }
     let other = Signature::other_than("usdc", &head);
     let none = "does not begin as a file of USD does; export it again";

@@ -1,7 +1,9 @@
 //! Packages, `.usdz`: zip archives of files as they are, of which the first is the layer.
 
 use std::io::{self, Read, Seek, SeekFrom};
+use std::sync::Arc;
 
+use cager_geometry::surface::Picture;
 use zip::{CompressionMethod, ZipArchive};
 
 use crate::error::Fault;
@@ -35,6 +37,25 @@ pub(super) fn first(source: Reader<'_>, length: u64) -> Result<(Reader<'_>, u64)
     let mut inside = Inside { source: archive.into_inner(), start, length: size, at: 0 };
     inside.rewind()?;
     Ok((Box::new(inside), size))
+}
+
+/// The other files of a package, as far as they are not compressed and do not overlap.
+pub(super) fn others(source: Reader<'_>, length: u64) -> Result<(Reader<'_>, Vec<Picture>), Fault> {
+    let wrong = |_| damaged("its list of files cannot be read");
+    let mut archive = ZipArchive::new(source).map_err(wrong)?;
+    let (mut left, mut files) = (length, Vec::new());
+    for index in 1..archive.len() {
+        let file = archive.by_index_raw(index).map_err(wrong)?;
+        let size = left.checked_sub(file.size());
+        let Some(rest) = size.filter(|_| file.compression() == CompressionMethod::Stored && file.is_file()) else {
+            continue;
+        };
+        left = rest;
+        let (Ok(path), mut bytes) = (file.name().map(|name| name.into_owned()), Vec::new()) else { continue };
+        file.take(length).read_to_end(&mut bytes)?;
+        files.push(Picture { path, bytes: Arc::from(bytes) });
+    }
+    Ok((archive.into_inner(), files))
 }
 
 impl Read for Inside<'_> {

@@ -1,11 +1,11 @@
 //! What a mesh of a layer has that is not read.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use cager_geometry::surface::Part;
 
 use super::layer::Layer;
-use crate::dropped::{Dropped, listed};
+use crate::dropped::{Dropped, counted, listed};
 
 /// Attributes beside points and faces, and what they are.
 const KINDS: [(&str, &str); 9] = [
@@ -20,26 +20,51 @@ const KINDS: [(&str, &str); 9] = [
     ("skel:blendShapes", "blend shapes"),
 ];
 
-/// Adds what a mesh has beside the properties that were read.
-pub(super) fn add(layer: &mut Layer<'_>, mesh: usize, part: &Part, read: &HashSet<String>, dropped: &mut Dropped) {
-    let mut properties = layer.source.properties(mesh);
-    properties.retain(|(name, _)| !read.contains(name));
-    properties.sort_unstable();
-    properties.dedup();
-    for what in ["texture coordinates", "normals", "colours", "a skin", "primvars"] {
-        let of_kind = properties.iter().filter(|(name, type_name)| kind(name, type_name) == Some(what));
-        let names: Vec<&[u8]> = of_kind.map(|(name, _)| name.as_bytes()).collect();
-        if !names.is_empty() {
-            dropped.add_on_faces(format!("{what} ({})", listed(names)));
+/// The names and types of properties of meshes that were not read.
+#[derive(Default)]
+pub(super) struct Unread {
+    properties: BTreeSet<(String, String)>,
+    /// Whether some of them belong to faces or corners.
+    is_on_faces: bool,
+    has_materials: bool,
+}
+
+impl Unread {
+    /// Adds what a mesh has beside the properties that were read.
+    pub(super) fn take(&mut self, layer: &mut Layer<'_>, mesh: usize, part: &Part, read: &HashSet<String>) {
+        for (name, type_name) in layer.source.properties(mesh).into_iter().filter(|(name, _)| !read.contains(name)) {
+            self.has_materials |= part.materials.is_empty() && name.starts_with("material:binding");
+            if kind(&name, &type_name).is_some() {
+                let told = layer.source.interpolation(mesh, &name).unwrap_or_default();
+                self.is_on_faces |= !matches!(told.as_str(), "" | "constant" | "vertex" | "varying");
+            }
+            self.properties.insert((name, type_name));
         }
     }
-    for (name, what) in KINDS {
-        if properties.iter().any(|(found, _)| found == name) {
-            dropped.add(what);
+
+    /// Says it, and of how many materials the names alone are kept.
+    pub(super) fn tell(&self, names_alone: usize, dropped: &mut Dropped) {
+        let mut add = |phrase: String| {
+            if self.is_on_faces { dropped.add_on_faces(phrase) } else { dropped.add(phrase) }
+        };
+        for what in ["texture coordinates", "normals", "colours", "a skin", "primvars"] {
+            let of_kind = self.properties.iter().filter(|(name, type_name)| kind(name, type_name) == Some(what));
+            let names: Vec<&[u8]> = of_kind.map(|(name, _)| name.as_bytes()).collect();
+            if !names.is_empty() {
+                add(format!("{what} ({})", listed(names)));
+            }
         }
-    }
-    if part.materials.is_empty() && properties.iter().any(|(name, _)| name.starts_with("material:binding")) {
-        dropped.add_on_faces("materials (material:binding)");
+        for (name, what) in KINDS {
+            if self.properties.iter().any(|(found, _)| found == name) {
+                dropped.add(what);
+            }
+        }
+        if self.has_materials {
+            dropped.add_on_faces("materials (material:binding)");
+        }
+        if names_alone > 0 {
+            dropped.add(format!("the values of {} (no UsdPreviewSurface)", counted(names_alone, "material")));
+        }
     }
 }
 

@@ -1,10 +1,10 @@
 """OpenUSD beside us. `usd.py read FILE` prints what the library reads of a file of one mesh: stage, faces, then a time code and the positions of each
-sample, moved by the transforms above; `usd.py cages FILE` what each mesh is for and its positions; `usd.py make FOLDER` writes files that the library can write and we cannot, each in binary, as text of USD, and with a text of what is to be read."""
+sample, moved by the transforms above; `usd.py cages FILE` what each mesh is for and its positions; `usd.py surface FILE` what lies on the faces of each mesh; `usd.py make FOLDER` writes files that the library can write and we cannot, each in binary, as text of USD, and with a text of what is to be read."""
 
 import sys
 import zipfile
 
-from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 
 def numbers(mesh, code):
@@ -42,6 +42,42 @@ def cages(path):
         print(mesh.GetPath(), UsdGeom.Imageable(mesh).ComputePurpose(), len(mesh.GetPointsAttr().Get()))
         for code in mesh.GetPointsAttr().GetTimeSamples():
             print(*map(repr, numbers(mesh, code)))
+
+
+def surface(path):
+    stage = Usd.Stage.Open(path)
+
+    def material(prim):
+        found, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+        return found.GetPath() if found else None
+
+    for mesh in meshes(stage):
+        print(mesh.GetPath(), mesh.GetSubdivisionSchemeAttr().Get(), material(mesh.GetPrim()))
+        for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues():
+            print(primvar.GetPrimvarName(), primvar.GetTypeName(), primvar.GetInterpolation(),
+                  *primvar.ComputeFlattened())
+        for subset in UsdGeom.Subset.GetAllGeomSubsets(mesh):
+            print(subset.GetPrim().GetName(), subset.GetFamilyNameAttr().Get(), *subset.GetIndicesAttr().Get(),
+                  material(subset.GetPrim()))
+        creases = (mesh.GetCreaseIndicesAttr(), mesh.GetCreaseLengthsAttr(), mesh.GetCreaseSharpnessesAttr())
+        print("creases", *(attribute.Get() for attribute in creases))
+        for code in mesh.GetNormalsAttr().GetTimeSamples():
+            print("normals", mesh.GetNormalsInterpolation(), code, *mesh.GetNormalsAttr().Get(code))
+        print("shown", *(mesh.ComputeVisibility(code) for code in mesh.GetPointsAttr().GetTimeSamples()))
+    for prim in stage.Traverse():
+        if not prim.IsA(UsdShade.Material):
+            continue
+        shader, _, _ = UsdShade.Material(prim).ComputeSurfaceSource()
+        print(prim.GetPath(), shader.GetIdAttr().Get())
+        for shader_input in sorted(shader.GetInputs(), key=lambda found: found.GetBaseName()):
+            print(shader_input.GetBaseName(), shader_input.Get())
+            for source in shader_input.GetConnectedSources()[0]:
+                picture = UsdShade.Shader(source.source.GetPrim())
+                reader = UsdShade.Shader(picture.GetInput("st").GetConnectedSources()[0][0].source.GetPrim())
+                file = picture.GetInput("file").Get()
+                is_there = bool(file.resolvedPath)
+                print(source.sourceName, file.path, is_there, picture.GetInput("sourceColorSpace").Get(),
+                      reader.GetInput("varname").Get())
 
 
 def make(folder):
@@ -151,6 +187,63 @@ def make(folder):
     with open(f"{folder}/doubles.txt", "w") as out:
         print(*(repr(x) for point in points for x in point), file=out)
 
+    # What lies on faces, in the ways that the library has for it.
+    stage = begin("surface", (1, 1))
+    UsdGeom.Xform.Define(stage, "/root")
+    roof = UsdGeom.Mesh.Define(stage, "/root/roof")
+    roof.GetPointsAttr().Set([(0, 0, 0), (1, 0, 0), (1, 1, 1), (0, 1, 1), (1, 2, 0), (0, 2, 0)])
+    roof.GetFaceVertexCountsAttr().Set([4, 2, 4])
+    roof.GetFaceVertexIndicesAttr().Set([0, 1, 2, 3, 0, 1, 3, 2, 4, 5])
+    roof.GetSubdivisionSchemeAttr().Set("none")
+    roof.GetNormalsAttr().Set([(0, -1, 1), (0, 0, 1), (0, 1, 1)])
+    roof.SetNormalsInterpolation("uniform")
+    primvars = UsdGeom.PrimvarsAPI(roof)
+    types = Sdf.ValueTypeNames
+    coordinates = primvars.CreatePrimvar("detail", types.TexCoord2fArray, "faceVarying")
+    coordinates.Set([(0, 0), (0.5, 0.25)])
+    coordinates.SetIndices(Vt.IntArray([0, 1, 0, 1, 0, 0, 1, 1, 1, 0]))
+    primvars.CreatePrimvar("st", types.TexCoord2hArray, "vertex").Set([(k / 8, 1 - k / 8) for k in range(6)])
+    primvars.CreatePrimvar("tint", types.Color3fArray, "uniform").Set([(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    primvars.CreatePrimvar("all", types.Color4fArray, "constant").Set([(0.5, 0.5, 0.5, 0.25)])
+    primvars.CreatePrimvar("mask", types.FloatArray, "vertex").Set([0.5] * 6)
+    strip = UsdGeom.Mesh.Define(stage, "/root/group/strip")
+    strip.GetPointsAttr().Set([(k, k % 2, 0) for k in range(20)])
+    strip.GetFaceVertexCountsAttr().Set([3] * 18)
+    strip.GetFaceVertexIndicesAttr().Set([k + j for k in range(18) for j in range(3)])
+    strip.GetSubdivisionSchemeAttr().Set("loop")
+    strip.GetCreaseIndicesAttr().Set(list(range(20)))
+    strip.GetCreaseLengthsAttr().Set([20])
+    strip.GetCreaseSharpnessesAttr().Set([2.5, 0.5] * 9 + [2.5])
+
+    def material(name):
+        return UsdShade.Material.Define(stage, "/root/looks/" + name)
+
+    def shader(name, kind):
+        made = UsdShade.Shader.Define(stage, "/root/looks/" + name)
+        made.CreateIdAttr(kind)
+        return made
+
+    paint, metal = material("paint"), material("metal")
+    look = shader("paint/look", "UsdPreviewSurface")
+    paint.CreateSurfaceOutput().ConnectToSource(look.ConnectableAPI(), "surface")
+    tint = paint.CreateInput("tint", types.Color3f)
+    tint.Set((0.2, 0.4, 0.6))
+    look.CreateInput("diffuseColor", types.Color3f).ConnectToSource(tint)
+    look.CreateInput("roughness", types.Float).Set(0.25)
+    look.CreateInput("metallic", types.Float).Set(1)
+    picture = shader("paint/picture", "UsdUVTexture")
+    picture.CreateInput("file", types.Asset).Set("./pictures/paint.png")
+    look.CreateInput("opacity", types.Float).ConnectToSource(picture.ConnectableAPI(), "a")
+    inside = UsdShade.NodeGraph.Define(stage, "/root/looks/metal/inside")
+    metal.CreateSurfaceOutput().ConnectToSource(inside.CreateOutput("surface", types.Token))
+    other = shader("metal/inside/other", "ND_standard_surface_surfaceshader")
+    inside.GetOutput("surface").ConnectToSource(other.CreateOutput("out", types.Token))
+    UsdShade.MaterialBindingAPI.Apply(stage.GetPrimAtPath("/root")).Bind(paint)
+    patch = UsdGeom.Subset.CreateGeomSubset(roof, "patch", "face", Vt.IntArray([2]), "materialBind")
+    UsdShade.MaterialBindingAPI.Apply(patch.GetPrim()).Bind(metal)
+    UsdGeom.Subset.CreateGeomSubset(roof, "both", "face", Vt.IntArray([0, 1, 2]), "parts")
+    keep(stage)
+
     for name, compose in {
         "references": lambda prim: prim.GetReferences().AddReference("./reset.usdc", "/a"),
         "payloads": lambda prim: prim.GetPayloads().AddPayload("./reset.usdc", "/a"),
@@ -164,4 +257,4 @@ def make(folder):
         keep(stage)
 
 
-{"read": read, "cages": cages, "make": make}[sys.argv[1]](sys.argv[2])
+{"read": read, "cages": cages, "surface": surface, "make": make}[sys.argv[1]](sys.argv[2])

@@ -56,7 +56,7 @@ impl SceneWriter {
             let cage = options.cage.as_ref();
             let of_cage = cage.map(|cage| (cage.points, &cage.faces));
             let mesh = usd::MeshWriter::new(file, (announced.points, faces), of_cage, scene).map_err(write)?;
-            if format == CacheFormat::Usdz && announced.frames.saturating_mul(mesh.frame_size()) > LONGEST_PACKAGE {
+            if format == CacheFormat::Usdz && mesh.size(announced.frames) > LONGEST_PACKAGE {
                 return Err(too_long().at(path));
             }
             let cage = cage.map(|cage| Announced { points: cage.points, path: path.clone(), ..*announced });

@@ -1,6 +1,7 @@
 //! Values of a layer, and the prims and properties that have them.
 
 use std::io::{self, Seek, Write};
+use std::sync::Arc;
 
 use super::sink::Sink;
 use super::tables::{Tables, integers};
@@ -109,11 +110,12 @@ impl<W: Write + Seek> Encoder<W> {
         Self { sink, tables, bytes: Vec::new() }
     }
 
-    /// Writes the tables, and what a layer begins with; gives the file back.
-    pub(super) fn close(mut self) -> io::Result<W> {
+    /// Writes the tables, what a layer begins with, and the other files of its package; gives the
+    /// file back.
+    pub(super) fn close(mut self, files: &[(String, Arc<[u8]>)]) -> io::Result<W> {
         let contents = self.tables.write(&mut self.sink)?;
         let head = [&MAGIC[..], &VERSION, &[0; 5], &contents.to_le_bytes()].concat();
-        self.sink.close(&head)
+        self.sink.close(&head, files)
     }
 
     /// Writes a prim and what lies below it.

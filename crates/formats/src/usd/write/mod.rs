@@ -10,12 +10,14 @@ mod tables;
 mod tree;
 
 use std::io::{self, Seek, Write};
+use std::sync::Arc;
 
 use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::surface::{PartRange, Surface};
 use cager_geometry::units::{Units, Up};
 
 use super::binary::{ROOT, kind};
+use crate::pictures::rename;
 use encoder::{Encoder, Prim, Property};
 use mesh::Mesh;
 use sink::Sink;
@@ -48,6 +50,8 @@ pub(crate) struct MeshWriter<W> {
     meshes: Vec<Mesh>,
     materials: Option<Prim>,
     cage: Option<usize>,
+    /// The other files of a package.
+    pictures: Vec<(String, Arc<[u8]>)>,
 }
 
 impl<W: Write + Seek> MeshWriter<W> {
@@ -56,10 +60,15 @@ impl<W: Write + Seek> MeshWriter<W> {
         out: W,
         (points, faces): (usize, &Polygons),
         cage: Option<(usize, &Polygons)>,
-        scene: Scene,
+        mut scene: Scene,
     ) -> io::Result<Self> {
         let sink = Sink::new(out, scene.is_packed.then(|| format!("{}.usdc", scene.name)))?;
         let mut encoder = Encoder::new(sink);
+        let mut pictures = Vec::new();
+        if scene.is_packed {
+            let files = rename(&mut scene.surface, PICTURES).into_iter();
+            pictures.extend(files.map(|(name, bytes)| (format!("{PICTURES}/{name}"), bytes)));
+        }
         let surface = &scene.surface;
         let paths = surface.parts.iter().map(|part| part.path.as_str());
         // Of a model without parts, one without a name.
@@ -86,12 +95,14 @@ impl<W: Write + Seek> MeshWriter<W> {
             }
             None => None,
         };
-        Ok(Self { encoder, scene, tree, meshes, materials, cage })
+        Ok(Self { encoder, scene, tree, meshes, materials, cage, pictures })
     }
 
-    /// Bytes of a frame at the most.
-    pub(crate) fn frame_size(&self) -> usize {
-        self.meshes.iter().map(Mesh::frame_size).sum()
+    /// Bytes of the file, about, with so many frames.
+    pub(crate) fn size(&self, frames: usize) -> usize {
+        let pictures: usize = self.pictures.iter().map(|(name, bytes)| bytes.len() + name.len() + 256).sum();
+        let of_frame: usize = self.meshes.iter().map(Mesh::frame_size).sum();
+        frames.saturating_mul(of_frame).saturating_add(pictures)
     }
 
     /// Writes a frame, `x y z x y z …`, of the model, or of the cage where one was announced.
@@ -122,7 +133,7 @@ impl<W: Write + Seek> MeshWriter<W> {
         encoder.tables.begin(ROOT, "", &fields);
         self.put(0, times)?;
         self.encoder.tables.end();
-        self.encoder.close()
+        self.encoder.close(&self.pictures)
     }
 
     /// Writes a node of the tree and what lies below it.
@@ -155,5 +166,7 @@ impl<W: Write + Seek> MeshWriter<W> {
     }
 }
 
+/// Folder of pictures in a package.
+const PICTURES: &str = "textures";
 const TRANSLATE: &str = "xformOp:translate";
 const ORDER: &str = "xformOpOrder";
