@@ -212,6 +212,66 @@ fn files_of_the_library_have_what_it_wrote() {
     }
 }
 
+fn data() -> PathBuf {
+    std::env::var_os("CAGER_CAPTURES")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
+}
+
+/// Written by Blender, with what its author says of it beside it.
+#[test]
+#[ignore = "needs the captures: make captures"]
+fn a_character_has_what_its_author_gave_it() {
+    let folder = data().join("character");
+    let truth: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("truth.json")).unwrap()).unwrap();
+    for name in ["robin.usdc", "robin.usdz"] {
+        let read = read_mesh(&folder.join(name), &[]).unwrap();
+        let told = read.dropped.sentence(Path::new(name), true).unwrap();
+        assert!(
+            told.starts_with(&format!("{name}: primvars (primvars:arm_L, ")) && !told.contains(" and primvars"),
+            "{told}"
+        );
+        let surface = &read.model.surface;
+        surface.check(read.model.points.len(), &read.model.faces).unwrap();
+        let parts = truth["parts"].as_array().unwrap();
+        assert_eq!(surface.parts.len(), parts.len());
+        for told in parts {
+            let text = |key: &str| told[key].as_str().unwrap();
+            let names = |key: &str| -> Vec<String> {
+                told[key].as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned()).collect()
+            };
+            let path = format!("/root{}/{}", text("path"), text("mesh")).replace('.', "_");
+            let part = surface.parts.iter().find(|part| part.path == path).expect(&path);
+            assert_eq!(
+                (part.points as u64, part.faces as u64),
+                (told["points"].as_u64().unwrap(), told["faces"].as_u64().unwrap())
+            );
+            let uvs: Vec<String> = part.uv_sets.iter().map(|set| set.name.clone()).collect();
+            assert_eq!(uvs, names("uv_sets"), "{path}");
+            assert_eq!(part.color_sets.len(), told["colours"].as_array().unwrap().len(), "{path}");
+            assert_eq!(part.creases.len() as u64, told["creases"].as_u64().unwrap());
+            assert_eq!(part.subdivision == Subdivision::CatmullClark, text("subdivision") == "catmullClark");
+            let mut materials: Vec<String> =
+                part.materials.iter().map(|&k| surface.materials[k as usize].name.clone()).collect();
+            materials.sort();
+            materials.dedup();
+            let mut expected = names("materials");
+            expected.sort();
+            assert_eq!(materials, expected, "{path}");
+        }
+        for (material, told) in truth["materials"].as_object().unwrap() {
+            let found = surface.materials.iter().find(|found| found.name == *material).unwrap();
+            let picture = |channel| found.textures.iter().find(|t| t.channel == channel).map(|t| t.path.as_str());
+            assert_eq!(picture(Channel::BaseColor), told["base"].as_str());
+            assert_eq!(picture(Channel::Roughness), told["roughness"].as_str());
+            assert_eq!(picture(Channel::Opacity).is_some(), told["alpha"].is_string());
+            assert_eq!(f64::from(found.metalness), told["metallic"].as_f64().unwrap());
+            let in_file = surface.pictures.iter().find(|picture| Some(picture.path.as_str()) == told["base"].as_str());
+            assert_eq!(in_file.is_some(), name == "robin.usdz");
+            assert!(in_file.is_none_or(|picture| picture.bytes.starts_with(b"\x89PNG")));
+        }
+    }
+}
+
 /// The value of each corner.
 fn spread<const N: usize>(set: &CornerSet<N>) -> Vec<[f32; N]> {
     set.corners.iter().map(|&corner| set.values[corner as usize]).collect()
