@@ -75,6 +75,7 @@ short! {
     usdz "usdz" 30_000;
     usda "usda" 20_000;
     glb_frames "glb-frames" 20_000;
+    fbx "fbx" 5_000;
     npz "npz" 3_000;
     container "container" 30_000;
     record "record" 360_000;

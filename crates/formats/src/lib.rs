@@ -11,6 +11,7 @@ mod colors;
 mod dropped;
 mod error;
 mod faces;
+mod fbx;
 pub mod frames;
 mod glb;
 mod listing;

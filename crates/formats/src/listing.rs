@@ -36,6 +36,10 @@ pub const FORMATS: &[Listed] = &[
     animated("usd", "the same, binary", true, "unit, up axis, frame rate, times"),
     animated("glb", "binary glTF", true, "metres, Y up, times"),
     animated("gltf", "the same as text and files", true, "metres, Y up, times"),
+    Listed {
+        read: cfg!(feature = "fbx"),
+        ..animated("fbx", "FBX, binary and as text", false, "unit, up axis, frame rate, times")
+    },
     Listed { read: false, ..animated("vat", "animation textures (OpenVAT)", true, "frame rate") },
 ];
 
@@ -60,6 +64,8 @@ mod tests {
         let meshes = MeshFormat::STILL.into_iter().filter(|&format| format != MeshFormat::Glb);
         assert_eq!(listed(false).collect::<Vec<_>>(), meshes.map(MeshFormat::extension).collect::<Vec<_>>());
         let caches: Vec<_> = listed(true).filter(|&extension| extension != "npz").collect();
-        assert_eq!(caches, CacheFormat::ALL.map(CacheFormat::extension));
+        let with_fbx = |format: &CacheFormat| cfg!(feature = "fbx") || *format != CacheFormat::Fbx;
+        let all = CacheFormat::ALL.into_iter().filter(with_fbx);
+        assert_eq!(caches, all.map(CacheFormat::extension).collect::<Vec<_>>());
     }
 }

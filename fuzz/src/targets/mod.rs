@@ -3,6 +3,7 @@
 mod alembic;
 mod bodies;
 mod container;
+mod fbx;
 mod frames;
 mod gltf;
 mod meshes;
@@ -32,6 +33,7 @@ pub const TARGETS: &[Target] = &[
     usd::USDZ,
     usd::USDA,
     gltf::GLB_FRAMES,
+    fbx::FBX,
     frames::NPZ,
     container::CONTAINER,
     bodies::RECORD,

@@ -43,7 +43,7 @@ const ELSEWHERE: Readonly<Record<string, string>> = {
   npz: 'Save only the position array, as .npy.',
 };
 /** Animations that the command line takes and this page does not. */
-const ANIMATIONS = new Set(['abc', 'usd', 'usda', 'usdc', 'usdz', 'gltf', 'mcx', 'mc']);
+const ANIMATIONS = new Set(['abc', 'usd', 'usda', 'usdc', 'usdz', 'gltf', 'fbx', 'mcx', 'mc']);
 
 export function encodeElsewhere(): string {
   return `The page reads frames from .npy, .pc2, .mdd and .obj; encode this file with “cager encode --server ${serviceAddress()}”.`;

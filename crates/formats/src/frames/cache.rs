@@ -9,6 +9,7 @@ use super::layout::{LONGEST_HEADER, Layout};
 use super::{CacheFormat, FrameReader, FrameSelection, maya, mdd, npy, pc2};
 use crate::alembic;
 use crate::error::{Error, Fault};
+use crate::fbx;
 use crate::glb;
 use crate::scene::{self, MovingScene, Wanted};
 use crate::signature::Signature;
@@ -46,6 +47,7 @@ pub(super) fn open<'a>(
             let kind = glb::Source { is_text: format == CacheFormat::Gltf, folder, is_split: false };
             return glb::open_frames(path, (source, length), &kind, expected_points, selection);
         }
+        CacheFormat::Fbx => return fbx::open_frames(path, (source, length), expected_points, selection, folder),
         CacheFormat::Abc => return open_scene(path, alembic::open(source, length, wanted, None), expected_points),
     };
     let mut layout = layout.map_err(|fault| fault.at(path))?;

@@ -142,23 +142,25 @@ pub enum CacheFormat {
     Glb,
     /// The same as text, with its data in it or in files beside it.
     Gltf,
+    /// FBX: its meshes as an animation moves them; not written.
+    Fbx,
 }
 
 impl CacheFormat {
     /// All formats.
-    pub const ALL: [Self; 12] = {
+    pub const ALL: [Self; 13] = {
         use CacheFormat::*;
-        [Npy, Pc2, Mdd, Mcx, Mc, Abc, Usdc, Usdz, Usda, Usd, Glb, Gltf]
+        [Npy, Pc2, Mdd, Mcx, Mc, Abc, Usdc, Usdz, Usda, Usd, Glb, Gltf, Fbx]
     };
 
     /// Whether a file has a whole scene of several meshes; a `.glb` is taken as one mesh.
     pub fn is_scene(self) -> bool {
-        matches!(self, Self::Abc | Self::Usdc | Self::Usdz | Self::Usda | Self::Usd | Self::Gltf)
+        matches!(self, Self::Abc | Self::Usdc | Self::Usdz | Self::Usda | Self::Usd | Self::Gltf | Self::Fbx)
     }
 
     /// The file name extension, without the dot.
     pub fn extension(self) -> &'static str {
-        ["npy", "pc2", "mdd", "mcx", "mc", "abc", "usdc", "usdz", "usda", "usd", "glb", "gltf"][self as usize]
+        ["npy", "pc2", "mdd", "mcx", "mc", "abc", "usdc", "usdz", "usda", "usd", "glb", "gltf", "fbx"][self as usize]
     }
 
     /// The format that the path's extension names, if any.

@@ -52,7 +52,7 @@ pub(super) fn unknown(path: &Path) -> Error {
     let what = match way_out(path) {
         Some(way_out) => way_out,
         None => format!(
-            "is not a capture that is read; give .npy .pc2 .mdd .mcx .abc .usdc .usdz .glb .npz, or {} files in a folder",
+            "is not a capture that is read; give .npy .pc2 .mdd .mcx .abc .usdc .usdz .glb .fbx .npz, or {} files in a folder",
             extensions(&MeshFormat::STILL)
         ),
     };
@@ -69,7 +69,6 @@ pub(super) fn way_out(path: &Path) -> Option<String> {
         ));
     }
     let kind = match extension.as_str() {
-        "fbx" => "an FBX scene",
         "dae" => "a Collada scene",
         "blend" => "a Blender scene",
         "ma" | "mb" => "a Maya scene",

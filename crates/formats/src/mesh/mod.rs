@@ -19,6 +19,7 @@ use crate::alembic;
 use crate::dropped::Dropped;
 use crate::error::{Error, Fault};
 use crate::faces::Contents;
+use crate::fbx;
 use crate::glb;
 use crate::scene::Wanted;
 use crate::signature::Signature;
@@ -55,13 +56,15 @@ pub enum MeshFormat {
     Usd,
     /// glTF 2.0 as text, with its data in it or in files beside it.
     Gltf,
+    /// FBX: the first frame of its meshes; not written.
+    Fbx,
 }
 
 impl MeshFormat {
     /// All formats.
-    pub const ALL: [Self; 11] = {
+    pub const ALL: [Self; 12] = {
         use MeshFormat::*;
-        [Obj, Ply, Off, Stl, Glb, Abc, Usdc, Usdz, Usda, Usd, Gltf]
+        [Obj, Ply, Off, Stl, Glb, Abc, Usdc, Usdz, Usda, Usd, Gltf, Fbx]
     };
 
     /// Formats of one mesh that stands still, of which each file of a folder may be a frame.
@@ -69,7 +72,7 @@ impl MeshFormat {
 
     /// The file name extension, without the dot.
     pub fn extension(self) -> &'static str {
-        ["obj", "ply", "off", "stl", "glb", "abc", "usdc", "usdz", "usda", "usd", "gltf"][self as usize]
+        ["obj", "ply", "off", "stl", "glb", "abc", "usdc", "usdz", "usda", "usd", "gltf", "fbx"][self as usize]
     }
 
     /// The format that the extension of `path` stands for, in upper or lower case.
@@ -273,8 +276,12 @@ fn read_scene(
         let kind = glb::Source { is_text: true, folder, ..glb::Source::default() };
         return finished(format, name, &bytes, glb::read(&bytes, &kind, prims).map(Parsed::of_gltf));
     }
-    let mut dropped = Dropped::default();
     let wanted = Wanted { prims, points: None };
+    if format == MeshFormat::Fbx {
+        let (model, left_out, units, dropped) = fbx::read(name, (source, length), wanted, folder)?;
+        return Ok(Parsed { left_out, units, dropped, ..Parsed::from(model) });
+    }
+    let mut dropped = Dropped::default();
     let opened = if format == MeshFormat::Abc {
         alembic::open(source, length, wanted, Some(&mut dropped))
     } else {

@@ -118,7 +118,9 @@ fn names_pictures(target: &Target) -> bool {
 
 fn begin(all: &Announced, target: &Target, faces: &Polygons, options: &FrameOptions) -> Result<Box<dyn Output>, Error> {
     let given = target.path();
-    let (path, pattern, cache) = (&all.path, mesh_pattern(given), CacheFormat::from_path(&all.path));
+    // FBX is read alone.
+    let cache = CacheFormat::from_path(&all.path).filter(|&format| format != CacheFormat::Fbx);
+    let (path, pattern) = (&all.path, mesh_pattern(given));
     if *target == Target::StandardOutput {
         return Ok(Box::new(CacheWriter::create(all, target, CacheFormat::Npy, options)?));
     }

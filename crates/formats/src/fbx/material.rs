@@ -1,0 +1,76 @@
+//! The materials of faces.
+
+use std::collections::HashMap;
+
+use cager_geometry::surface::{Channel, Material, NO_MATERIAL, Texture};
+use ufbx::{MaterialMap, Mesh, Node};
+
+/// Those of all meshes that are read.
+#[derive(Default)]
+pub(super) struct Materials {
+    pub(super) list: Vec<Material>,
+    /// Places in the list by numbers in the scene.
+    known: HashMap<u32, u32>,
+}
+
+impl Materials {
+    /// The material of each of these faces; empty where none has one. Copies of a mesh may have
+    /// others than the mesh.
+    pub(super) fn of_faces(&mut self, node: &Node, mesh: &Mesh, faces: &[u32]) -> Vec<u32> {
+        let own = if node.materials.is_empty() { &mesh.materials } else { &node.materials };
+        let mut places: Vec<Option<u32>> = vec![None; own.len()];
+        let mut material = |&face: &u32| {
+            // Where all faces have the first one, some files have no list.
+            let slot = mesh.face_material.as_ref().get(face as usize).map_or(0, |&slot| slot as usize);
+            let Some(stored) = own.as_ref().get(slot) else { return NO_MATERIAL };
+            *places[slot].get_or_insert_with(|| {
+                *self.known.entry(stored.element.typed_id).or_insert_with(|| {
+                    self.list.push(read(stored));
+                    self.list.len() as u32 - 1
+                })
+            })
+        };
+        let all: Vec<u32> = faces.iter().map(&mut material).collect();
+        if all.iter().all(|&material| material == NO_MATERIAL) { Vec::new() } else { all }
+    }
+}
+
+fn read(stored: &ufbx::Material) -> Material {
+    let (usual, maps) = (Material::default(), &stored.pbr);
+    let value = |map: &MaterialMap, usual: f32| match map.value_vec4.x as f32 {
+        value if map.has_value && value.is_finite() => value.clamp(0.0, 1.0),
+        _ => usual,
+    };
+    let color = &maps.base_color.value_vec4;
+    let factor = if maps.base_factor.has_value { maps.base_factor.value_vec4.x } else { 1.0 };
+    let base_color = [color.x, color.y, color.z].map(|x| (factor * x) as f32);
+    let is_said = maps.base_color.has_value && base_color.iter().all(|x| x.is_finite());
+    let textures = [
+        (Channel::BaseColor, &maps.base_color),
+        (Channel::Opacity, &maps.opacity),
+        (Channel::Roughness, &maps.roughness),
+        (Channel::Metalness, &maps.metalness),
+        (Channel::Normal, &maps.normal_map),
+        (Channel::Emission, &maps.emission_color),
+    ];
+    Material {
+        name: stored.element.name.to_string(),
+        base_color: if is_said { base_color } else { usual.base_color },
+        opacity: value(&maps.opacity, usual.opacity),
+        roughness: value(&maps.roughness, usual.roughness),
+        metalness: value(&maps.metalness, usual.metalness),
+        textures: textures
+            .into_iter()
+            .filter_map(|(channel, map)| Some(Texture { channel, path: picture(map)? }))
+            .collect(),
+    }
+}
+
+/// The file of a picture, of several layers the lowest.
+fn picture(map: &MaterialMap) -> Option<String> {
+    let texture = map.texture.as_deref().filter(|_| map.texture_enabled)?;
+    let texture = texture.file_textures.as_ref().first().map_or(texture, |first| &**first);
+    let names = [&texture.relative_filename, &texture.filename, &texture.absolute_filename];
+    let path = names.into_iter().find(|name| !name.is_empty())?;
+    Some(path.replace('\\', "/"))
+}
