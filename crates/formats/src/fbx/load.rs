@@ -10,6 +10,7 @@ use ufbx::{
 };
 
 use crate::error::Fault;
+use crate::signature::Signature;
 
 /// Bytes that a scene may take, once for good and once while it is read: so many whatever the file
 /// is, and so many for each byte of it, as files are packed.
@@ -51,16 +52,19 @@ impl Scene {
                 handedness_conversion_axis: axes.map_or(MirrorAxis::None, |_| MirrorAxis::X),
                 ..LoadOpts::default()
             };
-            ufbx::load_memory(bytes, options).map_err(|error| fault(&error, limit))
+            ufbx::load_memory(bytes, options).map_err(|error| match Signature::other_than("fbx", bytes) {
+                Some(other) => Fault::damaged(other),
+                None => fault(&error, limit),
+            })
         };
         let mut root = load(None)?;
-        let mut note = None;
+        let (mut note, mut units) = (None, units(&root.settings));
         if !is_upright(root.settings.axes) {
+            drop(root);
             root = load(Some(ufbx::axes_right_handed_y_up()))?;
-            note =
-                Some("its axes are not those of a right-handed scene with Y or Z up; it is turned to Y up".to_owned());
+            units.up = Some(Up::Y);
+            note = Some("is not right-handed with Y or Z up, and is turned to Y up".to_owned());
         }
-        let units = units(&root.settings);
         Ok(Self { root, units, note, limit, folder: folder.map(Path::to_owned) })
     }
 
@@ -92,16 +96,14 @@ fn beside(folder: Option<&Path>, path: &str, info: &OpenFileInfo) -> Option<Stre
     File::open(path).ok().filter(|_| is_plain).map(Stream::File)
 }
 
-/// Whether axes are right-handed, with one upwards that has a name; nothing said is Y.
+/// Whether axes are right-handed with Y or Z up, or say nothing.
 fn is_upright(axes: CoordinateAxes) -> bool {
     let axis = |axis: CoordinateAxis| (axis as usize / 2, if axis as usize % 2 == 0 { 1 } else { -1 });
     let [(right, a), (up, b), (front, c)] = [axes.right, axes.up, axes.front].map(axis);
-    if axes.up == CoordinateAxis::Unknown {
-        return true;
-    }
     let is_even = (right + 1) % 3 == up && (up + 1) % 3 == front;
     let is_right_handed = a * b * c == if is_even { 1 } else { -1 };
-    is_right_handed && matches!(axes.up, CoordinateAxis::PositiveY | CoordinateAxis::PositiveZ)
+    let is_up = matches!(axes.up, CoordinateAxis::PositiveY | CoordinateAxis::PositiveZ);
+    is_right_handed && is_up || !ufbx::coordinate_axes_valid(axes)
 }
 
 fn units(settings: &SceneSettings) -> Units {
@@ -127,6 +129,9 @@ fn fault(error: &ufbx::Error, limit: usize) -> Fault {
             Fault::unsupported("is of a version of FBX that is not read; export it as FBX 2010 or later")
         }
         ErrorType::UnrecognizedFileFormat => Fault::damaged("does not begin as a file of FBX does; export it again"),
+        ErrorType::Unknown => {
+            Fault::damaged("is not whole: a number in it names what is not there, or was cut; copy or export it again")
+        }
         _ => Fault::damaged(format!("is not whole as FBX ({what}); copy or export it again")),
     }
 }
