@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use cager_geometry::surface;
 use ufbx::{Anim, AnimCurve, AnimStack, Node, Scene};
 
 use crate::dropped::listed;
 use crate::error::Fault;
 use crate::frames::{RATES, Times, nominal};
-use crate::scene::{Timeline, check_held, ranges, shown};
+use crate::scene::{Timeline, check_held, shown};
 
 /// Frames by which the first and the last may miss whole ones.
 const SLACK: f64 = 1e-3;
@@ -109,7 +110,7 @@ pub(super) fn shown_in(anim: &Anim, stack: Option<&AnimStack>, above: &[&Node], 
     };
     let states: Vec<bool> = changes.iter().map(|&frame| is_shown(frame)).collect();
     let state = |frame| states[changes.partition_point(|&change| change <= frame) - 1];
-    ranges((0..at.len()).map(state))
+    surface::shown_in((0..at.len()).map(state))
 }
 
 /// The times of the keys of a node's visibility.
