@@ -16,7 +16,7 @@ use cager_client::{FrameSource, MeshFile};
 use cager_core::cage::Cage;
 use cager_formats::{AtomicFile, Target, Units, obj_bytes};
 use cager_geometry::mesh::{Model, Point};
-use cager_proto::container::{ContainerReader, ContainerWriter, counted_from_zero};
+use cager_proto::container::{ContainerReader, ContainerWriter, counted_from_zero, pack_model};
 use std::io::{BufReader, BufWriter};
 use std::path::Path;
 use std::time::Instant;
@@ -101,8 +101,11 @@ pub(super) fn run(
     let job = RemoteJob {
         address,
         token: token.as_deref(),
-        // A service reads a rest pose as it is, with the doubles along seams, and where it is; of an archive it would get all meshes and all frames.
-        rest: if args.capture.weld
+        // A service reads a rest pose as it is, with the doubles along seams, and where it is; of an archive it would get all meshes and all frames, and
+        // of a file without those beside it neither materials nor pictures.
+        rest: if !rest.surface.is_empty() {
+            MeshFile::new("rest.cager", pack_model(rest, Units::UNKNOWN)?)
+        } else if args.capture.weld
             || files.origin.is_some()
             || !args.capture.checks.prim.is_empty()
             || is_scene(&args.rest)

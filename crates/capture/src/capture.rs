@@ -6,7 +6,6 @@ use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, DEFINITION};
 use cager_core::inversion::{Solver, SolverOptions};
 use cager_geometry::mesh::{Model, Point};
-use cager_geometry::surface::Picture;
 use cager_geometry::units::Units;
 use cager_proto::container::{self, ContainerWriter, Header, counted_from_zero};
 use cager_proto::report::{Coding, ConditionNumber, FrameError, Report};
@@ -104,14 +103,6 @@ impl<W: Write> CaptureWriter<W> {
         let diagonal = encoding.solver.diagonal();
         let stays_near = encoding.solver.nearness().is_some();
         Ok(Self { writer, report, squared: 0.0, spread: 0.0, diagonal, farthest: (0, 0.0), stays_near })
-    }
-
-    /// Adds the pictures that the materials of the model name, before any frame.
-    ///
-    /// # Errors
-    /// An output that refuses.
-    pub fn write_pictures(&mut self, pictures: &[Picture]) -> Result<(), container::Error> {
-        self.writer.write_pictures(pictures)
     }
 
     /// Sets the frame numbers, one for each frame to be written.

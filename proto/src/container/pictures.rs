@@ -26,7 +26,7 @@ impl<W: Write> ContainerWriter<W> {
     ///
     /// # Errors
     /// An output that refuses.
-    pub fn write_pictures(&mut self, pictures: &[Picture]) -> Result<(), Error> {
+    pub(super) fn write_pictures(&mut self, pictures: &[Picture]) -> Result<(), Error> {
         if pictures.is_empty() {
             return Ok(());
         }

@@ -85,7 +85,10 @@ impl<W: Write> ContainerWriter<W> {
             Some(coded) => coded.surface.clone(),
             None => CodedSurface::new(rest, &rest.faces),
         };
-        surface.map_or(Ok(()), |surface| writer.write_surface(&surface))?;
+        if let Some(surface) = surface {
+            writer.write_surface(&surface)?;
+            writer.write_pictures(&surface.outline.pictures)?;
+        }
         writer.positions(tag::CAGE_VERTICES, &cage.vertices, coded_cage)?;
         writer.faces(tag::CAGE_FACES, cage.triangles.as_flattened(), coded_cage)?;
         Ok(writer)

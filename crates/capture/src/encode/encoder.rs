@@ -135,7 +135,6 @@ impl Encoder {
         let coded = meshes.as_ref().map(|meshes| (&meshes.rest, &meshes.cage));
         let out = BufWriter::with_capacity(1 << 20, file);
         let mut writer = CaptureWriter::new(out, &encoding, coded).map_err(fail)?;
-        writer.write_pictures(&job.rest.surface.pictures).map_err(fail)?;
         let points = rest.points.len();
         let group_frames = group_frames(points, solver.decoder().unknowns());
         let group_frames = job.memory_limit().frames(BYTES_PER_POSITION * points, group_frames);

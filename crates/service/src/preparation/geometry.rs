@@ -12,6 +12,7 @@ use cager_core::regularize::Regularizer;
 use cager_formats::{MeshFormat, Units, read_matrix_bytes, read_mesh_bytes};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
+use cager_proto::container::unpack_model;
 use std::path::Path;
 
 /// Rest pose and cage of a session, on a grid where its frames are coded.
@@ -116,6 +117,9 @@ pub(crate) fn read_part(part: &str, name: &str, bytes: &[u8]) -> Result<Model, A
 /// As [`read_part`].
 pub(crate) fn read_part_with_units(part: &str, name: &str, bytes: &[u8]) -> Result<(Model, Units), ApiError> {
     let path = Path::new(name);
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("cager")) {
+        return unpack_model(bytes).map_err(|error| geometry(format!("{part}: {name}: {error}")));
+    }
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
     let read = read_mesh_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))?;
     Ok((read.model, read.units))
