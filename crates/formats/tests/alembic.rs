@@ -473,23 +473,23 @@ fn one_of_several_meshes_is_chosen_by_path_or_name() {
     let source = array(".instanceSource", (TEXT, 1), 0, &[b"/coat/body".to_vec()], u8::to_le_bytes);
     instance.properties = vec![Property { kind: 1, ..source }];
     let (_folder, path) = saved(&archive("", &[EVEN], &[place("coat", same), place("skin", other), instance]));
-    let list = "/coat/body (3 points), /skin/body (2 points)";
-    let error = message(open_frames(&path, 3));
-    assert!(
-        error.contains(&format!("holds 3 meshes, {list} and /twin (an instance); choose one by its path with --prim")),
-        "{error}"
-    );
+    let list = "/coat/body (3 points) and /skin/body (2 points)";
+    let together = format!("holds 2 meshes, {list}, which together have 5 points, and 7 are expected; choose by paths");
+    assert!(message(open_frames(&path, 7)).contains(&together));
+    let frames = open_frames(&path, 5).unwrap();
+    assert!(frames.notes()[0].contains("/twin is an instance of /coat/body, which is not read"));
     let take = |prim: &str, points| {
         let selection = FrameSelection { prims: vec![prim.to_owned()], ..FrameSelection::default() };
         open_selected_frames(&path, points, &selection).map(|mut reader| all(&mut *reader))
     };
-    for prim in ["/skin/body", "skin/body/", "skin", "/skin"] {
+    for prim in ["/skin/body", "skin/body/", "skin", "/skin", "body"] {
         assert_eq!(take(prim, 2).unwrap(), [vec![5.0; 6]], "{prim}");
-        assert_eq!(read_mesh(&path, &[prim.to_owned()]).unwrap().model.points.len(), 2, "{prim}");
     }
-    assert!(message(take("body", 2)).contains("holds 2 meshes, /coat/body (3 points) and /skin/body (2 points)"));
+    for (prim, points) in [("/skin/body", 2), ("skin", 2), ("body", 5)] {
+        assert_eq!(read_mesh(&path, &[prim.to_owned()]).unwrap().model.points.len(), points, "{prim}");
+    }
     for prim in ["hat", "/hat/body", "/body", "ody", "/coat/body/body"] {
-        assert!(message(take(prim, 2)).contains(&format!("holds no mesh {prim}, but {list} and /twin")), "{prim}");
+        assert!(message(take(prim, 2)).contains(&format!("holds no mesh {prim}, but {list}; give")), "{prim}");
     }
     assert!(message(take("twin", 3)).contains("/twin is an instance of /coat/body, which is not read; "));
     assert!(matches!(take("/coat", 2), Err(Error::PointCount { expected: 2, found: 3, .. })));

@@ -230,23 +230,53 @@ fn a_character_of_blender_comes_back_from_an_archive() {
     assert_eq!(read_mesh(&copy, &[]).unwrap().model.surface, model.surface);
 }
 
-/// `make alembic` installs it.
+#[test]
+fn names_of_any_number_and_length_are_kept() {
+    let mut faces = Polygons::new();
+    (0..300).for_each(|k| faces.push(&[3 * k, 3 * k + 1, 3 * k + 2]));
+    let name = |k: usize| format!("{}{k}", "n".repeat(k));
+    let part = |k: usize| Part {
+        path: format!("/all/{}", name(k)),
+        points: 3,
+        faces: 1,
+        uv_sets: vec![CornerSet { name: name(k), values: vec![[0.5, 0.25]], corners: vec![0; 3] }],
+        ..Part::default()
+    };
+    let surface = Surface { parts: (0..300).map(part).collect(), ..Surface::default() };
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("a.abc");
+    let options = FrameOptions { surface: surface.clone(), ..FrameOptions::default() };
+    let mut writer = create_frames(&path, 900, 1, &faces, &options).unwrap();
+    writer.write_frame(&(0..2700_u16).map(f32::from).collect::<Vec<_>>()).unwrap();
+    writer.finish().unwrap();
+    assert_eq!(read_mesh(&path, &[]).unwrap().model.surface, surface);
+    if let Some(text) = read_by_library(&path) {
+        let found: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("uv ")).collect();
+        let expected = (0..300).map(|k| format!("{} kFacevaryingScope 0.5 0.25 0.5 0.25 0.5 0.25", name(k)));
+        assert_eq!(found, expected.collect::<Vec<_>>());
+    }
+}
+
 #[test]
 fn the_library_of_alembic_reads_what_lies_on_the_faces() {
     let folder = tempdir().unwrap();
-    let path = written(folder.path());
-    let python = std::env::var("CAGER_ALEMBIC_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let found = Command::new(&python).args(["-c", "import imath, alembic3d"]).output();
-    if !found.is_ok_and(|found| found.status.success()) {
-        eprintln!("skipped: {python} has no alembic3d; `make alembic` installs it and runs this test");
-        return;
-    }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/read_alembic_surface.py");
-    let done = Command::new(&python).arg(script).arg(&path).output().unwrap();
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let text = String::from_utf8(done.stdout).unwrap();
+    let Some(text) = read_by_library(&written(folder.path())) else { return };
     for (found, expected) in text.lines().zip(READ.lines()) {
         assert_eq!(found.trim(), expected);
     }
     assert_eq!(text.lines().count(), READ.lines().count());
+}
+
+/// What the library of Alembic says of a file, where it is there: `make alembic` installs it.
+fn read_by_library(path: &Path) -> Option<String> {
+    let python = std::env::var("CAGER_ALEMBIC_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let found = Command::new(&python).args(["-c", "import imath, alembic3d"]).output();
+    if !found.is_ok_and(|found| found.status.success()) {
+        eprintln!("skipped: {python} has no alembic3d; `make alembic` installs it and runs this test");
+        return None;
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/read_alembic_surface.py");
+    let done = Command::new(&python).arg(script).arg(path).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    Some(String::from_utf8(done.stdout).unwrap())
 }

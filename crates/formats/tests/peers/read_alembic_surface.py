@@ -12,9 +12,9 @@ def numbers(values):
     return " ".join(f"{x:.3f}".rstrip("0").rstrip(".") for x in flat)
 
 
-def samples(property):
-    times = property.getTimeSampling()
-    return [Abc.ISampleSelector(times.getSampleTime(k)) for k in range(property.getNumSamples())]
+def samples(values):
+    times = values.getTimeSampling()
+    return [Abc.ISampleSelector(times.getSampleTime(k)) for k in range(values.getNumSamples())]
 
 
 def show(parent, header, kind):
@@ -43,8 +43,8 @@ def show(parent, header, kind):
                 value = kind(others, name).getExpandedValue(Abc.ISampleSelector(0.0))
                 print("other", kind.__name__, name, value.getScope(), numbers(value.getVals()))
     for name in schema.getFaceSetNames():
-        set = schema.getFaceSet(name).getSchema()
-        print("set", name, set.getFaceExclusivity(), *set.getValue(Abc.ISampleSelector(0.0)).getFaces())
+        faces = schema.getFaceSet(name).getSchema()
+        print("set", name, faces.getFaceExclusivity(), *faces.getValue(Abc.ISampleSelector(0.0)).getFaces())
 
 
 def visit(parent):

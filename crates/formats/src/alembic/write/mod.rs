@@ -7,6 +7,7 @@ mod tables;
 mod tree;
 
 use std::io::{self, Seek, Write};
+use std::ops::Range;
 
 use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::surface::{Part, Surface};
@@ -59,7 +60,7 @@ pub(crate) struct MeshWriter<W> {
     nodes: Vec<Node>,
     parts: Vec<PartWriter>,
     /// When each part is shown.
-    shown: Vec<Option<Vec<std::ops::Range<u32>>>>,
+    shown: Vec<Option<Vec<Range<u32>>>>,
     frames: u32,
     bytes: Vec<u8>,
 }
@@ -123,7 +124,7 @@ impl<W: Write + Seek> MeshWriter<W> {
         self.sink.close(root)
     }
 
-    /// Writes the properties of a transform, which `own` ends: Maya shows no mesh without one above it.
+    /// Writes the properties of a transform behind its `own`: Maya shows no mesh without one above it.
     fn transform(&mut self, metadata: &mut Metadata, own: Compound, is_top: bool) -> io::Result<Written> {
         let sink = &mut self.sink;
         let still = |number, extent| Values { kind: Kind::Scalar, number, extent, sampling: 0 };

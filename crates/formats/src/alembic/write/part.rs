@@ -1,5 +1,6 @@
 //! One mesh of an archive: what is the same in all frames, and its frames.
 
+use std::collections::BTreeMap;
 use std::io::{self, Seek, Write};
 use std::ops::Range;
 
@@ -114,7 +115,7 @@ impl PartWriter {
         Ok(())
     }
 
-    /// Writes the object with the properties that `visible` begins, and the sets of faces below it.
+    /// Writes the object with what `properties` has and the mesh, and the sets of faces below it.
     pub(super) fn finish<W: Write + Seek>(
         &self,
         sink: &mut Sink<W>,
@@ -173,7 +174,7 @@ fn sets<W: Write + Seek>(sink: &mut Sink<W>, part: &Part, surface: &Surface) -> 
         found.push(FaceSet { name: names.unique(None, name), faces: sink.sample(&bytes)?, is_material });
         io::Result::Ok(())
     };
-    let mut of_material = std::collections::BTreeMap::<u32, Vec<u32>>::new();
+    let mut of_material = BTreeMap::<u32, Vec<u32>>::new();
     for (face, &material) in (0..).zip(&part.materials).filter(|&(_, &material)| material != NO_MATERIAL) {
         of_material.entry(material).or_default().push(face);
     }
