@@ -3,6 +3,7 @@
 mod support;
 
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -13,6 +14,10 @@ use cager_geometry::surface::{
 };
 use support::{all, archive, polygons, wide};
 use tempfile::tempdir;
+
+fn only(range: Range<u32>) -> Option<Vec<Range<u32>>> {
+    Some(std::iter::once(range).collect())
+}
 
 /// A roof of two quads that meet at a ridge, a flag below it that is hidden in the first and the last of three frames,
 /// and a triangle without a path.
@@ -51,7 +56,7 @@ fn scene() -> (Surface, Polygons, Vec<Vec<f32>>) {
         subdivision: Subdivision::CatmullClark,
         creases: vec![Crease { edge: [0, 2], sharpness: 2.5 }, Crease { edge: [1, 2], sharpness: 10.0 }],
         materials: vec![NO_MATERIAL],
-        shown: Some(vec![1..2]),
+        shown: only(1..2),
         ..Part::default()
     };
     let bare =
@@ -141,7 +146,7 @@ fn what_was_written_comes_back() {
     assert_eq!(roof.groups, [FaceGroup { name: "tiles_1".to_owned(), faces: vec![0, 1] }]);
     assert_eq!((flag.subdivision, &flag.creases), (Subdivision::CatmullClark, &expected_flag.creases));
     let mut reader = open_frames(&path, 12).unwrap();
-    assert_eq!(reader.shown(), [None, Some(vec![1..2]), Some(vec![0..1, 2..3])]);
+    assert_eq!(reader.shown(), [None, only(1..2), Some(vec![0..1, 2..3])]);
     let found: Vec<Vec<f64>> = all(&mut *reader);
     assert_eq!(found, wide(&frames));
 }
@@ -213,9 +218,10 @@ fn a_character_of_blender_comes_back_from_an_archive() {
             materials.iter().map(|&k| model.surface.materials[k as usize].name.as_str()).collect();
         let mut expected_names: Vec<_> =
             expected["materials"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
-        (names.sort_unstable(), expected_names.sort_unstable());
+        names.sort_unstable();
+        expected_names.sort_unstable();
         assert_eq!(names, expected_names, "{name}");
-        let hidden_before = (name == "lantern").then(|| vec![9..24]);
+        let hidden_before = only(9..24).filter(|_| name == "lantern");
         assert_eq!(reader.shown()[k], hidden_before, "{name}");
     }
     // The archive that is written of it has the same.

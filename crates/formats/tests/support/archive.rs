@@ -63,7 +63,7 @@ pub fn parameter(name: &'static str, metadata: &'static str, extent: u32, values
 }
 
 pub fn compound(name: &'static str, metadata: &'static str, inner: Vec<Property>) -> Property {
-    let none = array(name, (0, 0), 0, &[Vec::<u8>::new(); 0], u8::to_le_bytes);
+    let none = array(name, (0, 0), 0, &[], u8::to_le_bytes);
     Property { metadata, kind: 0, inner, ..none }
 }
 
