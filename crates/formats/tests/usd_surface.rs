@@ -73,7 +73,7 @@ fn surface() -> Surface {
         faces: 1,
         normals: vec![0, 1, 2],
         materials: vec![1],
-        shown: Some(vec![1..2]),
+        shown: Some(vec![0..1, 2..3]),
         ..Part::default()
     };
     let ball = Part {
@@ -129,7 +129,7 @@ fn what_lies_on_faces_comes_back() {
     expected.parts[1].shown = None;
     assert_eq!(read.model.surface, expected);
     let reader = cager_formats::open_frames(&path, 12).unwrap();
-    assert_eq!(reader.shown(), [None, Some(vec![1..2]), None]);
+    assert_eq!(reader.shown(), [None, Some(vec![0..1, 2..3]), None]);
 }
 
 #[test]
@@ -331,7 +331,7 @@ fn the_library_of_usd_reads_what_lies_on_faces() {
         "left groups 0 1 None",
         "/house/flag none /house/_materials/glass",
         "normals vertex 0.0 (0, 0, 1) (0, 0, 1) (0, 0, 1)",
-        "shown invisible inherited invisible",
+        "shown inherited invisible inherited",
         "/house/ball catmullClark None",
         "creases [0, 1, 1, 2] [2, 2] [2.5, 10]",
         "/house/_materials/tiles UsdPreviewSurface",

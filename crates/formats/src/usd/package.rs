@@ -1,5 +1,6 @@
 //! Packages, `.usdz`: zip archives of files as they are, of which the first is the layer.
 
+use std::borrow::Cow;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::Arc;
 
@@ -51,7 +52,7 @@ pub(super) fn others(source: Reader<'_>, length: u64) -> Result<(Reader<'_>, Vec
             continue;
         };
         left = rest;
-        let (Ok(path), mut bytes) = (file.name().map(|name| name.into_owned()), Vec::new()) else { continue };
+        let (Ok(path), mut bytes) = (file.name().map(Cow::into_owned), Vec::new()) else { continue };
         file.take(length).read_to_end(&mut bytes)?;
         files.push(Picture { path, bytes: Arc::from(bytes) });
     }

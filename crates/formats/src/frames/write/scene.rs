@@ -24,8 +24,8 @@ pub(super) struct SceneWriter {
 }
 
 enum Mesh {
-    Alembic(alembic::MeshWriter<AtomicFile>),
-    Usd(usd::MeshWriter<AtomicFile>),
+    Alembic(Box<alembic::MeshWriter<AtomicFile>>),
+    Usd(Box<usd::MeshWriter<AtomicFile>>),
 }
 
 impl SceneWriter {
@@ -60,7 +60,7 @@ impl SceneWriter {
                 return Err(too_long().at(path));
             }
             let cage = cage.map(|cage| Announced { points: cage.points, path: path.clone(), ..*announced });
-            return Ok(Self { mesh: Mesh::Usd(mesh), cage });
+            return Ok(Self { mesh: Mesh::Usd(Box::new(mesh)), cage });
         }
         let step = options.even_step();
         let numbers = if step.is_some() { vec![options.number(0)] } else { options.numbers.clone() };
@@ -68,7 +68,7 @@ impl SceneWriter {
         let (points, surface, origin) = (announced.points, &options.surface, options.origin);
         let scene = alembic::Scene { name: &name, points, faces, surface, schedule, origin };
         let mesh = alembic::MeshWriter::new(file, scene).map_err(write)?;
-        Ok(Self { mesh: Mesh::Alembic(mesh), cage: None })
+        Ok(Self { mesh: Mesh::Alembic(Box::new(mesh)), cage: None })
     }
 }
 

@@ -78,7 +78,7 @@ impl<'a, 'b> Parser<'a, 'b> {
     pub(super) fn parse(scanner: &'a mut Scanner<'b>) -> Result<Contents, Fault> {
         let mut parser = Self { scanner, contents: Contents::default(), open: Vec::new() };
         if parser.scanner.solid()? == Some(b'(') {
-            parser.fields(Owner::Layer)?;
+            parser.fields(&Owner::Layer)?;
         }
         loop {
             match parser.scanner.solid()? {
@@ -133,14 +133,14 @@ impl<'a, 'b> Parser<'a, 'b> {
         self.contents.nodes.push(Node { name: name.into_bytes().into(), parent, depth });
         self.contents.prims.push(Prim { kind, is_there: is_defined, composed: None });
         if self.scanner.solid()? == Some(b'(') {
-            self.fields(Owner::Prim(index))?;
+            self.fields(&Owner::Prim(index))?;
         }
         self.open.push(index);
         self.scanner.expect(b'{')
     }
 
     /// What is said in round brackets of a layer, a prim or a property.
-    fn fields(&mut self, owner: Owner) -> Result<(), Fault> {
+    fn fields(&mut self, owner: &Owner) -> Result<(), Fault> {
         self.scanner.expect(b'(')?;
         while !self.scanner.has(b')')? {
             // A comment has no key.
@@ -150,7 +150,7 @@ impl<'a, 'b> Parser<'a, 'b> {
             }
             let key = self.key()?;
             self.scanner.expect(b'=')?;
-            match (&owner, self.open.last()) {
+            match (owner, self.open.last()) {
                 (Owner::Layer, _) => self.layer_field(&key)?,
                 (Owner::Prim(prim), _) => self.prim_field(*prim, &key)?,
                 (Owner::Property(name), Some(&prim)) if key == "interpolation" => {
@@ -229,7 +229,7 @@ impl<'a, 'b> Parser<'a, 'b> {
             self.value(type_name, &name)?;
         }
         if self.scanner.solid()? == Some(b'(') {
-            self.fields(Owner::Property(name))?;
+            self.fields(&Owner::Property(name))?;
         }
         Ok(())
     }

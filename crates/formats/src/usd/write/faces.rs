@@ -87,7 +87,7 @@ fn put_subsets<W: Write + Seek>(
             Property::new("int[]", "indices").value(encoder.integers(faces)?),
         ];
         properties.extend(bound.map(|path| Property::to(BINDING, path.clone())));
-        let name = names.add(identifier(name));
+        let name = names.add(&identifier(name));
         let (type_name, is_bound) = ("GeomSubset", bound.is_some());
         subsets.push(Prim { name, type_name, is_bound, properties, children: Vec::new() });
         Ok::<_, io::Error>(())
@@ -122,10 +122,10 @@ fn names(part: &Part) -> Vec<String> {
     let colors = part.color_sets.iter().map(|set| (&set.name, "displayColor"));
     // Primvars of this name would be normals.
     let mut names = Names::default();
-    names.add("normals".to_owned());
+    names.add("normals");
     let named = |(name, usual): (&String, &str)| {
         let name = if name.is_empty() { usual.to_owned() } else { identifier(name) };
-        names.add(name)
+        names.add(&name)
     };
     uvs.chain(colors).map(named).collect()
 }

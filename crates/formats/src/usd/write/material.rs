@@ -26,7 +26,7 @@ pub(super) fn materials<W: Write + Seek>(
     let mut group = Prim { name: GROUP.to_owned(), type_name: "Scope", ..Prim::default() };
     let (mut names, mut paths) = (Names::default(), Vec::new());
     for (k, material) in (0..).zip(&surface.materials) {
-        let name = names.add(identifier(&material.name));
+        let name = names.add(&identifier(&material.name));
         let path = format!("{root}/{GROUP}/{name}");
         let of = surface.parts.iter().find(|part| !part.uv_sets.is_empty() && part.materials.contains(&k));
         let uvs = of.map_or_else(|| USUAL_UVS.to_owned(), |part| uv_names(part).remove(0));

@@ -47,7 +47,7 @@ impl Tree {
             None => root.to_owned(),
         };
         let mut tree = Self { nodes: vec![Node::new(root, None)] };
-        tree.nodes[0].names.add(GROUP.to_owned());
+        tree.nodes[0].names.add(GROUP);
         let mut groups: HashMap<(usize, &str), usize> = HashMap::new();
         let mut above = Vec::new();
         for path in &paths {
@@ -69,7 +69,7 @@ impl Tree {
     /// Adds a prim below another, with a name that no other one there has.
     fn add(&mut self, above: usize, name: &str, mesh: Option<usize>) -> usize {
         let node = self.nodes.len();
-        let name = self.nodes[above].names.add(identifier(name));
+        let name = self.nodes[above].names.add(&identifier(name));
         self.nodes.push(Node::new(name, mesh));
         self.nodes[above].children.push(node);
         node
@@ -95,10 +95,10 @@ pub(super) struct Names {
 
 impl Names {
     /// Adds a name, with a number behind it where it is taken.
-    pub(super) fn add(&mut self, name: String) -> String {
-        let mut found = name.clone();
+    pub(super) fn add(&mut self, name: &str) -> String {
+        let mut found = name.to_owned();
         while !self.taken.insert(found.clone()) {
-            let number = self.numbers.entry(name.clone()).or_default();
+            let number = self.numbers.entry(name.to_owned()).or_default();
             *number += 1;
             found = format!("{name}_{number}");
         }
