@@ -10,11 +10,13 @@ use std::path::{Component, Path};
 use base64::Engine as _;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use gltf::json::Root;
+use gltf::json::{Index, Root, deserialize};
 use percent_encoding::percent_decode_str;
+use serde_json::json;
 
 use super::container::split;
 use super::document::{Document, document};
+use super::draco::unpack;
 use super::faults::{damaged, item, too_large};
 use super::materials::Look;
 use super::meshopt::Packed;
@@ -62,7 +64,7 @@ impl<'a> Buffers<'a> {
             None => Vec::new(),
         };
         let file = bytes.len() + others.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
-        let buffers = Self {
+        let mut buffers = Self {
             decoded: vec![OnceCell::new(); root.buffers.len()],
             unpacked: vec![OnceCell::new(); root.buffer_views.len()],
             root,
@@ -74,7 +76,28 @@ impl<'a> Buffers<'a> {
             file,
         };
         others.into_iter().for_each(|(k, bytes)| drop(buffers.decoded[k].set(bytes)));
+        unpack(&mut buffers)?;
         Ok(buffers)
+    }
+
+    /// Adds a buffer in which accessors have their numbers.
+    pub(super) fn append(&mut self, bytes: Vec<u8>, accessors: &[(usize, Range<usize>)]) -> Result<(), Fault> {
+        let wrong = |cause: gltf::json::Error| Fault::damaged(cause.to_string());
+        let buffer = self.root.buffers.len();
+        self.taken.set(self.taken.get() + bytes.len());
+        let told = deserialize::from_value(json!({ "byteLength": bytes.len() })).map_err(wrong)?;
+        self.root.buffers.push(told);
+        self.decoded.push(bytes.into());
+        for (accessor, range) in accessors {
+            let view = json!({ "buffer": buffer, "byteOffset": range.start, "byteLength": range.len() });
+            self.root.buffer_views.push(deserialize::from_value(view).map_err(wrong)?);
+            self.unpacked.push(OnceCell::new());
+            if let Some(accessor) = self.root.accessors.get_mut(*accessor) {
+                accessor.buffer_view = Some(Index::new(self.root.buffer_views.len() as u32 - 1));
+                accessor.byte_offset = None;
+            }
+        }
+        Ok(())
     }
 
     /// Bytes that what is read of the file may take.

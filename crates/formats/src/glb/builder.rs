@@ -10,7 +10,6 @@ use gltf::json::validation::Checked;
 use super::accessor::{COLORS, POSITIONS, attribute};
 use super::alike::Block;
 use super::buffers::Buffers;
-use super::document::{DRACO, draco};
 use super::faults::{damaged, too_large};
 use super::scene::{Placement, Scene};
 use super::skin::Joints;
@@ -38,6 +37,8 @@ pub(super) struct Builder<'a, 'b> {
     pub(super) kept: Vec<u32>,
     /// How many points were stored.
     pub(super) stored: usize,
+    /// The node of each part.
+    pub(super) nodes: Vec<Option<usize>>,
     /// The numbers of materials among those that are used.
     pub(super) materials: HashMap<usize, u32>,
     /// Bytes that may still be taken, beside those of points and corners.
@@ -51,6 +52,8 @@ pub(super) struct Built {
     pub(super) kept: Option<Vec<u32>>,
     /// How many are stored.
     pub(super) stored: usize,
+    /// The node of each part, where it has one.
+    pub(super) nodes: Vec<Option<usize>>,
 }
 
 /// A mesh that is being placed.
@@ -77,15 +80,15 @@ impl<'a, 'b> Builder<'a, 'b> {
     /// Where `is_split`, points along seams are as many as are stored; without faces they always are.
     pub(super) fn new(buffers: &'a Buffers<'b>, scene: &'a Scene, contents: Contents, is_split: bool) -> Self {
         let (model, colors, materials) = (Model::default(), Colors::default(), HashMap::new());
-        let (kept, stored, most) = (Vec::new(), 0, buffers.most_bytes());
-        Self { buffers, scene, contents, is_split, model, colors, kept, stored, materials, most }
+        let (kept, stored, nodes, most) = (Vec::new(), 0, Vec::new(), buffers.most_bytes());
+        Self { buffers, scene, contents, is_split, model, colors, kept, stored, nodes, materials, most }
     }
 
     /// The meshes of placements in their order, as one.
     pub(super) fn build(mut self, placements: &[Placement]) -> Result<Built, Fault> {
         placements.iter().try_for_each(|placement| self.place(placement))?;
         self.finish_surface();
-        let Self { mut model, colors, kept, stored, .. } = self;
+        let Self { mut model, colors, kept, stored, nodes, .. } = self;
         let colors = colors.finish(stored, Scale::Fractions);
         let is_merged = kept.len() < stored && self.contents == Contents::PointsAndFaces;
         let kept = is_merged.then_some(kept);
@@ -93,7 +96,7 @@ impl<'a, 'b> Builder<'a, 'b> {
             Some(kept) if !colors.is_empty() => kept.iter().map(|&k| colors[k as usize]).collect(),
             _ => colors,
         };
-        Ok(Built { model, kept, stored })
+        Ok(Built { model, kept, stored, nodes })
     }
 
     fn place(&mut self, placement: &Placement) -> Result<(), Fault> {
@@ -123,15 +126,9 @@ impl<'a, 'b> Builder<'a, 'b> {
         if matches!(mode, Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
             return Ok(());
         }
-        let extensions = primitive.extensions.as_ref().map(|extensions| &extensions.others);
-        let is_draco = extensions.is_some_and(|extensions| extensions.contains_key(DRACO));
         let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).ok_or_else(|| {
             Fault::unsupported(format!("{place} has no POSITION; export the mesh without compression"))
         })?;
-        // Some files have the plain data as well.
-        if is_draco && self.buffers.root.accessors.get(positions.value()).is_some_and(|a| a.buffer_view.is_none()) {
-            return Err(draco());
-        }
         let block = match placed.points.get(&positions.value()) {
             Some(&known) => known,
             None => {

@@ -85,9 +85,32 @@ impl Channel {
         self.interpolation != Interpolation::Step && self.times.len() > 1 && !is_still()
     }
 
+    /// The scale of a mesh that is shown, where this one hides it by scales of 0.
+    pub(super) fn switched(&self) -> Option<&[f64]> {
+        let is_switch = self.property == Property::Scale && self.interpolation == Interpolation::Step;
+        let (mut shown, mut hidden) = (None, false);
+        for value in self.values.chunks(self.width).filter(|_| is_switch) {
+            if value == [0.0; 3] {
+                hidden = true;
+            } else if *shown.get_or_insert(value) != value {
+                return None;
+            }
+        }
+        shown.filter(|_| hidden)
+    }
+
+    /// Whether all of it is 0 at a time.
+    pub(super) fn is_zero(&self, time: f64) -> bool {
+        self.value(time).iter().all(|&x| x == 0.0)
+    }
+
     /// Puts the value at a time into a node.
     pub(super) fn apply(&self, time: f64, node: &mut Node) {
-        let value = self.value(time);
+        self.put(self.value(time), node);
+    }
+
+    /// Puts a value into a node.
+    pub(super) fn put(&self, value: Vec<f64>, node: &mut Node) {
         match self.property {
             Property::MorphTargetWeights => node.weights = Some(value.iter().map(|&x| x as f32).collect()),
             Property::Rotation => {

@@ -19,7 +19,9 @@ use crate::scene::{shown, union};
 const NUMBER_BYTES: usize = 12;
 
 pub(super) struct Clip {
-    pub(super) channels: Vec<Channel>,
+    channels: Vec<Channel>,
+    /// Those that show and hide a mesh, which is where it is all the same.
+    switches: Vec<Channel>,
     /// What is to be said of others.
     pub(super) note: Option<String>,
 }
@@ -33,7 +35,8 @@ impl Clip {
         wanted: Option<&str>,
     ) -> Result<Option<Self>, Fault> {
         let root = &buffers.root;
-        let movers = Movers::of(root, scene, &scene.placements[chosen]);
+        let chosen = &scene.placements[chosen];
+        let movers = Movers::of(root, scene, chosen);
         let moves = |k: &usize| {
             let channels = &root.animations[*k].channels;
             channels.iter().any(|channel| movers.move_by(channel.target.node.value(), &channel.target.path))
@@ -80,12 +83,32 @@ impl Clip {
                 names(root, &others)
             )
         });
-        Ok(Some(Self { channels, note }))
+        let is_own = |channel: &Channel| {
+            let has_none_below = root.nodes[channel.node].children.as_ref().is_none_or(Vec::is_empty);
+            has_none_below && chosen.iter().any(|own| own.skin.is_none() && own.node == Some(channel.node))
+        };
+        let (switches, channels) =
+            channels.into_iter().partition(|channel| channel.switched().is_some() && is_own(channel));
+        Ok(Some(Self { channels, switches, note }))
     }
 
     /// The times of all keys, ascending, none twice.
     pub(super) fn key_times(&self) -> Vec<f64> {
-        union(self.channels.iter().flat_map(|channel| &channel.times).copied().collect(), NEAR)
+        let all = self.channels.iter().chain(&self.switches);
+        union(all.flat_map(|channel| &channel.times).copied().collect(), NEAR)
+    }
+
+    /// Which of some times the mesh of a node is shown at; none where it always is.
+    pub(super) fn shown(&self, node: usize, times: &[f64]) -> Option<Vec<Range<u32>>> {
+        let switch = self.switches.iter().find(|channel| channel.node == node)?;
+        let mut shown: Vec<Range<u32>> = Vec::new();
+        for (k, _) in (0..).zip(times).filter(|&(_, &time)| !switch.is_zero(time)) {
+            match shown.last_mut().filter(|range| range.end == k) {
+                Some(range) => range.end += 1,
+                None => shown.push(k..k + 1),
+            }
+        }
+        (shown != [0..times.len() as u32]).then_some(shown)
     }
 
     pub(super) fn moves_between_keys(&self) -> bool {
@@ -97,6 +120,11 @@ impl Clip {
         for channel in &self.channels {
             if let Some(node) = root.nodes.get_mut(channel.node) {
                 channel.apply(time, node);
+            }
+        }
+        for channel in &self.switches {
+            if let (Some(node), Some(shown)) = (root.nodes.get_mut(channel.node), channel.switched()) {
+                channel.put(shown.to_vec(), node);
             }
         }
     }

@@ -4,6 +4,7 @@
 
 use gltf::json::{Root, Value};
 
+use super::draco::DRACO;
 use super::materials::{Look, materials};
 use crate::error::Fault;
 use crate::text::quoted;
@@ -63,7 +64,6 @@ pub(super) fn document(json: &[u8]) -> Result<Document, Fault> {
     without_channels_of_no_node(&mut document)?;
     let root: Root = gltf::json::deserialize::from_value(document).map_err(wrong)?;
     match root.extensions_required.iter().find(|name| !is_read(name)) {
-        Some(name) if name == DRACO => Err(draco()),
         Some(name) => {
             let name = quoted(name.as_bytes());
             Err(Fault::unsupported(format!(
@@ -162,19 +162,11 @@ fn frame_numbers(document: &Value) -> Option<[f64; 2]> {
     (first.abs() < 1e9 && crate::frames::RATES.contains(&rate)).then_some([first, rate])
 }
 
-pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
-
 /// Whether files that require an extension are read: it is understood, or changes no shape.
 fn is_read(extension: &str) -> bool {
     /// Parts of the names of extensions for appearance, sound, behaviour and notes.
     const OTHER: &str = "_materials_ _texture_ _light _xmp _audio _animation_pointer _interactivity _node_visibility \
         _node_selectability _node_hoverability _mesh_features _structural_metadata";
-    matches!(extension, "KHR_mesh_quantization" | "EXT_meshopt_compression" | "KHR_meshopt_compression")
+    matches!(extension, DRACO | "KHR_mesh_quantization" | "EXT_meshopt_compression" | "KHR_meshopt_compression")
         || OTHER.split(' ').any(|part| extension.contains(part))
-}
-
-pub(super) fn draco() -> Fault {
-    Fault::unsupported(format!(
-        "is compressed by Draco ({DRACO}), which is not read; export it without compression, or open it in Blender and do so there"
-    ))
 }

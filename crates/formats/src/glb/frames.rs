@@ -86,7 +86,7 @@ impl MeshFrames {
         if rest.model.points.len() != expected_points && rest.stored == expected_points && rest.kept.is_some() {
             rest = build(true)?;
         }
-        let Built { model: rest, kept, stored } = rest;
+        let Built { model: rest, kept, stored, .. } = rest;
         let points = rest.points.len();
         if points == 0 {
             return Err(Fault::invalid("has no points; export the mesh with its vertices"));

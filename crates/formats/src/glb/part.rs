@@ -39,6 +39,7 @@ impl Builder<'_, '_> {
             self.add_sets(&mut part, placed, &corners);
         }
         self.model.surface.parts.push(part);
+        self.nodes.push(placed.placement.node);
         for face in corners.as_chunks::<3>().0 {
             self.model.faces.push(&face.map(|point| point + first as u32));
         }
