@@ -36,16 +36,16 @@ pub(crate) struct CaptureArgs {
 /// What is accepted of a capture.
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
-    /// The meshes to take of Alembic archives, USD files and glTF (rest pose and capture): paths, such as /walk/body, names, or globs of these, such as '/walk/**/eye*';
+    /// The meshes to take of Alembic archives, USD files, glTF and FBX (rest pose and capture): paths, such as /walk/body, names, or globs of these, such as '/walk/**/eye*';
     /// may be given several times [default: all that are rendered]. An only mesh is taken whatever it is called. Of .npz with several arrays that fit, the name of one.
     #[arg(long, value_name = "PATH", hide_default_value = true)]
     pub(super) prim: Vec<String>,
 
-    /// Frames to take for each second of an animated .glb or .gltf, which has keys instead of frames [default: those at its keys].
+    /// Frames to take for each second of an animated .glb, .gltf or .fbx, which has keys instead of frames [default: those at its keys; of .fbx at the rate of its scene].
     #[arg(long, value_name = "F", value_parser = rate, allow_negative_numbers = true, hide_default_value = true)]
     pub(super) sample_rate: Option<f64>,
 
-    /// The animation to take of a .glb or .gltf with several: its name, or its number from 0 [default: the first that moves the mesh].
+    /// The animation to take of a .glb, .gltf or .fbx with several: its name, or its number from 0 [default: the first that moves the mesh].
     #[arg(long, value_name = "NAME", hide_default_value = true)]
     pub(super) animation: Option<String>,
 

@@ -179,7 +179,7 @@ fn frames_that_are_not_there_are_refused() {
     std::fs::create_dir(dir.path("empty")).expect("a folder");
     dir.model("mixed/1.obj", &small.rest);
     dir.model("mixed/2.ply", &small.rest);
-    dir.write("walk.fbx", "a format that is not read");
+    dir.write("walk.dae", "a format that is not read");
     dir.write("walk.mp4", "another");
     for (frames, word) in [
         ("empty", "no mesh files"),
@@ -189,7 +189,7 @@ fn frames_that_are_not_there_are_refused() {
         ("nowhere", "check the path"),
         ("nowhere.npy", "check the path"),
         ("mixed", "mixes"),
-        ("walk.fbx", "export the animated mesh as Alembic, USD or a point cache, .abc, .usdc, .pc2 or .mdd"),
+        ("walk.dae", "export the animated mesh as Alembic, USD or a point cache, .abc, .usdc, .pc2 or .mdd"),
         ("walk.mp4", ".npy .pc2 .mdd"),
         ("[.obj", "pattern"),
     ] {
@@ -204,7 +204,7 @@ fn frames_that_are_not_there_are_refused() {
 #[test]
 fn missing_and_unreadable_meshes_are_refused() {
     let (dir, _) = Dir::with_capture();
-    dir.write("rest.fbx", "a format that is not read");
+    dir.write("rest.dae", "a format that is not read");
     dir.write("bare", "no extension");
     dir.write("empty.obj", "");
     dir.write("text.obj", "Dear reader,\nthis is a letter.\n");
@@ -212,7 +212,7 @@ fn missing_and_unreadable_meshes_are_refused() {
     for (rest, word) in [
         ("nowhere.obj", "check the path"),
         ("rest.obj/x.obj", "check the path"),
-        ("rest.fbx", ".obj .ply .off .stl .glb"),
+        ("rest.dae", ".obj .ply .off .stl .glb"),
         ("bare", "extension"),
         ("empty.obj", "empty"),
         ("text.obj", "no points"),

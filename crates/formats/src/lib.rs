@@ -2,7 +2,7 @@
 //!
 //! Readers take bytes of any origin: they return an error for whatever they do not understand,
 //! never panic, and never allocate more than a small multiple of what the file holds (and 512 MiB
-//! for copies that glTF makes). Writers make files that appear whole or not at all.
+//! for copies that glTF and FBX make). Writers make files that appear whole or not at all.
 
 mod alembic;
 pub mod atomic;

@@ -10,8 +10,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use cager_formats::{
-    CacheFormat, FrameSelection, MeshFormat, ReadModel, Up, open_frames, open_frames_bytes, open_selected_frames,
-    read_mesh, read_mesh_bytes,
+    CacheFormat, FrameSelection, MeshFormat, ReadModel, Up, create_frames, open_frames, open_frames_bytes,
+    open_selected_frames, read_mesh, read_mesh_bytes,
 };
 use cager_geometry::surface::{Channel, Part, Subdivision};
 use support::message;
@@ -139,6 +139,49 @@ Connections:  {
 }
 
 #[test]
+fn a_geometry_cache_beside_the_scene_moves_its_mesh() {
+    let cache = "\tDeformer: 120, \"Deformer::cache\", \"VertexCacheDeformer\" {
+		Version: 100
+		Properties70:  {
+			P: \"Active\", \"bool\", \"\", \"\",1
+		}
+	}
+	Cache: 121, \"Cache::walk\", \"\" {
+		Version: 100
+		Properties70:  {
+			P: \"CacheFileName\", \"KString\", \"XRefUrl\", \"\", \"caches\\walk.xml\"
+			P: \"CacheFileType\", \"enum\", \"\", \"\",2
+		}
+	}
+}
+Connections:  {
+	C: \"OO\",120,100
+	C: \"OO\",121,120
+";
+    let text = CUBE.replace("}\nConnections:  {\n", cache);
+    let (still, _, notes) = frames(&text, 8, &cube_alone());
+    assert!(notes[0].contains("/walker/cube is moved by a geometry cache that is not there"), "{notes:?}");
+    assert_eq!(still[3][21..24], [1.5, 6.0, 1.0]);
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("a.fbx");
+    fs::write(&path, &text).unwrap();
+    let mut writer =
+        create_frames(folder.path().join("walk.mcx"), 8, 25, &Default::default(), &Default::default()).unwrap();
+    for k in 0..25_u8 {
+        writer.write_frame(&[f32::from(k); 24]).unwrap();
+    }
+    writer.finish().unwrap();
+    let mut reader = open_selected_frames(&path, 8, &cube_alone()).unwrap();
+    assert!(reader.notes().is_empty());
+    let mut frame = Vec::new();
+    for k in 0..25 {
+        assert!(reader.read_next(&mut frame).unwrap());
+        let k = f64::from(k);
+        assert!((frame[21] - 1.5 * k).abs() < 1e-5 && (frame[22] - 5.0 - k).abs() < 1e-5, "{:?}", &frame[21..]);
+    }
+}
+
+#[test]
 fn other_axes_are_turned_and_said() {
     // The first axis towards the left.
     let mirrored = CUBE
@@ -184,7 +227,7 @@ fn what_is_wrong_with_a_file_is_said() {
     assert!(error.contains("holds 2 meshes, /walker/cube (8 points) and /walker/flag (5 points)"), "{error}");
     let folder = tempdir().unwrap();
     let path = folder.path().join("new.fbx");
-    let error = message(cager_formats::create_frames(&path, 1, 1, &Default::default(), &Default::default()));
+    let error = message(create_frames(&path, 1, 1, &Default::default(), &Default::default()));
     assert!(error.contains("is not a format of frames that is written"), "{error}");
 }
 

@@ -384,10 +384,10 @@ fn a_binary_stl_cut_short_says_how_much_is_there() {
 
 #[test]
 fn unknown_formats_are_answered_with_the_known_ones() {
-    let error = message(MeshFormat::from_path("scan.fbx".as_ref()));
+    let error = message(MeshFormat::from_path("scan.dae".as_ref()));
     assert_eq!(
         error,
-        "scan.fbx: .fbx is not a mesh format that is read; convert it to one of .obj .ply .off .stl .glb .abc .usdc .usdz .usda .usd .gltf"
+        "scan.dae: .dae is not a mesh format that is read; convert it to one of .obj .ply .off .stl .glb .abc .usdc .usdz .usda .usd .gltf .fbx"
     );
     assert!(message(MeshFormat::from_path("scan".as_ref())).contains("has no file name extension"));
     assert_eq!(MeshFormat::from_path("A.OBJ".as_ref()).unwrap(), MeshFormat::Obj);

@@ -56,7 +56,7 @@ fn what_else_stands_in_place_of_a_file_is_called_by_its_name() {
         ("annex.stl", b"/annex/objects/SHA256E-s1048576--00.stl\n", "is a git-annex pointer"),
         ("page.glb", b"404: Not Found", "is a web page, not the file itself"),
         ("packed.obj", b"\x1f\x8b\x08\0\0\0\0\0\0\x03", "is packed with gzip; unpack it first"),
-        ("scene.obj", b"Kaydara FBX Binary  \0\x1a\0", "is not a .obj file but a file of FBX"),
+        ("scene.obj", b"Kaydara FBX Binary  \0\x1a\0", "is not a .obj file but a file of the kind .fbx"),
         ("rest.off", &dir.read("rest.obj"), "is not a .off file but a file of the kind .obj; rename it"),
     ] {
         dir.write(name, bytes);

@@ -19,9 +19,9 @@ fn refused(dir: &Dir, line: &str, words: &[&str]) {
 fn scenes_that_are_not_read_name_the_way_out() {
     let dir = Dir::with_case(CASE);
     dir.write("scene.blend", "BLENDER");
-    dir.write("scenes/f1.fbx", "Kaydara");
-    dir.write("scenes/f2.fbx", "Kaydara");
-    for frames in ["walk.fbx", "scene.blend", "scenes", "scenes/*.fbx"] {
+    dir.write("scenes/f1.dae", "<COLLADA");
+    dir.write("scenes/f2.dae", "<COLLADA");
+    for frames in ["walk.dae", "scene.blend", "scenes", "scenes/*.dae"] {
         let line = format!("encode --rest rest.obj --cage cage.obj --frames {frames} -o out.cager");
         refused(&dir, &line, &["not read", ".abc, .usdc, .pc2 or .mdd", "docs/BLENDER.md"]);
     }

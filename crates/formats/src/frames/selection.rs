@@ -17,9 +17,10 @@ pub struct FrameSelection {
     /// Meshes of a scene that has several, by paths, names or globs of these, all where there are
     /// none; the array of an `.npz` file, the cache of a Maya file.
     pub prims: Vec<String>,
-    /// The animation of glTF, by its name or number; by default the first that moves the mesh.
+    /// The animation of glTF and FBX, by its name or number; by default the first that moves the mesh.
     pub animation: Option<String>,
-    /// Frames per second to take of glTF; by default frames are at the times of its keys.
+    /// Frames per second to take of glTF and FBX; by default frames are at the times of the keys of
+    /// glTF and at the rate of FBX.
     pub rate: Option<f64>,
     /// The rest pose, of whose parts files of a frame each may lack some.
     pub rest: Option<Arc<Model>>,
