@@ -6,7 +6,7 @@ mod support;
 
 use std::collections::HashMap;
 use std::fs::{self, File};
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use cager_formats::{
@@ -229,6 +229,92 @@ fn what_is_wrong_with_a_file_is_said() {
     let path = folder.path().join("new.fbx");
     let error = message(create_frames(&path, 1, 1, &Default::default(), &Default::default()));
     assert!(error.contains("is not a format of frames that is written"), "{error}");
+}
+
+#[test]
+fn copies_of_a_mesh_are_parts_of_their_own() {
+    let copy = "}
+Connections:  {
+	C: \"OO\",203,200
+	C: \"OO\",100,203
+	C: \"OO\",301,203
+	C: \"OO\",300,203
+";
+    let node = "\tModel: 203, \"Model::copy\", \"Mesh\" {
+		Version: 232
+		Properties70:  {
+			P: \"Lcl Translation\", \"Lcl Translation\", \"\", \"A\",0,0,7
+		}
+	}
+";
+    let text = CUBE.replace("}\nConnections:  {\n", &(node.to_owned() + copy));
+    let model = read(&text).unwrap().model;
+    let names: Vec<_> = model.surface.parts.iter().map(|part| part.path.as_str()).collect();
+    assert_eq!(names, ["/walker/cube", "/walker/flag", "/walker/copy"]);
+    assert_eq!((model.points.len(), model.points[13 + 7]), (21, [0.0, 1.0, 8.0]));
+    // With materials of its own.
+    assert_eq!(model.surface.parts[2].materials, [1, 1, 1, 0, 0, 0]);
+}
+
+/// A record of a binary file: its name, its properties and the records in it.
+fn record(start: usize, name: &str, properties: &[&[u8]], inner: &dyn Fn(usize) -> Vec<u8>) -> Vec<u8> {
+    let all = properties.concat();
+    let head = 13 + name.len();
+    let mut within = inner(start + head + all.len());
+    if !within.is_empty() {
+        within.extend([0; 13]);
+    }
+    let end = (start + head + all.len() + within.len()) as u32;
+    let sizes = [end, properties.len() as u32, all.len() as u32].map(u32::to_le_bytes).concat();
+    [sizes, vec![name.len() as u8], name.as_bytes().to_vec(), all, within].concat()
+}
+
+/// A mesh of so many zeros, packed.
+fn binary(zeros: usize) -> Vec<u8> {
+    let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    packer.write_all(&vec![0; 8 * zeros]).unwrap();
+    let packed = packer.finish().unwrap();
+    let sizes = [zeros as u32, 1, packed.len() as u32].map(u32::to_le_bytes).concat();
+    let vertices = [b"d".to_vec(), sizes, packed].concat();
+    let corners = [b"i".to_vec(), [3, 0, 12, 0, 1, (-3_i32) as u32].map(u32::to_le_bytes).concat()].concat();
+    let string = |text: &str| [b"S".to_vec(), (text.len() as u32).to_le_bytes().to_vec(), text.into()].concat();
+    let number = |number: i64| [b"L".to_vec(), number.to_le_bytes().to_vec()].concat();
+    let nothing = |_| Vec::new();
+    let mesh = |start| {
+        let mut all = record(start, "Vertices", &[&vertices], &nothing);
+        all.extend(record(start + all.len(), "PolygonVertexIndex", &[&corners], &nothing));
+        all
+    };
+    let objects = |start| {
+        let kind = |name: &str, class: &str| string(&format!("{name}\0\u{1}{class}"));
+        let geometry = [number(100), kind("m", "Geometry"), string("Mesh")];
+        let mut all = record(start, "Geometry", &geometry.each_ref().map(Vec::as_slice), &mesh);
+        let model = [number(200), kind("m", "Model"), string("Mesh")];
+        all.extend(record(start + all.len(), "Model", &model.each_ref().map(Vec::as_slice), &nothing));
+        all
+    };
+    let connections = |start| {
+        let mut all = Vec::new();
+        for [from, to] in [[200, 0], [100, 200]] {
+            let ends = [string("OO"), number(from), number(to)];
+            all.extend(record(start + all.len(), "C", &ends.each_ref().map(Vec::as_slice), &nothing));
+        }
+        all
+    };
+    let mut file = [b"Kaydara FBX Binary  \0\x1a\0".to_vec(), 7400_u32.to_le_bytes().to_vec()].concat();
+    file.extend(record(file.len(), "Objects", &[], &objects));
+    file.extend(record(file.len(), "Connections", &[], &connections));
+    file.extend([0; 13]);
+    file
+}
+
+#[test]
+fn a_file_that_unpacks_to_far_more_than_its_size_is_refused() {
+    let read = |zeros| read_mesh_bytes(MeshFormat::Fbx, Path::new("a.fbx"), &binary(zeros));
+    assert_eq!(read(9).unwrap().model.points, [[0.0; 3]; 3]);
+    assert_eq!(read(300_000).unwrap().model.points.len(), 100_000);
+    let error = message(read(9_000_000));
+    assert!(error.contains("takes more than 12 MiB, far more than its size"), "{error}");
 }
 
 /// The arrays of an archive of NumPy by their names, all numbers one after another.

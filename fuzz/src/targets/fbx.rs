@@ -35,7 +35,7 @@ pub(super) const FBX: Target = Target {
         "1e308",
         "nan",
     ],
-    // What a scene may take is a multiple of its bytes, as files are packed, beside 16 MiB for good and as many while it is read.
-    fixed: 40 << 20,
-    per_byte: 4096,
+    // Files are packed: a scene may take 8 MiB and a multiple of its bytes, once for good and once while it is read.
+    fixed: 18 << 20,
+    per_byte: 2048,
 };
