@@ -98,7 +98,7 @@ fn beside(folder: Option<&Path>, path: &str, info: &OpenFileInfo) -> Option<Stre
 
 /// Whether axes are right-handed with Y or Z up, or say nothing.
 fn is_upright(axes: CoordinateAxes) -> bool {
-    let axis = |axis: CoordinateAxis| (axis as usize / 2, if axis as usize % 2 == 0 { 1 } else { -1 });
+    let axis = |axis: CoordinateAxis| (axis as usize / 2, 1 - 2 * (axis as i32 % 2));
     let [(right, a), (up, b), (front, c)] = [axes.right, axes.up, axes.front].map(axis);
     let is_even = (right + 1) % 3 == up && (up + 1) % 3 == front;
     let is_right_handed = a * b * c == if is_even { 1 } else { -1 };
