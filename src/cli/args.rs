@@ -255,6 +255,11 @@ pub(crate) struct DecodeArgs {
     #[arg(long, value_enum, value_name = "LAYER", default_value = "all", conflicts_with = "cages")]
     pub(crate) layer: Layer,
 
+    /// Write a layer of USD on top of this file, which the capture came from: the points of its meshes in each frame alone, so that materials, groups and
+    /// bindings stay those of the file.
+    #[arg(long, value_name = "SOURCE.usd", conflicts_with_all = ["cages", "model"])]
+    pub(crate) onto: Option<PathBuf>,
+
     /// Write these parts of the model alone: their paths, names, or globs of these, such as 'eye*'; may be given several times.
     #[arg(long, value_name = "NAME", conflicts_with = "cages")]
     pub(crate) part: Vec<String>,

@@ -23,7 +23,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     }
     let transfer = &args.transfer;
     let dry_run = args.outputs.dry_run;
-    let inputs = [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref()];
+    let inputs = [Some(&args.input), transfer.with_cages.as_ref(), transfer.model.as_ref(), args.onto.as_ref()];
     let output = Outputs::new(args.outputs, inputs.into_iter().flatten())?.frames(&args.output)?;
     let mut container = if args.salvage { decode::open_cut(&args.input) } else { decode::open(&args.input) }?;
     if container.lacks_end() {
@@ -91,6 +91,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
         salvage: args.salvage,
         morphs: args.morphs.options(),
         with_cage: transfer.with_cage,
+        onto: args.onto.clone(),
         parts: args.part.clone(),
         units: transfer.meaning.units(),
     };
@@ -155,6 +156,7 @@ fn joined(args: &DecodeArgs, list: &StretchList, clock: Instant) -> Result<()> {
         (transfer.cages, "--cages", "each file of a list has a cage of its own"),
         (transfer.with_cage, "--with-cage", "each file of a list has a cage of its own"),
         (transfer.with_cages.is_some(), "--with-cages", "each file of a list has a cage of its own"),
+        (args.onto.is_some(), "--onto", "a layer moves the meshes of one capture"),
         (!args.part.is_empty(), "--part", "the files of a list may have parts of their own"),
         (transfer.model.is_some(), "--model", "each file of a list has a cage of its own"),
         (args.salvage, "--salvage", "what a list says holds for whole files"),

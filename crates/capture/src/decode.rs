@@ -24,7 +24,7 @@ use cager_geometry::surface::Surface;
 use cager_geometry::units::{Change, Units};
 use cager_proto::container;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What to decode, if not all frames of the container with its own model and cages.
 #[derive(Default)]
@@ -49,6 +49,8 @@ pub struct Decoding<'a> {
     pub morphs: MorphOptions,
     /// Whether the cage is kept beside the model, which USD alone does.
     pub with_cage: bool,
+    /// The file of USD whose meshes get the points: the output is a layer on top of it.
+    pub onto: Option<PathBuf>,
     /// Parts of the model that are written, by paths, names or globs of these: all where there are
     /// none.
     pub parts: Vec<String>,
@@ -176,6 +178,7 @@ impl<'a> Chosen<'a> {
             if there == 0 { Vec::new() } else { (0..taken.count()).map(|k| taken.frame(k)).collect() };
         let mut options = frame_options(&mut container, there, taken, timing, salvage).map_err(fail)?;
         let change = units::convert(&mut options, what.units, path)?;
+        options.onto.clone_from(&what.onto);
         if what.with_cage {
             let cage = container.cage().map_err(fail)?;
             let faces = Polygons::of_triangles(&cage.triangles);

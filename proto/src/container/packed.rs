@@ -34,7 +34,8 @@ pub fn unpack_model(bytes: &[u8]) -> Result<(Model, Units), Error> {
 
 fn around(model: &Model) -> TriMesh {
     let (low, high) = bounds(&model.points);
-    let corner = |k: usize| std::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] - 1.0 } else { high[axis] + 1.0 });
+    let corner =
+        |k: usize| std::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] - 1.0 } else { high[axis] + 1.0 });
     let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     TriMesh { vertices: (0..8).map(corner).collect(), triangles }

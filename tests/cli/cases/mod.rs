@@ -12,6 +12,7 @@ mod numbers;
 mod numpy;
 mod one_file_each;
 mod origin;
+mod parts;
 mod pointers;
 mod surface;
 mod turns;

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
+use cager_geometry::surface::shown_in;
 use gltf::json::animation::Property;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
@@ -101,14 +102,7 @@ impl Clip {
     /// Which of some times the mesh of a node is shown at; none where it always is.
     pub(super) fn shown(&self, node: usize, times: &[f64]) -> Option<Vec<Range<u32>>> {
         let switch = self.switches.iter().find(|channel| channel.node == node)?;
-        let mut shown: Vec<Range<u32>> = Vec::new();
-        for (k, _) in (0..).zip(times).filter(|&(_, &time)| !switch.is_zero(time)) {
-            match shown.last_mut().filter(|range| range.end == k) {
-                Some(range) => range.end += 1,
-                None => shown.push(k..k + 1),
-            }
-        }
-        (shown != [0..times.len() as u32]).then_some(shown)
+        shown_in(times.iter().map(|&time| !switch.is_zero(time)))
     }
 
     pub(super) fn moves_between_keys(&self) -> bool {

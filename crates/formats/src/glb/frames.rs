@@ -86,7 +86,7 @@ impl MeshFrames {
         if rest.model.points.len() != expected_points && rest.stored == expected_points && rest.kept.is_some() {
             rest = build(true)?;
         }
-        let Built { model: rest, kept, stored, .. } = rest;
+        let Built { model: rest, kept, stored, nodes } = rest;
         let points = rest.points.len();
         if points == 0 {
             return Err(Fault::invalid("has no points; export the mesh with its vertices"));
@@ -107,15 +107,9 @@ impl MeshFrames {
         let is_smooth = clip.as_ref().is_some_and(Clip::moves_between_keys);
         let Timeline { times, at } = timeline(keys, selection.rate, (buffers.frame_numbers, is_smooth), is_held)?;
         let notes = clip.as_ref().and_then(|clip| clip.note.clone()).into_iter().collect();
-        let info = MeshInfo {
-            points,
-            frames: at.len(),
-            times,
-            faces: rest.faces,
-            units: Units::METRES,
-            notes,
-            shown: Vec::new(),
-        };
+        let shown_at = |node: &Option<usize>| clip.as_ref().zip(*node).and_then(|(clip, node)| clip.shown(node, &at));
+        let shown = nodes.iter().map(shown_at).collect();
+        let info = MeshInfo { points, frames: at.len(), times, faces: rest.faces, units: Units::METRES, notes, shown };
         Ok(Self { buffers, chosen, kept, stored, clip, at, info })
     }
 }

@@ -94,7 +94,7 @@ fn visible(layer: &mut Layer<'_>, prim: usize) -> Result<Steps, Fault> {
     })
 }
 
-fn units(stage: &Stage) -> Units {
+pub(super) fn units(stage: &Stage) -> Units {
     let unit = stage.metres_per_unit.filter(|&unit| Units::is_length(unit));
     if unit.is_none() && stage.up_is_z.is_none() {
         return Units::UNKNOWN;

@@ -9,6 +9,7 @@ mod choice;
 mod layer;
 mod materials;
 mod mesh;
+mod onto;
 mod package;
 mod surface;
 mod text;
@@ -28,7 +29,8 @@ use crate::signature::Signature;
 use binary::Binary;
 use layer::Layer;
 use text::Text;
-pub(crate) use write::{MeshWriter, Scene};
+pub(crate) use onto::Onto;
+pub(crate) use write::{MeshWriter, OverWriter, Scene};
 
 /// Opens the meshes that are wanted; of their first frame alone where what is not read is to be told.
 pub(crate) fn open<'a>(

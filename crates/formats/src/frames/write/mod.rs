@@ -96,8 +96,16 @@ pub fn create_frames(
     if options.cage.is_some() && (pattern.is_some() || !keeps_cages) {
         return Err(Fault::unsupported("is not written with a cage; write .usdc or .usdz").at(path));
     }
+    let is_layer = matches!(CacheFormat::from_path(path), Some(CacheFormat::Usdc | CacheFormat::Usd));
+    if let Some(source) = options.onto.as_ref().filter(|_| !is_layer || options.cage.is_some()) {
+        let what = format!(
+            "is not written onto {}; end the name in .usdc, without a cage (.abc and others have the paths of the source as they are)",
+            source.display()
+        );
+        return Err(Fault::unsupported(what).at(path));
+    }
     let mut surface = options.surface.clone();
-    let beside = names_pictures(target).then(|| Beside::of(&mut surface, target));
+    let beside = (names_pictures(target) && options.onto.is_none()).then(|| Beside::of(&mut surface, target));
     let options = &FrameOptions { surface, ..options.clone() };
     let output = begin(&all, target, faces, options)?;
     Ok(FrameWriter::new(all, output, &options.surface, beside))

@@ -152,6 +152,9 @@ pub struct FrameOptions {
     pub morphs: MorphOptions,
     /// What lies on the faces; what a format has no place for is left out, and a note says so.
     pub surface: Surface,
+    /// The file of USD whose meshes get the frames: a layer on top of it is written, with points and
+    /// normals alone.
+    pub onto: Option<PathBuf>,
 }
 
 /// A cage that is written as a second mesh, which programs show as a guide and do not render.
@@ -209,6 +212,7 @@ impl Default for FrameOptions {
             cage: None,
             morphs: MorphOptions::default(),
             surface: Surface::default(),
+            onto: None,
         }
     }
 }

@@ -26,6 +26,7 @@ pub(super) struct SceneWriter {
 enum Mesh {
     Alembic(Box<alembic::MeshWriter<AtomicFile>>),
     Usd(Box<usd::MeshWriter<AtomicFile>>),
+    Over(Box<usd::OverWriter<AtomicFile>>),
 }
 
 impl SceneWriter {
@@ -42,12 +43,24 @@ impl SceneWriter {
         if let Some(cage) = &options.cage {
             check_cage(cage).map_err(|fault| fault.at(path))?;
         }
+        let codes = (0..announced.frames).map(|frame| options.number(frame)).collect();
+        if let Some(source) = &options.onto {
+            let onto = usd::Onto::find(source, path, &options.surface)?;
+            if !options.units.change_to(onto.units).is_none() {
+                let what = "has another unit or upward axis than what is written; bring it there with --up and --unit";
+                return Err(Fault::invalid(what).at(source));
+            }
+            let file = AtomicFile::create(target)?;
+            let (timing, origin) = ((options.fps, codes), options.origin);
+            let mesh = usd::OverWriter::new(file, faces, &options.surface, onto, timing, origin).map_err(write)?;
+            return Ok(Self { mesh: Mesh::Over(Box::new(mesh)), cage: None });
+        }
         let file = AtomicFile::create(target)?;
         if format != CacheFormat::Abc {
             let scene = usd::Scene {
                 name,
                 fps: options.fps,
-                codes: (0..announced.frames).map(|frame| options.number(frame)).collect(),
+                codes,
                 units: options.units,
                 origin: options.origin,
                 is_packed: format == CacheFormat::Usdz,
@@ -112,6 +125,7 @@ impl Output for SceneWriter {
         let written = match &mut self.mesh {
             Mesh::Alembic(mesh) => mesh.write_frame(positions),
             Mesh::Usd(mesh) => mesh.write_frame(positions, false),
+            Mesh::Over(mesh) => mesh.write_frame(positions),
         };
         written.map_err(|cause| Error::write(&announced.path, cause))
     }
@@ -131,7 +145,7 @@ impl Output for SceneWriter {
     }
 
     fn lost(&self, surface: &Surface) -> Vec<String> {
-        if matches!(self.mesh, Mesh::Usd(_)) {
+        if !matches!(self.mesh, Mesh::Alembic(_)) {
             return Vec::new();
         }
         // Archives have the names of materials alone, those of sets of faces.
@@ -145,6 +159,7 @@ impl Output for SceneWriter {
         let finished = match self.mesh {
             Mesh::Alembic(mesh) => mesh.finish(),
             Mesh::Usd(mesh) => mesh.finish(),
+            Mesh::Over(mesh) => mesh.finish(),
         };
         finished.map_err(|cause| Error::write(&announced.path, cause))?.commit()
     }

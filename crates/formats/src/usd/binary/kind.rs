@@ -27,4 +27,6 @@ pub(crate) const SPECIFIER: u8 = 42;
 pub(crate) const VARIABILITY: u8 = 44;
 pub(crate) const TIME_SAMPLES: u8 = 46;
 pub(crate) const DOUBLES: u8 = 48;
+pub(crate) const LAYER_OFFSETS: u8 = 49;
+pub(crate) const STRINGS: u8 = 50;
 pub(crate) const BLOCKED: u8 = 51;

@@ -1,5 +1,6 @@
 //! Values of a layer, and the prims and properties that have them.
 
+use std::borrow::Cow;
 use std::io::{self, Seek, Write};
 use std::sync::Arc;
 
@@ -32,7 +33,7 @@ pub(super) struct Prim {
 /// An attribute, or a relationship where it has no type.
 pub(super) struct Property {
     name: String,
-    type_name: &'static str,
+    type_name: Cow<'static, str>,
     is_uniform: bool,
     fields: Vec<(&'static str, Said)>,
     target: Option<String>,
@@ -45,8 +46,8 @@ pub(super) enum Said {
 }
 
 impl Property {
-    pub(super) fn new(type_name: &'static str, name: impl Into<String>) -> Self {
-        Self { name: name.into(), type_name, is_uniform: false, fields: Vec::new(), target: None }
+    pub(super) fn new(type_name: impl Into<Cow<'static, str>>, name: impl Into<String>) -> Self {
+        Self { name: name.into(), type_name: type_name.into(), is_uniform: false, fields: Vec::new(), target: None }
     }
 
     /// A token that does not change.
@@ -57,6 +58,10 @@ impl Property {
     /// A relationship to what has this path.
     pub(super) fn to(name: &str, path: String) -> Self {
         Self::new("", name).uniform().from(path)
+    }
+
+    pub(super) fn is_called(&self, name: &str) -> bool {
+        self.name == name
     }
 
     pub(super) fn is_relationship(&self) -> bool {
@@ -124,11 +129,29 @@ impl<W: Write + Seek> Encoder<W> {
         let children: Vec<&str> = prim.children.iter().map(|child| child.name.as_str()).collect();
         self.begin(&prim.name, (prim.type_name, prim.is_bound), &properties, &children)?;
         for property in prim.properties.iter().filter(|property| !property.is_relationship()) {
-            self.tables.token(property.type_name);
+            self.tables.token(&property.type_name);
         }
         prim.properties.iter().for_each(|property| self.property(property));
         prim.children.iter().try_for_each(|child| self.prim(child))?;
         self.tables.end();
+        Ok(())
+    }
+
+    /// In place of a value that a layer below says.
+    pub(super) const BLOCK: u64 = INLINED | (kind::BLOCKED as u64) << 48;
+
+    /// Begins a prim that says something of one in a layer below, and writes its properties; the
+    /// prims below it follow, then the end.
+    pub(super) fn over(&mut self, name: &str, properties: &[Property], children: &[&str]) -> io::Result<()> {
+        let mut fields = vec![("specifier", INLINED | value(kind::SPECIFIER, 1))];
+        let names: Vec<&str> = properties.iter().map(|property| property.name.as_str()).collect();
+        for (field, names) in [("properties", names.as_slice()), ("primChildren", children)] {
+            if !names.is_empty() {
+                fields.push((field, self.tokens(names)?));
+            }
+        }
+        self.tables.begin(PRIM, name, &fields);
+        properties.iter().for_each(|property| self.property(property));
         Ok(())
     }
 
@@ -164,7 +187,7 @@ impl<W: Write + Seek> Encoder<W> {
         };
         let mut fields = Vec::new();
         if kind == ATTRIBUTE {
-            fields.push(("typeName", self.token(property.type_name)));
+            fields.push(("typeName", self.token(&property.type_name)));
         }
         if property.is_uniform {
             fields.push(("variability", INLINED | value(kind::VARIABILITY, 1)));
@@ -240,6 +263,21 @@ impl<W: Write + Seek> Encoder<W> {
     pub(super) fn tokens(&mut self, names: &[&str]) -> io::Result<u64> {
         let bytes: Vec<u8> = names.iter().flat_map(|name| self.tables.token(name).to_le_bytes()).collect();
         self.list(kind::TOKENS, names.len(), &bytes)
+    }
+
+    /// Texts that a field lists.
+    pub(super) fn strings(&mut self, texts: &[&str]) -> io::Result<u64> {
+        let bytes: Vec<u8> = texts.iter().flat_map(|text| self.tables.string(text).to_le_bytes()).collect();
+        self.list(kind::STRINGS, texts.len(), &bytes)
+    }
+
+    /// That the times of one layer below are as they are.
+    pub(super) fn layer_offset(&mut self) -> io::Result<u64> {
+        self.list(kind::LAYER_OFFSETS, 1, [0.0_f64, 1.0].map(f64::to_le_bytes).as_flattened())
+    }
+
+    pub(super) fn vector(&mut self, numbers: [f64; 3]) -> io::Result<u64> {
+        self.put(kind::VEC3D, numbers.map(f64::to_le_bytes).as_flattened())
     }
 
     /// An array of names.

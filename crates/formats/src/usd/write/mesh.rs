@@ -68,6 +68,40 @@ impl Mesh {
         Ok(Self { scheme, shown, fixed, subsets, normals, ..Self::new(encoder, range, faces)? })
     }
 
+    /// Of a part of which the points alone are written, and normals where it has some.
+    pub(super) fn moved<W: Write + Seek>(
+        encoder: &mut Encoder<W>,
+        part: &Part,
+        range: &PartRange,
+        faces: &Polygons,
+    ) -> io::Result<Self> {
+        let bare = Part { normals: part.normals.clone(), points: part.points, subdivision: part.subdivision, ..Part::default() };
+        Self::of_part(encoder, &bare, range, faces, &[])
+    }
+
+    /// What changes with the frames, when all are written at these times.
+    pub(super) fn moved_properties<W: Write + Seek>(
+        &self,
+        encoder: &mut Encoder<W>,
+        times: u64,
+    ) -> io::Result<Vec<Property>> {
+        let positions = encoder.samples(times, &self.positions)?;
+        let extents = encoder.samples(times, &self.extents)?;
+        // Readers without a time take the first frame.
+        let first = self.positions.first().copied().unwrap_or_default();
+        let mut properties = vec![
+            Property::new("float3[]", "extent").samples(extents),
+            Property::new("point3f[]", "points").value(first).samples(positions),
+        ];
+        if let Some(normals) = &self.normals {
+            let first = self.directions.first().copied().unwrap_or_default();
+            let samples = encoder.samples(times, &self.directions)?;
+            let by = if normals.of_points.is_some() { "vertex" } else { "faceVarying" };
+            properties.push(Property::new("normal3f[]", "normals").value(first).samples(samples).by(by));
+        }
+        Ok(properties)
+    }
+
     /// Bytes of a frame.
     pub(super) fn frame_size(&self) -> usize {
         12 * (self.points.len() + self.normals.as_ref().map_or(0, Normals::len)) + 96
@@ -97,27 +131,17 @@ impl Mesh {
         times: u64,
         codes: &[f64],
     ) -> io::Result<Prim> {
-        let positions = encoder.samples(times, &self.positions)?;
-        let extents = encoder.samples(times, &self.extents)?;
+        let mut properties = self.moved_properties(encoder, times)?;
         let [counts, corners] = self.faces;
-        // Readers without a time take the first frame.
-        let first = self.positions.first().copied().unwrap_or_default();
-        let mut properties = vec![
-            Property::new("float3[]", "extent").samples(extents),
+        let faces = [
             Property::new("int[]", "faceVertexCounts").value(counts),
             Property::new("int[]", "faceVertexIndices").value(corners),
-            Property::new("point3f[]", "points").value(first).samples(positions),
-            // Otherwise programs subdivide it.
-            Property::fixed("subdivisionScheme", faces::scheme(self.scheme)),
         ];
+        properties.splice(1..1, faces);
+        // Otherwise programs subdivide it.
+        properties.insert(4, Property::fixed("subdivisionScheme", faces::scheme(self.scheme)));
         if self.is_guide {
-            properties.push(Property::fixed("purpose", "guide"));
-        }
-        if let Some(normals) = &self.normals {
-            let first = self.directions.first().copied().unwrap_or_default();
-            let samples = encoder.samples(times, &self.directions)?;
-            let by = if normals.of_points.is_some() { "vertex" } else { "faceVarying" };
-            properties.push(Property::new("normal3f[]", "normals").value(first).samples(samples).by(by));
+            properties.insert(5, Property::fixed("purpose", "guide"));
         }
         if let Some(shown) = &self.shown {
             let samples = visibility(encoder, shown, codes)?;

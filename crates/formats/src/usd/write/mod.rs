@@ -5,6 +5,7 @@ mod encoder;
 mod faces;
 mod material;
 mod mesh;
+mod over;
 mod sink;
 mod tables;
 mod tree;
@@ -16,10 +17,11 @@ use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::surface::{PartRange, Surface};
 use cager_geometry::units::{Units, Up};
 
-use super::binary::{ROOT, kind};
+use super::binary::ROOT;
 use crate::pictures::rename;
 use encoder::{Encoder, Prim, Property};
 use mesh::Mesh;
+pub(crate) use over::OverWriter;
 use sink::Sink;
 use tree::Tree;
 
@@ -152,7 +154,7 @@ impl<W: Write + Seek> MeshWriter<W> {
         let properties = if origin.is_some() { vec![TRANSLATE, ORDER] } else { Vec::new() };
         self.encoder.begin(&name, ("Xform", false), &properties, &names)?;
         if let Some(origin) = origin {
-            let at = self.encoder.put(kind::VEC3D, origin.map(f64::to_le_bytes).as_flattened())?;
+            let at = self.encoder.vector(origin)?;
             self.encoder.property(&Property::new("double3", TRANSLATE).value(at));
             let order = self.encoder.token_array(&[TRANSLATE])?;
             self.encoder.property(&Property::new("token[]", ORDER).uniform().value(order));

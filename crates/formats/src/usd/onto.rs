@@ -1,0 +1,94 @@
+//! What a layer has that another one is to move: the meshes of its parts, and what of these would
+//! contradict other points.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use cager_geometry::surface::Surface;
+use cager_geometry::units::Units;
+
+use super::layer::{Kind, Layer};
+use super::{mesh, open_layer};
+use crate::error::{Error, Fault};
+use crate::scene;
+
+/// Attributes that hold at the points of the source alone, or move them once more.
+const BLOCKED: [&str; 8] = [
+    "normals",
+    "primvars:normals",
+    "primvars:normals:indices",
+    "velocities",
+    "accelerations",
+    "primvars:skel:jointIndices",
+    "primvars:skel:jointWeights",
+    "skel:blendShapes",
+];
+
+/// A layer whose meshes get other points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Onto {
+    /// The file, as the layer on top of it names it.
+    pub(crate) file: String,
+    pub(crate) units: Units,
+    /// Of each part of the model its path, and the attributes of the mesh that are blocked, with their types.
+    pub(crate) meshes: Vec<(String, Vec<(String, String)>)>,
+}
+
+impl Onto {
+    /// Looks up the parts of a surface in a file; `output` is what will name it.
+    ///
+    /// # Errors
+    /// A file that is not USD, or lacks a part.
+    pub(crate) fn find(source: &Path, output: &Path, surface: &Surface) -> Result<Self, Error> {
+        let read = |cause| Error::read(source, cause);
+        let file = File::open(source).map_err(read)?;
+        let length = file.metadata().map_err(read)?.len();
+        let find = || {
+            let (mut layer, _) = open_layer(Box::new(file), length, false)?;
+            let units = mesh::units(&layer.stage);
+            let meshes = surface.parts.iter().map(|part| found(&mut layer, &part.path, part.points));
+            Ok(Self { file: relative(source, output), units, meshes: meshes.collect::<Result<_, _>>()? })
+        };
+        if surface.is_empty() {
+            let what = "cannot get the points of a model that has no paths; encode it from this file";
+            return Err(Fault::invalid(what).at(source));
+        }
+        find().map_err(|fault: Fault| fault.at(source))
+    }
+}
+
+/// A part's mesh in a layer.
+fn found(layer: &mut Layer<'_>, path: &str, points: usize) -> Result<(String, Vec<(String, String)>), Fault> {
+    let is_mesh = |&k: &usize| layer.prims[k].kind == Kind::Mesh && scene::path(&layer.nodes, k) == path;
+    let Some(mesh) = (0..layer.prims.len()).find(is_mesh) else {
+        return Err(Fault::invalid(format!("has no mesh {path}, a part of the model; give the file that it was encoded from")));
+    };
+    let there = match layer.attribute(mesh, "points")?.still() {
+        Some(value) => layer.source.points(value)?.count,
+        None => points,
+    };
+    if there != points {
+        return Err(Fault::invalid(format!(
+            "{path} has {there} points, and the part of the model {points}; give the file that it was encoded from"
+        )));
+    }
+    let properties = layer.source.properties(mesh);
+    let blocked = properties.into_iter().filter(|(name, _)| BLOCKED.contains(&name.as_str())).collect();
+    Ok((path.to_owned(), blocked))
+}
+
+/// A file as another one names it: from its own folder where that can be told.
+fn relative(file: &Path, from: &Path) -> String {
+    let folder = |path: &Path| match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.canonicalize(),
+        _ => Path::new(".").canonicalize(),
+    };
+    let name = file.file_name().unwrap_or_default();
+    let (Ok(there), Ok(here)) = (folder(file), folder(from)) else { return file.display().to_string() };
+    let common = there.components().zip(here.components()).take_while(|(a, b)| a == b).count();
+    let up = here.components().skip(common).map(|_| "..");
+    let down: PathBuf = there.components().skip(common).collect();
+    let path: PathBuf = up.collect::<PathBuf>().join(down).join(name);
+    let text = path.to_string_lossy().replace('\\', "/");
+    if text.starts_with("..") { text } else { format!("./{text}") }
+}
