@@ -105,14 +105,51 @@ fn other_formats_say_what_they_have_no_place_for() {
     let model = house(folder.path());
     let options = FrameOptions { surface: model.surface.clone(), ..FrameOptions::default() };
     let positions: Vec<f32> = model.points.as_flattened().iter().map(|&x| x as f32).collect();
-    for name in ["a.ply", "a.npy"] {
+    for (name, first) in [("a.ply", ""), ("a.npy", "texture coordinates, ")] {
         let mut writer = create_frames(folder.path().join(name), 9, 1, &model.faces, &options).unwrap();
         writer.write_frame(&positions).unwrap();
         let notes = writer.notes().join("\n");
-        let all =
-            "texture coordinates, 2 parts (roof and flag), 2 materials, normals and 3 groups (left, right and windows)";
-        assert!(notes.contains(all), "{notes}");
+        let all = "2 parts (roof and flag), 2 materials, normals and 3 groups (left, right and windows)";
+        assert!(notes.contains(&format!("has no place for {first}{all}")), "{notes}");
     }
+}
+
+#[test]
+fn a_ply_has_texture_coordinates_of_corners_or_vertices_and_names_its_pictures() {
+    let folder = tempdir().unwrap();
+    let model = house(folder.path());
+    let options = FrameOptions { surface: model.surface.clone(), ..FrameOptions::default() };
+    let path = folder.path().join("house.ply");
+    let mut writer = create_frames(&path, 9, 1, &model.faces, &options).unwrap();
+    writer.write_frame(&model.points.as_flattened().iter().map(|&x| x as f32).collect::<Vec<_>>()).unwrap();
+    writer.finish().unwrap();
+    let back = read_mesh(&path, &[]).unwrap();
+    assert_eq!((back.dropped, &back.model.faces), (Default::default(), &model.faces));
+    let (found, given) = (&back.model.surface, &model.surface.parts[0].uv_sets[0]);
+    let set = &found.parts[0].uv_sets[0];
+    for corner in 0..8 {
+        assert_eq!(set.values[set.corners[corner] as usize], given.values[given.corners[corner] as usize]);
+    }
+    let material = &found.materials[0];
+    assert_eq!((material.name.as_str(), material.textures[0].path.as_str()), ("tiles.png", "tiles.png"));
+    // Of vertices, with two pictures.
+    let head = "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b c.png\nelement vertex 4\n";
+    let vertex = "property float x\nproperty float y\nproperty float z\nproperty float u\nproperty float v\n";
+    let faces = "element face 2\nproperty list uchar int vertex_indices\nproperty int texnumber\nend_header\n";
+    let body = "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n1 1 0 1 1\n3 0 1 2 1\n3 1 3 2 0\n";
+    fs::write(&path, [head, vertex, faces, body].concat()).unwrap();
+    let model = read_mesh(&path, &[]).unwrap().model;
+    let part = &model.surface.parts[0];
+    assert_eq!((&part.materials[..], &part.uv_sets[0].corners[..]), (&[1, 0][..], model.faces.indices()));
+    assert_eq!(part.uv_sets[0].values[3], [1.0, 1.0]);
+    assert_eq!(model.surface.materials[1].textures[0].path, "b c.png");
+    // Corners without coordinates of their own are none.
+    let list = faces.replace("property int texnumber", "property list uchar float texcoord");
+    let body = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 6 0 0 1 0 0 1\n3 1 3 2 0\n";
+    fs::write(&path, [head, &vertex.replace("property float u\nproperty float v\n", ""), &list, body].concat()).unwrap();
+    let read = read_mesh(&path, &[]).unwrap();
+    assert!(read.model.surface.is_empty());
+    assert!(read.dropped.sentence(&path, false).unwrap().contains("texcoord"));
 }
 
 #[test]

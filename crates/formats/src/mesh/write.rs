@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use cager_geometry::mesh::Model;
+use cager_geometry::surface::{Channel, Material};
 
 use super::obj::{ObjText, write_obj_faces};
 use super::{MeshFormat, extensions};
@@ -123,15 +124,19 @@ pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
     let coordinates = model.points.as_flattened();
     let single = coordinates.iter().all(|&x| f64::from(x as f32).to_bits() == x.to_bits());
     let scalar = if single { "float" } else { "double" };
+    let texture = PlyTexture::of(model);
+    out.write_all(b"ply\nformat binary_little_endian 1.0\n")?;
+    texture.pictures.iter().try_for_each(|path| writeln!(out, "comment TextureFile {path}"))?;
     write!(
         out,
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n\
+        "element vertex {}\n\
          property {scalar} x\nproperty {scalar} y\nproperty {scalar} z\n",
         model.points.len()
     )?;
     let largest = model.faces.arities().iter().max().copied();
     // Most readers expect `uchar` and `int`; the wider types are for what does not fit.
     let small_faces = largest.is_none_or(|corners| corners <= 255);
+    let small_lists = largest.is_none_or(|corners| corners <= 127);
     if largest.is_some() {
         write!(
             out,
@@ -140,6 +145,12 @@ pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
             if small_faces { "uchar" } else { "uint" },
             if i32::try_from(model.points.len()).is_ok() { "int" } else { "uint" },
         )?;
+        if !texture.corners.is_empty() {
+            writeln!(out, "property list {} float texcoord", if small_lists { "uchar" } else { "uint" })?;
+        }
+        if texture.pictures.len() > 1 {
+            writeln!(out, "property int texnumber")?;
+        }
     }
     out.write_all(b"end_header\n")?;
     for &x in coordinates {
@@ -149,15 +160,58 @@ pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
             out.write_all(&x.to_le_bytes())?;
         }
     }
-    for face in model.faces.iter() {
-        if small_faces {
-            out.write_all(&[face.len() as u8])?;
-        } else {
-            out.write_all(&(face.len() as u32).to_le_bytes())?;
-        }
+    let length = |out: &mut _, is_small: bool, count: usize| {
+        if is_small { Write::write_all(out, &[count as u8]) } else { Write::write_all(out, &(count as u32).to_le_bytes()) }
+    };
+    let mut corners = texture.corners.iter();
+    for (k, face) in model.faces.iter().enumerate() {
+        length(out, small_faces, face.len())?;
         for index in face {
             out.write_all(&index.to_le_bytes())?;
         }
+        if !texture.corners.is_empty() {
+            length(out, small_lists, 2 * face.len())?;
+            for uv in corners.by_ref().take(face.len()).flatten() {
+                out.write_all(&uv.to_le_bytes())?;
+            }
+        }
+        if texture.pictures.len() > 1 {
+            out.write_all(&texture.faces.get(k).copied().unwrap_or(0).to_le_bytes())?;
+        }
     }
     Ok(())
+}
+
+/// What a PLY file says of texture: the first coordinates of each corner, and the pictures of faces.
+#[derive(Default)]
+struct PlyTexture {
+    corners: Vec<[f32; 2]>,
+    pictures: Vec<String>,
+    faces: Vec<u32>,
+}
+
+impl PlyTexture {
+    fn of(model: &Model) -> Self {
+        let (mut texture, surface) = (Self::default(), &model.surface);
+        if surface.parts.iter().all(|part| part.uv_sets.is_empty()) {
+            return texture;
+        }
+        let base = |material: &Material| {
+            let found = material.textures.iter().find(|found| found.channel == Channel::BaseColor)?;
+            Some(found.path.replace(char::is_control, "_"))
+        };
+        let of_materials: Vec<Option<String>> = surface.materials.iter().map(base).collect();
+        texture.pictures = of_materials.iter().flatten().cloned().collect();
+        texture.pictures.dedup();
+        let number = |material: Option<&u32>| {
+            let path = of_materials.get(*material? as usize)?.as_ref()?;
+            texture.pictures.iter().position(|found| found == path)
+        };
+        for (part, range) in surface.ranges(&model.faces) {
+            let uv = |k: usize| part.uv_sets.first().and_then(|set| set.values.get(*set.corners.get(k)? as usize));
+            texture.corners.extend((0..range.corners.len()).map(|k| uv(k).copied().unwrap_or_default()));
+            texture.faces.extend((0..part.faces).map(|k| number(part.materials.get(k)).unwrap_or(0) as u32));
+        }
+        texture
+    }
 }

@@ -5,9 +5,11 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use cager_geometry::mesh::{Model, Point, Polygons};
+use cager_geometry::surface::Surface;
 use cager_geometry::vector::add;
 
 use super::output::{Announced, FrameOptions, check_precision};
+use crate::dropped::phrases_of;
 use crate::error::{Error, Fault};
 use crate::mesh::{MeshFormat, ObjText, materials_text, write_obj_faces, write_off, write_ply, write_stl};
 
@@ -56,6 +58,10 @@ impl FrameMesh {
                     has_materials.then(|| (library.to_owned(), materials_text(&surface.materials).into_bytes()));
                 text = Some(ObjText::new(faces, surface, has_materials.then_some(library)));
             }
+            MeshFormat::Ply => {
+                let what = |what| Fault::invalid(format!("cannot have what lies on the faces ({what}); give that of this mesh"));
+                surface.check(announced.points, faces).map_err(|cause| what(cause).at(path))?;
+            }
             MeshFormat::Obj => write_obj_faces(&mut lines, faces).map_err(|cause| Error::write(path, cause))?,
             MeshFormat::Stl if faces.is_empty() => {
                 let what = "cannot be .stl, which holds triangles alone, and there are only points; write .ply instead";
@@ -64,8 +70,20 @@ impl FrameMesh {
             MeshFormat::Stl => check_precision(options, path)?,
             _ => {}
         }
-        let model = Model { faces: faces.clone(), ..Model::default() };
+        let surface = if format == MeshFormat::Ply { surface.clone() } else { Surface::default() };
+        let model = Model { faces: faces.clone(), surface, ..Model::default() };
         Ok(Self { format, model, faces: lines, text, library: of_materials, origin: options.origin })
+    }
+
+    /// What of a surface has no place.
+    pub(super) fn lost(&self, surface: &Surface) -> Vec<String> {
+        let mut lost = phrases_of(surface, self.format == MeshFormat::Obj);
+        if self.format == MeshFormat::Ply {
+            lost.retain(|phrase| phrase != "texture coordinates");
+            let sets = lost.iter_mut().filter(|phrase| phrase.ends_with("sets of texture coordinates"));
+            sets.for_each(|phrase| phrase.push_str(", but for the first"));
+        }
+        lost
     }
 
     /// Writes the mesh of a frame.

@@ -118,7 +118,7 @@ fn names_pictures(target: &Target) -> bool {
         Some(format) => matches!(format, CacheFormat::Usdc | CacheFormat::Usd | CacheFormat::Gltf | CacheFormat::Glb),
         None => {
             let extension = path.extension().map(|found| found.to_ascii_lowercase());
-            extension.is_none_or(|found| found == "obj")
+            extension.is_none_or(|found| found == "obj" || found == "ply")
         }
     };
     is_named && *target != Target::StandardOutput

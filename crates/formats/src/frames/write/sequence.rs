@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::Surface;
 
 use super::super::numbered::NumberedNames;
 use super::mesh::FrameMesh;
@@ -91,6 +92,10 @@ impl Output for SequenceWriter {
 
     fn keeps_surface(&self) -> bool {
         self.mesh.format == MeshFormat::Obj
+    }
+
+    fn lost(&self, surface: &Surface) -> Vec<String> {
+        self.mesh.lost(surface)
     }
 
     fn finish(self: Box<Self>, _: &Announced) -> Result<(), Error> {

@@ -3,6 +3,7 @@
 use std::io::{BufWriter, Write};
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::Surface;
 
 use super::mesh::FrameMesh;
 use super::output::{Announced, FrameOptions, Output};
@@ -60,6 +61,10 @@ impl Output for SingleWriter {
 
     fn keeps_surface(&self) -> bool {
         self.mesh.format == MeshFormat::Obj
+    }
+
+    fn lost(&self, surface: &Surface) -> Vec<String> {
+        self.mesh.lost(surface)
     }
 
     fn finish(self: Box<Self>, _: &Announced) -> Result<(), Error> {

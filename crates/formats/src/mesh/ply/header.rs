@@ -7,8 +7,8 @@ use crate::text::{Lines, damaged, integer, quoted, words};
 pub(super) struct Header<'a> {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// Whether a comment names a picture.
-    pub(super) has_texture: bool,
+    /// Pictures that comments name.
+    pub(super) textures: Vec<String>,
     /// What follows the header.
     pub(super) body: Lines<'a>,
 }
@@ -131,7 +131,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header<'_>, Fault> {
     if lines.next() != Some(b"ply") {
         return Err(Fault::damaged("does not begin with `ply`, so this is not a PLY file; export the mesh again"));
     }
-    let (mut encoding, mut has_texture) = (None, false);
+    let (mut encoding, mut textures) = (None, Vec::new());
     let mut elements: Vec<Element> = Vec::new();
     while let Some(line) = lines.next() {
         let words: Vec<_> = words(line).take(6).collect();
@@ -156,10 +156,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header<'_>, Fault> {
             }
             [b"end_header", ..] => {
                 let encoding = encoding.ok_or_else(|| Fault::damaged("has no `format` line; export the mesh again"))?;
-                return Ok(Header { encoding, elements, has_texture, body: lines });
+                return Ok(Header { encoding, elements, textures, body: lines });
             }
             [b"element" | b"property" | b"format", ..] => return Err(unreadable(&lines, line)),
-            [b"comment", b"TextureFile", ..] => has_texture = true,
+            [b"comment", b"TextureFile", ..] => {
+                let name = line.split(|&b| b == b' ').skip(2).collect::<Vec<_>>().join(&b' ');
+                textures.push(String::from_utf8_lossy(name.trim_ascii()).into_owned());
+            }
             // Comments, and what other programs note.
             _ => {}
         }

@@ -2,10 +2,11 @@
 
 use super::super::parsed::Parsed;
 use super::header::{Element, Header};
+use super::surface;
 use crate::dropped::{counted, listed};
 
 /// Tells what the header promises beside positions, colours of points and corners of faces.
-pub(super) fn tell(header: &Header<'_>, parsed: &mut Parsed) {
+pub(super) fn tell(header: &Header<'_>, parsed: &mut Parsed, is_dressed: bool) {
     let has_colors = !parsed.model.colors.is_empty();
     let dropped = &mut parsed.dropped;
     for element in header.elements.iter().filter(|element| element.count > 0) {
@@ -14,6 +15,7 @@ pub(super) fn tell(header: &Header<'_>, parsed: &mut Parsed) {
                 let is_other = |_: usize, name: &str| match name {
                     "x" | "y" | "z" => false,
                     "red" | "green" | "blue" => !has_colors,
+                    name if is_dressed && matches!(surface::plain(name), "s" | "t") => false,
                     _ => true,
                 };
                 if let Some((count, names)) = others(element, is_other) {
@@ -23,7 +25,8 @@ pub(super) fn tell(header: &Header<'_>, parsed: &mut Parsed) {
             }
             "face" | "tristrips" => {
                 let corners = element.corners().ok();
-                if let Some((count, names)) = others(element, |k, _| Some(k) != corners) {
+                let is_read = |name: &str| is_dressed && matches!(name, "texcoord" | "texnumber");
+                if let Some((count, names)) = others(element, |k, name| Some(k) != corners && !is_read(name)) {
                     let properties = if count == 1 { "property" } else { "properties" };
                     dropped.add_on_faces(format!("{count} {properties} ({names}) of its faces"));
                 }
@@ -34,7 +37,7 @@ pub(super) fn tell(header: &Header<'_>, parsed: &mut Parsed) {
             }
         }
     }
-    if header.has_texture {
+    if !header.textures.is_empty() && !is_dressed {
         dropped.add("its texture (TextureFile)");
     }
 }
