@@ -221,6 +221,53 @@ fn a_strip_of_a_byte_a_triangle_is_not_taken_for_endless_copies() {
     assert_eq!(model.faces.indices()[3 * triangles - 1] as usize, points - 1);
 }
 
+/// The tetrahedron as the reference encoder packs it (Draco 1.5, positions of 14 bits).
+const DRACO: &str = "445241434f02020101000000040400030000012f01011001ff000001000903000002010101000f0301102f013003\
+    005082000056d500000060550100719c5505000000000000ff3f00000000000000000000000010c0000010400e";
+
+fn draco_file(stream: &[u8]) -> Vec<u8> {
+    let extension = r#"{"KHR_draco_mesh_compression":{"bufferView":0,"attributes":{"POSITION":0}}}"#;
+    let packed = format!(r#"{{"attributes":{{"POSITION":0}},"indices":1,"extensions":{extension}}}"#);
+    let json = glb_json("")
+        .replace(r#"{"asset""#, r#"{"extensionsRequired":["KHR_draco_mesh_compression"],"asset""#)
+        .replace(PRIMITIVE, &packed)
+        .replace(FIRST_VIEW, &format!(r#"{{"buffer":0,"byteLength":{}}}"#, stream.len()))
+        .replace(&format!(",{SECOND_VIEW}"), "")
+        .replace(r#""bufferView":0,"componentType""#, r#""componentType""#)
+        .replace(r#""bufferView":1,"componentType""#, r#""componentType""#)
+        .replace(r#"{"byteLength":72}"#, &format!(r#"{{"byteLength":{}}}"#, stream.len()));
+    glb_file(&json, stream)
+}
+
+#[test]
+fn what_draco_packed_is_unpacked() {
+    let digits: Vec<u8> = DRACO.bytes().map(|digit| (digit as char).to_digit(16).unwrap() as u8).collect();
+    let stream: Vec<u8> = digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect();
+    let model = read("a.glb", draco_file(&stream)).unwrap();
+    // Points and faces come in the order of the stream.
+    let place = |point: u32| -> usize {
+        let near = |wanted: &[f64; 3]| (0..3).all(|k| (model.points[point as usize][k] - wanted[k]).abs() < 2e-4);
+        POINTS.iter().position(near).unwrap_or_else(|| panic!("{:?}", model.points[point as usize]))
+    };
+    let turned = |face: [usize; 3]| (0..3).map(|k| [face[k], face[(k + 1) % 3], face[(k + 2) % 3]]).min().unwrap();
+    let mut faces: Vec<[usize; 3]> =
+        model.faces.iter().map(|face| turned([place(face[0]), place(face[1]), place(face[2])])).collect();
+    faces.sort_unstable();
+    let mut wanted = FACES.map(|face| turned(face.map(|point| point as usize)));
+    wanted.sort_unstable();
+    assert_eq!((model.points.len(), &faces[..]), (4, &wanted[..]));
+    for length in 0..stream.len() {
+        let told = message(read("a.glb", draco_file(&stream[..length])));
+        assert!(told.contains("mesh 0, primitive 0: its Draco data is not understood"), "{length}: {told}");
+    }
+    // More points than the accessor says.
+    let file = String::from_utf8_lossy(&draco_file(&stream)[20..]).into_owned();
+    let json = file.split_once("BIN\0").unwrap().0;
+    let end = json.rfind('}').unwrap() + 1;
+    let fewer = json[..end].replace(r#""count":4"#, r#""count":3"#);
+    assert!(message(read("a.glb", glb_file(&fewer, &stream))).contains("its Draco data has no accessor 0"));
+}
+
 const SKIN: &str = r#","nodes":[{"mesh":0,"skin":0,"translation":[9,9,9]},{"children":[2],"translation":[0,0,1]},{"rotation":[0,0,0.70710678118,0.70710678118]}],"skins":[{"joints":[1,2]}]"#;
 
 /// With two joints that move all points half and half.

@@ -254,7 +254,7 @@ fn scene() -> (Model, Surface) {
         points: 3,
         faces: 1,
         materials: vec![0],
-        shown: Some(vec![1..3]),
+        shown: Some(vec![1..2, 3..4]),
         ..Part::default()
     };
     let texture = |channel, path: &str| Texture { channel, path: path.to_owned() };
@@ -372,7 +372,7 @@ fn parts_move_together_and_are_where_they_are_though_hidden() {
         }
         let shown: Vec<_> =
             read_mesh(&path, None).unwrap().model.surface.parts.into_iter().map(|part| part.shown).collect();
-        assert_eq!(shown, [None, Some(vec![1..3])]);
+        assert_eq!(shown, [None, Some(vec![1..2, 3..4])]);
         // Other programs see scales of nothing.
         let (json, data) = split(&fs::read(&path).unwrap());
         let animation = &json["animations"][0];
@@ -382,7 +382,7 @@ fn parts_move_together_and_are_where_they_are_though_hidden() {
         assert_eq!((&scales.unwrap()["target"]["node"], &sampler["interpolation"]), (&1.into(), &"STEP".into()));
         let values: Vec<f32> = numbers(&json, &data, &sampler["output"]);
         let scale = json["nodes"][1]["scale"][0].as_f64().unwrap() as f32;
-        assert_eq!(values, [0.0, scale, 0.0].map(|x| [x; 3]).concat());
+        assert_eq!(values, [0.0, scale, 0.0, scale].map(|x| [x; 3]).concat());
         fs::remove_file(&path).unwrap();
     }
 }

@@ -52,6 +52,46 @@ fn every_capture_is_read_to_its_last_frame() {
 
 #[test]
 #[ignore = "needs the captures: make captures"]
+fn a_character_of_gltf_has_its_parts_and_the_points_it_was_made_of() {
+    let folder = data().join("character");
+    // Each with its points, and faces of three corners.
+    let wanted = [
+        ("body", 436, 868),
+        ("buckle", 72, 144),
+        ("eye.L", 42, 80),
+        ("eye.R", 42, 80),
+        ("hair", 160, 128),
+        ("jacket", 267, 440),
+        ("lantern", 36, 60),
+        ("teeth", 128, 192),
+    ];
+    let of = |name: &str| {
+        let path = folder.join(name);
+        let model = read_model(&path).unwrap();
+        model.surface.check(model.points.len(), &model.faces).unwrap();
+        let mut frames = open_frames(&path, model.points.len()).unwrap();
+        let (mut frame, mut last) = (Vec::new(), Vec::new());
+        while frames.read_next(&mut frame).unwrap() {
+            last.clone_from(&frame);
+        }
+        assert_eq!((frames.frames(), last.len()), (24, 3 * model.points.len()));
+        let parts = model.surface.parts.iter();
+        let mut parts: Vec<_> =
+            parts.map(|part| (part.path.rsplit('/').next().unwrap().to_owned(), part.points, part.faces)).collect();
+        parts.sort();
+        parts
+    };
+    let parts = of("robin.glb");
+    assert!(parts.iter().map(|(name, points, faces)| (name.as_str(), *points, *faces)).eq(wanted));
+    // Each material of a mesh is quantised apart, so that its points are not quite where the others' are.
+    let packed = of("robin_draco.glb");
+    for ((name, points, faces), (wanted, fewest, all)) in packed.into_iter().zip(wanted) {
+        assert!(name == wanted && faces == all && (fewest..fewest + 33).contains(&points), "{name}: {points}");
+    }
+}
+
+#[test]
+#[ignore = "needs the captures: make captures"]
 fn every_mesh_keeps_its_counts_and_survives_every_format() {
     let data = data();
     let folder = tempfile::tempdir().unwrap();

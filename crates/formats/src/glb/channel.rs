@@ -106,20 +106,20 @@ impl Channel {
 
     /// Puts the value at a time into a node.
     pub(super) fn apply(&self, time: f64, node: &mut Node) {
-        self.put(self.value(time), node);
+        self.put(&self.value(time), node);
     }
 
     /// Puts a value into a node.
-    pub(super) fn put(&self, value: Vec<f64>, node: &mut Node) {
+    pub(super) fn put(&self, value: &[f64], node: &mut Node) {
         match self.property {
             Property::MorphTargetWeights => node.weights = Some(value.iter().map(|&x| x as f32).collect()),
             Property::Rotation => {
-                let turn = DQuat::from_slice(&value);
+                let turn = DQuat::from_slice(value);
                 let turn = if turn.length() > 0.0 { turn.normalize() } else { DQuat::IDENTITY };
                 node.rotation = Some(gltf::json::scene::UnitQuaternion(turn.as_quat().to_array()));
             }
-            Property::Translation => node.translation = Some(DVec3::from_slice(&value).as_vec3().to_array()),
-            Property::Scale => node.scale = Some(DVec3::from_slice(&value).as_vec3().to_array()),
+            Property::Translation => node.translation = Some(DVec3::from_slice(value).as_vec3().to_array()),
+            Property::Scale => node.scale = Some(DVec3::from_slice(value).as_vec3().to_array()),
         }
     }
 

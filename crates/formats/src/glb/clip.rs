@@ -118,7 +118,7 @@ impl Clip {
         }
         for channel in &self.switches {
             if let (Some(node), Some(shown)) = (root.nodes.get_mut(channel.node), channel.switched()) {
-                channel.put(shown.to_vec(), node);
+                channel.put(shown, node);
             }
         }
     }
