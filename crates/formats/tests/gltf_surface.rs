@@ -63,7 +63,8 @@ const LOOKS: &str = r#""materials":[{"name":"unused"},
     "textures":[{"source":1},{"source":0}],
     "images":[{"name":"rough.v2","mimeType":"image/jpeg","bufferView":0},{"uri":"tex/my%20skin.png"}]"#;
 
-/// With texture coordinates, normals, colours of the first half, and what else primitives and documents have.
+/// With texture coordinates, normals, colours of the first half, and what else primitives and
+/// documents have.
 fn folded(built: &mut Built, of_half: [&str; 2], rest: &str) -> Vec<u8> {
     let uvs = [[[0.0, 1.0], [1.0, 1.0], [1.0, 0.25]], [[0.0, 1.0], [0.5, 0.5], [0.0, 0.0]]];
     let normals = [[[0.0, 0.0, 1.0]; 3], [[0.0, -0.707, 0.707]; 3]];
@@ -219,7 +220,8 @@ fn pictures_that_are_placed_alike_place_the_texture_coordinates() {
     assert!(told.contains("places of textures that differ in one material (KHR_texture_transform)"), "{told}");
 }
 
-/// A strip of two squares with a seam, a hard edge and two materials, and a triangle without anything below it.
+/// A strip of two squares with a seam, a hard edge and two materials, and a triangle without
+/// anything below it.
 fn scene() -> (Model, Surface) {
     let points =
         [[0, 0, 0], [1, 0, 0], [2, 0, 1], [0, 1, 0], [1, 1, 0], [2, 1, 1], [5, 5, 5], [0, 0, 3], [1, 0, 3], [0, 1, 3]];

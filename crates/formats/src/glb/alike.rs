@@ -1,5 +1,5 @@
-//! Points that are one, though a file stores them several times along seams and hard edges: those that lie in one
-//! place at rest, and that joints and morph targets move in the same way.
+//! Points that are one, though a file stores them several times along seams and hard edges: those
+//! that lie in one place at rest, and that joints and morph targets move in the same way.
 
 use std::collections::HashMap;
 
@@ -103,7 +103,8 @@ impl Alike {
         }
     }
 
-    /// The points in the order in which they come: the new number of each that is stored, and those that are kept.
+    /// The points in the order in which they come: the new number of each that is stored, and those
+    /// that are kept.
     pub(super) fn merged(self) -> (Vec<u32>, Vec<u32>) {
         let (mut kept, mut names) = (Vec::new(), HashMap::new());
         let name = |(k, number): (u32, &u64)| {

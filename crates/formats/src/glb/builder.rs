@@ -48,7 +48,8 @@ pub(super) struct Builder<'a, 'b> {
 /// What placements gave.
 pub(super) struct Built {
     pub(super) model: Model,
-    /// The points that are kept of those that are stored, where these are more; the others are one with them.
+    /// The points that are kept of those that are stored, where these are more; the others are one
+    /// with them.
     pub(super) kept: Option<Vec<u32>>,
     /// How many are stored.
     pub(super) stored: usize,
@@ -60,8 +61,8 @@ pub(super) struct Built {
 pub(super) struct Placed<'a> {
     pub(super) placement: &'a Placement,
     pub(super) joints: Option<Joints>,
-    /// By accessor which of the blocks they are, as primitives that differ by their material alone often share their
-    /// points.
+    /// By accessor which of the blocks they are, as primitives that differ by their material alone
+    /// often share their points.
     points: HashMap<usize, usize>,
     pub(super) blocks: Vec<Block<'a>>,
     /// Primitives with faces: the number of their block, and how many corners they have.
@@ -77,7 +78,8 @@ impl Placed<'_> {
 }
 
 impl<'a, 'b> Builder<'a, 'b> {
-    /// Where `is_split`, points along seams are as many as are stored; without faces they always are.
+    /// Where `is_split`, points along seams are as many as are stored; without faces they always
+    /// are.
     pub(super) fn new(buffers: &'a Buffers<'b>, scene: &'a Scene, contents: Contents, is_split: bool) -> Self {
         let (model, colors, materials) = (Model::default(), Colors::default(), HashMap::new());
         let (kept, stored, nodes, most) = (Vec::new(), 0, Vec::new(), buffers.most_bytes());

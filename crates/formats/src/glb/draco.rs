@@ -1,5 +1,5 @@
-//! Primitives that Draco compressed (`KHR_draco_mesh_compression`), unpacked into a buffer of their own. The streams are
-//! the `draco-core` crate's to read; what they say is bounded here.
+//! Primitives that Draco compressed (`KHR_draco_mesh_compression`), unpacked into a buffer of their
+//! own. The streams are the `draco-core` crate's to read; what they say is bounded here.
 
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -29,7 +29,8 @@ struct Packed {
     indices: Option<usize>,
 }
 
-/// Gives all accessors of packed primitives their numbers; files that have the plain ones too stay as they are.
+/// Gives all accessors of packed primitives their numbers; files that have the plain ones too stay
+/// as they are.
 pub(super) fn unpack(buffers: &mut Buffers<'_>) -> Result<(), Fault> {
     let packed = packed(&buffers.root)?;
     if packed.is_empty() {

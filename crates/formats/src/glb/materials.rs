@@ -1,4 +1,5 @@
-//! Materials of metallic-roughness, as far as those of other formats are like them, and the pictures that they name.
+//! Materials of metallic-roughness, as far as those of other formats are like them, and the
+//! pictures that they name.
 
 use cager_geometry::surface::{Channel, Material, Texture};
 use gltf::json::Value;

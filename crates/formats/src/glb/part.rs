@@ -1,4 +1,5 @@
-//! What a placed mesh is among others: a part, its points merged along seams, with what lies on its faces.
+//! What a placed mesh is among others: a part, its points merged along seams, with what lies on its
+//! faces.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

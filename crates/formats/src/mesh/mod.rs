@@ -165,8 +165,8 @@ pub fn read_mesh(path: &Path, prims: &[String]) -> Result<ReadModel, Error> {
     parse_file(path, prims).map(|parsed| ReadModel::of(parsed, path))
 }
 
-/// As [`read_mesh`] of a glTF file, with points as often as it stores them, where seams and hard edges split them;
-/// `None` of other files.
+/// As [`read_mesh`] of a glTF file, with points as often as it stores them, where seams and hard
+/// edges split them; `None` of other files.
 ///
 /// # Errors
 /// As [`read_mesh`].

@@ -84,7 +84,8 @@ impl Morphs<'_> {
         if self.scene.pieces.iter().all(|piece| piece.vertices.len() <= FEW) { 2 } else { 4 }
     }
 
-    /// Of positions, corners, times and weights, normals, what else vertices have, and what shows and hides.
+    /// Of positions, corners, times and weights, normals, what else vertices have, and what shows
+    /// and hides.
     fn lengths(&self) -> [usize; 6] {
         let (parts, pieces) = (self.components.stored.parts(), &self.scene.pieces);
         let vertices =
@@ -145,7 +146,8 @@ impl Morphs<'_> {
         Ok(())
     }
 
-    /// Normals of vertices, what else they have, and scales that show and hide meshes behind their times.
+    /// Normals of vertices, what else they have, and scales that show and hide meshes behind their
+    /// times.
     fn write_others(&self, out: &mut impl Write) -> io::Result<()> {
         let mut write = |numbers: &[f32]| numbers.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
         let parts = self.components.stored.parts();

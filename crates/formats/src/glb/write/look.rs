@@ -79,7 +79,8 @@ impl Looks {
     }
 }
 
-/// Pictures that are left out: the format has roughness and metalness in one, and opacity in that of the colour.
+/// Pictures that are left out: the format has roughness and metalness in one, and opacity in that
+/// of the colour.
 pub(crate) fn lost_pictures(materials: &[Material]) -> Vec<&'static str> {
     let any = |is_lost: fn(&Material) -> bool| materials.iter().any(is_lost);
     let mut lost = Vec::new();

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use crate::normals::unit;
 
-/// Normals of the base and each target: `of_frame` gives so many of the positions of one of the `frames`, and
-/// `weights` are those of targets.
+/// Normals of the base and each target: `of_frame` gives so many of the positions of one of the
+/// `frames`, and `weights` are those of targets.
 ///
 /// Weights of principal components are about orthogonal but for their means, so a least-squares fit
 /// is one product for each target. Programs make the sum of a length of 1, so what is fitted is

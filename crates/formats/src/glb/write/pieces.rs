@@ -1,5 +1,5 @@
-//! The meshes of a file: the parts of a model, their points split where corners have other texture coordinates,
-//! colours or normals.
+//! The meshes of a file: the parts of a model, their points split where corners have other texture
+//! coordinates, colours or normals.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -57,7 +57,8 @@ impl Piece {
         }
     }
 
-    /// Of the parts of a model; those without a name have this one. Parts with normals have them anyway.
+    /// Of the parts of a model; those without a name have this one. Parts with normals have them
+    /// anyway.
     pub(crate) fn of(surface: &Surface, faces: &Polygons, name: &str, has_normals: bool) -> Vec<Self> {
         surface.ranges(faces).map(|(part, range)| Self::of_part(part, &range, faces, (name, has_normals))).collect()
     }
