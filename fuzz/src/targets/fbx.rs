@@ -35,7 +35,7 @@ pub(super) const FBX: Target = Target {
         "1e308",
         "nan",
     ],
-    // Files are packed: a scene may take 8 MiB and a multiple of its bytes, once for good and once while it is read.
-    fixed: 18 << 20,
-    per_byte: 2048,
+    // Files are packed: a scene may take 32 MiB and a multiple of its bytes, once for good and once while it is read.
+    fixed: 68 << 20,
+    per_byte: 1024,
 };

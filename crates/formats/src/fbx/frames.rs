@@ -82,12 +82,12 @@ impl MeshFrames {
         selection: &FrameSelection,
         mut all: Option<(&mut Surface, &mut Dropped)>,
     ) -> Result<Self, Fault> {
-        let (stack, mut notes) = choose(&scene.root, selection.animation.as_deref())?;
+        let (stack, others) = choose(&scene.root, selection.animation.as_deref())?;
         let Timeline { times, at } = timeline(&scene.root, stack, selection.rate)?;
         let mut nodes = Nodes::of(&scene);
-        let (meshes, note) = nodes.choose(wanted, |nodes, mesh| is_hidden(stack, nodes.above(mesh)))?;
+        let (meshes, hidden) = nodes.choose(wanted, |nodes, mesh| is_hidden(stack, nodes.above(mesh)))?;
         let mut info = MeshInfo { frames: at.len(), times, units: scene.units, ..MeshInfo::default() };
-        info.notes.extend(notes.take().into_iter().chain(note).chain(scene.note.clone()));
+        info.notes.extend([others, hidden, scene.note.clone()].into_iter().flatten());
         let anim = stack.map_or(&*scene.root.anim, |stack| &*stack.anim);
         let (mut chosen, mut left_out, mut materials) = (Vec::new(), 0, Materials::default());
         let first = scene.at(anim, at[0])?;
@@ -95,9 +95,8 @@ impl MeshFrames {
             let Some(mesh) = nodes.mesh(number) else { continue };
             let node = nodes.stored(number);
             let name = path(nodes.nodes(), number);
-            let is_turned =
-                is_mirrored(first.nodes.as_ref().get(node.element.typed_id as usize).map_or(node, |now| now));
-            let kept = Kept::of(mesh, is_turned).map_err(|fault| fault.within(&name))?;
+            let now = first.nodes.as_ref().get(node.element.typed_id as usize);
+            let kept = Kept::of(mesh, now.is_some_and(|now| is_mirrored(now))).map_err(|fault| fault.within(&name))?;
             left_out += mesh.num_faces - kept.faces.len();
             kept.add_to(&mut info.faces, info.points as u32);
             let above: Vec<&Node> = nodes.above(number).collect();

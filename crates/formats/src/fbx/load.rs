@@ -14,8 +14,8 @@ use crate::signature::Signature;
 
 /// Bytes that a scene may take, once for good and once while it is read: so many whatever the file
 /// is, and so many for each byte of it, as files are packed.
-const FIXED: usize = 8 << 20;
-const PER_BYTE: usize = 64;
+const FIXED: usize = 32 << 20;
+const PER_BYTE: usize = 16;
 /// Nodes above one another.
 const DEEPEST: u32 = 1 << 10;
 

@@ -29,9 +29,12 @@ pub(crate) fn open<'a>(
 ) -> Result<Box<dyn FrameReader + 'a>, ApiError> {
     let path = Path::new(name);
     if let Some(format) = CacheFormat::from_path(path) {
-        if matches!(format, CacheFormat::Glb | CacheFormat::Gltf) {
-            // It is read as a whole, and may be many times larger in memory.
-            return Err(mismatch(format!("frames: {name} is glTF, which is not taken here; send .npy, .abc or .usdc")));
+        if matches!(format, CacheFormat::Glb | CacheFormat::Gltf | CacheFormat::Fbx) {
+            // They are read as a whole, and may be many times larger in memory.
+            let kind = if format == CacheFormat::Fbx { "FBX" } else { "glTF" };
+            return Err(mismatch(format!(
+                "frames: {name} is {kind}, which is not taken here; send .npy, .abc or .usdc"
+            )));
         }
         let reader = open_frames_in(format, path, source, bytes, points).map_err(|error| unreadable(&error))?;
         return match announced.filter(|&announced| announced as usize != reader.frames()) {
