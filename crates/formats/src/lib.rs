@@ -40,7 +40,7 @@ pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};
 pub use mesh::{
     MeshFormat, ReadModel, model_bytes, obj_bytes, read_mesh, read_mesh_bytes, read_model, read_model_bytes,
-    read_split_mesh, write_model,
+    read_split_mesh, read_split_mesh_bytes, write_model,
 };
 pub use pictures::take_pictures;
 pub use scene::chosen_parts;

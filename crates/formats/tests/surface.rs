@@ -146,7 +146,8 @@ fn a_ply_has_texture_coordinates_of_corners_or_vertices_and_names_its_pictures()
     // Corners without coordinates of their own are none.
     let list = faces.replace("property int texnumber", "property list uchar float texcoord");
     let body = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 6 0 0 1 0 0 1\n3 1 3 2 0\n";
-    fs::write(&path, [head, &vertex.replace("property float u\nproperty float v\n", ""), &list, body].concat()).unwrap();
+    fs::write(&path, [head, &vertex.replace("property float u\nproperty float v\n", ""), &list, body].concat())
+        .unwrap();
     let read = read_mesh(&path, &[]).unwrap();
     assert!(read.model.surface.is_empty());
     assert!(read.dropped.sentence(&path, false).unwrap().contains("texcoord"));

@@ -235,7 +235,9 @@ impl PartRange {
     pub fn local(&self, faces: &Polygons) -> Polygons {
         let mut local = Polygons::new();
         let first = self.points.start as u32;
-        for face in faces.iter().skip(self.faces.start).take(self.faces.len()) {
+        let mut corners = faces.indices().get(self.corners.clone()).unwrap_or_default();
+        for &arity in faces.arities().get(self.faces.clone()).unwrap_or_default() {
+            let Some(face) = corners.split_off(..arity as usize) else { break };
             local.push(&face.iter().map(|&point| point.wrapping_sub(first)).collect::<Vec<_>>());
         }
         local

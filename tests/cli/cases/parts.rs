@@ -41,7 +41,8 @@ fn encoded() -> Dir {
         dir.write(&format!("take/f.{k}.obj"), boxes(0.1 * k as f64, has_hat));
         dir.write("take/cast.mtl", "newmtl skin\nnewmtl felt\n");
     }
-    let line = "encode --rest cast.obj --frames take --cage-vertices 30 --max-error 0.001 -o cast.cager --textures embed";
+    let line =
+        "encode --rest cast.obj --frames take --cage-vertices 30 --max-error 0.001 -o cast.cager --textures embed";
     dir.cager(line).succeeds();
     dir
 }
@@ -96,14 +97,21 @@ fn meshes_of_a_scene_are_chosen_by_globs_and_taken_together_otherwise() {
         prims: words.iter().map(|&word| word.to_owned()).collect(),
         ..FrameSelection::default()
     };
-    let points = |words: &[&str]| read_mesh(&dir.path("cast.abc"), &prims(words).prims).map(|read| read.model.points.len());
-    assert_eq!([points(&[]), points(&["**/h*"]), points(&["hat", "body"])].map(|found| found.expect("meshes")), [16, 8, 16]);
+    let points =
+        |words: &[&str]| read_mesh(&dir.path("cast.abc"), &prims(words).prims).map(|read| read.model.points.len());
+    assert_eq!(
+        [points(&[]), points(&["**/h*"]), points(&["hat", "body"])].map(|found| found.expect("meshes")),
+        [16, 8, 16]
+    );
     assert!(points(&["/x*"]).unwrap_err().to_string().contains("holds no mesh /x*, but "));
     let open = |words: &[&str], points| open_selected_frames(dir.path("cast.abc"), points, &prims(words));
     assert_eq!(open(&["hat"], 8).expect("frames").points(), 8);
     // Both have eight points, so that these do not tell which is meant.
     let said = open(&[], 8).err().expect("a choice").to_string();
-    assert!(said.contains("holds 2 meshes, ") && said.contains("which together have 16 points, and 8 are expected"), "{said}");
+    assert!(
+        said.contains("holds 2 meshes, ") && said.contains("which together have 16 points, and 8 are expected"),
+        "{said}"
+    );
 }
 
 #[test]

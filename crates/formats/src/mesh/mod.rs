@@ -179,6 +179,17 @@ pub fn read_split_mesh(path: &Path, prims: &[String]) -> Result<Option<ReadModel
     Ok(Some(ReadModel::of(read_split(format, path, &bytes, prims)?, path)))
 }
 
+/// As [`read_mesh_bytes`], of glTF with points as often as it stores them.
+///
+/// # Errors
+/// As [`read_mesh_bytes`].
+pub fn read_split_mesh_bytes(format: MeshFormat, name: &Path, bytes: &[u8]) -> Result<ReadModel, Error> {
+    match format {
+        MeshFormat::Glb => read_split(format, name, bytes, &[]).map(|parsed| ReadModel::of(parsed, name)),
+        _ => read_mesh_bytes(format, name, bytes),
+    }
+}
+
 fn read_split(format: MeshFormat, path: &Path, bytes: &[u8], prims: &[String]) -> Result<Parsed, Error> {
     let is_text = format == MeshFormat::Gltf;
     let kind = glb::Source { is_text, folder: path.parent().filter(|_| is_text), is_split: true };

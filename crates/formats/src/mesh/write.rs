@@ -161,7 +161,11 @@ pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
         }
     }
     let length = |out: &mut _, is_small: bool, count: usize| {
-        if is_small { Write::write_all(out, &[count as u8]) } else { Write::write_all(out, &(count as u32).to_le_bytes()) }
+        if is_small {
+            Write::write_all(out, &[count as u8])
+        } else {
+            Write::write_all(out, &(count as u32).to_le_bytes())
+        }
     };
     let mut corners = texture.corners.iter();
     for (k, face) in model.faces.iter().enumerate() {

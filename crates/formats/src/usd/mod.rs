@@ -28,8 +28,8 @@ use crate::scene::{MovingScene, Reader, Wanted};
 use crate::signature::Signature;
 use binary::Binary;
 use layer::Layer;
-use text::Text;
 pub(crate) use onto::Onto;
+use text::Text;
 pub(crate) use write::{MeshWriter, OverWriter, Scene};
 
 /// Opens the meshes that are wanted; of their first frame alone where what is not read is to be told.

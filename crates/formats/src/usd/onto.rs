@@ -61,7 +61,9 @@ impl Onto {
 fn found(layer: &mut Layer<'_>, path: &str, points: usize) -> Result<(String, Vec<(String, String)>), Fault> {
     let is_mesh = |&k: &usize| layer.prims[k].kind == Kind::Mesh && scene::path(&layer.nodes, k) == path;
     let Some(mesh) = (0..layer.prims.len()).find(is_mesh) else {
-        return Err(Fault::invalid(format!("has no mesh {path}, a part of the model; give the file that it was encoded from")));
+        return Err(Fault::invalid(format!(
+            "has no mesh {path}, a part of the model; give the file that it was encoded from"
+        )));
     };
     let there = match layer.attribute(mesh, "points")?.still() {
         Some(value) => layer.source.points(value)?.count,

@@ -22,6 +22,8 @@ pub fn numbered(faces: &Polygons, given: &[u32]) -> (Vec<u32>, Vec<usize>) {
 /// Cosine of the angle within which normals of a point are one: rounding and averages of programs
 /// are within it, and nobody sees such an edge.
 const ONE: f32 = 0.9994;
+/// Normals of a point that are compared.
+const MOST_OF_POINT: usize = 64;
 
 /// Which corners share a normal ([`Part::normals`](super::Part::normals)), by the point of each and
 /// the normal that a file gives it, of any length.
@@ -31,7 +33,8 @@ pub fn sharing(points: &[u32], normals: &[[f32; 3]]) -> Vec<u32> {
     let number = |(&point, &normal): (&u32, &[f32; 3])| {
         let normal = Vec3::from(normal).normalize_or_zero();
         let of_point = known.entry(point).or_default();
-        let same = of_point.iter().find(|(other, _)| *other == normal || other.dot(normal) > ONE);
+        // Of more than a mesh has at a point, each is one of its own.
+        let same = of_point.iter().take(MOST_OF_POINT).find(|(other, _)| *other == normal || other.dot(normal) > ONE);
         same.map(|&(_, number)| number).unwrap_or_else(|| {
             of_point.push((normal, count));
             count += 1;

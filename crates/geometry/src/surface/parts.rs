@@ -18,8 +18,8 @@ pub struct Chosen {
 impl Surface {
     /// The parts of which `is_chosen` is true, by their places.
     pub fn choose(&self, faces: &Polygons, is_chosen: impl Fn(usize) -> bool) -> Chosen {
-        let mut chosen = Chosen::default();
-        chosen.surface = Surface { parts: Vec::new(), ..self.clone() };
+        let surface = Surface { parts: Vec::new(), ..self.clone() };
+        let mut chosen = Chosen { surface, ..Chosen::default() };
         let mut first = 0;
         for (_, (part, range)) in self.ranges(faces).enumerate().filter(|&(k, _)| is_chosen(k)) {
             for face in range.local(faces).iter() {

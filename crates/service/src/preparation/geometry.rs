@@ -9,7 +9,7 @@ use cager_capture::origin::move_to;
 use cager_codec::CodedMesh;
 use cager_core::cage::{Cage, CageError};
 use cager_core::regularize::Regularizer;
-use cager_formats::{MeshFormat, Units, read_matrix_bytes, read_mesh_bytes};
+use cager_formats::{MeshFormat, Units, read_matrix_bytes, read_split_mesh_bytes};
 use cager_geometry::linalg::SparseMatrix;
 use cager_geometry::mesh::{Model, Point, TriMesh, diagonal};
 use cager_proto::container::unpack_model;
@@ -121,7 +121,8 @@ pub(crate) fn read_part_with_units(part: &str, name: &str, bytes: &[u8]) -> Resu
         return unpack_model(bytes).map_err(|error| geometry(format!("{part}: {name}: {error}")));
     }
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
-    let read = read_mesh_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))?;
+    // Frames come without a file that would say which points are one.
+    let read = read_split_mesh_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))?;
     Ok((read.model, read.units))
 }
 

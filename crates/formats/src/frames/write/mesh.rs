@@ -59,7 +59,9 @@ impl FrameMesh {
                 text = Some(ObjText::new(faces, surface, has_materials.then_some(library)));
             }
             MeshFormat::Ply => {
-                let what = |what| Fault::invalid(format!("cannot have what lies on the faces ({what}); give that of this mesh"));
+                let what = |what| {
+                    Fault::invalid(format!("cannot have what lies on the faces ({what}); give that of this mesh"))
+                };
                 surface.check(announced.points, faces).map_err(|cause| what(cause).at(path))?;
             }
             MeshFormat::Obj => write_obj_faces(&mut lines, faces).map_err(|cause| Error::write(path, cause))?,

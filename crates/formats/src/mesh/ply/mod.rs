@@ -48,9 +48,7 @@ fn read_elements<V: Values>(header: &Header<'_>, contents: Contents, mut values:
                 Ok(())
             })?,
             "tristrips" if faces => {
-                each_list(element, &mut values, |k, strip| {
-                    add_strip(strip.vertices, points, k, &mut parsed.model)
-                })?;
+                each_list(element, &mut values, |k, strip| add_strip(strip.vertices, points, k, &mut parsed.model))?;
             }
             _ => skip(element, &mut values)?,
         }
@@ -77,8 +75,8 @@ fn read_points<V: Values>(
     let all = contents == Contents::PointsAndFaces;
     let has_normals = all && READ[3..6].iter().all(|name| element.scalar(name).is_some());
     let full_light = element.full_light().filter(|_| all);
-    let has_coordinates = all
-        && READ[9..].iter().all(|name| element.properties.iter().any(|found| surface::plain(&found.name) == *name));
+    let has_coordinates =
+        all && READ[9..].iter().all(|name| element.properties.iter().any(|found| surface::plain(&found.name) == *name));
     let (mut colors, mut coordinates) = (Colors::default(), Vec::new());
     // Three scalars take at least three bytes.
     let most = (values.remaining() / 3) as u64;

@@ -75,7 +75,12 @@ impl Mesh {
         range: &PartRange,
         faces: &Polygons,
     ) -> io::Result<Self> {
-        let bare = Part { normals: part.normals.clone(), points: part.points, subdivision: part.subdivision, ..Part::default() };
+        let bare = Part {
+            normals: part.normals.clone(),
+            points: part.points,
+            subdivision: part.subdivision,
+            ..Part::default()
+        };
         Self::of_part(encoder, &bare, range, faces, &[])
     }
 
