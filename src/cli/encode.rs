@@ -33,7 +33,9 @@ pub(super) fn run(mut args: EncodeArgs) -> Result<()> {
     let args = &args;
     // What is wrong with it is told before anything is computed.
     let is_coded = goal(&args.coding, args.coding.units(), args.cage.is_some(), &rest, 1)?.is_some();
-    targets.warnings.extend(dropped.sentence(&args.rest, is_coded && !args.coding.exact_rest));
+    targets
+        .warnings
+        .extend(dropped.sentence(&args.rest, is_coded && !args.coding.exact_rest && rest.surface.is_empty()));
     if args.outputs.dry_run {
         dry_run(args, &targets, &files, &rest, cage.as_ref())?;
         warn(&targets.warnings);

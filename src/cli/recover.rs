@@ -128,7 +128,7 @@ fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Un
     let placing = [args.align, args.scale].map(|placing| placing == Align::Auto);
     let units = placed_units(said, args.up, placing).or(args.coding.units());
     let is_coded = goal(&args.coding, units, true, &template, 1)?.is_some();
-    warn(dropped.sentence(path, is_coded && !args.coding.exact_rest).as_slice());
+    warn(dropped.sentence(path, is_coded && !args.coding.exact_rest && template.surface.is_empty()).as_slice());
     let origin = own_origin(&template.points);
     if origin.is_some() && args.rig.is_some() {
         bail!(

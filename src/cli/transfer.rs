@@ -41,7 +41,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     move_to(origin, &mut target.points);
     // What is wrong with them is told before anything is computed.
     let is_coded = goal(&args.coding, units, true, &target, 1)?.is_some();
-    warn(dropped.sentence(&args.target, is_coded && !args.coding.exact_rest).as_slice());
+    warn(dropped.sentence(&args.target, is_coded && !args.coding.exact_rest && target.surface.is_empty()).as_slice());
     let design = DesignOptions {
         goal: design_goal(args.cage_vertices, args.coding.mean_error, target.points.len())?,
         ..DesignOptions::default()

@@ -174,7 +174,7 @@ fn frames_have_the_points_of_their_rest_pose_merged_or_as_stored() {
     }
     let mut frames = open_frames(folder.path(), 6).unwrap();
     assert_eq!((frames.frames(), all(frames.as_mut())[1].len()), (2, 18));
-    let split = read_split_mesh(&folder.path().join("a.0001.glb"), None).unwrap().unwrap().model;
+    let split = read_split_mesh(&folder.path().join("a.0001.glb"), &[]).unwrap().unwrap().model;
     assert_eq!(split.points, stored);
     split.surface.check(6, &split.faces).unwrap();
 }
@@ -204,7 +204,7 @@ fn pictures_that_are_placed_alike_place_the_texture_coordinates() {
         let folder = tempdir().unwrap();
         let path = folder.path().join("a.glb");
         fs::write(&path, file).unwrap();
-        let read = read_mesh(&path, None).unwrap();
+        let read = read_mesh(&path, &[]).unwrap();
         let set = &read.model.surface.parts[0].uv_sets[0];
         let values: Vec<[f32; 2]> = set.corners.iter().map(|&k| set.values[k as usize]).collect();
         (values, read.dropped.sentence(&path, false).unwrap())
@@ -276,7 +276,7 @@ fn scene() -> (Model, Surface) {
         ],
     };
     let plain = Material { name: "plain".to_owned(), base_color: [0.5, 0.25, 0.125], ..Material::default() };
-    let surface = Surface { parts: vec![strip, flag], materials: vec![plain, gold] };
+    let surface = Surface { parts: vec![strip, flag], materials: vec![plain, gold], ..Surface::default() };
     let points = points.map(|p| p.map(f64::from)).to_vec();
     surface.check(points.len(), &faces).unwrap();
     (Model { points, faces, ..Model::default() }, surface)
@@ -326,7 +326,7 @@ fn what_is_written_is_read_again() {
     let lost = "a.glb: has no place for subdivision, creases, 1 group (left) and faces of more than three corners of the model";
     assert!(notes.iter().any(|note| note.ends_with(lost)), "{notes:?}");
     let (model, surface) = scene();
-    let back = read_mesh(&path, None).unwrap().model;
+    let back = read_mesh(&path, &[]).unwrap().model;
     back.surface.check(10, &back.faces).unwrap();
     assert_eq!(back.faces, Polygons::of_triangles(&model.faces.triangulated()));
     let [strip, flag] = &back.surface.parts[..] else { panic!() };
@@ -372,9 +372,7 @@ fn parts_move_together_and_are_where_they_are_though_hidden() {
                 assert!(distance < tolerance, "frame {frame}, point {k}: {found:?}");
             }
         }
-        let shown: Vec<_> =
-            read_mesh(&path, None).unwrap().model.surface.parts.into_iter().map(|part| part.shown).collect();
-        assert_eq!(shown, [None, Some(vec![1..2, 3..4])]);
+        assert_eq!(open_frames(&path, 10).unwrap().shown(), [None, Some(vec![1..2, 3..4])]);
         // Other programs see scales of nothing.
         let (json, data) = split(&fs::read(&path).unwrap());
         let animation = &json["animations"][0];

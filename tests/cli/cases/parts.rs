@@ -1,7 +1,7 @@
 //! Captures of several parts: which are read, shown and written, and their pictures.
 
 use crate::support::Dir;
-use cager_formats::{FrameReader, FrameSelection, open_frames, open_selected_frames, read_mesh};
+use cager_formats::{FrameSelection, open_frames, open_selected_frames, read_mesh};
 use cager_geometry::mesh::Model;
 use std::fmt::Write;
 
@@ -75,7 +75,7 @@ fn parts_come_back_alone_by_name_or_glob() {
     let dir = encoded();
     dir.cager("decode cast.cager --part hat -o hat.usdc").succeeds();
     let hat = model(&dir, "hat.usdc");
-    assert_eq!((hat.points.len(), hat.surface.parts.len(), hat.surface.parts[0].path.as_str()), (8, 1, "/hat"));
+    assert_eq!((hat.points.len(), hat.surface.parts.len(), hat.surface.parts[0].path.as_str()), (8, 1, "/hat/hat"));
     assert_eq!(hat.surface.parts[0].uv_sets[0].corners.len(), 24);
     dir.cager("decode cast.cager --part *y -o body.npy").succeeds();
     let mut reader = open_frames(dir.path("body.npy"), 8).expect("the points of the body");

@@ -17,9 +17,17 @@ pub(super) struct Look {
     /// How its pictures move texture coordinates, and those of which sets.
     pub(super) moved: Option<(Transform, Vec<u64>)>,
     /// Pictures that lie in the file itself.
-    pub(super) embedded: Vec<usize>,
+    pub(super) embedded: Vec<Embedded>,
     /// What else of it is not kept.
     pub(super) dropped: Vec<&'static str>,
+}
+
+/// A picture that lies in the file itself.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Embedded {
+    pub(super) path: String,
+    /// The buffer view that has its bytes, where it is no text.
+    pub(super) view: Option<usize>,
 }
 
 /// `KHR_texture_transform`: scaled, then turned counter-clockwise in the picture, then moved.
@@ -94,7 +102,7 @@ fn look(document: &Value, k: usize, value: &Value, room: &mut usize) -> Look {
             continue;
         };
         *room = left;
-        look.embedded.extend(embedded);
+        look.embedded.extend(embedded.map(|view| Embedded { path: path.clone(), view }));
         look.material.textures.push(Texture { channel, path });
         let extension = &info["extensions"]["KHR_texture_transform"];
         let set = extension["texCoord"].as_u64().or(info["texCoord"].as_u64()).unwrap_or(0);
@@ -116,8 +124,8 @@ fn look(document: &Value, k: usize, value: &Value, room: &mut usize) -> Look {
     look
 }
 
-/// The name of the picture of a texture, and its index where it lies in the file itself.
-fn picture(document: &Value, texture: usize) -> Option<(String, Option<usize>)> {
+/// The name of the picture of a texture, and where its bytes are if it lies in the file itself.
+fn picture(document: &Value, texture: usize) -> Option<(String, Option<Option<usize>>)> {
     let texture = items(document, "textures").get(texture)?;
     // Formats that need an extension have it there.
     let others = texture["extensions"].as_object().into_iter().flat_map(|others| others.values());
@@ -137,7 +145,7 @@ fn picture(document: &Value, texture: usize) -> Option<(String, Option<usize>)> 
     let name = image["name"].as_str().filter(|name| !name.is_empty());
     let name = name.map_or_else(|| format!("image_{source}"), |name| name.replace(['/', '\\'], "_"));
     let has_extension = name.rsplit_once('.').is_some_and(|(_, end)| end.eq_ignore_ascii_case(extension));
-    Some((if has_extension { name } else { format!("{name}.{extension}") }, Some(source)))
+    Some((if has_extension { name } else { format!("{name}.{extension}") }, Some(index(&image["bufferView"]))))
 }
 
 fn index(value: &Value) -> Option<usize> {

@@ -24,7 +24,10 @@ mod skin;
 mod unread;
 mod write;
 
+use std::collections::HashSet;
+
 use cager_geometry::mesh::Model;
+use cager_geometry::surface::{Picture, Surface};
 
 use crate::dropped::Dropped;
 use crate::error::Fault;
@@ -36,6 +39,25 @@ pub(crate) use frames::{is_animated, open_frames};
 use scene::Scene;
 pub(crate) use write::{MOST_FRAMES, Morphs, Piece, Scene as MorphScene, Wanted, lost_pictures, write_head};
 
+/// The pictures in the file that materials of a surface name.
+fn pictures(buffers: &Buffers<'_>, surface: &Surface) -> Vec<Picture> {
+    let names: HashSet<&str> =
+        surface.materials.iter().flat_map(|found| &found.textures).map(|texture| texture.path.as_str()).collect();
+    let mut found: Vec<Picture> = Vec::new();
+    for embedded in buffers.materials.iter().flat_map(|look| &look.embedded) {
+        let Some(view) = embedded.view.filter(|_| names.contains(embedded.path.as_str())) else { continue };
+        let is_new = found.len() < MOST_PICTURES && found.iter().all(|picture| picture.path != embedded.path);
+        // A picture that is not there is no reason to refuse a mesh.
+        if is_new && let Ok((bytes, _)) = buffers.view(view, "a picture") {
+            found.push(Picture { path: embedded.path.clone(), bytes: bytes.into() });
+        }
+    }
+    found
+}
+
+/// Pictures that are taken of a file, so that many of the same bytes take little.
+const MOST_PICTURES: usize = 256;
+
 /// The meshes of the default scene at rest as one, or those of several that are named.
 pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prims: &[String]) -> Result<(Model, Dropped), Fault> {
     let buffers = Buffers::open(bytes, source)?;
@@ -43,7 +65,8 @@ pub(crate) fn read(bytes: &[u8], source: &Source<'_>, prims: &[String]) -> Resul
     let chosen = choice::choose(&buffers.root, &scene, prims)?;
     let placements = &scene.placements[chosen];
     let builder = Builder::new(&buffers, &scene, Contents::PointsAndFaces, source.is_split);
-    let model = builder.build(placements)?.model;
+    let mut model = builder.build(placements)?.model;
+    model.surface.pictures = pictures(&buffers, &model.surface);
     let dropped = unread::of(&buffers, placements, &model);
     Ok((model, dropped))
 }

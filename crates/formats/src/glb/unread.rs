@@ -71,9 +71,10 @@ fn add_materials(dropped: &mut Dropped, materials: &[Look], faces: &[&Primitive]
     let used: BTreeSet<usize> =
         faces.iter().filter_map(|found| found.material.map(|material| material.value())).collect();
     let used = || used.iter().filter_map(|&material| materials.get(material));
-    let embedded: BTreeSet<usize> = used().flat_map(|look| look.embedded.iter().copied()).collect();
+    let as_text = used().flat_map(|look| &look.embedded).filter(|found| found.view.is_none());
+    let embedded: BTreeSet<&str> = as_text.map(|found| found.path.as_str()).collect();
     if !embedded.is_empty() {
-        dropped.add(counted(embedded.len(), "texture") + " within the file");
+        dropped.add(counted(embedded.len(), "texture") + " as text within the file");
     }
     used().flat_map(|look| &look.dropped).for_each(|phrase| dropped.add(*phrase));
 }
