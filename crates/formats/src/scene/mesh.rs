@@ -3,6 +3,7 @@
 use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::Part;
 
+use super::deform::Deformer;
 use super::faces::{faces, most_corners, topology_changes};
 use super::shown::Steps;
 use super::surface::arranged;
@@ -17,6 +18,8 @@ pub(crate) struct MeshTracks {
     /// How many corners faces have, and which.
     pub(crate) faces: [Track; 2],
     pub(crate) is_clockwise: bool,
+    /// What moves them before the transforms above do.
+    pub(crate) deformer: Option<Box<dyn Deformer>>,
     pub(crate) chain: Chain,
     pub(crate) shown: Steps,
     /// The path; where a model is read, what lies on the faces too, of all faces and their corners
@@ -136,6 +139,10 @@ impl MovingMesh {
             self.next.resize(out.len(), 0.0);
             finite &= source.read(following, &mut self.next)?;
             out.iter_mut().zip(&self.next).for_each(|(value, next)| *value += share * (next - *value));
+            finite &= out.iter().all(|x| x.is_finite());
+        }
+        if let Some(deformer) = &mut self.tracks.deformer {
+            deformer.deform(time, out)?;
             finite &= out.iter().all(|x| x.is_finite());
         }
         Ok(place(matrix, out, finite))

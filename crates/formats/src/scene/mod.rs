@@ -2,6 +2,7 @@
 //! chosen; values at times, read when a frame is asked for; transforms above a mesh; its frames.
 
 mod bytes;
+mod deform;
 mod faces;
 mod mesh;
 mod moving;
@@ -13,6 +14,7 @@ mod track;
 mod transform;
 
 pub(crate) use bytes::{Allowance, Fields, Reader, Source, damaged};
+pub(crate) use deform::Deformer;
 pub(crate) use faces::most_corners;
 pub(crate) use mesh::{MeshTracks, bounds};
 pub(crate) use moving::{MovingScene, SceneTracks, no_points};
@@ -21,4 +23,4 @@ pub(crate) use node::{Node, Tree, Wanted, ancestry, choose, list, named, path, s
 pub(crate) use reader::{Animation, MeshInfo, open};
 pub(crate) use shown::Steps;
 pub(crate) use track::{Points, Timeline, Track, Value, Values, check_held, union};
-pub(crate) use transform::{Chain, MOST_OPERATIONS, Operation};
+pub(crate) use transform::{Chain, MOST_OPERATIONS, Operation, affine};

@@ -55,10 +55,7 @@ impl Operation {
             Self::Turn => rotation(DVec3::from_slice(values), values[3]),
             // As OpenUSD has it: quaternions are not made to be of length 1.
             Self::Orient => DAffine3::from_mat3(DMat3::from_quat(DQuat::from_slice(values))),
-            Self::Matrix | Self::Rigid => {
-                let column = |k: usize| DVec3::from_slice(&values[4 * k..]);
-                DAffine3::from_cols(column(0), column(1), column(2), column(3))
-            }
+            Self::Matrix | Self::Rigid => affine(values),
         }
     }
 
@@ -85,6 +82,12 @@ impl Operation {
             _ => self.matrix(&line),
         }
     }
+}
+
+/// The matrix of sixteen numbers, of which the last column is passed over: vectors are rows.
+pub(crate) fn affine(values: &[f64]) -> DAffine3 {
+    let row = |k: usize| DVec3::from_slice(&values[4 * k..]);
+    DAffine3::from_cols(row(0), row(1), row(2), row(3))
 }
 
 /// About an axis; the identity where there is none.

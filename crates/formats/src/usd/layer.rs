@@ -29,6 +29,11 @@ pub(super) enum Kind {
     Shading,
     /// What shows the prims below it many times, and not where they are.
     PointInstancer,
+    /// Below it skeletons move meshes.
+    SkelRoot,
+    Skeleton,
+    /// Poses of a skeleton, or shapes that a mesh takes.
+    Motion,
     Other,
 }
 
@@ -39,6 +44,9 @@ impl Kind {
             b"GeomSubset" => Self::Subset,
             b"Material" | b"Shader" | b"NodeGraph" => Self::Shading,
             b"PointInstancer" => Self::PointInstancer,
+            b"SkelRoot" => Self::SkelRoot,
+            b"Skeleton" => Self::Skeleton,
+            b"SkelAnimation" | b"BlendShape" => Self::Motion,
             _ => Self::Other,
         }
     }
@@ -84,6 +92,12 @@ impl Layer<'_> {
         Ok(track.values.first().copied().or(track.default))
     }
 
+    /// The numbers of the first value of an attribute of a prim.
+    pub(super) fn numbers(&mut self, prim: usize, name: &str) -> Result<Option<Vec<f64>>, Fault> {
+        let value = self.first(prim, name)?;
+        value.map(|value| self.source.numbers(value)).transpose()
+    }
+
     /// The tokens that an attribute of a prim is at all times, or first.
     pub(super) fn tokens(&mut self, prim: usize, name: &str, most: usize) -> Result<Option<Vec<String>>, Fault> {
         let value = self.attribute(prim, name)?.still();
@@ -91,21 +105,39 @@ impl Layer<'_> {
     }
 }
 
+/// A prim, and one of its attributes or none.
+pub(super) type Target = (usize, String);
+
 pub(super) trait Attributes: Values {
     /// The values of an attribute of a prim; none where it has none of this name.
     fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault>;
 
-    /// The names and types of what a mesh has beside its faces, and of the materials of any prim.
+    /// The names and types of what a mesh or a shape has, and of the materials of any prim.
     fn properties(&self, prim: usize) -> Vec<(String, String)>;
 
     /// What the elements of an attribute belong to, such as corners; empty where it is not said.
     fn interpolation(&mut self, prim: usize, name: &str) -> Result<String, Fault>;
 
-    /// What an attribute or a relationship leads to: the first prim, and its attribute.
-    fn target(&mut self, prim: usize, name: &str) -> Result<Option<(usize, String)>, Fault>;
+    /// The weight at which a shape between others is reached, where it says one.
+    fn weight(&mut self, prim: usize, name: &str) -> Result<Option<f64>, Fault>;
 
-    /// The numbers of vectors of `width` numbers, of which there are at most so many, or of one.
-    fn floats(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f32>, Fault>;
+    /// What an attribute or a relationship leads to: prims, and their attributes; `None` for those
+    /// that are not there.
+    fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault>;
+
+    /// The first of these.
+    fn target(&mut self, prim: usize, name: &str) -> Result<Option<Target>, Fault> {
+        Ok(self.targets(prim, name)?.into_iter().next().flatten())
+    }
+
+    /// The numbers of vectors of `width` numbers, of which there are at most so many, or of one;
+    /// of quaternions the real part last.
+    fn vectors(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f64>, Fault>;
+
+    /// The same, of single precision.
+    fn floats(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f32>, Fault> {
+        Ok(self.vectors(value, width, most)?.iter().map(|&x| x as f32).collect())
+    }
 
     /// Refuses more memory than such a file should take.
     fn reserve(&mut self, count: u64, size: u64) -> Result<(), Fault>;

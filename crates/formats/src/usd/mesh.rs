@@ -8,12 +8,13 @@ use cager_geometry::units::{Units, Up};
 use super::choice::choose;
 use super::layer::{Layer, Stage};
 use super::materials::Materials;
+use super::skel::Rigs;
 use super::timing::timeline;
 use super::unread::Unread;
 use super::{surface, transform};
 use crate::dropped::Dropped;
 use crate::error::Fault;
-use crate::scene::{MeshTracks, MovingScene, SceneTracks, Steps, Track, Wanted, ancestry, path};
+use crate::scene::{Deformer, MeshTracks, MovingScene, SceneTracks, Steps, Track, Wanted, ancestry, path};
 
 /// The unit of layers that do not say theirs: a centimetre.
 const USUAL_UNIT: f64 = 0.01;
@@ -27,14 +28,16 @@ pub(super) fn open<'a>(
 ) -> Result<MovingScene<'a>, Fault> {
     let (prims, notes) = choose(&mut layer, wanted)?;
     let mut tracks = SceneTracks { notes, units: units(&layer.stage), ..SceneTracks::default() };
+    let mut rigs = Rigs::default();
     for &prim in &prims {
         let name = path(&layer.nodes, prim);
         let named = |fault: Fault| if prims.len() > 1 { fault.within(&name) } else { fault };
-        tracks.meshes.push(read_mesh(&mut layer, prim, model.is_some()).map_err(named)?);
+        tracks.meshes.push(read_mesh(&mut layer, prim, &mut rigs).map_err(named)?);
     }
     let of_mesh = |mesh: &MeshTracks| {
         let moved = mesh.chain.moving().flatten();
-        mesh.positions.times.iter().chain(moved).copied().collect::<Vec<f64>>()
+        let deformed = mesh.deformer.as_ref().map_or(Vec::new(), |deformer| deformer.times());
+        mesh.positions.times.iter().chain(moved).copied().chain(deformed).collect::<Vec<f64>>()
     };
     tracks.timeline = timeline(&layer.stage, tracks.meshes.iter().flat_map(of_mesh).collect())?;
     if let Some((dropped, mut pictures)) = model {
@@ -43,7 +46,7 @@ pub(super) fn open<'a>(
         for (&prim, mesh) in prims.iter().zip(&mut tracks.meshes) {
             // What cannot be read is no reason to refuse a mesh.
             let read = surface::read(&mut layer, prim, &mut materials, &mut mesh.part).unwrap_or_default();
-            unread.take(&mut layer, prim, &mesh.part, &read);
+            unread.take(&mut layer, prim, mesh, &read);
         }
         unread.tell(materials.names_alone, dropped);
         pictures.retain(|picture| materials.names(&picture.path));
@@ -52,22 +55,23 @@ pub(super) fn open<'a>(
     MovingScene::new(layer.source, tracks)
 }
 
-fn read_mesh(layer: &mut Layer<'_>, prim: usize, is_still: bool) -> Result<MeshTracks, Fault> {
+fn read_mesh(layer: &mut Layer<'_>, prim: usize, rigs: &mut Rigs) -> Result<MeshTracks, Fault> {
     let mut attribute = |name| layer.attribute(prim, name);
     let positions = attribute("points")?;
     let faces = [attribute("faceVertexCounts")?, attribute("faceVertexIndices")?];
-    for (name, mover) in [("primvars:skel:jointIndices", "a skeleton moves"), ("skel:blendShapes", "blend shapes move")]
-    {
-        if !is_still && positions.times.is_empty() && !attribute(name)?.is_empty() {
-            let what =
-                format!("has a mesh that {mover}, which is not read; export it with its points baked, or as Alembic");
-            return Err(Fault::unsupported(what));
-        }
-    }
-    let chain = transform::above(layer, prim)?;
-    let is_clockwise = layer.tokens(prim, "orientation", 1)?.is_some_and(|told| told == ["leftHanded"]);
+    let mut is_clockwise = layer.tokens(prim, "orientation", 1)?.is_some_and(|told| told == ["leftHanded"]);
+    // Points that move are where a skeleton has taken them.
+    let still = positions.default.filter(|_| positions.times.is_empty());
+    let points = still.map(|value| layer.source.points(value)).transpose()?;
+    let bound = match points.filter(|points| points.count > 0) {
+        Some(points) => rigs.bind(layer, prim, points.count)?,
+        None => None,
+    };
+    let chain = transform::above(layer, bound.as_ref().map_or(prim, |bound| bound.space))?;
+    is_clockwise ^= bound.as_ref().is_some_and(|bound| bound.is_mirrored);
+    let deformer = bound.map(|bound| Box::new(bound.skin) as Box<dyn Deformer>);
     let part = Part { path: path(&layer.nodes, prim), ..Part::default() };
-    Ok(MeshTracks { positions, faces, is_clockwise, chain, shown: visible(layer, prim)?, part })
+    Ok(MeshTracks { positions, faces, is_clockwise, deformer, chain, shown: visible(layer, prim)?, part })
 }
 
 /// When a prim is shown: what is invisible hides all below it.

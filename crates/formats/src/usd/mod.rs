@@ -11,6 +11,7 @@ mod materials;
 mod mesh;
 mod onto;
 mod package;
+mod skel;
 mod surface;
 mod text;
 mod timing;

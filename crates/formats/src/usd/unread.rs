@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeSet, HashSet};
 
-use cager_geometry::surface::Part;
-
 use super::layer::Layer;
 use crate::dropped::{Dropped, counted, listed};
+use crate::scene::MeshTracks;
 
 /// Attributes beside points and faces, and what they are.
 const KINDS: [(&str, &str); 9] = [
@@ -31,11 +30,14 @@ pub(super) struct Unread {
 
 impl Unread {
     /// Adds what a mesh has beside the properties that were read.
-    pub(super) fn take(&mut self, layer: &mut Layer<'_>, mesh: usize, part: &Part, read: &HashSet<String>) {
-        for (name, type_name) in layer.source.properties(mesh).into_iter().filter(|(name, _)| !read.contains(name)) {
+    pub(super) fn take(&mut self, layer: &mut Layer<'_>, prim: usize, mesh: &MeshTracks, read: &HashSet<String>) {
+        let (part, is_moved) = (&mesh.part, mesh.deformer.is_some());
+        let is_read =
+            |name: &str| read.contains(name) || (is_moved && name.trim_start_matches("primvars:").starts_with("skel:"));
+        for (name, type_name) in layer.source.properties(prim).into_iter().filter(|(name, _)| !is_read(name)) {
             self.has_materials |= part.materials.is_empty() && name.starts_with("material:binding");
             if kind(&name, &type_name).is_some() {
-                let told = layer.source.interpolation(mesh, &name).unwrap_or_default();
+                let told = layer.source.interpolation(prim, &name).unwrap_or_default();
                 self.is_on_faces |= !matches!(told.as_str(), "" | "constant" | "vertex" | "varying");
             }
             self.properties.insert((name, type_name));

@@ -90,11 +90,11 @@ impl File<'_> {
     }
 
     /// The numbers of an array of at most so many vectors of `width` numbers, or of one vector.
-    pub(super) fn floats(&mut self, rep: Rep, width: usize, most: u64) -> Result<Vec<f32>, Fault> {
+    pub(super) fn vectors(&mut self, rep: Rep, width: usize, most: u64) -> Result<Vec<f64>, Fault> {
         if !rep.is_array() {
             let numbers = self.numbers(rep)?;
             let is_fit = numbers.len() == width;
-            return if is_fit { Ok(numbers.iter().map(|&x| x as f32).collect()) } else { Err(other_vectors(width)) };
+            return if is_fit { Ok(numbers) } else { Err(other_vectors(width)) };
         }
         let (scalar, found) = match rep.kind() {
             kind::HALF => (Scalar::F16Little, 1),
@@ -109,6 +109,10 @@ impl File<'_> {
             kind::VEC4H => (Scalar::F16Little, 4),
             kind::VEC4F => (Scalar::F32Little, 4),
             kind::VEC4D => (Scalar::F64Little, 4),
+            kind::QUATH => (Scalar::F16Little, 4),
+            kind::QUATF => (Scalar::F32Little, 4),
+            kind::QUATD => (Scalar::F64Little, 4),
+            kind::MATRIX4D => (Scalar::F64Little, 16),
             _ => return Err(other_vectors(width)),
         };
         let (start, count) = self.elements(rep)?;
@@ -116,26 +120,26 @@ impl File<'_> {
             return Err(other_vectors(width));
         }
         if rep.is_packed() && count > 0 {
-            return self.packed_floats(start, scalar, count);
+            return self.packed_numbers(start, scalar, count);
         }
-        self.unpacked_floats(start, scalar, count * width as u64)
+        self.unpacked_numbers(start, scalar, count.saturating_mul(width as u64))
     }
 
-    fn unpacked_floats(&mut self, start: u64, scalar: Scalar, count: u64) -> Result<Vec<f32>, Fault> {
+    fn unpacked_numbers(&mut self, start: u64, scalar: Scalar, count: u64) -> Result<Vec<f64>, Fault> {
         self.source.check(start, count, scalar.size() as u64)?;
         let mut numbers = vec![0.0; self.source.allowance.take(count, 12)?];
         self.source.values(start, scalar, &mut numbers)?;
-        Ok(numbers.iter().map(|&x| x as f32).collect())
+        Ok(numbers)
     }
 
     /// Numbers that are whole, or a table of numbers and which of them is where.
-    fn packed_floats(&mut self, start: u64, scalar: Scalar, count: u64) -> Result<Vec<f32>, Fault> {
+    fn packed_numbers(&mut self, start: u64, scalar: Scalar, count: u64) -> Result<Vec<f64>, Fault> {
         let (mut at, mut table) = (start + 1, None);
         match self.source.array(start)? {
             [b'i'] => {}
             [b't'] => {
                 let length = u32::from_le_bytes(self.source.array(at)?);
-                table = Some(self.unpacked_floats(at + 4, scalar, length.into())?);
+                table = Some(self.unpacked_numbers(at + 4, scalar, length.into())?);
                 at += 4 + u64::from(length) * scalar.size() as u64;
             }
             _ => return Err(damaged("an array of numbers is packed in an unknown way")),
@@ -143,9 +147,9 @@ impl File<'_> {
         let length = self.source.number(at)?;
         let packed = self.source.bytes(at.saturating_add(8), length, 1)?;
         let numbers = integers(&packed, self.source.allowance.take(count, 8)?)?;
-        let Some(table) = table else { return Ok(numbers.iter().map(|&x| x as f32).collect()) };
+        let Some(table) = table else { return Ok(numbers.into_iter().map(f64::from).collect()) };
         let number = |&k: &i32| usize::try_from(k).ok().and_then(|k| table.get(k).copied());
-        let all: Option<Vec<f32>> = numbers.iter().map(number).collect();
+        let all: Option<Vec<f64>> = numbers.iter().map(number).collect();
         all.ok_or_else(|| damaged("an array has a number that is not in its table"))
     }
 }

@@ -8,7 +8,7 @@ mod sections;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::layer::{Attributes, COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, composed, spline};
+use super::layer::{Attributes, COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, Target, composed, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
 use crate::scene::{Node, Points, Reader, Source, Track, Value, Values, damaged};
@@ -201,24 +201,45 @@ impl Attributes for Binary<'_> {
         Ok(told.map_or(Ok(Vec::new()), |told| self.tokens(Value(told.0), 1))?.concat())
     }
 
-    fn target(&mut self, prim: usize, name: &str) -> Result<Option<(usize, String)>, Fault> {
+    fn weight(&mut self, prim: usize, name: &str) -> Result<Option<f64>, Fault> {
         let Some(spec) = self.find(prim, name) else { return Ok(None) };
-        let field = if spec.kind == RELATIONSHIP { "targetPaths" } else { "connectionPaths" };
-        let Some(list) = self.sections.field(spec, field)? else { return Ok(None) };
-        // Which lists follow, each behind how many paths it has: the first is of those that are there.
-        let [head] = self.file.source.array(list.offset())?;
-        if list.kind() != kind::PATH_LIST || head & FILLED == 0 || self.file.source.number(list.offset() + 1)? == 0 {
-            return Ok(None);
-        }
-        let path = u32::from_le_bytes(self.file.source.array(list.offset() + 9)?);
-        let of = |path: u32| self.paths.binary_search(&path).ok();
-        let Some(&Path { parent, name, .. }) = self.sections.paths.get(path as usize) else { return Ok(None) };
-        let property = || Some((of(parent)?, String::from_utf8_lossy(self.sections.token(name)).into_owned()));
-        Ok(of(path).map(|prim| (prim, String::new())).or_else(property))
+        let told = self.sections.field(spec, "weight")?;
+        Ok(told.map_or(Ok(Vec::new()), |told| self.file.numbers(told))?.first().copied())
     }
 
-    fn floats(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f32>, Fault> {
-        self.file.floats(Rep(value.0), width, most)
+    fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
+        let Some(spec) = self.find(prim, name) else { return Ok(Vec::new()) };
+        let field = if spec.kind == RELATIONSHIP { "targetPaths" } else { "connectionPaths" };
+        let Some(list) = self.sections.field(spec, field)? else { return Ok(Vec::new()) };
+        // Which lists follow, each behind how many paths it has: the first is of those that are there.
+        let [head] = self.file.source.array(list.offset())?;
+        if list.kind() != kind::PATH_LIST || head & FILLED == 0 {
+            return Ok(Vec::new());
+        }
+        let count = self.file.source.number(list.offset() + 1)?;
+        let bytes = self.file.source.bytes(list.offset() + 9, count, 4)?;
+        // Of each the name of an attribute, which may be long.
+        self.file.source.allowance.take(count, 28)?;
+        let mut targets = Vec::new();
+        for path in bytes.as_chunks().0 {
+            let path = u32::from_le_bytes(*path);
+            let of = |path: u32| self.paths.binary_search(&path).ok();
+            let Some(&Path { parent, name, .. }) = self.sections.paths.get(path as usize) else { continue };
+            targets.push(match (of(path), of(parent)) {
+                (Some(prim), _) => Some((prim, String::new())),
+                (None, Some(prim)) => {
+                    let name = self.sections.token(name);
+                    self.file.source.allowance.take(name.len() as u64, 1)?;
+                    Some((prim, String::from_utf8_lossy(name).into_owned()))
+                }
+                (None, None) => None,
+            });
+        }
+        Ok(targets)
+    }
+
+    fn vectors(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f64>, Fault> {
+        self.file.vectors(Rep(value.0), width, most)
     }
 
     fn reserve(&mut self, count: u64, size: u64) -> Result<(), Fault> {

@@ -5,7 +5,7 @@ mod scanner;
 
 use std::collections::HashMap;
 
-use super::layer::{Attributes, Layer, spline};
+use super::layer::{Attributes, Layer, Target, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
 use crate::scene::{Allowance, Node, Points, Reader, Track, Value, Values, damaged};
@@ -22,7 +22,7 @@ pub(super) struct Text<'a> {
     scanner: Scanner<'a>,
     contents: Contents,
     /// Where attributes and relationships lead.
-    targets: HashMap<(usize, String), (usize, String)>,
+    targets: HashMap<(usize, String), Vec<Option<Target>>>,
     allowance: Allowance,
     /// Where points were read from, and these; the last ones first.
     read: Vec<(u64, Vec<f64>)>,
@@ -57,6 +57,30 @@ impl<'a> Text<'a> {
         Ok(!self.scanner.has(b']')?)
     }
 
+    /// The numbers of the next value: a number, or those within brackets.
+    fn one(&mut self, is_double: bool, is_quaternion: bool) -> Result<Vec<f64>, Fault> {
+        let (mut numbers, mut depth) = (Vec::new(), 0_usize);
+        loop {
+            if self.scanner.has(b'(')? {
+                depth += 1;
+            } else if depth > 0 && self.scanner.has(b')')? {
+                depth -= 1;
+            } else if depth == 0 || !self.scanner.has(b',')? {
+                numbers.push(rounded(self.scanner.number()?, is_double));
+                if numbers.len() > MOST_NUMBERS {
+                    return Err(self.scanner.wrong("a value has more numbers than a matrix"));
+                }
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+        if is_quaternion && numbers.len() == 4 {
+            numbers.rotate_left(1);
+        }
+        Ok(numbers)
+    }
+
     fn parse_points(&mut self, index: u64) -> Result<Vec<f64>, Fault> {
         let Stored { count, is_double, .. } = self.enter(Value(index))?;
         let mut values = Vec::with_capacity(3 * count);
@@ -76,10 +100,13 @@ impl<'a> Text<'a> {
 }
 
 /// The prims of paths, and their attributes.
-fn targets(nodes: &[Node], paths: HashMap<(usize, String), String>) -> HashMap<(usize, String), (usize, String)> {
+fn targets(
+    nodes: &[Node],
+    paths: HashMap<(usize, String), Vec<String>>,
+) -> HashMap<(usize, String), Vec<Option<Target>>> {
     let places: HashMap<(Option<usize>, &[u8]), usize> =
         nodes.iter().enumerate().map(|(k, node)| ((node.parent, &*node.name), k)).collect();
-    let find = |path: &str| {
+    let find = |path: &String| {
         let (names, attribute) = path.split_once('.').unwrap_or((path, ""));
         let mut prim = None;
         for name in names.strip_prefix('/')?.split('/') {
@@ -87,7 +114,7 @@ fn targets(nodes: &[Node], paths: HashMap<(usize, String), String>) -> HashMap<(
         }
         Some((prim?, attribute.to_owned()))
     };
-    paths.into_iter().filter_map(|(key, path)| Some((key, find(&path)?))).collect()
+    paths.into_iter().map(|(key, paths)| (key, paths.iter().map(find).collect())).collect()
 }
 
 /// As a type that is not of double precision holds it.
@@ -112,29 +139,28 @@ impl Attributes for Text<'_> {
         Ok(self.contents.interpolations.get(&(prim, name.to_owned())).cloned().unwrap_or_default())
     }
 
-    fn target(&mut self, prim: usize, name: &str) -> Result<Option<(usize, String)>, Fault> {
-        Ok(self.targets.get(&(prim, name.to_owned())).cloned())
+    fn weight(&mut self, prim: usize, name: &str) -> Result<Option<f64>, Fault> {
+        Ok(self.contents.weights.get(&(prim, name.to_owned())).copied())
     }
 
-    fn floats(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f32>, Fault> {
-        let count = self.enter(value)?.count;
+    fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
+        Ok(self.targets.get(&(prim, name.to_owned())).cloned().unwrap_or_default())
+    }
+
+    fn vectors(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f64>, Fault> {
+        let Stored { count, is_double, is_quaternion, .. } = self.enter(value)?;
         if count as u64 > most {
             return Err(damaged(&format!("it has {count} vectors where {most} are the most")));
         }
-        self.reserve((count * width) as u64, 4)?;
+        self.reserve((count * width) as u64, 8)?;
         let is_list = self.scanner.has(b'[')?;
         let mut numbers = Vec::new();
         while !is_list || self.follows()? {
-            let is_vector = self.scanner.has(b'(')?;
-            for k in 0..width {
-                if k > 0 {
-                    self.scanner.expect(b',')?;
-                }
-                numbers.push(self.scanner.number()? as f32);
+            let vector = self.one(is_double, is_quaternion)?;
+            if vector.len() != width {
+                return Err(self.scanner.wrong(&format!("{} numbers stand where {width} belong", vector.len())));
             }
-            if is_vector {
-                self.scanner.expect(b')')?;
-            }
+            numbers.extend(vector);
             if !is_list {
                 break;
             }
@@ -168,26 +194,7 @@ impl Attributes for Text<'_> {
 impl Values for Text<'_> {
     fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Fault> {
         let Stored { is_double, is_quaternion, .. } = self.enter(value)?;
-        let (mut numbers, mut depth) = (Vec::new(), 0_usize);
-        loop {
-            if self.scanner.has(b'(')? {
-                depth += 1;
-            } else if depth > 0 && self.scanner.has(b')')? {
-                depth -= 1;
-            } else if depth == 0 || !self.scanner.has(b',')? {
-                numbers.push(rounded(self.scanner.number()?, is_double));
-                if numbers.len() > MOST_NUMBERS {
-                    return Err(self.scanner.wrong("a value has more numbers than a matrix"));
-                }
-            }
-            if depth == 0 {
-                break;
-            }
-        }
-        if is_quaternion && numbers.len() == 4 {
-            numbers.rotate_left(1);
-        }
-        Ok(numbers)
+        self.one(is_double, is_quaternion)
     }
 
     fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault> {

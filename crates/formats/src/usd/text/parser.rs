@@ -12,26 +12,18 @@ const MODIFIERS: [&str; 9] =
     ["custom", "uniform", "varying", "config", "add", "append", "prepend", "delete", "reorder"];
 
 /// Attributes that are asked for of all prims, beside the operations of transforms.
-const WANTED: [&str; 9] = [
-    "subdivisionScheme",
-    "points",
-    "faceVertexCounts",
-    "faceVertexIndices",
-    "orientation",
-    "purpose",
-    "visibility",
-    "primvars:skel:jointIndices",
-    "skel:blendShapes",
-];
+const WANTED: [&str; 7] =
+    ["subdivisionScheme", "points", "faceVertexCounts", "faceVertexIndices", "orientation", "purpose", "visibility"];
 
 /// Whether an attribute or a relationship of a prim is asked for.
 fn is_wanted(kind: Kind, name: &str) -> bool {
     let of_kind = match kind {
         Kind::Mesh => name == "normals" || ["primvars:", "crease"].iter().any(|start| name.starts_with(start)),
-        Kind::Subset | Kind::Shading => true,
-        Kind::PointInstancer | Kind::Other => false,
+        Kind::Subset | Kind::Shading | Kind::Skeleton | Kind::Motion => true,
+        Kind::PointInstancer | Kind::SkelRoot | Kind::Other => false,
     };
-    of_kind || WANTED.contains(&name) || ["xformOp", "material:binding"].iter().any(|start| name.starts_with(start))
+    let starts = ["xformOp", "material:binding", "skel:", "primvars:skel:"];
+    of_kind || WANTED.contains(&name) || starts.iter().any(|start| name.starts_with(start))
 }
 
 /// A value: its place, how many values it has within it, and what they are.
@@ -54,8 +46,10 @@ pub(super) struct Contents {
     /// What the elements of attributes belong to.
     pub(super) interpolations: HashMap<(usize, String), String>,
     /// The paths to which attributes and relationships lead.
-    pub(super) targets: HashMap<(usize, String), String>,
-    /// Of meshes their names and types, of others those of materials.
+    pub(super) targets: HashMap<(usize, String), Vec<String>>,
+    /// At which weights shapes between others are reached.
+    pub(super) weights: HashMap<(usize, String), f64>,
+    /// Of meshes and shapes their names and types, of others those of materials.
     pub(super) properties: HashMap<usize, Vec<(String, String)>>,
     pub(super) splines: HashSet<(usize, String)>,
 }
@@ -159,6 +153,12 @@ impl<'a, 'b> Parser<'a, 'b> {
                         self.contents.interpolations.insert((prim, name.clone()), value);
                     }
                 }
+                (Owner::Property(name), Some(&prim))
+                    if key == "weight" && self.contents.prims[prim].kind == Kind::Motion =>
+                {
+                    let weight = self.scanner.number()?;
+                    self.contents.weights.insert((prim, name.clone()), weight);
+                }
                 (Owner::Property(_), _) => {
                     self.scanner.pass()?;
                 }
@@ -220,7 +220,8 @@ impl<'a, 'b> Parser<'a, 'b> {
         }
         let name = self.word()?;
         if let Some(&prim) = self.open.last()
-            && (self.contents.prims[prim].kind == Kind::Mesh || name.starts_with("material:binding"))
+            && (matches!(self.contents.prims[prim].kind, Kind::Mesh | Kind::Motion)
+                || name.starts_with("material:binding"))
         {
             let plain = name.split('.').next().unwrap_or_default().to_owned();
             self.contents.properties.entry(prim).or_default().push((plain, type_name.to_owned()));
@@ -243,9 +244,8 @@ impl<'a, 'b> Parser<'a, 'b> {
         let key = (prim, name.to_owned());
         match part {
             _ if type_name == "rel" || part == "connect" => {
-                if let Some(path) = self.first_path()? {
-                    self.contents.targets.insert(key, path);
-                }
+                let paths = self.paths()?;
+                self.contents.targets.insert(key, paths);
             }
             "" => {
                 let value = self.stored(type_name)?;
@@ -267,16 +267,21 @@ impl<'a, 'b> Parser<'a, 'b> {
         Ok(())
     }
 
-    /// The first path of a value, which is passed over.
-    fn first_path(&mut self) -> Result<Option<String>, Fault> {
+    /// The paths of a value, one or a list of them; none where it is something else.
+    fn paths(&mut self) -> Result<Vec<String>, Fault> {
+        let mut paths = Vec::new();
         self.scanner.solid()?;
         let start = self.scanner.place();
         self.scanner.has(b'[')?;
-        let is_path = self.scanner.solid()? == Some(b'<');
-        let path = if is_path { Some(self.scanner.enclosed()?) } else { None };
+        while self.scanner.solid()? == Some(b'<') {
+            paths.push(self.scanner.enclosed()?);
+            if !self.scanner.has(b',')? {
+                break;
+            }
+        }
         self.scanner.go(start)?;
         self.scanner.pass()?;
-        Ok(path)
+        Ok(paths)
     }
 
     fn stored(&mut self, type_name: &str) -> Result<Value, Fault> {
