@@ -4,9 +4,8 @@
 
 mod support;
 
-use std::collections::HashMap;
-use std::fs::{self, File};
-use std::io::{Read, Write};
+use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use cager_formats::{
@@ -14,7 +13,7 @@ use cager_formats::{
     open_selected_frames, read_mesh, read_mesh_bytes,
 };
 use cager_geometry::surface::{Channel, Part, Subdivision};
-use support::message;
+use support::{arrays, message};
 use tempfile::tempdir;
 
 const CUBE: &str = include_str!("fbx/cube.fbx");
@@ -316,29 +315,6 @@ fn a_file_that_unpacks_to_far_more_than_its_size_is_refused() {
     assert_eq!(read(300_000).unwrap().model.points.len(), 100_000);
     let error = message(read(9_000_000));
     assert!(error.contains("takes more than 33 MiB, far more than its size"), "{error}");
-}
-
-/// The arrays of an archive of NumPy by their names, all numbers one after another.
-fn arrays(path: &Path) -> HashMap<String, Vec<f64>> {
-    let mut archive = zip::ZipArchive::new(File::open(path).unwrap()).unwrap();
-    let mut found = HashMap::new();
-    for k in 0..archive.len() {
-        let mut file = archive.by_index(k).unwrap();
-        let (name, mut bytes) = (file.name().unwrap().trim_end_matches(".npy").to_owned(), Vec::new());
-        file.read_to_end(&mut bytes).unwrap();
-        let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-        let header = String::from_utf8_lossy(&bytes[..start]).into_owned();
-        let four = bytes[start..].as_chunks().0;
-        let values = if header.contains("'<f4'") {
-            four.iter().map(|&four| f32::from_le_bytes(four).into()).collect()
-        } else if header.contains("'<i4'") {
-            four.iter().map(|&four| i32::from_le_bytes(four).into()).collect()
-        } else {
-            continue;
-        };
-        found.insert(name, values);
-    }
-    found
 }
 
 /// A character that Blender wrote, beside the repository.

@@ -4,6 +4,9 @@
 
 pub mod archive;
 
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use cager_formats::{Error, FrameReader, MeshFormat, read_model_bytes};
@@ -253,4 +256,27 @@ pub fn animated_glb() -> Vec<u8> {
         "animations":[{"channels":[{"sampler":0,"target":{"node":0,"path":"weights"}}],"samplers":[{"input":2,"output":3}]}]}"#;
     let numbers = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 0.0, 0.5, 1.0, 0.25, 0.5, -1.0_f32];
     glb_file(json, &numbers.map(f32::to_le_bytes).concat())
+}
+
+/// The arrays of an archive of NumPy by their names, all numbers one after another.
+pub fn arrays(path: &Path) -> HashMap<String, Vec<f64>> {
+    let mut archive = zip::ZipArchive::new(File::open(path).unwrap()).unwrap();
+    let mut found = HashMap::new();
+    for k in 0..archive.len() {
+        let mut file = archive.by_index(k).unwrap();
+        let (name, mut bytes) = (file.name().unwrap().trim_end_matches(".npy").to_owned(), Vec::new());
+        file.read_to_end(&mut bytes).unwrap();
+        let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+        let header = String::from_utf8_lossy(&bytes[..start]).into_owned();
+        let four = bytes[start..].as_chunks().0;
+        let values = if header.contains("'<f4'") {
+            four.iter().map(|&four| f32::from_le_bytes(four).into()).collect()
+        } else if header.contains("'<i4'") {
+            four.iter().map(|&four| i32::from_le_bytes(four).into()).collect()
+        } else {
+            continue;
+        };
+        found.insert(name, values);
+    }
+    found
 }
