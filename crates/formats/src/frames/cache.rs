@@ -41,7 +41,7 @@ pub(super) fn open<'a>(
         CacheFormat::Mdd => mdd::layout(&head),
         CacheFormat::Mcx | CacheFormat::Mc => return maya::open(path, source, length, expected_points, (prim, folder)),
         CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usda | CacheFormat::Usd => {
-            return open_scene(path, usd::open(source, length, wanted, None), expected_points);
+            return open_scene(path, usd::open(source, length, wanted, folder, None), expected_points);
         }
         CacheFormat::Glb | CacheFormat::Gltf => {
             let kind = glb::Source { is_text: format == CacheFormat::Gltf, folder, is_split: false };

@@ -296,7 +296,7 @@ fn read_scene(
     let opened = if format == MeshFormat::Abc {
         alembic::open(source, length, wanted, Some(&mut dropped))
     } else {
-        usd::open(source, length, wanted, Some(&mut dropped))
+        usd::open(source, length, wanted, folder, Some(&mut dropped))
     };
     let (model, left_out, units) = opened.map_err(|failure| failure.at(name))?.into_model(name)?;
     Ok(Parsed { left_out, units, dropped, ..Parsed::from(model) })

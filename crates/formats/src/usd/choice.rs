@@ -11,7 +11,9 @@ pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<u
     let is_a = |k: usize, kind: Kind| layer.prims[k].kind == kind;
     let instancer = there.iter().copied().find(|&k| is_a(k, Kind::PointInstancer));
     // Those below an instancer are shown where its points are, and not where they are themselves.
-    let is_placed = |&k: &usize| !ancestry(&layer.nodes, k).any(|above| is_a(above, Kind::PointInstancer));
+    let places = [Kind::PointInstancer, Kind::Instanced, Kind::Instance];
+    let place = |k: usize| ancestry(&layer.nodes, k).map(|k| layer.prims[k].kind).find(|kind| places.contains(kind));
+    let is_placed = |&k: &usize| place(k).is_none_or(|kind| kind == Kind::Instance);
     let mut meshes: Vec<usize> = there.iter().copied().filter(|&k| is_a(k, Kind::Mesh)).collect();
     let is_none = meshes.is_empty();
     meshes.retain(is_placed);
@@ -39,6 +41,12 @@ pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<u
         });
     }
     let chosen = choose_meshes(layer, &meshes, wanted)?;
+    if layer.most_points < u64::MAX && count(layer, &chosen) as u64 > layer.most_points {
+        return Err(Fault::unsupported(format!(
+            "shows its meshes so many times that they have more than {} points together; choose some with --prim",
+            layer.most_points
+        )));
+    }
     // What else is composed may be a mesh that is meant, unless all were named.
     let is_named =
         !wanted.prims.is_empty() && wanted.prims.iter().all(|prim| !named(&layer.nodes, &chosen, prim).is_empty());

@@ -1,5 +1,7 @@
 //! What a layer of USD holds: a tree of prims, whose attributes have values, at time codes or not.
 
+use std::collections::{HashMap, HashSet};
+
 use crate::error::Fault;
 use crate::scene::{Node, Track, Value, Values};
 
@@ -29,6 +31,10 @@ pub(super) enum Kind {
     Shading,
     /// What shows the prims below it many times, and not where they are.
     PointInstancer,
+    /// The same, where what it shows is here as instances.
+    Instanced,
+    /// One of these.
+    Instance,
     /// Below it skeletons move meshes.
     SkelRoot,
     Skeleton,
@@ -57,12 +63,40 @@ pub(super) struct Prim {
     pub(super) kind: Kind,
     /// Whether it, without regard to what it lies below, is there: defined and active.
     pub(super) is_there: bool,
-    /// What it is composed of beside what is told here, in words.
+    pub(super) is_inactive: bool,
+    /// What it is composed of beside what is told here and by arcs, in words.
     pub(super) composed: Option<&'static str>,
+    /// The strongest first.
+    pub(super) arcs: Vec<Arc>,
+}
+
+/// Another prim, whose opinions count where a prim has none itself.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Arc {
+    /// What it is, in words.
+    pub(super) words: &'static str,
+    /// The path of its file as the layer has it; empty for the layer itself.
+    pub(super) asset: String,
+    /// Its path; empty for the one that its file has as the usual one.
+    pub(super) prim: String,
+    pub(super) times: Times,
+}
+
+/// How times of another layer are counted: scaled, then moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Times {
+    pub(super) offset: f64,
+    pub(super) scale: f64,
+}
+
+impl Default for Times {
+    fn default() -> Self {
+        Self { offset: 0.0, scale: 1.0 }
+    }
 }
 
 /// What a layer says of all that it holds.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Stage {
     pub(super) up_is_z: Option<bool>,
     pub(super) metres_per_unit: Option<f64>,
@@ -70,6 +104,10 @@ pub(super) struct Stage {
     pub(super) frames_per_second: Option<f64>,
     pub(super) start: Option<f64>,
     pub(super) end: Option<f64>,
+    /// The usual prim of a reference to it.
+    pub(super) default_prim: String,
+    /// Files whose opinions count where it has none itself, the strongest first.
+    pub(super) sublayers: Vec<(String, Times)>,
 }
 
 pub(super) struct Layer<'a> {
@@ -77,7 +115,27 @@ pub(super) struct Layer<'a> {
     /// Where the prims are in their tree, and what they are.
     pub(super) nodes: Vec<Node>,
     pub(super) prims: Vec<Prim>,
+    /// What instancers show, by their prims.
+    pub(super) instances: HashMap<usize, Instance>,
+    /// The most points that all meshes may have together, where prims may be there several times.
+    pub(super) most_points: u64,
     pub(super) source: Box<dyn Attributes + 'a>,
+}
+
+/// One of what an instancer shows.
+#[derive(Clone, Debug)]
+pub(super) struct Instance {
+    pub(super) instancer: usize,
+    pub(super) index: usize,
+    /// When the instancer says which are hidden, and in which of these values this one is.
+    pub(super) hidden: (Track, HashSet<u64>),
+}
+
+impl<'a> Layer<'a> {
+    /// Of one file.
+    pub(super) fn plain(stage: Stage, nodes: Vec<Node>, prims: Vec<Prim>, source: Box<dyn Attributes + 'a>) -> Self {
+        Self { stage, nodes, prims, instances: HashMap::new(), most_points: u64::MAX, source }
+    }
 }
 
 impl Layer<'_> {
@@ -120,6 +178,18 @@ pub(super) trait Attributes: Values {
 
     /// The weight at which a shape between others is reached, where it says one.
     fn weight(&mut self, prim: usize, name: &str) -> Result<Option<f64>, Fault>;
+
+    /// The values of one element of an attribute whose values are lists of so many numbers each.
+    fn element(&mut self, _prim: usize, _name: &str, _width: usize, _index: usize) -> Result<Track, Fault> {
+        Ok(Track::default())
+    }
+
+    /// Adds a prim like another, or one without attributes: within a copy of what lies below the
+    /// first prim, the copy of which is the second.
+    fn copy(&mut self, _of: usize, _tops: (usize, usize)) {}
+
+    /// The paths to which an attribute or a relationship leads.
+    fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault>;
 
     /// What an attribute or a relationship leads to: prims, and their attributes; `None` for those
     /// that are not there.

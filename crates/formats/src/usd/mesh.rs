@@ -88,6 +88,9 @@ fn visible(layer: &mut Layer<'_>, prim: usize) -> Result<Steps, Fault> {
         if !hidden.is_empty() {
             tracks.push((track, hidden));
         }
+        if let Some(instance) = layer.instances.get(&prim).filter(|instance| !instance.hidden.1.is_empty()) {
+            tracks.push(instance.hidden.clone());
+        }
     }
     let times = tracks.iter().flat_map(|(track, _)| track.times.iter().copied().chain(track.default.map(|_| 0.0)));
     Steps::of(times.collect(), |time| {

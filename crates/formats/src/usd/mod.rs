@@ -1,11 +1,12 @@
 //! Universal Scene Description: polygon meshes that move, read and written frame by frame.
 //!
-//! One layer is read, binary, as text, or the first in a package; what it is composed of beside
-//! itself is refused. Positions are those of the layer, moved by the transforms above a mesh,
+//! A layer is read, binary, as text, or the first in a package, with the files that it names
+//! below its folder, where that is plain. Positions are those of the layer, moved by the transforms above a mesh,
 //! with the unit and the upward axis that the layer says.
 
 mod binary;
 mod choice;
+mod compose;
 mod layer;
 mod materials;
 mod mesh;
@@ -20,6 +21,7 @@ mod unread;
 mod write;
 
 use std::io::{Read, Seek};
+use std::path::Path;
 
 use cager_geometry::surface::Picture;
 
@@ -38,17 +40,21 @@ pub(crate) fn open<'a>(
     source: impl Read + Seek + Send + 'a,
     length: u64,
     wanted: Wanted<'_>,
+    folder: Option<&Path>,
     dropped: Option<&mut Dropped>,
 ) -> Result<MovingScene<'a>, Fault> {
-    let (layer, pictures) = open_layer(Box::new(source), length, dropped.is_some())?;
+    let ((layer, pictures), is_package) = open_layer(Box::new(source), length, dropped.is_some())?;
+    // Files of a package lie in it.
+    let layer = compose::compose(layer, length, folder.filter(|_| !is_package))?;
     mesh::open(layer, wanted, dropped.map(|dropped| (dropped, pictures)))
 }
 
 /// The layer that a file is, or the first one in a package, whatever its name, and the other files
-/// of a package where they are wanted.
-fn open_layer(mut source: Reader<'_>, mut length: u64, wants_others: bool) -> Result<(Layer<'_>, Vec<Picture>), Fault> {
+/// of a package where they are wanted; also whether it is one.
+fn open_layer(mut source: Reader<'_>, mut length: u64, wants_others: bool) -> Result<((Layer<'_>, Vec<Picture>), bool), Fault> {
     let (mut head, mut others) = (head(&mut source)?, Vec::new());
-    if head.starts_with(package::MAGIC) {
+    let is_package = head.starts_with(package::MAGIC);
+    if is_package {
         if wants_others {
             (source, others) = package::others(source, length)?;
         }
@@ -56,10 +62,10 @@ fn open_layer(mut source: Reader<'_>, mut length: u64, wants_others: bool) -> Re
         head = self::head(&mut source)?;
     }
     if head.starts_with(binary::MAGIC) {
-        return Ok((Binary::open(source, length)?, others));
+        return Ok(((Binary::open(source, length)?, others), is_package));
     }
     if head.starts_with(text::MAGIC) {
-        return Ok((Text::open(source)?, others));
+        return Ok(((Text::open(source)?, others), is_package));
     }
     let other = Signature::other_than("usdc", &head);
     let none = "does not begin as a file of USD does; export it again";

@@ -1,6 +1,6 @@
 //! Transforms above a mesh: a stack of operations, of which each is an attribute.
 
-use super::layer::Layer;
+use super::layer::{Instance, Layer};
 use crate::error::Fault;
 use crate::scene::{Chain, MOST_OPERATIONS, Operation, ancestry, shown};
 
@@ -37,6 +37,18 @@ fn operation(name: &str) -> Option<Operation> {
 pub(super) fn above(layer: &mut Layer<'_>, mesh: usize) -> Result<Chain, Fault> {
     let mut chain = Chain::default();
     for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
+        if let Some(&Instance { instancer, index, .. }) = layer.instances.get(&prim) {
+            let has_single = !layer.attribute(instancer, "orientationsf")?.is_empty();
+            let turns = if has_single { "orientationsf" } else { "orientations" };
+            for (name, operation) in
+                [("scales", Operation::Scale(0, 3)), (turns, Operation::Orient), ("positions", Operation::Translate(0, 3))]
+            {
+                let values = layer.source.element(instancer, name, operation.count(), index)?;
+                if !values.is_empty() {
+                    chain.push(layer.source.as_mut(), values, vec![operation], false)?;
+                }
+            }
+        }
         let Some(names) = layer.tokens(prim, "xformOpOrder", MOST_OPERATIONS)? else { continue };
         let reset = names.iter().rposition(|name| name == RESET);
         for name in names[reset.map_or(0, |place| place + 1)..].iter().rev() {

@@ -1,6 +1,7 @@
 //! Types of values.
 
 pub(crate) const INT: u8 = 3;
+pub(crate) const INT64: u8 = 5;
 pub(crate) const HALF: u8 = 7;
 pub(crate) const FLOAT: u8 = 8;
 pub(crate) const DOUBLE: u8 = 9;
@@ -22,11 +23,14 @@ pub(crate) const VEC4F: u8 = 28;
 pub(crate) const VEC4H: u8 = 29;
 pub(crate) const TOKEN_LIST: u8 = 32;
 pub(crate) const PATH_LIST: u8 = 34;
+pub(crate) const REFERENCE_LIST: u8 = 35;
 pub(crate) const TOKENS: u8 = 41;
 pub(crate) const SPECIFIER: u8 = 42;
 pub(crate) const VARIABILITY: u8 = 44;
 pub(crate) const TIME_SAMPLES: u8 = 46;
+pub(crate) const PAYLOAD: u8 = 47;
 pub(crate) const DOUBLES: u8 = 48;
-pub(crate) const LAYER_OFFSETS: u8 = 49;
+pub(crate) const OFFSETS: u8 = 49;
 pub(crate) const STRINGS: u8 = 50;
 pub(crate) const BLOCKED: u8 = 51;
+pub(crate) const PAYLOAD_LIST: u8 = 55;

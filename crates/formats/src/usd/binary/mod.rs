@@ -1,5 +1,6 @@
 //! Binary layers, which OpenUSD calls crate files: values are read when they are asked for.
 
+mod arcs;
 mod file;
 pub(super) mod kind;
 mod pack;
@@ -8,7 +9,7 @@ mod sections;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::layer::{Attributes, COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, Target, composed, spline};
+use super::layer::{Attributes, COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, Target, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
 use crate::scene::{Node, Points, Reader, Source, Track, Value, Values, damaged};
@@ -63,11 +64,12 @@ impl<'a> Binary<'a> {
         attributes.sort_unstable();
         let mut layer = Self { file, sections, paths: Vec::new(), attributes };
         let (nodes, prims) = layer.list_prims()?;
-        Ok(Layer { stage: layer.read_stage()?, nodes, prims, source: Box::new(layer) })
+        let stage = layer.read_stage()?;
+        Ok(Layer::plain(stage, nodes, prims, Box::new(layer)))
     }
 
     fn list_prims(&mut self) -> Result<(Vec<Node>, Vec<Prim>), Fault> {
-        let (sections, mut nodes, mut prims) = (&self.sections, Vec::new(), Vec::new());
+        let (sections, file, mut nodes, mut prims) = (&self.sections, &mut self.file, Vec::new(), Vec::new());
         let mut places = vec![usize::MAX; sections.paths.len()];
         // Many prims may share one.
         let mut names: HashMap<u32, Arc<[u8]>> = HashMap::new();
@@ -76,21 +78,26 @@ impl<'a> Binary<'a> {
             places[spec.path as usize] = prims.len();
             let name = names.entry(path.name).or_insert_with(|| Arc::from(sections.token(path.name)));
             nodes.push(Node { name: Arc::clone(name), parent: None, depth: path.depth as usize });
-            let mut prim = Prim { kind: Kind::Other, is_there: false, composed: None };
-            let mut is_active = true;
+            let mut prim = Prim { kind: Kind::Other, is_there: false, is_inactive: false, composed: None, arcs: Vec::new() };
             for field in sections.fields(spec) {
                 let (name, value) = field?;
                 match name {
                     b"typeName" => prim.kind = Kind::of(sections.token(u32::from_le_bytes(value.inlined()))),
                     b"specifier" => prim.is_there = value.inlined() == [0; 4],
-                    b"active" => is_active = value.inlined()[0] != 0,
+                    b"active" => prim.is_inactive = value.inlined()[0] == 0,
                     _ => {
                         let told = COMPOSED.iter().find(|(field, _)| field.as_bytes() == name);
-                        prim.composed = told.map(|(_, words)| *words).or(prim.composed);
+                        if let Some((_, words)) = told {
+                            match arcs::read(file, sections, value, words)? {
+                                Some(arcs) => prim.arcs.extend(arcs),
+                                None => prim.composed = Some(words),
+                            }
+                        }
                     }
                 }
             }
-            prim.is_there &= is_active && path.depth <= DEEPEST;
+            prim.arcs.sort_by_key(|arc| arc.words == "payloads");
+            prim.is_there &= !prim.is_inactive && path.depth <= DEEPEST;
             self.paths.push(spec.path);
             prims.push(prim);
         }
@@ -107,11 +114,7 @@ impl<'a> Binary<'a> {
         let Some(&root) = self.sections.specs.iter().find(|spec| spec.kind == ROOT) else {
             return Ok(Stage::default());
         };
-        if let Some(list) = self.sections.field(root, "subLayers")?
-            && self.file.source.number(list.offset())? > 0
-        {
-            return Err(composed("the layer", "sublayers"));
-        }
+        let sublayers = arcs::sublayers(&mut self.file, &self.sections, root)?;
         let mut number = |name: &str| -> Result<Option<f64>, Fault> {
             let Some(value) = self.sections.field(root, name)? else { return Ok(None) };
             Ok(self.file.numbers(value)?.first().copied())
@@ -123,7 +126,11 @@ impl<'a> Binary<'a> {
             frames_per_second: number("framesPerSecond")?,
             start: number("startTimeCode")?,
             end: number("endTimeCode")?,
+            default_prim: String::new(),
+            sublayers,
         };
+        let usual = self.sections.field(root, "defaultPrim")?.map_or(&[][..], |name| self.sections.token(u32::from_le_bytes(name.inlined())));
+        stage.default_prim = String::from_utf8_lossy(usual).into_owned();
         let up = self.sections.field(root, "upAxis")?;
         stage.up_is_z = up.map(|up| self.sections.token(u32::from_le_bytes(up.inlined())) == b"Z");
         Ok(stage)
@@ -170,6 +177,42 @@ impl<'a> Binary<'a> {
     }
 }
 
+impl Binary<'_> {
+    /// The paths to which an attribute or a relationship leads, by their numbers.
+    fn target_indices(&mut self, prim: usize, name: &str) -> Result<Vec<u32>, Fault> {
+        let Some(spec) = self.find(prim, name) else { return Ok(Vec::new()) };
+        let field = if spec.kind == RELATIONSHIP { "targetPaths" } else { "connectionPaths" };
+        let Some(list) = self.sections.field(spec, field)? else { return Ok(Vec::new()) };
+        // Which lists follow, each behind how many paths it has: the first is of those that are there.
+        let [head] = self.file.source.array(list.offset())?;
+        if list.kind() != kind::PATH_LIST || head & FILLED == 0 {
+            return Ok(Vec::new());
+        }
+        let count = self.file.source.number(list.offset() + 1)?;
+        let bytes = self.file.source.bytes(list.offset() + 9, count, 4)?;
+        // Of each a name or more.
+        self.file.source.allowance.take(count, 32)?;
+        Ok(bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect())
+    }
+
+    /// Whole numbers of eight bytes, which are taken where four are enough.
+    fn long_integers(&mut self, rep: Rep, most: u64) -> Result<Vec<i32>, Fault> {
+        let (start, count) = self.file.elements(rep)?;
+        if count > most {
+            return Err(damaged(&format!("it has {count} numbers where {most} are the most")));
+        }
+        let numbers: Vec<i64> = if rep.is_packed() && count > 0 {
+            let length = self.file.source.number(start)?;
+            let packed = self.file.source.bytes(start.saturating_add(8), length, 1)?;
+            pack::long_integers(&packed, self.file.source.allowance.take(count, 8)?)?
+        } else {
+            let bytes = self.file.source.bytes(start, count, 8)?;
+            bytes.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect()
+        };
+        Ok(numbers.into_iter().map(|number| i32::try_from(number).unwrap_or(-1)).collect())
+    }
+}
+
 impl Attributes for Binary<'_> {
     fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault> {
         let mut attribute = Track::default();
@@ -207,22 +250,19 @@ impl Attributes for Binary<'_> {
         Ok(told.map_or(Ok(Vec::new()), |told| self.file.numbers(told))?.first().copied())
     }
 
-    fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
-        let Some(spec) = self.find(prim, name) else { return Ok(Vec::new()) };
-        let field = if spec.kind == RELATIONSHIP { "targetPaths" } else { "connectionPaths" };
-        let Some(list) = self.sections.field(spec, field)? else { return Ok(Vec::new()) };
-        // Which lists follow, each behind how many paths it has: the first is of those that are there.
-        let [head] = self.file.source.array(list.offset())?;
-        if list.kind() != kind::PATH_LIST || head & FILLED == 0 {
-            return Ok(Vec::new());
+    fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault> {
+        let mut paths = Vec::new();
+        for path in self.target_indices(prim, name)? {
+            let path = self.sections.path(path);
+            self.file.source.allowance.take(path.len() as u64, 1)?;
+            paths.push(path);
         }
-        let count = self.file.source.number(list.offset() + 1)?;
-        let bytes = self.file.source.bytes(list.offset() + 9, count, 4)?;
-        // Of each the name of an attribute, which may be long.
-        self.file.source.allowance.take(count, 28)?;
+        Ok(paths)
+    }
+
+    fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
         let mut targets = Vec::new();
-        for path in bytes.as_chunks().0 {
-            let path = u32::from_le_bytes(*path);
+        for path in self.target_indices(prim, name)? {
             let of = |path: u32| self.paths.binary_search(&path).ok();
             let Some(&Path { parent, name, .. }) = self.sections.paths.get(path as usize) else { continue };
             targets.push(match (of(path), of(parent)) {
@@ -278,6 +318,9 @@ impl Values for Binary<'_> {
 
     fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault> {
         let rep = Rep(value.0);
+        if rep.kind() == kind::INT64 && rep.is_array() {
+            return self.long_integers(rep, most);
+        }
         if rep.kind() != kind::INT || !rep.is_array() {
             return Err(damaged("it has another value where a list of whole numbers belongs"));
         }

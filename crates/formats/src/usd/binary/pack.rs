@@ -46,6 +46,25 @@ fn unpack(packed: &[u8], most: usize) -> Result<Vec<u8>, Fault> {
     Ok(out)
 }
 
+/// The same of numbers of eight bytes, of whose differences the shortest have two.
+pub(super) fn long_integers(packed: &[u8], count: usize) -> Result<Vec<i64>, Fault> {
+    let bytes = unpack(packed, 8 + count.div_ceil(4) + 8 * count)?;
+    let mut fields = Fields(&bytes);
+    let usual = i64::from_le_bytes(fields.array()?);
+    let codes = fields.take(count.div_ceil(4))?;
+    let (mut number, mut out) = (0_i64, Vec::with_capacity(count));
+    for k in 0..count {
+        number = number.wrapping_add(match codes[k / 4] >> (2 * (k % 4)) & 3 {
+            0 => usual,
+            1 => i16::from_le_bytes(fields.array()?).into(),
+            2 => i32::from_le_bytes(fields.array()?).into(),
+            _ => i64::from_le_bytes(fields.array()?),
+        });
+        out.push(number);
+    }
+    Ok(out)
+}
+
 /// So many whole numbers from their differences.
 pub(super) fn integers(packed: &[u8], count: usize) -> Result<Vec<i32>, Fault> {
     if count == 0 {

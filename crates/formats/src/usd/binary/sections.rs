@@ -12,6 +12,9 @@ const UNPACKED_ALWAYS: u64 = 1 << 16;
 /// Sections of a file, of which these are read.
 const MOST_SECTIONS: u64 = 64;
 
+/// Bytes of a name or a path of a file that are kept.
+const LONGEST_STRING: usize = 4096;
+
 /// Fields of a prim or an attribute; programs write some thirty.
 const MOST_FIELDS: usize = 256;
 
@@ -28,6 +31,8 @@ pub(super) struct Sections {
     text: Vec<u8>,
     /// Where the tokens begin in the text, and where the last ends.
     starts: Vec<u32>,
+    /// Which tokens strings are.
+    strings: Vec<u32>,
     fields: Vec<(u32, Rep)>,
     /// Indices of fields, set after set, each with an end that is no index.
     sets: Vec<i32>,
@@ -53,6 +58,7 @@ impl Sections {
             }
             Err(damaged(&format!("it has no section {name}")))
         };
+        let strings = read("STRINGS").unwrap_or_default();
         let [tokens, fields, sets, tree, specs] =
             [read("TOKENS")?, read("FIELDS")?, read("FIELDSETS")?, read("PATHS")?, read("SPECS")?];
         let mut allowance = Allowance(file.source.length.saturating_mul(UNPACKED).saturating_add(UNPACKED_ALWAYS));
@@ -69,6 +75,10 @@ impl Sections {
         if starts.len() as u64 <= count {
             return Err(damaged("it has fewer names than it says"));
         }
+
+        // Behind how many they are.
+        let strings = strings.get(8..).unwrap_or_default().as_chunks().0;
+        let strings = strings.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
 
         let mut section = Fields(&fields);
         let count = section.number()?;
@@ -104,7 +114,7 @@ impl Sections {
         if specs.last().is_some_and(|spec| spec.path as usize >= paths.len()) {
             return Err(damaged("it describes what has no path"));
         }
-        Ok(Self { text, starts, fields, sets, paths, specs })
+        Ok(Self { text, starts, strings, fields, sets, paths, specs })
     }
 
     /// A name by its index; empty where there is none.
@@ -113,6 +123,25 @@ impl Sections {
             Some(&[start, end]) => &self.text[start as usize..end as usize - 1],
             _ => &[],
         }
+    }
+
+    /// A string by its index; empty where there is none.
+    pub(super) fn string(&self, index: u32) -> String {
+        let token = self.strings.get(index as usize).map_or(&[][..], |&token| self.token(token));
+        String::from_utf8_lossy(&token[..token.len().min(LONGEST_STRING)]).into_owned()
+    }
+
+    /// The names down to a prim, each behind a `/`, or to its property, behind a dot; empty for the root and for no path.
+    pub(super) fn path(&self, index: u32) -> String {
+        let mut names = Vec::new();
+        let mut at = self.paths.get(index as usize).copied().unwrap_or_default();
+        while at.depth > 0 {
+            let name = self.token(at.name);
+            names.push(String::from_utf8_lossy(&name[..name.len().min(LONGEST_STRING)]));
+            names.push(if at.is_property { "." } else { "/" }.into());
+            at = self.paths[at.parent as usize];
+        }
+        names.iter().rev().map(|name| &**name).collect()
     }
 
     /// The fields of a spec: their names and their values.
@@ -145,6 +174,7 @@ pub(super) struct Path {
     pub(super) parent: u32,
     pub(super) name: u32,
     pub(super) depth: u32,
+    pub(super) is_property: bool,
 }
 
 /// In place of the distance to the next sibling: it follows at once; there is none, but a child
@@ -171,7 +201,7 @@ pub(super) fn paths(count: usize, [indices, names, jumps]: [&[i32]; 3]) -> Resul
             if depth > DEEPEST + 1 {
                 return Err(too_deep());
             }
-            paths[index as usize] = Path { parent, depth, name: names[place].unsigned_abs() };
+            paths[index as usize] = Path { parent, depth, name: names[place].unsigned_abs(), is_property: names[place] < 0 };
             match jumps[place] {
                 LAST => break,
                 SIBLING => place += 1,

@@ -4,11 +4,12 @@ mod parser;
 mod scanner;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::layer::{Attributes, Layer, Target, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
-use crate::scene::{Allowance, Node, Points, Reader, Track, Value, Values, damaged};
+use crate::scene::{Allowance, Points, Reader, Track, Value, Values, damaged};
 use parser::{Contents, Parser, Stored};
 use scanner::Scanner;
 
@@ -21,8 +22,8 @@ const KEPT: usize = 2;
 pub(super) struct Text<'a> {
     scanner: Scanner<'a>,
     contents: Contents,
-    /// Where attributes and relationships lead.
-    targets: HashMap<(usize, String), Vec<Option<Target>>>,
+    /// The prims by the one above each and their names.
+    places: HashMap<(Option<usize>, Arc<[u8]>), usize>,
     allowance: Allowance,
     /// Where points were read from, and these; the last ones first.
     read: Vec<(u64, Vec<f64>)>,
@@ -35,10 +36,10 @@ impl<'a> Text<'a> {
         let mut contents = Parser::parse(&mut scanner)?;
         let (nodes, prims) = (std::mem::take(&mut contents.nodes), std::mem::take(&mut contents.prims));
         let stage = std::mem::take(&mut contents.stage);
-        let targets = targets(&nodes, std::mem::take(&mut contents.targets));
+        let places = nodes.iter().enumerate().map(|(k, node)| ((node.parent, Arc::clone(&node.name)), k)).collect();
         let allowance = Allowance(scanner.at.saturating_mul(64).saturating_add(1 << 16));
-        let text = Self { scanner, contents, targets, allowance, read: Vec::new() };
-        Ok(Layer { stage, nodes, prims, source: Box::new(text) })
+        let text = Self { scanner, contents, places, allowance, read: Vec::new() };
+        Ok(Layer::plain(stage, nodes, prims, Box::new(text)))
     }
 
     fn enter(&mut self, value: Value) -> Result<Stored, Fault> {
@@ -99,24 +100,6 @@ impl<'a> Text<'a> {
     }
 }
 
-/// The prims of paths, and their attributes.
-fn targets(
-    nodes: &[Node],
-    paths: HashMap<(usize, String), Vec<String>>,
-) -> HashMap<(usize, String), Vec<Option<Target>>> {
-    let places: HashMap<(Option<usize>, &[u8]), usize> =
-        nodes.iter().enumerate().map(|(k, node)| ((node.parent, &*node.name), k)).collect();
-    let find = |path: &String| {
-        let (names, attribute) = path.split_once('.').unwrap_or((path, ""));
-        let mut prim = None;
-        for name in names.strip_prefix('/')?.split('/') {
-            prim = Some(*places.get(&(prim, name.as_bytes()))?);
-        }
-        Some((prim?, attribute.to_owned()))
-    };
-    paths.into_iter().map(|(key, paths)| (key, paths.iter().map(find).collect())).collect()
-}
-
 /// As a type that is not of double precision holds it.
 fn rounded(number: f64, is_double: bool) -> f64 {
     if is_double { number } else { f64::from(number as f32) }
@@ -143,8 +126,21 @@ impl Attributes for Text<'_> {
         Ok(self.contents.weights.get(&(prim, name.to_owned())).copied())
     }
 
+    fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault> {
+        Ok(self.contents.targets.get(&(prim, name.to_owned())).cloned().unwrap_or_default())
+    }
+
     fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
-        Ok(self.targets.get(&(prim, name.to_owned())).cloned().unwrap_or_default())
+        let paths = self.paths(prim, name)?;
+        let find = |path: &String| {
+            let (names, attribute) = path.split_once('.').unwrap_or((path, ""));
+            let mut prim = None;
+            for name in names.strip_prefix('/')?.split('/') {
+                prim = Some(*self.places.get(&(prim, Arc::from(name.as_bytes())))?);
+            }
+            Some((prim?, attribute.to_owned()))
+        };
+        Ok(paths.iter().map(find).collect())
     }
 
     fn vectors(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f64>, Fault> {

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::scanner::{Place, Scanner, is_letter};
 use crate::error::Fault;
 use crate::scene::{Node, Track, Value};
-use crate::usd::layer::{COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep};
+use crate::usd::layer::{Arc, COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep};
 
 /// Words in front of the type of a property or of the key of a field.
 const MODIFIERS: [&str; 9] =
@@ -15,12 +15,28 @@ const MODIFIERS: [&str; 9] =
 const WANTED: [&str; 7] =
     ["subdivisionScheme", "points", "faceVertexCounts", "faceVertexIndices", "orientation", "purpose", "visibility"];
 
+/// Arcs of one prim; programs write a handful.
+const MOST_ARCS: usize = 64;
+
+/// Attributes of instancers.
+const INSTANCING: [&str; 8] = [
+    "prototypes",
+    "protoIndices",
+    "positions",
+    "orientations",
+    "orientationsf",
+    "scales",
+    "ids",
+    "invisibleIds",
+];
+
 /// Whether an attribute or a relationship of a prim is asked for.
 fn is_wanted(kind: Kind, name: &str) -> bool {
     let of_kind = match kind {
         Kind::Mesh => name == "normals" || ["primvars:", "crease"].iter().any(|start| name.starts_with(start)),
         Kind::Subset | Kind::Shading | Kind::Skeleton | Kind::Motion => true,
-        Kind::PointInstancer | Kind::SkelRoot | Kind::Other => false,
+        Kind::PointInstancer => INSTANCING.contains(&name),
+        _ => false,
     };
     let starts = ["xformOp", "material:binding", "skel:", "primvars:skel:"];
     of_kind || WANTED.contains(&name) || starts.iter().any(|start| name.starts_with(start))
@@ -92,18 +108,20 @@ impl<'a, 'b> Parser<'a, 'b> {
         Ok(self.scanner.word(b"_:.")?.to_owned())
     }
 
-    /// The next word behind those that say how it is meant.
-    fn key(&mut self) -> Result<String, Fault> {
+    /// The next word behind those that say how it is meant, and whether that takes something away.
+    fn key(&mut self) -> Result<(String, bool), Fault> {
+        let mut is_removed = false;
         loop {
             let word = self.word()?;
             if !MODIFIERS.contains(&word.as_str()) {
-                return Ok(word);
+                return Ok((word, is_removed));
             }
+            is_removed |= matches!(word.as_str(), "delete" | "reorder");
         }
     }
 
     fn statement(&mut self) -> Result<(), Fault> {
-        let word = self.key()?;
+        let (word, _) = self.key()?;
         match (word.as_str(), self.open.last()) {
             ("def" | "over" | "class", _) => self.prim(word == "def"),
             ("variantSet", Some(&prim)) => {
@@ -125,7 +143,8 @@ impl<'a, 'b> Parser<'a, 'b> {
         let index = self.contents.prims.len();
         let (parent, depth) = (self.open.last().copied(), self.open.len() + 1);
         self.contents.nodes.push(Node { name: name.into_bytes().into(), parent, depth });
-        self.contents.prims.push(Prim { kind, is_there: is_defined, composed: None });
+        let prim = Prim { kind, is_there: is_defined, is_inactive: false, composed: None, arcs: Vec::new() };
+        self.contents.prims.push(prim);
         if self.scanner.solid()? == Some(b'(') {
             self.fields(&Owner::Prim(index))?;
         }
@@ -142,11 +161,11 @@ impl<'a, 'b> Parser<'a, 'b> {
                 self.scanner.string()?;
                 continue;
             }
-            let key = self.key()?;
+            let (key, is_removed) = self.key()?;
             self.scanner.expect(b'=')?;
             match (owner, self.open.last()) {
                 (Owner::Layer, _) => self.layer_field(&key)?,
-                (Owner::Prim(prim), _) => self.prim_field(*prim, &key)?,
+                (Owner::Prim(prim), _) => self.prim_field(*prim, &key, is_removed)?,
                 (Owner::Property(name), Some(&prim)) if key == "interpolation" => {
                     let value = self.short()?;
                     if is_wanted(self.contents.prims[prim].kind, name) {
@@ -182,15 +201,15 @@ impl<'a, 'b> Parser<'a, 'b> {
 
     fn layer_field(&mut self, key: &str) -> Result<(), Fault> {
         if key == "subLayers" {
-            return match self.scanner.pass()?.count {
-                0 => Ok(()),
-                _ => Err(composed("the layer", "sublayers")),
-            };
+            let arcs = self.arcs("sublayers")?.ok_or_else(|| composed("the layer", "sublayers"))?;
+            self.contents.stage.sublayers = arcs.into_iter().map(|arc| (arc.asset, arc.times)).collect();
+            return Ok(());
         }
         let value = self.short()?;
         let number = value.parse().ok();
         let stage = &mut self.contents.stage;
         match key {
+            "defaultPrim" => stage.default_prim = value,
             "upAxis" => stage.up_is_z = Some(value == "Z"),
             "metersPerUnit" => stage.metres_per_unit = number,
             "timeCodesPerSecond" => stage.time_codes_per_second = number,
@@ -202,15 +221,70 @@ impl<'a, 'b> Parser<'a, 'b> {
         Ok(())
     }
 
-    fn prim_field(&mut self, prim: usize, key: &str) -> Result<(), Fault> {
+    fn prim_field(&mut self, prim: usize, key: &str, is_removed: bool) -> Result<(), Fault> {
+        if let Some((_, words)) = COMPOSED[..2].iter().find(|(field, _)| *field == key) {
+            match self.arcs(words)?.filter(|_| !is_removed) {
+                Some(arcs) => {
+                    let all = &mut self.contents.prims[prim].arcs;
+                    all.extend(arcs);
+                    all.sort_by_key(|arc| arc.words == "payloads");
+                }
+                None => self.contents.prims[prim].composed = Some(words),
+            }
+            return Ok(());
+        }
         let value = self.short()?;
         let prim = &mut self.contents.prims[prim];
         if key == "active" {
-            prim.is_there &= !matches!(value.as_str(), "false" | "0");
+            prim.is_inactive = matches!(value.as_str(), "false" | "0");
+            prim.is_there &= !prim.is_inactive;
         }
         let told = COMPOSED.iter().find(|(field, _)| *field == key);
         prim.composed = told.map(|(_, words)| *words).or(prim.composed);
         Ok(())
+    }
+
+    /// Other prims and files that a value names, which is passed over; none where it is not plain.
+    fn arcs(&mut self, words: &'static str) -> Result<Option<Vec<Arc>>, Fault> {
+        self.scanner.solid()?;
+        let start = self.scanner.place();
+        let (mut arcs, mut is_plain) = (Vec::new(), true);
+        let is_list = self.scanner.has(b'[')?;
+        while is_plain && !(is_list && self.scanner.solid()? == Some(b']')) {
+            let mut arc = Arc { words, ..Arc::default() };
+            if self.scanner.solid()? == Some(b'@') {
+                arc.asset = self.scanner.enclosed()?;
+                is_plain = !arc.asset.is_empty();
+            }
+            if self.scanner.solid()? == Some(b'<') {
+                arc.prim = self.scanner.enclosed()?;
+                is_plain &= !arc.prim.is_empty();
+            }
+            is_plain &= !(arc.asset.is_empty() && arc.prim.is_empty()) && arcs.len() < MOST_ARCS;
+            if is_plain && self.scanner.has(b'(')? {
+                while is_plain && !self.scanner.has(b')')? {
+                    let key = self.word()?;
+                    match key.as_str() {
+                        "offset" => {
+                            self.scanner.expect(b'=')?;
+                            arc.times.offset = self.scanner.number()?;
+                        }
+                        "scale" => {
+                            self.scanner.expect(b'=')?;
+                            arc.times.scale = self.scanner.number()?;
+                        }
+                        _ => is_plain = false,
+                    }
+                }
+            }
+            arcs.push(arc);
+            if !is_list || !self.scanner.has(b',')? {
+                break;
+            }
+        }
+        self.scanner.go(start)?;
+        self.scanner.pass()?;
+        Ok(Some(arcs).filter(|_| is_plain))
     }
 
     /// A property behind its type, or an order of names, which has none.

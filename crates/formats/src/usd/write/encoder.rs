@@ -273,7 +273,7 @@ impl<W: Write + Seek> Encoder<W> {
 
     /// That the times of one layer below are as they are.
     pub(super) fn layer_offset(&mut self) -> io::Result<u64> {
-        self.list(kind::LAYER_OFFSETS, 1, [0.0_f64, 1.0].map(f64::to_le_bytes).as_flattened())
+        self.list(kind::OFFSETS, 1, [0.0_f64, 1.0].map(f64::to_le_bytes).as_flattened())
     }
 
     pub(super) fn vector(&mut self, numbers: [f64; 3]) -> io::Result<u64> {

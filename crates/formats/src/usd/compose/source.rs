@@ -1,0 +1,216 @@
+//! The values of a composed scene: those of the strongest site that has some.
+
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
+
+use super::files::Loaded;
+use super::instances::MOST_INSTANCES;
+use super::{Mapping, Name, Site};
+use crate::error::Fault;
+use crate::scene::{Points, Track, Value, Values, damaged};
+use crate::usd::layer::{Attributes, Target};
+
+/// Bits of the number of an element in a value, and of the layer in the start of points.
+const ELEMENT: u32 = 48;
+const LAYER: u32 = 48;
+/// Of values that are elements of lists.
+const IS_ELEMENT: u64 = 1 << 63;
+
+pub(super) struct Composite<'a> {
+    layers: Vec<Loaded<'a>>,
+    sites: Vec<Vec<Site>>,
+    places: HashMap<(Option<usize>, Name), usize>,
+    mappings: Vec<Mapping>,
+    /// Copies of prims: the top of the original and that of the copy.
+    copies: HashMap<usize, (usize, usize)>,
+    /// The layer of each value, and the value there.
+    values: Vec<(usize, Value)>,
+    numbers: HashMap<(usize, u64), u64>,
+    /// Lists of which elements were asked for.
+    lists: HashMap<u64, Vec<f64>>,
+}
+
+impl<'a> Composite<'a> {
+    pub(super) fn new(
+        layers: Vec<Loaded<'a>>,
+        sites: Vec<Vec<Site>>,
+        places: HashMap<(Option<usize>, Name), usize>,
+        mappings: Vec<Mapping>,
+    ) -> Self {
+        let (copies, values, numbers, lists) = (HashMap::new(), Vec::new(), HashMap::new(), HashMap::new());
+        Self { layers, sites, places, mappings, copies, values, numbers, lists }
+    }
+
+    fn held(&mut self, layer: usize, value: Value) -> Value {
+        let next = self.values.len() as u64;
+        let number = *self.numbers.entry((layer, value.0)).or_insert(next);
+        if number == next {
+            self.values.push((layer, value));
+        }
+        Value(number)
+    }
+
+    /// The layer of a value, and the value there.
+    fn of(&mut self, value: Value) -> Result<(&mut (dyn Attributes + 'a), Value, usize), Fault> {
+        let held = usize::try_from(value.0).ok().and_then(|number| self.values.get(number).copied());
+        let (layer, value) = held.ok_or_else(|| damaged("it has one number where a list belongs"))?;
+        Ok((self.layers[layer].layer.source.as_mut(), value, layer))
+    }
+
+    /// The prim of a path in the layers of a mapping.
+    fn mapped(&self, path: &str, mapping: usize) -> Option<Target> {
+        let (names, attribute) = path.split_once('.').unwrap_or((path, ""));
+        let names: Vec<Name> = names.strip_prefix('/')?.split('/').map(|name| Arc::from(name.as_bytes())).collect();
+        let mut mapping = &self.mappings[mapping];
+        while !names.starts_with(&mapping.root) {
+            mapping = &self.mappings[mapping.outer?];
+        }
+        Some((self.down(mapping.at, &names[mapping.root.len()..])?, attribute.to_owned()))
+    }
+
+    fn down(&self, from: Option<usize>, names: &[Name]) -> Option<usize> {
+        names.iter().try_fold(from, |prim, name| self.places.get(&(prim, Arc::clone(name))).copied().map(Some)).flatten()
+    }
+
+    /// Where the copy of a prim is for what lies in the same copy.
+    fn copied(&self, prim: usize, target: usize) -> usize {
+        let Some(&(original, copy)) = self.copies.get(&prim) else { return target };
+        // Copies keep the order of what they are of.
+        let last = self.copies.len();
+        let offset = target.checked_sub(original).filter(|offset| *offset <= last);
+        let there = offset.and_then(|offset| copy.checked_add(offset));
+        there.filter(|there| self.copies.get(there) == Some(&(original, copy))).unwrap_or(target)
+    }
+}
+
+impl Attributes for Composite<'_> {
+    fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault> {
+        for site in self.sites[prim].clone() {
+            let mut track = self.layers[site.layer].layer.source.attribute(site.prim, name)?;
+            if track.is_empty() {
+                continue;
+            }
+            track.times.iter_mut().for_each(|time| *time = site.times.offset + site.times.scale * *time);
+            track.values.iter_mut().for_each(|value| *value = self.held(site.layer, *value));
+            track.default = track.default.map(|value| self.held(site.layer, value));
+            return Ok(track);
+        }
+        Ok(Track::default())
+    }
+
+    fn properties(&self, prim: usize) -> Vec<(String, String)> {
+        let (mut all, mut known) = (Vec::new(), BTreeSet::new());
+        for site in &self.sites[prim] {
+            let own = self.layers[site.layer].layer.source.properties(site.prim);
+            all.extend(own.into_iter().filter(|(name, _)| known.insert(name.clone())));
+        }
+        all
+    }
+
+    fn interpolation(&mut self, prim: usize, name: &str) -> Result<String, Fault> {
+        for site in self.sites[prim].clone() {
+            let told = self.layers[site.layer].layer.source.interpolation(site.prim, name)?;
+            if !told.is_empty() {
+                return Ok(told);
+            }
+        }
+        Ok(String::new())
+    }
+
+    fn weight(&mut self, prim: usize, name: &str) -> Result<Option<f64>, Fault> {
+        for site in self.sites[prim].clone() {
+            let told = self.layers[site.layer].layer.source.weight(site.prim, name)?;
+            if told.is_some() {
+                return Ok(told);
+            }
+        }
+        Ok(None)
+    }
+
+    fn element(&mut self, prim: usize, name: &str, width: usize, index: usize) -> Result<Track, Fault> {
+        let mut track = self.attribute(prim, name)?;
+        self.reserve(track.times.len() as u64 + 1, 16)?;
+        for value in track.values.iter_mut().chain(&mut track.default) {
+            if !self.lists.contains_key(&value.0) {
+                let (source, inner, _) = self.of(*value)?;
+                let list = source.vectors(inner, width, MOST_INSTANCES as u64)?;
+                self.lists.insert(value.0, list);
+            }
+            // Three numbers or four.
+            *value = Value(IS_ELEMENT | (width as u64 & 4) << 60 | (index as u64) << ELEMENT | value.0);
+        }
+        Ok(track)
+    }
+
+    fn copy(&mut self, of: usize, tops: (usize, usize)) {
+        self.copies.insert(self.sites.len(), tops);
+        self.sites.push(self.sites.get(of).cloned().unwrap_or_default());
+    }
+
+    fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault> {
+        for site in self.sites[prim].clone() {
+            let paths = self.layers[site.layer].layer.source.paths(site.prim, name)?;
+            if !paths.is_empty() {
+                return Ok(paths);
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
+        for site in self.sites[prim].clone() {
+            let paths = self.layers[site.layer].layer.source.paths(site.prim, name)?;
+            if !paths.is_empty() {
+                let found = paths.iter().map(|path| self.mapped(path, site.mapping));
+                return Ok(found.map(|found| found.map(|(at, name)| (self.copied(prim, at), name))).collect());
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    fn vectors(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f64>, Fault> {
+        let (source, value, _) = self.of(value)?;
+        source.vectors(value, width, most)
+    }
+
+    fn reserve(&mut self, count: u64, size: u64) -> Result<(), Fault> {
+        self.layers[0].layer.source.reserve(count, size)
+    }
+
+    fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
+        let (source, value, _) = self.of(value)?;
+        source.tokens(value, most)
+    }
+}
+
+impl Values for Composite<'_> {
+    fn numbers(&mut self, value: Value) -> Result<Vec<f64>, Fault> {
+        if value.0 & IS_ELEMENT == 0 {
+            let (source, value, _) = self.of(value)?;
+            return source.numbers(value);
+        }
+        let width = if value.0 >> 62 & 1 == 1 { 4 } else { 3 };
+        let (index, list) = ((value.0 >> ELEMENT & 0x3fff) as usize, value.0 & ((1 << ELEMENT) - 1));
+        let list = self.lists.get(&list).and_then(|list| list.get(width * index..width * (index + 1)));
+        list.map(<[f64]>::to_vec).ok_or_else(|| damaged("an instancer says of fewer instances where they are than there are"))
+    }
+
+    fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault> {
+        let (source, value, _) = self.of(value)?;
+        source.integers(value, most)
+    }
+
+    fn points(&mut self, value: Value) -> Result<Points, Fault> {
+        let (source, value, layer) = self.of(value)?;
+        let points = source.points(value)?;
+        if points.start >> LAYER != 0 {
+            return Err(damaged("an offset leads out of the file"));
+        }
+        Ok(Points { start: points.start | (layer as u64) << LAYER, ..points })
+    }
+
+    fn read(&mut self, points: Points, out: &mut [f64]) -> Result<bool, Fault> {
+        let (layer, start) = ((points.start >> LAYER) as usize, points.start & ((1 << LAYER) - 1));
+        self.layers[layer].layer.source.read(Points { start, ..points }, out)
+    }
+}
