@@ -188,6 +188,11 @@ pub(super) trait Attributes: Values {
     /// first prim, the copy of which is the second.
     fn copy(&mut self, _of: usize, _tops: (usize, usize)) {}
 
+    /// What is the same of prims that are copies or instances of one.
+    fn origin(&self, prim: usize) -> (usize, usize) {
+        (0, prim)
+    }
+
     /// The paths to which an attribute or a relationship leads.
     fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault>;
 

@@ -28,7 +28,7 @@ pub(super) struct Materials {
     pub(super) list: Vec<Material>,
     /// Those that are kept by name alone.
     pub(super) names_alone: usize,
-    numbers: HashMap<usize, u32>,
+    numbers: HashMap<(usize, usize), u32>,
     /// The subsets of each mesh.
     subsets: HashMap<usize, Vec<usize>>,
 }
@@ -105,7 +105,8 @@ impl Materials {
     }
 
     fn number(&mut self, layer: &mut Layer<'_>, prim: usize) -> u32 {
-        if let Some(&number) = self.numbers.get(&prim) {
+        let origin = layer.source.origin(prim);
+        if let Some(&number) = self.numbers.get(&origin) {
             return number;
         }
         let name = String::from_utf8_lossy(&layer.nodes[prim].name).into_owned();
@@ -114,7 +115,7 @@ impl Materials {
         self.names_alone += usize::from(read.is_none());
         let number = self.list.len() as u32;
         self.list.push(Material { name, ..read.unwrap_or_default() });
-        self.numbers.insert(prim, number);
+        self.numbers.insert(origin, number);
         number
     }
 }

@@ -51,7 +51,11 @@ pub(crate) fn open<'a>(
 
 /// The layer that a file is, or the first one in a package, whatever its name, and the other files
 /// of a package where they are wanted; also whether it is one.
-fn open_layer(mut source: Reader<'_>, mut length: u64, wants_others: bool) -> Result<((Layer<'_>, Vec<Picture>), bool), Fault> {
+fn open_layer(
+    mut source: Reader<'_>,
+    mut length: u64,
+    wants_others: bool,
+) -> Result<((Layer<'_>, Vec<Picture>), bool), Fault> {
     let (mut head, mut others) = (head(&mut source)?, Vec::new());
     let is_package = head.starts_with(package::MAGIC);
     if is_package {

@@ -40,9 +40,11 @@ pub(super) fn above(layer: &mut Layer<'_>, mesh: usize) -> Result<Chain, Fault> 
         if let Some(&Instance { instancer, index, .. }) = layer.instances.get(&prim) {
             let has_single = !layer.attribute(instancer, "orientationsf")?.is_empty();
             let turns = if has_single { "orientationsf" } else { "orientations" };
-            for (name, operation) in
-                [("scales", Operation::Scale(0, 3)), (turns, Operation::Orient), ("positions", Operation::Translate(0, 3))]
-            {
+            for (name, operation) in [
+                ("scales", Operation::Scale(0, 3)),
+                (turns, Operation::Orient),
+                ("positions", Operation::Translate(0, 3)),
+            ] {
                 let values = layer.source.element(instancer, name, operation.count(), index)?;
                 if !values.is_empty() {
                     chain.push(layer.source.as_mut(), values, vec![operation], false)?;

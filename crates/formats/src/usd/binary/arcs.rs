@@ -60,11 +60,7 @@ fn times(file: &mut File<'_>, at: u64) -> Result<Times, Fault> {
 }
 
 /// The layers below a layer.
-pub(super) fn sublayers(
-    file: &mut File<'_>,
-    sections: &Sections,
-    root: Spec,
-) -> Result<Vec<(String, Times)>, Fault> {
+pub(super) fn sublayers(file: &mut File<'_>, sections: &Sections, root: Spec) -> Result<Vec<(String, Times)>, Fault> {
     let Some(list) = sections.field(root, "subLayers")? else { return Ok(Vec::new()) };
     let count = file.source.number(list.offset())?;
     if list.kind() != kind::STRINGS || count > MOST {

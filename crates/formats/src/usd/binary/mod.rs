@@ -78,7 +78,8 @@ impl<'a> Binary<'a> {
             places[spec.path as usize] = prims.len();
             let name = names.entry(path.name).or_insert_with(|| Arc::from(sections.token(path.name)));
             nodes.push(Node { name: Arc::clone(name), parent: None, depth: path.depth as usize });
-            let mut prim = Prim { kind: Kind::Other, is_there: false, is_inactive: false, composed: None, arcs: Vec::new() };
+            let mut prim =
+                Prim { kind: Kind::Other, is_there: false, is_inactive: false, composed: None, arcs: Vec::new() };
             for field in sections.fields(spec) {
                 let (name, value) = field?;
                 match name {
@@ -129,7 +130,10 @@ impl<'a> Binary<'a> {
             default_prim: String::new(),
             sublayers,
         };
-        let usual = self.sections.field(root, "defaultPrim")?.map_or(&[][..], |name| self.sections.token(u32::from_le_bytes(name.inlined())));
+        let usual = self
+            .sections
+            .field(root, "defaultPrim")?
+            .map_or(&[][..], |name| self.sections.token(u32::from_le_bytes(name.inlined())));
         stage.default_prim = String::from_utf8_lossy(usual).into_owned();
         let up = self.sections.field(root, "upAxis")?;
         stage.up_is_z = up.map(|up| self.sections.token(u32::from_le_bytes(up.inlined())) == b"Z");

@@ -201,7 +201,8 @@ pub(super) fn paths(count: usize, [indices, names, jumps]: [&[i32]; 3]) -> Resul
             if depth > DEEPEST + 1 {
                 return Err(too_deep());
             }
-            paths[index as usize] = Path { parent, depth, name: names[place].unsigned_abs(), is_property: names[place] < 0 };
+            paths[index as usize] =
+                Path { parent, depth, name: names[place].unsigned_abs(), is_property: names[place] < 0 };
             match jumps[place] {
                 LAST => break,
                 SIBLING => place += 1,

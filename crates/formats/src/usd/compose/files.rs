@@ -96,7 +96,11 @@ impl<'a> Files<'a> {
 
     /// A file that is not known yet, or the stack of one that is.
     #[allow(clippy::type_complexity)]
-    fn load(&mut self, from: usize, asset: &str) -> Result<Option<Result<Option<usize>, (PathBuf, Loaded<'a>)>>, Fault> {
+    fn load(
+        &mut self,
+        from: usize,
+        asset: &str,
+    ) -> Result<Option<Result<Option<usize>, (PathBuf, Loaded<'a>)>>, Fault> {
         let Loaded { folder: base, depth, .. } = &self.layers[from];
         let (Some(folder), Some(path)) = (&self.folder, resolved(base, asset)) else { return Ok(None) };
         if let Some(known) = self.known.get(&path) {

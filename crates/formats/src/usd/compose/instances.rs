@@ -37,6 +37,9 @@ fn add_all(
         None => Ok(Vec::new()),
     };
     let (numbers, ids) = (integers("protoIndices")?, integers("ids")?);
+    if numbers.is_empty() {
+        return Ok(());
+    }
     let track = layer.attribute(instancer, "protoIndices")?;
     for &value in &track.values {
         if layer.source.integers(value, u32::MAX.into())? != numbers {

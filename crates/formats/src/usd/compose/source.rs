@@ -69,7 +69,10 @@ impl<'a> Composite<'a> {
     }
 
     fn down(&self, from: Option<usize>, names: &[Name]) -> Option<usize> {
-        names.iter().try_fold(from, |prim, name| self.places.get(&(prim, Arc::clone(name))).copied().map(Some)).flatten()
+        names
+            .iter()
+            .try_fold(from, |prim, name| self.places.get(&(prim, Arc::clone(name))).copied().map(Some))
+            .flatten()
     }
 
     /// Where the copy of a prim is for what lies in the same copy.
@@ -147,6 +150,10 @@ impl Attributes for Composite<'_> {
         self.sites.push(self.sites.get(of).cloned().unwrap_or_default());
     }
 
+    fn origin(&self, prim: usize) -> (usize, usize) {
+        self.sites[prim].first().map_or((usize::MAX, prim), |site| (site.layer, site.prim))
+    }
+
     fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault> {
         for site in self.sites[prim].clone() {
             let paths = self.layers[site.layer].layer.source.paths(site.prim, name)?;
@@ -192,7 +199,8 @@ impl Values for Composite<'_> {
         let width = if value.0 >> 62 & 1 == 1 { 4 } else { 3 };
         let (index, list) = ((value.0 >> ELEMENT & 0x3fff) as usize, value.0 & ((1 << ELEMENT) - 1));
         let list = self.lists.get(&list).and_then(|list| list.get(width * index..width * (index + 1)));
-        list.map(<[f64]>::to_vec).ok_or_else(|| damaged("an instancer says of fewer instances where they are than there are"))
+        list.map(<[f64]>::to_vec)
+            .ok_or_else(|| damaged("an instancer says of fewer instances where they are than there are"))
     }
 
     fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault> {

@@ -19,16 +19,8 @@ const WANTED: [&str; 7] =
 const MOST_ARCS: usize = 64;
 
 /// Attributes of instancers.
-const INSTANCING: [&str; 8] = [
-    "prototypes",
-    "protoIndices",
-    "positions",
-    "orientations",
-    "orientationsf",
-    "scales",
-    "ids",
-    "invisibleIds",
-];
+const INSTANCING: [&str; 8] =
+    ["prototypes", "protoIndices", "positions", "orientations", "orientationsf", "scales", "ids", "invisibleIds"];
 
 /// Whether an attribute or a relationship of a prim is asked for.
 fn is_wanted(kind: Kind, name: &str) -> bool {
