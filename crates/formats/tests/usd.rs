@@ -297,7 +297,9 @@ fn what_a_layer_is_composed_of_is_named() {
         ("sublayers", "the layer has sublayers"),
     ] {
         for kind in KINDS {
-            let error = message(take(name, kind, None));
+            // As uploads have no files beside them.
+            let bytes = fs::read(made(name).with_extension(kind)).unwrap();
+            let error = message(open_frames_bytes(CacheFormat::Usd, Path::new("a.usd"), &bytes, 3));
             let cure =
                 ", which are not read; write all into one file in Python (pip install usd-core): from pxr import Usd";
             assert!(error.contains(&format!("{what}{cure}")) && error.contains("SetInstanceable(False)"), "{error}");

@@ -40,7 +40,13 @@ pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<u
             _ => Fault::unsupported("holds no polygon mesh; export the mesh itself as USD"),
         });
     }
-    let chosen = choose_meshes(layer, &meshes, wanted)?;
+    let chosen = match (choose_meshes(layer, &meshes, wanted), first_composed(&layer.prims, &there)) {
+        // What is missing may be what is not read.
+        (Err(_), Some((prim, of))) if wanted.prims.is_empty() => {
+            return Err(composed(&shown_path(&layer.nodes, prim), of));
+        }
+        (chosen, _) => chosen?,
+    };
     if layer.most_points < u64::MAX && count(layer, &chosen) as u64 > layer.most_points {
         return Err(Fault::unsupported(format!(
             "shows its meshes so many times that they have more than {} points together; choose some with --prim",

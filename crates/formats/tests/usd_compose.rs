@@ -1,0 +1,225 @@
+//! What scenes of USD are composed of: references, payloads, sublayers and instancers.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use cager_formats::{
+    CacheFormat, Error, FrameReader, MeshFormat, ReadModel, open_frames, open_frames_bytes, read_mesh, read_mesh_bytes,
+};
+use cager_geometry::surface::shown_in;
+use support::{all, message, numbers};
+use tempfile::{TempDir, tempdir};
+
+/// A prototype that two prims refer to, and an instancer of it and of a mesh below itself.
+const INSTANCES: &str = include_str!("usd/instances.usda");
+/// The same, written by usd-core.
+const INSTANCES_BINARY: &[u8] = include_bytes!("usd/instances.usdc");
+/// Two joints and three meshes.
+const ARM: &str = include_str!("usd/arm.usda");
+
+const TRIANGLE: &str = "int[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\n\
+                        point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n";
+
+fn open(text: &str, points: usize) -> Result<Box<dyn FrameReader + '_>, Error> {
+    open_frames_bytes(CacheFormat::Usda, Path::new("a.usda"), text.as_bytes(), points)
+}
+
+fn first(text: &str, points: usize) -> Vec<f64> {
+    all(&mut *open(text, points).unwrap()).swap_remove(0)
+}
+
+fn paths(read: &ReadModel) -> Vec<&str> {
+    read.model.surface.parts.iter().map(|part| part.path.as_str()).collect()
+}
+
+#[test]
+fn instances_are_parts_where_and_when_they_are_shown() {
+    for (mesh, format, bytes) in [
+        (MeshFormat::Usda, CacheFormat::Usda, INSTANCES.as_bytes()),
+        (MeshFormat::Usdc, CacheFormat::Usdc, INSTANCES_BINARY),
+    ] {
+        let read = read_mesh_bytes(mesh, Path::new("a.usd"), bytes).unwrap();
+        assert_eq!(
+            paths(&read),
+            ["/world/a/m", "/world/b/m", "/world/trees/x_0/x", "/world/trees/tri_1/tri/m", "/world/trees/x_2/x"]
+        );
+        let surface = &read.model.surface;
+        assert_eq!(surface.materials.iter().map(|material| &material.name).collect::<Vec<_>>(), ["red"]);
+        assert!([0, 1, 3].iter().all(|&k| surface.parts[k].materials == [0]) && surface.parts[2].materials.is_empty());
+        let mut reader = open_frames_bytes(format, Path::new("a.usd"), bytes, 15).unwrap();
+        assert_eq!(numbers(&*reader), [1.0, 2.0, 3.0]);
+        // The last one, whose id is 30, is hidden from the second frame on.
+        let mut shown = vec![None; 4];
+        shown.push(shown_in([true, false, false].into_iter()));
+        assert_eq!(reader.shown(), shown);
+        for (k, frame) in all(&mut *reader).iter().enumerate() {
+            let z = 100.0 + k as f64;
+            let expected = [
+                [[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]],
+                // What it says itself takes the place of what the prototype says.
+                [5.0, 6.0, 5.0].map(|x| x + k as f64).map(|x| [x, 0.0, 0.0]),
+                [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z + 1.0]],
+                // Above its place by 1, which is doubled and turned.
+                [[-1.0, 0.0, z], [-1.0, 2.0, z], [-3.0, 0.0, z]],
+                [[2.0, 0.0, z], [3.0, 0.0, z], [2.0, 1.0, z + 3.0]],
+            ];
+            let mut expected = expected;
+            expected[1][2][1] = 1.0;
+            // Quaternions of half precision.
+            let near = |(a, b): (&f64, &f64)| (a - b).abs() < 2e-3;
+            assert!(frame.iter().zip(expected.as_flattened().as_flattened()).all(near), "{k}: {frame:?}");
+        }
+    }
+}
+
+#[test]
+fn instancers_that_are_too_large_or_wrong_are_refused() {
+    let many = |count: usize| vec!["0"; count].join(", ");
+    let moved = |from: &str, to: &str| {
+        let text = INSTANCES.replacen(from, to, 1);
+        assert_ne!(text, INSTANCES);
+        message(open(&text, 15).and_then(|mut reader| reader.read_next(&mut Vec::new())))
+    };
+    for (from, to, what) in [
+        ("[0, 1, 0]", format!("[{}]", many(9000)), "is a PointInstancer of 9000 instances, where 8192 in all are read"),
+        ("[0, 1, 0]", "[0, 2, 0]".to_owned(), "a prototype that is not there"),
+        ("(1, 0, 0), (2, 0, 0)]", "(1, 0, 0)]".to_owned(), "says of fewer instances where they are than there are"),
+        (
+            "protoIndices = [0, 1, 0]",
+            "protoIndices.timeSamples = { 1: [0], 2: [0, 0] }".to_owned(),
+            "come, go or change",
+        ),
+        ("</world/trees/p/x>", "</world>".to_owned(), "is its own prototype"),
+    ] {
+        let error = moved(from, &to);
+        assert!(error.contains(what), "{error}\nnot: {what}");
+    }
+    // Of a mesh of a thousand points eight thousand are more than such a file may hold.
+    let points = vec!["(0, 0, 0)"; 1000].join(",");
+    let places = vec!["(1, 0, 0)"; 8000].join(",");
+    let text = format!(
+        "#usda 1.0\ndef PointInstancer \"i\" {{\nrel prototypes = </i/m>\nint[] protoIndices = [{}]\npoint3f[] positions = [{places}]\n\
+         def Mesh \"m\" {{\n{}\n}}\n}}\n",
+        many(8000),
+        TRIANGLE.replace("(0, 0, 0)", &points)
+    );
+    let error = message(open(&text, 8_016_000));
+    assert!(error.contains("together; choose some with --prim"), "{error}");
+}
+
+#[test]
+fn references_that_lead_in_circles_or_to_nothing_are_refused() {
+    let itself = format!(
+        "#usda 1.0\ndef Xform \"a\" {{\ndef \"b\" ( references = </a> ) {{ }}\ndef Mesh \"m\" {{\n{TRIANGLE}}}\n}}\n"
+    );
+    assert!(message(open(&itself, 3)).contains("nests deeper than 256"));
+    let circle = format!(
+        "#usda 1.0\ndef \"a\" ( references = </b> ) {{ }}\ndef \"b\" ( references = </a> ) {{ }}\ndef Mesh \"m\" {{\n{TRIANGLE}}}\n"
+    );
+    assert!(message(open(&circle, 3)).contains("one that refers to itself"));
+    let nothing = format!("#usda 1.0\ndef \"a\" ( references = </b> ) {{ }}\ndef Mesh \"m\" {{\n{TRIANGLE}}}\n");
+    assert!(message(open(&nothing, 3)).contains("/a has references, which are not read"));
+    // Twice as many in each step.
+    let steps = (0..40).map(|k| {
+        let next = k + 1;
+        format!("over \"p{k}\" {{\ndef \"x\" ( references = </p{next}> ) {{ }}\ndef \"y\" ( references = </p{next}> ) {{ }}\n}}\n")
+    });
+    let doubling = format!(
+        "#usda 1.0\ndef \"a\" ( references = </p0> ) {{ }}\n{}def Mesh \"p40\" {{\n{TRIANGLE}}}\n",
+        steps.collect::<String>()
+    );
+    assert!(message(open(&doubling, 3)).contains("is composed of more prims than its files hold"));
+}
+
+/// A folder with files of these names.
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempdir().unwrap();
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    folder
+}
+
+const SHOT: &str = "#usda 1.0\n(\ntimeCodesPerSecond = 48\nupAxis = \"Z\"\n)\n\
+    def \"one\" ( references = @./parts/shot.usda@</root> (offset = 5) ) {\n\
+    over \"aside\" {\nover \"free\" {\ndouble3 xformOp:translate = (1, 2, 3)\nuniform token[] xformOpOrder = [\"xformOp:translate\"]\n}\n}\n}\n\
+    def Xform \"two\" {\ndouble3 xformOp:translate = (1000, 0, 0)\nuniform token[] xformOpOrder = [\"xformOp:translate\"]\n\
+    def \"in\" ( payload = @parts/body.usda@ ) { }\n}\n";
+const PART: &str = "#usda 1.0\n( subLayers = [@./over.usda@, @../lib/arm.usda@ (offset = 10; scale = 2)] )\n";
+const OVER: &str = "#usda 1.0\nover \"root\" {\nover \"aside\" {\nover \"box\" ( active = false ) { }\n}\n}\n";
+
+#[test]
+fn files_below_a_layer_are_read_with_it() {
+    let body = format!("#usda 1.0\n( defaultPrim = \"body\" )\ndef Mesh \"body\" {{\n{TRIANGLE}}}\n");
+    let files = [
+        ("shot.usda", SHOT),
+        ("parts/shot.usda", PART),
+        ("parts/over.usda", OVER),
+        ("lib/arm.usda", ARM),
+        ("parts/body.usda", &body),
+    ];
+    let folder = folder(&files);
+    let path = folder.path().join("shot.usda");
+    let read = read_mesh(&path, &[]).unwrap();
+    assert_eq!(paths(&read), ["/one/aside/arm", "/one/aside/free", "/two/in"]);
+    let mut reader = open_frames(&path, 9).unwrap();
+    // From 1 and 3: doubled and moved by 10, doubled as time codes pass twice as fast, and moved by 5.
+    assert_eq!(numbers(&*reader), (29..38).map(f64::from).collect::<Vec<_>>());
+    let frames = all(&mut *reader);
+    let near = |found: &[f64], expected: [f64; 3]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5);
+    // Within what is referred to, skeletons and shapes are those there.
+    assert!(near(&frames[0][6..9], [3.0, 101.0, 12.0]) && near(&frames[8][6..9], [1.0, 101.0, 12.0]));
+    assert!(near(&frames[8][9..12], [8.0 - 7.0 + 3.0 + 7.0, 9.0, 24.0]), "{:?}", &frames[8][9..12]);
+    assert_eq!(frames[8][18..], [1000.0, 0.0, 0.0, 1001.0, 0.0, 0.0, 1000.0, 1.0, 0.0]);
+    // As an upload it has no files.
+    assert!(message(open(SHOT, 9)).contains("/one has references, which are not read"));
+    for (name, what) in [("parts/body.usda", "/two/in has payloads"), ("lib/arm.usda", "/one has references")] {
+        fs::remove_file(folder.path().join(name)).unwrap();
+        let error = message(open_frames(&path, 9));
+        assert!(error.contains(what), "{error}");
+        let text = files.iter().find(|(file, _)| *file == name).unwrap().1;
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    fs::write(folder.path().join("lib/arm.usda"), "#usda 1.0\ndef Mesh {").unwrap();
+    assert!(message(open_frames(&path, 9)).contains("lib/arm.usda"));
+}
+
+#[test]
+fn files_elsewhere_or_that_name_each_other_are_not_followed() {
+    let of = |asset: &str| format!("#usda 1.0\ndef Mesh \"m\" ( references = @{asset}@</m> ) {{\n{TRIANGLE}}}\n");
+    let folder = folder(&[("in/a.usda", ""), ("b.usda", &of("a.usda")), ("in/c.usda", &of("c.usda"))]);
+    let path = folder.path().join("in/a.usda");
+    let outside = folder.path().join("b.usda").display().to_string();
+    for asset in ["../b.usda", "https://example.com/b.usda", "in.usdz[b.usda]", &outside, "gone.usda"] {
+        fs::write(&path, of(asset)).unwrap();
+        assert!(message(open_frames(&path, 3)).contains("/m has references"), "{asset}");
+    }
+    assert!(message(open_frames(folder.path().join("in/c.usda"), 3)).contains("refers to itself"));
+    fs::write(&path, "#usda 1.0\n( subLayers = [@a.usda@] )\n").unwrap();
+    assert!(message(open_frames(&path, 3)).contains("the layer has sublayers"));
+}
+
+#[test]
+fn damaged_scenes_are_errors_at_the_most() {
+    let mut state = 5_u64;
+    let mut random = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    for _ in 0..500 {
+        for (format, whole) in [(CacheFormat::Usda, INSTANCES.as_bytes()), (CacheFormat::Usdc, INSTANCES_BINARY)] {
+            let mut bytes = whole.to_vec();
+            for _ in 0..=random() % 3 {
+                let at = random() % bytes.len();
+                bytes[at] = [b"0123456789-\"]),<>"[random() % 17], random() as u8][random() % 2];
+            }
+            let Ok(mut reader) = open_frames_bytes(format, Path::new("a.usd"), &bytes, 15) else { continue };
+            let (mut out, most) = (Vec::new(), reader.frames().min(16));
+            let _ = (0..most).all(|_| reader.read_next(&mut out).is_ok());
+        }
+    }
+}
