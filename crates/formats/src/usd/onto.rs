@@ -8,7 +8,7 @@ use cager_geometry::surface::Surface;
 use cager_geometry::units::Units;
 
 use super::layer::{Kind, Layer};
-use super::{mesh, open_layer};
+use super::{compose, mesh, open_layer};
 use crate::error::{Error, Fault};
 use crate::scene;
 
@@ -44,7 +44,8 @@ impl Onto {
         let file = File::open(source).map_err(read)?;
         let length = file.metadata().map_err(read)?.len();
         let find = || {
-            let (mut layer, _) = open_layer(Box::new(file), length, false)?;
+            let ((layer, _), is_package) = open_layer(Box::new(file), length, false)?;
+            let mut layer = compose::compose(layer, length, source.parent().filter(|_| !is_package))?;
             let units = mesh::units(&layer.stage);
             let meshes = surface.parts.iter().map(|part| found(&mut layer, &part.path, part.points));
             Ok(Self { file: relative(source, output), units, meshes: meshes.collect::<Result<_, _>>()? })
