@@ -124,6 +124,14 @@ class Capture:
     def faces(self) -> NDArray[np.int64] | list[NDArray[np.int64]]:
         """Faces of the model: (k, 3) or (k, 4) where all have as many vertices, else an array for each."""
     @property
+    def parts(self) -> list[dict[str, Any]]:
+        """The meshes that the model is made of, with what lies on their faces, these in the order of the source: dictionaries of path, points
+        (first and last + 1), face_counts, face_points (of the part's own points), uvs and colors (arrays by corner, by name), materials (of faces;
+        -1 for none, None without) and shown (ranges of frames, None for all)."""
+    @property
+    def materials(self) -> list[dict[str, Any]]:
+        """The materials that parts count: name, base_color, opacity, roughness, metalness and textures by channel."""
+    @property
     def frame_rate(self) -> float | None:
         """Frames per second, where known."""
     @property

@@ -2,6 +2,7 @@
 
 mod decoding;
 mod layers;
+mod parts;
 mod stamp;
 
 use self::layers::{check_name, told};
@@ -19,7 +20,8 @@ use cager_capture::edit::{self, Editing, edit};
 use cager_capture::edited::EditedCages;
 use cager_capture::origin::move_from;
 use cager_formats::{Action, AtomicFile, Error, FrameReader, Target, commit_together};
-use cager_geometry::mesh::{Model, Point, TriMesh};
+use cager_geometry::mesh::{Model, Point, Polygons, TriMesh};
+use cager_geometry::surface::Surface;
 use cager_geometry::units::{Units, Up};
 use cager_proto::container::EditLayer;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
@@ -40,6 +42,8 @@ pub(crate) struct Capture {
     /// Of a capture that has no name yet.
     _temporary: Option<OwnFile>,
     rest: Model,
+    /// What lies on its faces, and these in the order of the source.
+    surface: Option<(Surface, Polygons)>,
     cage: TriMesh,
     origin: Option<Point>,
     rows: usize,
@@ -73,6 +77,7 @@ impl Capture {
         let fail = |cause| DecodeError::container(&path, cause);
         let mut container = decode::open(&path)?;
         let (rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
+        let surface = container.surface().map_err(fail)?;
         let report = container.report().map_err(fail)?;
         let warnings = report.warnings.clone();
         let report = serde_json::to_string(&report).map_err(|error| of(path.display(), error))?;
@@ -90,6 +95,7 @@ impl Capture {
             stamp,
             _temporary: temporary,
             rest,
+            surface,
             cage,
             origin,
             rows,
@@ -316,6 +322,19 @@ impl Capture {
         }
         let each = faces.iter().map(|face| PyArray1::from_iter(py, face.iter().map(|&vertex| i64::from(vertex))));
         Ok(PyList::new(py, each.collect::<Vec<_>>())?.into_any())
+    }
+
+    /// The meshes that the model is made of, with what lies on their faces in the order of the source: dictionaries of path, points (first and
+    /// last + 1), face_counts, face_points (of the part's own points), uvs, colors (by corner), materials (of faces; -1 for none) and shown.
+    #[getter]
+    fn parts<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyDict>>, Fault> {
+        self.surface.as_ref().map_or(Ok(Vec::new()), |surface| parts::parts(py, surface))
+    }
+
+    /// The materials that parts count: name, base_color, opacity, roughness, metalness and textures.
+    #[getter]
+    fn materials<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyDict>>, Fault> {
+        self.surface.as_ref().map_or(Ok(Vec::new()), |(surface, _)| parts::materials(py, surface))
     }
 
     /// Frames per second, where known.

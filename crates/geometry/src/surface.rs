@@ -174,6 +174,20 @@ pub enum Channel {
     Emission,
 }
 
+impl Channel {
+    /// As files of this program name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BaseColor => "base_color",
+            Self::Opacity => "opacity",
+            Self::Roughness => "roughness",
+            Self::Metalness => "metalness",
+            Self::Normal => "normal",
+            Self::Emission => "emission",
+        }
+    }
+}
+
 impl Surface {
     /// Whether it says nothing that a model of points and faces does not.
     pub fn is_empty(&self) -> bool {

@@ -6,9 +6,25 @@ use serde_json::{Value, json};
 
 use super::pieces::Piece;
 
+/// Whether each mesh has a transform of its own, which programs that write such scenes name: it is
+/// then the node of the mesh, and the mesh has the last name.
+fn have_own_transforms(pieces: &[Piece]) -> bool {
+    let mut below: HashMap<&[String], usize> = HashMap::new();
+    for piece in pieces {
+        (1..piece.path.len()).for_each(|depth| *below.entry(&piece.path[..depth]).or_default() += 1);
+    }
+    let is_own = |piece: &Piece| piece.path.len() > 2 && below[&piece.path[..piece.path.len() - 1]] == 1;
+    pieces.len() > 1 && pieces.iter().all(is_own)
+}
+
 /// A node for each mesh in their order, then those above them; and which of these are at the root.
 pub(super) fn nodes(pieces: &[Piece], place: [f32; 3], scale: [f32; 3]) -> (Vec<Value>, Vec<usize>) {
-    let of_mesh = |(mesh, piece): (usize, &Piece)| json!({ "name": piece.path.last(), "mesh": mesh, "translation": place, "scale": scale });
+    let names_left = if have_own_transforms(pieces) { 2 } else { 1 };
+    let depth = |piece: &Piece| piece.path.len().saturating_sub(names_left);
+    let of_mesh = |(mesh, piece): (usize, &Piece)| {
+        let name = piece.path.get(depth(piece));
+        json!({ "name": name, "mesh": mesh, "translation": place, "scale": scale })
+    };
     let mut nodes: Vec<Value> = pieces.iter().enumerate().map(of_mesh).collect();
     let (mut groups, mut roots) = (HashMap::new(), Vec::new());
     for (mesh, piece) in pieces.iter().enumerate() {
@@ -21,7 +37,7 @@ pub(super) fn nodes(pieces: &[Piece], place: [f32; 3], scale: [f32; 3]) -> (Vec<
             },
         };
         // A mesh that has others below it stays beside the node above these, as its place is not theirs.
-        for depth in 1..piece.path.len() {
+        for depth in 1..=depth(piece) {
             let next = nodes.len();
             let group = *groups.entry(&piece.path[..depth]).or_insert(next);
             if group == next {
