@@ -16,11 +16,14 @@ use crate::scene::Node;
 use files::{Files, within};
 use source::Composite;
 
-/// Prims and points that a scene may have beyond those that its files hold, however small these are.
+/// Prims, points and bytes of lists that a scene may have of what its files hold once, however small
+/// these are.
 const MOST_PRIMS: usize = 1 << 17;
-const MOST_POINTS: u64 = 1 << 22;
-/// Points for each byte of the files.
-const POINTS_OF_BYTE: u64 = 16;
+const MOST_POINTS: u64 = 1 << 21;
+const MOST_BYTES: u64 = 1 << 28;
+/// Points and bytes of lists for each byte of the files.
+const POINTS_OF_BYTE: u64 = 1;
+const BYTES_OF_BYTE: u64 = 64;
 /// Opinions of one prim, and references that lead to each other.
 const MOST_SITES: usize = 64;
 const MOST_IN_A_ROW: usize = 32;
@@ -81,7 +84,8 @@ pub(super) fn compose<'a>(layer: Layer<'a>, length: u64, folder: Option<&Path>) 
     builder.build()?;
     let (length, nodes, prims) = (builder.files.length, builder.nodes, builder.prims);
     let most_points = MOST_POINTS.max(length.saturating_mul(POINTS_OF_BYTE));
-    let source = Composite::new(builder.files.layers, builder.sites, builder.places, builder.mappings);
+    let allowance = length.saturating_mul(BYTES_OF_BYTE).saturating_add(MOST_BYTES);
+    let source = Composite::new(builder.files.layers, builder.sites, builder.places, builder.mappings, allowance);
     let mut layer = Layer { most_points, ..Layer::plain(stage, nodes, prims, Box::new(source)) };
     instances::expand(&mut layer, builder.children, builder.most)?;
     Ok(layer)

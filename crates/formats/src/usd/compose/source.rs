@@ -7,7 +7,7 @@ use super::files::Loaded;
 use super::instances::MOST_INSTANCES;
 use super::{Mapping, Name, Site};
 use crate::error::Fault;
-use crate::scene::{Points, Track, Value, Values, damaged};
+use crate::scene::{Allowance, Points, Track, Value, Values, damaged};
 use crate::usd::layer::{Attributes, Target};
 
 /// Bits of the number of an element in a value, and of the layer in the start of points.
@@ -26,8 +26,23 @@ pub(super) struct Composite<'a> {
     /// The layer of each value, and the value there.
     values: Vec<(usize, Value)>,
     numbers: HashMap<(usize, u64), u64>,
-    /// Lists of which elements were asked for.
-    lists: HashMap<u64, Vec<f64>>,
+    /// What was read once: copies ask for the same again.
+    tracks: HashMap<(usize, usize, String), Track>,
+    paths: HashMap<(usize, usize, String), Vec<String>>,
+    tokens: HashMap<u64, Vec<String>>,
+    integers: HashMap<u64, Vec<i32>>,
+    vectors: HashMap<(u64, usize), Vec<f64>>,
+    /// Bytes that may still be given of it.
+    allowance: Allowance,
+}
+
+/// A list that was read once, where it is not longer than it may be.
+fn given<T: Clone>(list: &[T], most: u64, allowance: &mut Allowance) -> Result<Vec<T>, Fault> {
+    if list.len() as u64 > most {
+        return Err(damaged("it has a longer list than there may be"));
+    }
+    allowance.take(list.len() as u64, size_of::<T>() as u64)?;
+    Ok(list.to_vec())
 }
 
 impl<'a> Composite<'a> {
@@ -36,9 +51,59 @@ impl<'a> Composite<'a> {
         sites: Vec<Vec<Site>>,
         places: HashMap<(Option<usize>, Name), usize>,
         mappings: Vec<Mapping>,
+        allowance: u64,
     ) -> Self {
-        let (copies, values, numbers, lists) = (HashMap::new(), Vec::new(), HashMap::new(), HashMap::new());
-        Self { layers, sites, places, mappings, copies, values, numbers, lists }
+        Self {
+            layers,
+            sites,
+            places,
+            mappings,
+            copies: HashMap::new(),
+            values: Vec::new(),
+            numbers: HashMap::new(),
+            tracks: HashMap::new(),
+            paths: HashMap::new(),
+            tokens: HashMap::new(),
+            integers: HashMap::new(),
+            vectors: HashMap::new(),
+            allowance: Allowance(allowance),
+        }
+    }
+
+    /// The values that a site itself has.
+    fn own(&mut self, site: Site, name: &str) -> Result<Track, Fault> {
+        let key = (site.layer, site.prim, name.to_owned());
+        if !self.tracks.contains_key(&key) {
+            let mut track = self.layers[site.layer].layer.source.attribute(site.prim, name)?;
+            track.values.iter_mut().for_each(|value| *value = self.held(site.layer, *value));
+            track.default = track.default.map(|value| self.held(site.layer, value));
+            self.tracks.insert(key.clone(), track);
+        }
+        let track = &self.tracks[&key];
+        self.allowance.take(track.times.len() as u64, 16)?;
+        Ok(track.clone())
+    }
+
+    /// The paths to which a site itself leads.
+    fn own_paths(&mut self, site: Site, name: &str) -> Result<Vec<String>, Fault> {
+        let key = (site.layer, site.prim, name.to_owned());
+        if !self.paths.contains_key(&key) {
+            let paths = self.layers[site.layer].layer.source.paths(site.prim, name)?;
+            self.paths.insert(key.clone(), paths);
+        }
+        let paths = &self.paths[&key];
+        self.allowance.take(paths.iter().map(|path| path.len() as u64 + 64).sum(), 1)?;
+        Ok(paths.clone())
+    }
+
+    /// Reads vectors once.
+    fn list(&mut self, value: Value, width: usize, most: u64) -> Result<&[f64], Fault> {
+        if !self.vectors.contains_key(&(value.0, width)) {
+            let (source, inner, _) = self.of(value)?;
+            let list = source.vectors(inner, width, most)?;
+            self.vectors.insert((value.0, width), list);
+        }
+        Ok(&self.vectors[&(value.0, width)])
     }
 
     fn held(&mut self, layer: usize, value: Value) -> Value {
@@ -89,14 +154,11 @@ impl<'a> Composite<'a> {
 impl Attributes for Composite<'_> {
     fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault> {
         for site in self.sites[prim].clone() {
-            let mut track = self.layers[site.layer].layer.source.attribute(site.prim, name)?;
-            if track.is_empty() {
-                continue;
+            let mut track = self.own(site, name)?;
+            if !track.is_empty() {
+                track.times.iter_mut().for_each(|time| *time = site.times.offset + site.times.scale * *time);
+                return Ok(track);
             }
-            track.times.iter_mut().for_each(|time| *time = site.times.offset + site.times.scale * *time);
-            track.values.iter_mut().for_each(|value| *value = self.held(site.layer, *value));
-            track.default = track.default.map(|value| self.held(site.layer, value));
-            return Ok(track);
         }
         Ok(Track::default())
     }
@@ -134,11 +196,7 @@ impl Attributes for Composite<'_> {
         let mut track = self.attribute(prim, name)?;
         self.reserve(track.times.len() as u64 + 1, 16)?;
         for value in track.values.iter_mut().chain(&mut track.default) {
-            if !self.lists.contains_key(&value.0) {
-                let (source, inner, _) = self.of(*value)?;
-                let list = source.vectors(inner, width, MOST_INSTANCES as u64)?;
-                self.lists.insert(value.0, list);
-            }
+            self.list(*value, width, MOST_INSTANCES as u64)?;
             // Three numbers or four.
             *value = Value(IS_ELEMENT | (width as u64 & 4) << 60 | (index as u64) << ELEMENT | value.0);
         }
@@ -156,7 +214,7 @@ impl Attributes for Composite<'_> {
 
     fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault> {
         for site in self.sites[prim].clone() {
-            let paths = self.layers[site.layer].layer.source.paths(site.prim, name)?;
+            let paths = self.own_paths(site, name)?;
             if !paths.is_empty() {
                 return Ok(paths);
             }
@@ -166,7 +224,7 @@ impl Attributes for Composite<'_> {
 
     fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
         for site in self.sites[prim].clone() {
-            let paths = self.layers[site.layer].layer.source.paths(site.prim, name)?;
+            let paths = self.own_paths(site, name)?;
             if !paths.is_empty() {
                 let found = paths.iter().map(|path| self.mapped(path, site.mapping));
                 return Ok(found.map(|found| found.map(|(at, name)| (self.copied(prim, at), name))).collect());
@@ -176,17 +234,23 @@ impl Attributes for Composite<'_> {
     }
 
     fn vectors(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f64>, Fault> {
-        let (source, value, _) = self.of(value)?;
-        source.vectors(value, width, most)
+        self.list(value, width, most)?;
+        given(&self.vectors[&(value.0, width)], most.saturating_mul(width as u64), &mut self.allowance)
     }
 
     fn reserve(&mut self, count: u64, size: u64) -> Result<(), Fault> {
-        self.layers[0].layer.source.reserve(count, size)
+        self.allowance.take(count, size).map(|_| ())
     }
 
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
-        let (source, value, _) = self.of(value)?;
-        source.tokens(value, most)
+        if !self.tokens.contains_key(&value.0) {
+            let (source, inner, _) = self.of(value)?;
+            let names = source.tokens(inner, most)?;
+            self.tokens.insert(value.0, names);
+        }
+        let names = &self.tokens[&value.0];
+        self.allowance.take(names.iter().map(|name| name.len() as u64).sum(), 1)?;
+        given(names, most as u64, &mut self.allowance)
     }
 }
 
@@ -198,14 +262,18 @@ impl Values for Composite<'_> {
         }
         let width = if value.0 >> 62 & 1 == 1 { 4 } else { 3 };
         let (index, list) = ((value.0 >> ELEMENT & 0x3fff) as usize, value.0 & ((1 << ELEMENT) - 1));
-        let list = self.lists.get(&list).and_then(|list| list.get(width * index..width * (index + 1)));
+        let list = self.vectors.get(&(list, width)).and_then(|list| list.get(width * index..width * (index + 1)));
         list.map(<[f64]>::to_vec)
             .ok_or_else(|| damaged("an instancer says of fewer instances where they are than there are"))
     }
 
     fn integers(&mut self, value: Value, most: u64) -> Result<Vec<i32>, Fault> {
-        let (source, value, _) = self.of(value)?;
-        source.integers(value, most)
+        if !self.integers.contains_key(&value.0) {
+            let (source, inner, _) = self.of(value)?;
+            let list = source.integers(inner, most)?;
+            self.integers.insert(value.0, list);
+        }
+        given(&self.integers[&value.0], most, &mut self.allowance)
     }
 
     fn points(&mut self, value: Value) -> Result<Points, Fault> {
