@@ -26,10 +26,6 @@ fn open(text: &str, points: usize) -> Result<Box<dyn FrameReader + '_>, Error> {
     open_frames_bytes(CacheFormat::Usda, Path::new("a.usda"), text.as_bytes(), points)
 }
 
-fn first(text: &str, points: usize) -> Vec<f64> {
-    all(&mut *open(text, points).unwrap()).swap_remove(0)
-}
-
 fn paths(read: &ReadModel) -> Vec<&str> {
     read.model.surface.parts.iter().map(|part| part.path.as_str()).collect()
 }
@@ -154,7 +150,13 @@ const OVER: &str = "#usda 1.0\nover \"root\" {\nover \"aside\" {\nover \"box\" (
 
 #[test]
 fn files_below_a_layer_are_read_with_it() {
-    let body = format!("#usda 1.0\n( defaultPrim = \"body\" )\ndef Mesh \"body\" {{\n{TRIANGLE}}}\n");
+    let body = format!(
+        "#usda 1.0\n( defaultPrim = \"body\" )\ndef Mesh \"body\" {{\n{TRIANGLE}rel material:binding = </body/skin>\n\
+         def Material \"skin\" {{\ntoken outputs:surface.connect = </body/skin/s.outputs:surface>\n\
+         def Shader \"s\" {{\nuniform token info:id = \"UsdPreviewSurface\"\n\
+         color3f inputs:diffuseColor.connect = </body/skin/t.outputs:rgb>\ntoken outputs:surface\n}}\n\
+         def Shader \"t\" {{\nuniform token info:id = \"UsdUVTexture\"\nasset inputs:file = @./skin.png@\nfloat3 outputs:rgb\n}}\n}}\n}}\n"
+    );
     let files = [
         ("shot.usda", SHOT),
         ("parts/shot.usda", PART),
@@ -166,6 +168,9 @@ fn files_below_a_layer_are_read_with_it() {
     let path = folder.path().join("shot.usda");
     let read = read_mesh(&path, &[]).unwrap();
     assert_eq!(paths(&read), ["/one/aside/arm", "/one/aside/free", "/two/in"]);
+    // Pictures lie beside the file that names them.
+    let textures: Vec<&str> = read.model.surface.materials[0].textures.iter().map(|texture| &*texture.path).collect();
+    assert_eq!(textures, ["parts/skin.png"]);
     let mut reader = open_frames(&path, 9).unwrap();
     // From 1 and 3: doubled and moved by 10, doubled as time codes pass twice as fast, and moved by 5.
     assert_eq!(numbers(&*reader), (29..38).map(f64::from).collect::<Vec<_>>());

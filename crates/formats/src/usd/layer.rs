@@ -188,6 +188,11 @@ pub(super) trait Attributes: Values {
     /// first prim, the copy of which is the second.
     fn copy(&mut self, _of: usize, _tops: (usize, usize)) {}
 
+    /// The folder that files are named from in a value, as seen from that of the first layer.
+    fn folder(&self, _value: Value) -> String {
+        String::new()
+    }
+
     /// What is the same of prims that are copies or instances of one.
     fn origin(&self, prim: usize) -> (usize, usize) {
         (0, prim)

@@ -146,9 +146,14 @@ fn read_material(layer: &mut Layer<'_>, prim: usize) -> Result<Option<Material>,
         let (prim, attribute) = source(layer, shader, name)?;
         if attribute.starts_with("outputs:") && is_a(layer, prim, "UsdUVTexture")? {
             let (prim, file) = source(layer, prim, "inputs:file")?;
-            let path = layer.first(prim, &file)?.map(|value| layer.source.tokens(value, 1)).transpose()?;
+            let value = layer.first(prim, &file)?;
+            let path = value.map(|value| layer.source.tokens(value, 1)).transpose()?;
             let path = path.unwrap_or_default().concat().replace('\\', "/");
-            let path = path.strip_prefix("./").unwrap_or(&path).to_owned();
+            let mut path = path.strip_prefix("./").unwrap_or(&path).to_owned();
+            let folder = value.map_or_else(String::new, |value| layer.source.folder(value));
+            if !folder.is_empty() && !path.is_empty() && !path.starts_with('/') && !path.contains(':') {
+                path = format!("{folder}/{path}");
+            }
             if !path.is_empty() {
                 material.textures.push(Texture { channel, path });
             }

@@ -52,6 +52,11 @@ impl<'a> Loaded<'a> {
         names.iter().try_fold(None, |parent, name| self.child(parent, name).map(Some)).flatten()
     }
 
+    pub(super) fn folder(&self) -> String {
+        let names = self.folder.iter().map(|name| name.to_string_lossy());
+        names.collect::<Vec<_>>().join("/")
+    }
+
     fn rate(&self) -> f64 {
         let told = self.layer.stage.time_codes_per_second.or(self.layer.stage.frames_per_second);
         told.filter(|rate| rate.is_finite() && *rate > 0.0).unwrap_or(USUAL_RATE)

@@ -1,5 +1,6 @@
 //! What instancers show: a copy of a prototype for each instance, where and when it is.
 
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use crate::usd::layer::{Instance, Kind, Layer, Prim};
 pub(super) const MOST_INSTANCES: usize = 1 << 13;
 
 /// Adds instances below their instancers; `children` are the prims below each.
-pub(super) fn expand(layer: &mut Layer<'_>, children: Vec<Vec<usize>>, most: usize) -> Result<(), Fault> {
+pub(super) fn expand(layer: &mut Layer<'_>, children: &[Vec<usize>], most: usize) -> Result<(), Fault> {
     let mut left = MOST_INSTANCES;
     for prim in 0..children.len() {
         let is_there = |prim: usize| ancestry(&layer.nodes, prim).all(|k| layer.prims[k].is_there);
@@ -19,7 +20,7 @@ pub(super) fn expand(layer: &mut Layer<'_>, children: Vec<Vec<usize>>, most: usi
         let is_inner = ancestry(&layer.nodes, prim).skip(1).any(|k| layer.prims[k].kind == Kind::Instanced);
         if layer.prims[prim].kind == Kind::PointInstancer && is_there(prim) && !is_inner {
             let name = shown_path(&layer.nodes, prim);
-            add_all(layer, prim, &children, (&mut left, most)).map_err(|fault| fault.within(&name))?;
+            add_all(layer, prim, children, (&mut left, most)).map_err(|fault| fault.within(&name))?;
         }
     }
     Ok(())
@@ -56,9 +57,9 @@ fn add_all(
     let hidden = layer.attribute(instancer, "invisibleIds")?;
     let mut sets = HashMap::new();
     for value in hidden.values.iter().chain(&hidden.default) {
-        if !sets.contains_key(&value.0) {
+        if let Entry::Vacant(entry) = sets.entry(value.0) {
             let list = layer.source.integers(*value, MOST_INSTANCES as u64)?;
-            sets.insert(value.0, list.into_iter().collect::<HashSet<i32>>());
+            entry.insert(list.into_iter().collect::<HashSet<i32>>());
         }
     }
     for (index, &number) in numbers.iter().enumerate() {

@@ -87,7 +87,7 @@ pub(super) fn compose<'a>(layer: Layer<'a>, length: u64, folder: Option<&Path>) 
     let allowance = length.saturating_mul(BYTES_OF_BYTE).saturating_add(MOST_BYTES);
     let source = Composite::new(builder.files.layers, builder.sites, builder.places, builder.mappings, allowance);
     let mut layer = Layer { most_points, ..Layer::plain(stage, nodes, prims, Box::new(source)) };
-    instances::expand(&mut layer, builder.children, builder.most)?;
+    instances::expand(&mut layer, &builder.children, builder.most)?;
     Ok(layer)
 }
 

@@ -208,6 +208,11 @@ impl Attributes for Composite<'_> {
         self.sites.push(self.sites.get(of).cloned().unwrap_or_default());
     }
 
+    fn folder(&self, value: Value) -> String {
+        let held = usize::try_from(value.0).ok().and_then(|number| self.values.get(number));
+        held.map_or_else(String::new, |&(layer, _)| self.layers[layer].folder())
+    }
+
     fn origin(&self, prim: usize) -> (usize, usize) {
         self.sites[prim].first().map_or((usize::MAX, prim), |site| (site.layer, site.prim))
     }

@@ -5,6 +5,7 @@ mod shapes;
 mod skin;
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::{Arc, Mutex};
 
 use super::layer::{Kind, Layer};
@@ -25,8 +26,8 @@ impl Arrays {
     fn read(layer: &mut Layer<'_>, prim: usize, (name, width): (&str, usize), most: u64) -> Result<Self, Fault> {
         let (track, mut values) = (layer.attribute(prim, name)?, HashMap::new());
         for &value in track.values.iter().chain(&track.default) {
-            if !values.contains_key(&value.0) {
-                values.insert(value.0, layer.source.floats(value, width, most)?);
+            if let Entry::Vacant(entry) = values.entry(value.0) {
+                entry.insert(layer.source.floats(value, width, most)?);
             }
         }
         Ok(Self { track, values })

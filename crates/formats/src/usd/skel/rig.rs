@@ -101,7 +101,7 @@ impl Rig {
                 let own = moved.or_else(|| self.rests.get(joint).copied()).unwrap_or_default();
                 joints.push(parent.map_or(own, |parent| joints[parent] * own));
             }
-            joints.iter_mut().zip(&self.unbinds).for_each(|(joint, unbind)| *joint = *joint * *unbind);
+            joints.iter_mut().zip(&self.unbinds).for_each(|(joint, unbind)| *joint *= *unbind);
             self.pose = Some((time, joints));
         }
         self.pose.as_ref().map_or(&[], |(_, pose)| pose)
