@@ -293,7 +293,6 @@ fn what_a_layer_is_composed_of_is_named() {
         ("references", "/group has references"),
         ("payloads", "/group has payloads"),
         ("inherited", "/group has inherited prims"),
-        ("variants", "/group has variants"),
         ("sublayers", "the layer has sublayers"),
     ] {
         for kind in KINDS {

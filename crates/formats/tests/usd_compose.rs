@@ -193,6 +193,40 @@ fn files_below_a_layer_are_read_with_it() {
     assert!(message(open_frames(&path, 9)).contains("lib/arm.usda"));
 }
 
+/// A model of two sets of variants, of which it chooses a small mesh and, of the other, nothing.
+const LOOK: &str = include_str!("usd/look.usda");
+/// The same, written by usd-core.
+const LOOK_BINARY: &[u8] = include_bytes!("usd/look.usdc");
+
+#[test]
+fn variants_are_those_that_are_chosen_outermost() {
+    for (format, bytes) in [(MeshFormat::Usda, LOOK.as_bytes()), (MeshFormat::Usdc, LOOK_BINARY)] {
+        let read = read_mesh_bytes(format, Path::new("a.usd"), bytes).unwrap();
+        assert_eq!(paths(&read), ["/model/m"]);
+        assert_eq!(read.model.points, [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]);
+    }
+    let refers = |name: &str, chosen: &str| {
+        format!("def \"{name}\" (\nreferences = @look.usdc@\nvariants = {{ {chosen} }}\n) {{ }}\n")
+    };
+    let large = "string size = \"large\"";
+    let scene = format!(
+        "#usda 1.0\n{}{}{}",
+        refers("one", ""),
+        refers("two", large),
+        refers("three", &format!("{large}; string \"kind\" = \"a\""))
+    );
+    let folder = folder(&[("scene.usda", &scene)]);
+    fs::write(folder.path().join("look.usdc"), LOOK_BINARY).unwrap();
+    let read = read_mesh(&folder.path().join("scene.usda"), &[]).unwrap();
+    assert_eq!(paths(&read), ["/one/m", "/two/m", "/two/n", "/three/n"]);
+    // The model itself says where it is, whatever its variants say.
+    assert_eq!(read.model.points[4], [10.0, 0.0, 1.0]);
+    // Where none is chosen, there is none.
+    let none = LOOK.replace("string size = \"small\"", "");
+    let error = message(read_mesh_bytes(MeshFormat::Usda, Path::new("a.usda"), none.as_bytes()));
+    assert!(error.contains("holds no polygon mesh"), "{error}");
+}
+
 #[test]
 fn files_elsewhere_or_that_name_each_other_are_not_followed() {
     let of = |asset: &str| format!("#usda 1.0\ndef Mesh \"m\" ( references = @{asset}@</m> ) {{\n{TRIANGLE}}}\n");
@@ -216,13 +250,19 @@ fn damaged_scenes_are_errors_at_the_most() {
         (state >> 33) as usize
     };
     for _ in 0..500 {
-        for (format, whole) in [(CacheFormat::Usda, INSTANCES.as_bytes()), (CacheFormat::Usdc, INSTANCES_BINARY)] {
+        for (format, whole) in [
+            (CacheFormat::Usda, INSTANCES.as_bytes()),
+            (CacheFormat::Usdc, INSTANCES_BINARY),
+            (CacheFormat::Usda, LOOK.as_bytes()),
+            (CacheFormat::Usdc, LOOK_BINARY),
+        ] {
+            let points = if whole == LOOK.as_bytes() || whole == LOOK_BINARY { 3 } else { 15 };
             let mut bytes = whole.to_vec();
             for _ in 0..=random() % 3 {
                 let at = random() % bytes.len();
                 bytes[at] = [b"0123456789-\"]),<>"[random() % 17], random() as u8][random() % 2];
             }
-            let Ok(mut reader) = open_frames_bytes(format, Path::new("a.usd"), &bytes, 15) else { continue };
+            let Ok(mut reader) = open_frames_bytes(format, Path::new("a.usd"), &bytes, points) else { continue };
             let (mut out, most) = (Vec::new(), reader.frames().min(16));
             let _ = (0..most).all(|_| reader.read_next(&mut out).is_ok());
         }

@@ -131,7 +131,7 @@ fn what_cannot_be_read_names_its_line_or_a_way_out() {
         ("#usda 1.0\n( subLayers = [@a.usda@ (offset = 10)] )".to_owned(), "the layer has sublayers"),
         (mesh("").replace("{", "( clips = { dictionary default = { } } ) {"), "has value clips"),
         (mesh("").replace("{", "( payload = None ) {"), "has payloads"),
-        (mesh("variantSet \"a\" = { \"b\" { } }"), "has variants"),
+        (mesh("variantSet \"a\" = { float x = 1 }"), "begins neither a prim nor a property"),
     ] {
         let read = open(&text, 3).and_then(|mut reader| {
             let mut out = Vec::new();

@@ -9,14 +9,12 @@ use crate::scene::{Node, Track, Value, Values};
 pub(super) const DEEPEST: u32 = 256;
 
 /// Fields that say what a prim is composed of, in text or in binary layers.
-pub(super) const COMPOSED: [(&str, &str); 9] = [
+pub(super) const COMPOSED: [(&str, &str); 7] = [
     ("references", "references"),
     ("payload", "payloads"),
     ("inheritPaths", "inherited prims"),
     ("inherits", "inherited prims"),
     ("specializes", "specialized prims"),
-    ("variantSetNames", "variants"),
-    ("variantSets", "variants"),
     ("clips", "value clips"),
     ("clipSets", "value clips"),
 ];
@@ -68,6 +66,24 @@ pub(super) struct Prim {
     pub(super) composed: Option<&'static str>,
     /// The strongest first.
     pub(super) arcs: Vec<Arc>,
+    pub(super) variants: Vec<Variant>,
+    /// Sets of variants, and which one of each is chosen.
+    pub(super) chosen: Vec<(String, String)>,
+}
+
+/// What a prim says where a variant is chosen, as a prim that is not there.
+#[derive(Clone, Debug)]
+pub(super) struct Variant {
+    pub(super) set: String,
+    pub(super) name: String,
+    pub(super) prim: usize,
+}
+
+impl Prim {
+    pub(super) fn new(kind: Kind, is_there: bool) -> Self {
+        let (arcs, variants, chosen) = (Vec::new(), Vec::new(), Vec::new());
+        Self { kind, is_there, is_inactive: false, composed: None, arcs, variants, chosen }
+    }
 }
 
 /// Another prim, whose opinions count where a prim has none itself.

@@ -79,3 +79,20 @@ pub(super) fn sublayers(file: &mut File<'_>, sections: &Sections, root: Spec) ->
     }
     Ok(layers)
 }
+
+/// Sets of variants, and which one of each is chosen.
+pub(super) fn chosen(file: &mut File<'_>, sections: &Sections, rep: Rep) -> Result<Vec<(String, String)>, Fault> {
+    let mut chosen = Vec::new();
+    if rep.kind() != kind::CHOSEN_VARIANTS || rep.is_inlined() {
+        return Ok(chosen);
+    }
+    let count = file.source.number(rep.offset())?;
+    let bytes = file.source.bytes(rep.offset() + 8, count, 8)?;
+    for pair in bytes.as_chunks::<8>().0 {
+        let [set, name] =
+            [0, 4].map(|at| sections.string(u32::from_le_bytes([pair[at], pair[at + 1], pair[at + 2], pair[at + 3]])));
+        file.source.allowance.take((set.len() + name.len()) as u64 + 48, 1)?;
+        chosen.push((set, name));
+    }
+    Ok(chosen)
+}

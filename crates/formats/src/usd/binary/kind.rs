@@ -27,6 +27,7 @@ pub(crate) const REFERENCE_LIST: u8 = 35;
 pub(crate) const TOKENS: u8 = 41;
 pub(crate) const SPECIFIER: u8 = 42;
 pub(crate) const VARIABILITY: u8 = 44;
+pub(crate) const CHOSEN_VARIANTS: u8 = 45;
 pub(crate) const TIME_SAMPLES: u8 = 46;
 pub(crate) const PAYLOAD: u8 = 47;
 pub(crate) const DOUBLES: u8 = 48;

@@ -9,7 +9,7 @@ mod sections;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::layer::{Attributes, COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, Target, spline};
+use super::layer::{Attributes, COMPOSED, DEEPEST, Kind, Layer, Prim, Stage, Target, Variant, spline};
 use crate::error::Fault;
 use crate::frames::Scalar;
 use crate::scene::{Node, Points, Reader, Source, Track, Value, Values, damaged};
@@ -23,6 +23,7 @@ pub(super) const ATTRIBUTE: u32 = 1;
 pub(super) const PRIM: u32 = 6;
 pub(super) const ROOT: u32 = 7;
 pub(super) const RELATIONSHIP: u32 = 8;
+const VARIANT: u32 = 10;
 
 /// Lists of paths that are there: explicit, added, prepended or appended.
 const FILLED: u8 = 0b0110_0110;
@@ -37,6 +38,13 @@ pub(super) struct Binary<'a> {
     paths: Vec<u32>,
     /// Attributes and relationships: the paths above them, ascending, and their specs.
     attributes: Vec<(u32, u32)>,
+}
+
+/// The set and the name of a variant, as paths have it.
+fn variant(name: &[u8]) -> Option<(String, String)> {
+    let text = String::from_utf8_lossy(name.strip_prefix(b"{")?.strip_suffix(b"}")?).into_owned();
+    let (set, name) = text.split_once('=')?;
+    Some((set.to_owned(), name.to_owned()))
 }
 
 impl<'a> Binary<'a> {
@@ -73,18 +81,18 @@ impl<'a> Binary<'a> {
         let mut places = vec![usize::MAX; sections.paths.len()];
         // Many prims may share one.
         let mut names: HashMap<u32, Arc<[u8]>> = HashMap::new();
-        for &spec in sections.specs.iter().filter(|spec| spec.kind == PRIM) {
+        for &spec in sections.specs.iter().filter(|spec| [PRIM, VARIANT].contains(&spec.kind)) {
             let path = sections.paths[spec.path as usize];
             places[spec.path as usize] = prims.len();
             let name = names.entry(path.name).or_insert_with(|| Arc::from(sections.token(path.name)));
             nodes.push(Node { name: Arc::clone(name), parent: None, depth: path.depth as usize });
-            let mut prim =
-                Prim { kind: Kind::Other, is_there: false, is_inactive: false, composed: None, arcs: Vec::new() };
+            let mut prim = Prim::new(Kind::Other, false);
             for field in sections.fields(spec) {
                 let (name, value) = field?;
                 match name {
                     b"typeName" => prim.kind = Kind::of(sections.token(u32::from_le_bytes(value.inlined()))),
                     b"specifier" => prim.is_there = value.inlined() == [0; 4],
+                    b"variantSelection" => prim.chosen = arcs::chosen(file, sections, value)?,
                     b"active" => prim.is_inactive = value.inlined()[0] == 0,
                     _ => {
                         let told = COMPOSED.iter().find(|(field, _)| field.as_bytes() == name);
@@ -98,15 +106,20 @@ impl<'a> Binary<'a> {
                 }
             }
             prim.arcs.sort_by_key(|arc| arc.words == "payloads");
-            prim.is_there &= !prim.is_inactive && path.depth <= DEEPEST;
+            prim.is_there &= !prim.is_inactive && path.depth <= DEEPEST && spec.kind == PRIM;
             self.paths.push(spec.path);
             prims.push(prim);
         }
-        for ((prim, node), &path) in prims.iter_mut().zip(&mut nodes).zip(&self.paths) {
+        for (k, &path) in self.paths.iter().enumerate() {
             let parent = places[sections.paths[path as usize].parent as usize];
+            let above = Some(parent).filter(|&parent| nodes[k].depth > 1 && parent != usize::MAX);
+            prims[k].is_there &= nodes[k].depth == 1 || above.is_some();
             // What lies below a variant is there in that variant alone.
-            prim.is_there &= node.depth == 1 || parent != usize::MAX;
-            node.parent = Some(parent).filter(|&parent| node.depth > 1 && parent != usize::MAX);
+            let told = variant(&nodes[k].name);
+            match (above, told) {
+                (Some(above), Some((set, name))) => prims[above].variants.push(Variant { set, name, prim: k }),
+                (above, _) => nodes[k].parent = above,
+            }
         }
         Ok((nodes, prims))
     }

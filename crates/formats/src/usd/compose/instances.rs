@@ -76,8 +76,7 @@ fn add_all(
         let name = [&*layer.nodes[prototype].name, format!("_{index}").as_bytes()].concat();
         let depth = layer.nodes[instancer].depth + 1;
         layer.nodes.push(Node { name: Arc::from(name), parent: Some(instancer), depth });
-        let prim = |kind, is_there| Prim { kind, is_there, is_inactive: false, composed: None, arcs: Vec::new() };
-        layer.prims.push(prim(Kind::Instance, true));
+        layer.prims.push(Prim::new(Kind::Instance, true));
         layer.source.copy(usize::MAX, (usize::MAX, place));
         layer.instances.insert(place, Instance { instancer, index, hidden });
         copy(layer, (prototype, place), children, most)?;

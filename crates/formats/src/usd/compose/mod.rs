@@ -1,6 +1,6 @@
 //! Scenes of several layers: references, payloads and sublayers are followed, and instancers are
 //! taken apart. Of all that names a prim the strongest opinion counts: that of the layer itself and
-//! those below it, then those of references and of payloads, each with its own.
+//! those below it, then those of its chosen variants, of references and of payloads, each with its own.
 
 mod files;
 mod instances;
@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::layer::{Arc as To, Kind, Layer, Prim, Times, composed, too_deep};
+use super::layer::{Arc as To, Kind, Layer, Prim, Times, Variant, composed, too_deep};
 use crate::error::Fault;
 use crate::scene::Node;
 use files::{Files, within};
@@ -65,7 +65,7 @@ struct Builder<'a> {
 /// A layer of `length` bytes with what it is composed of, where that is plain; of files those below
 /// a folder, where it is known.
 pub(super) fn compose<'a>(layer: Layer<'a>, length: u64, folder: Option<&Path>) -> Result<Layer<'a>, Fault> {
-    let is_alone = |prim: &Prim| prim.arcs.is_empty() && prim.kind != Kind::PointInstancer;
+    let is_alone = |prim: &Prim| prim.arcs.is_empty() && prim.variants.is_empty() && prim.kind != Kind::PointInstancer;
     if layer.stage.sublayers.is_empty() && layer.prims.iter().all(is_alone) {
         return Ok(layer);
     }
@@ -114,12 +114,11 @@ impl Builder<'_> {
             }
             let all = || sites.iter().map(|site| &self.files.layers[site.layer].layer.prims[site.prim]);
             let is_inactive = all().any(|prim| prim.is_inactive);
+            let kind = all().map(|prim| prim.kind).find(|kind| *kind != Kind::Other).unwrap_or(Kind::Other);
             let prim = Prim {
-                kind: all().map(|prim| prim.kind).find(|kind| *kind != Kind::Other).unwrap_or(Kind::Other),
-                is_there: all().any(|prim| prim.is_there) && !is_inactive,
                 is_inactive,
                 composed: all().find_map(|prim| prim.composed).or(unread),
-                arcs: Vec::new(),
+                ..Prim::new(kind, all().any(|prim| prim.is_there) && !is_inactive)
             };
             let of: Vec<_> = sites.iter().map(|site| (site.layer, Some(site.prim), site.mapping, site.times)).collect();
             // What is not there shows nothing below it, but may be referred to.
@@ -169,7 +168,16 @@ impl Builder<'_> {
             )));
         }
         sites.push(site);
-        let arcs = self.files.layers[site.layer].layer.prims[site.prim].arcs.clone();
+        let Prim { arcs, variants, .. } = self.files.layers[site.layer].layer.prims[site.prim].clone();
+        for Variant { set, name, prim } in variants {
+            let chosen = |site: &Site| {
+                let all = &self.files.layers[site.layer].layer.prims[site.prim].chosen;
+                all.iter().find(|(of, _)| *of == set).map(|(_, chosen)| chosen)
+            };
+            if sites.iter().find_map(chosen) == Some(&name) {
+                self.follow(Site { prim, ..site }, at, (&mut *sites, &mut *unread), depth + 1)?;
+            }
+        }
         for arc in arcs {
             let Some(mapping) = self.lead(site, &arc, at)? else {
                 *unread = Some(arc.words);

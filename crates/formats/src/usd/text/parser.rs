@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::scanner::{Place, Scanner, is_letter};
 use crate::error::Fault;
 use crate::scene::{Node, Track, Value};
-use crate::usd::layer::{Arc, COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep};
+use crate::usd::layer::{Arc, COMPOSED, DEEPEST, Kind, Prim, Stage, Variant, composed, too_deep};
 
 /// Words in front of the type of a property or of the key of a field.
 const MODIFIERS: [&str; 9] =
@@ -67,6 +67,8 @@ pub(super) struct Parser<'a, 'b> {
     contents: Contents,
     /// The prims that are open, from the outside to the inside.
     open: Vec<usize>,
+    /// The sets of variants that are open: within how many prims and in which.
+    sets: Vec<(usize, usize, String)>,
 }
 
 /// What fields in brackets belong to.
@@ -78,7 +80,7 @@ enum Owner {
 
 impl<'a, 'b> Parser<'a, 'b> {
     pub(super) fn parse(scanner: &'a mut Scanner<'b>) -> Result<Contents, Fault> {
-        let mut parser = Self { scanner, contents: Contents::default(), open: Vec::new() };
+        let mut parser = Self { scanner, contents: Contents::default(), open: Vec::new(), sets: Vec::new() };
         if parser.scanner.solid()? == Some(b'(') {
             parser.fields(&Owner::Layer)?;
         }
@@ -86,8 +88,13 @@ impl<'a, 'b> Parser<'a, 'b> {
             match parser.scanner.solid()? {
                 None if parser.open.is_empty() => return Ok(parser.contents),
                 None => return Err(parser.scanner.wrong("the text ends within a prim")),
+                Some(b'"' | b'\'') if parser.is_in_set() => parser.variant()?,
+                Some(b'}') if parser.is_in_set() => {
+                    parser.sets.pop();
+                    parser.scanner.expect(b'}')?;
+                }
                 Some(b'}') if parser.open.pop().is_some() => parser.scanner.expect(b'}')?,
-                Some(byte) if is_letter(byte) => parser.statement()?,
+                Some(byte) if is_letter(byte) && !parser.is_in_set() => parser.statement()?,
                 Some(_) => {
                     let found = parser.scanner.found()?;
                     return Err(parser.scanner.wrong(&format!("{found} begins neither a prim nor a property")));
@@ -117,13 +124,48 @@ impl<'a, 'b> Parser<'a, 'b> {
         match (word.as_str(), self.open.last()) {
             ("def" | "over" | "class", _) => self.prim(word == "def"),
             ("variantSet", Some(&prim)) => {
-                self.contents.prims[prim].composed = Some("variants");
-                self.scanner.string()?;
+                let set = self.scanner.string()?;
                 self.scanner.expect(b'=')?;
-                self.scanner.pass().map(|_| ())
+                self.sets.push((self.open.len(), prim, set));
+                self.scanner.expect(b'{')
             }
             _ => self.property(&word),
         }
+    }
+
+    /// Whether a variant is next, or the end of their set.
+    fn is_in_set(&self) -> bool {
+        self.sets.last().is_some_and(|(depth, ..)| *depth == self.open.len())
+    }
+
+    fn variant(&mut self) -> Result<(), Fault> {
+        let Some((_, prim, set)) = self.sets.last().cloned() else { return Ok(()) };
+        if self.open.len() == DEEPEST as usize {
+            return Err(too_deep());
+        }
+        let name = self.scanner.string()?;
+        let (index, depth) = (self.contents.prims.len(), self.open.len() + 1);
+        self.contents.nodes.push(Node { name: format!("{{{set}={name}}}").into_bytes().into(), parent: None, depth });
+        self.contents.prims.push(Prim::new(self.contents.prims[prim].kind, false));
+        self.contents.prims[prim].variants.push(Variant { set, name, prim: index });
+        if self.scanner.solid()? == Some(b'(') {
+            self.fields(&Owner::Prim(index))?;
+        }
+        self.open.push(index);
+        self.scanner.expect(b'{')
+    }
+
+    /// Which variants are chosen: strings by the names of sets.
+    fn chosen(&mut self, prim: usize) -> Result<(), Fault> {
+        self.scanner.expect(b'{')?;
+        while !self.scanner.has(b'}')? {
+            self.word()?;
+            let set = self.short()?;
+            self.scanner.expect(b'=')?;
+            let name = self.scanner.string()?;
+            self.contents.prims[prim].chosen.push((set, name));
+        }
+        Ok(())
     }
 
     fn prim(&mut self, is_defined: bool) -> Result<(), Fault> {
@@ -135,8 +177,7 @@ impl<'a, 'b> Parser<'a, 'b> {
         let index = self.contents.prims.len();
         let (parent, depth) = (self.open.last().copied(), self.open.len() + 1);
         self.contents.nodes.push(Node { name: name.into_bytes().into(), parent, depth });
-        let prim = Prim { kind, is_there: is_defined, is_inactive: false, composed: None, arcs: Vec::new() };
-        self.contents.prims.push(prim);
+        self.contents.prims.push(Prim::new(kind, is_defined));
         if self.scanner.solid()? == Some(b'(') {
             self.fields(&Owner::Prim(index))?;
         }
@@ -224,6 +265,9 @@ impl<'a, 'b> Parser<'a, 'b> {
                 None => self.contents.prims[prim].composed = Some(words),
             }
             return Ok(());
+        }
+        if key == "variants" {
+            return self.chosen(prim);
         }
         let value = self.short()?;
         let prim = &mut self.contents.prims[prim];
