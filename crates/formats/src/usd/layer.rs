@@ -71,10 +71,13 @@ pub(super) struct Prim {
     pub(super) chosen: Vec<(String, String)>,
 }
 
+/// Variants of one prim; programs write some tens.
+const MOST_VARIANTS: usize = 256;
+
 /// What a prim says where a variant is chosen, as a prim that is not there.
 #[derive(Clone, Debug)]
 pub(super) struct Variant {
-    pub(super) set: String,
+    pub(super) set: std::sync::Arc<str>,
     pub(super) name: String,
     pub(super) prim: usize,
 }
@@ -83,6 +86,15 @@ impl Prim {
     pub(super) fn new(kind: Kind, is_there: bool) -> Self {
         let (arcs, variants, chosen) = (Vec::new(), Vec::new(), Vec::new());
         Self { kind, is_there, is_inactive: false, composed: None, arcs, variants, chosen }
+    }
+
+    /// Adds a variant; too many are not looked at.
+    pub(super) fn vary(&mut self, variant: Variant) {
+        if self.variants.len() == MOST_VARIANTS {
+            self.composed = Some("variants");
+        } else {
+            self.variants.push(variant);
+        }
     }
 }
 

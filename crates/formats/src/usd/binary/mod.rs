@@ -41,10 +41,8 @@ pub(super) struct Binary<'a> {
 }
 
 /// The set and the name of a variant, as paths have it.
-fn variant(name: &[u8]) -> Option<(String, String)> {
-    let text = String::from_utf8_lossy(name.strip_prefix(b"{")?.strip_suffix(b"}")?).into_owned();
-    let (set, name) = text.split_once('=')?;
-    Some((set.to_owned(), name.to_owned()))
+fn variant(name: &[u8]) -> Option<(&str, &str)> {
+    std::str::from_utf8(name.strip_prefix(b"{")?.strip_suffix(b"}")?).ok()?.split_once('=')
 }
 
 impl<'a> Binary<'a> {
@@ -117,7 +115,11 @@ impl<'a> Binary<'a> {
             // What lies below a variant is there in that variant alone.
             let told = variant(&nodes[k].name);
             match (above, told) {
-                (Some(above), Some((set, name))) => prims[above].variants.push(Variant { set, name, prim: k }),
+                (Some(above), Some((set, name))) => {
+                    // Many may share a name.
+                    file.source.allowance.take(nodes[k].name.len() as u64, 1)?;
+                    prims[above].vary(Variant { set: set.into(), name: name.to_owned(), prim: k });
+                }
                 (above, _) => nodes[k].parent = above,
             }
         }

@@ -172,7 +172,7 @@ impl Builder<'_> {
         for Variant { set, name, prim } in variants {
             let chosen = |site: &Site| {
                 let all = &self.files.layers[site.layer].layer.prims[site.prim].chosen;
-                all.iter().find(|(of, _)| *of == set).map(|(_, chosen)| chosen)
+                all.iter().find(|(of, _)| **of == *set).map(|(_, chosen)| chosen)
             };
             if sites.iter().find_map(chosen) == Some(&name) {
                 self.follow(Site { prim, ..site }, at, (&mut *sites, &mut *unread), depth + 1)?;

@@ -1,11 +1,12 @@
 //! What a text says: its prims, and where the values of their attributes are.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 use super::scanner::{Place, Scanner, is_letter};
 use crate::error::Fault;
 use crate::scene::{Node, Track, Value};
-use crate::usd::layer::{Arc, COMPOSED, DEEPEST, Kind, Prim, Stage, Variant, composed, too_deep};
+use crate::usd::layer::{COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep};
 
 /// Words in front of the type of a property or of the key of a field.
 const MODIFIERS: [&str; 9] =
@@ -14,9 +15,6 @@ const MODIFIERS: [&str; 9] =
 /// Attributes that are asked for of all prims, beside the operations of transforms.
 const WANTED: [&str; 7] =
     ["subdivisionScheme", "points", "faceVertexCounts", "faceVertexIndices", "orientation", "purpose", "visibility"];
-
-/// Arcs of one prim; programs write a handful.
-const MOST_ARCS: usize = 64;
 
 /// Attributes of instancers.
 const INSTANCING: [&str; 8] =
@@ -63,16 +61,16 @@ pub(super) struct Contents {
 }
 
 pub(super) struct Parser<'a, 'b> {
-    scanner: &'a mut Scanner<'b>,
-    contents: Contents,
+    pub(super) scanner: &'a mut Scanner<'b>,
+    pub(super) contents: Contents,
     /// The prims that are open, from the outside to the inside.
-    open: Vec<usize>,
+    pub(super) open: Vec<usize>,
     /// The sets of variants that are open: within how many prims and in which.
-    sets: Vec<(usize, usize, String)>,
+    pub(super) sets: Vec<(usize, usize, Arc<str>)>,
 }
 
 /// What fields in brackets belong to.
-enum Owner {
+pub(super) enum Owner {
     Layer,
     Prim(usize),
     Property(String),
@@ -103,7 +101,7 @@ impl<'a, 'b> Parser<'a, 'b> {
         }
     }
 
-    fn word(&mut self) -> Result<String, Fault> {
+    pub(super) fn word(&mut self) -> Result<String, Fault> {
         Ok(self.scanner.word(b"_:.")?.to_owned())
     }
 
@@ -126,46 +124,11 @@ impl<'a, 'b> Parser<'a, 'b> {
             ("variantSet", Some(&prim)) => {
                 let set = self.scanner.string()?;
                 self.scanner.expect(b'=')?;
-                self.sets.push((self.open.len(), prim, set));
+                self.sets.push((self.open.len(), prim, Arc::from(set)));
                 self.scanner.expect(b'{')
             }
             _ => self.property(&word),
         }
-    }
-
-    /// Whether a variant is next, or the end of their set.
-    fn is_in_set(&self) -> bool {
-        self.sets.last().is_some_and(|(depth, ..)| *depth == self.open.len())
-    }
-
-    fn variant(&mut self) -> Result<(), Fault> {
-        let Some((_, prim, set)) = self.sets.last().cloned() else { return Ok(()) };
-        if self.open.len() == DEEPEST as usize {
-            return Err(too_deep());
-        }
-        let name = self.scanner.string()?;
-        let (index, depth) = (self.contents.prims.len(), self.open.len() + 1);
-        self.contents.nodes.push(Node { name: format!("{{{set}={name}}}").into_bytes().into(), parent: None, depth });
-        self.contents.prims.push(Prim::new(self.contents.prims[prim].kind, false));
-        self.contents.prims[prim].variants.push(Variant { set, name, prim: index });
-        if self.scanner.solid()? == Some(b'(') {
-            self.fields(&Owner::Prim(index))?;
-        }
-        self.open.push(index);
-        self.scanner.expect(b'{')
-    }
-
-    /// Which variants are chosen: strings by the names of sets.
-    fn chosen(&mut self, prim: usize) -> Result<(), Fault> {
-        self.scanner.expect(b'{')?;
-        while !self.scanner.has(b'}')? {
-            self.word()?;
-            let set = self.short()?;
-            self.scanner.expect(b'=')?;
-            let name = self.scanner.string()?;
-            self.contents.prims[prim].chosen.push((set, name));
-        }
-        Ok(())
     }
 
     fn prim(&mut self, is_defined: bool) -> Result<(), Fault> {
@@ -186,7 +149,7 @@ impl<'a, 'b> Parser<'a, 'b> {
     }
 
     /// What is said in round brackets of a layer, a prim or a property.
-    fn fields(&mut self, owner: &Owner) -> Result<(), Fault> {
+    pub(super) fn fields(&mut self, owner: &Owner) -> Result<(), Fault> {
         self.scanner.expect(b'(')?;
         while !self.scanner.has(b')')? {
             // A comment has no key.
@@ -224,7 +187,7 @@ impl<'a, 'b> Parser<'a, 'b> {
     }
 
     /// A value that is a word or a string; empty for others, which are passed over.
-    fn short(&mut self) -> Result<String, Fault> {
+    pub(super) fn short(&mut self) -> Result<String, Fault> {
         match self.scanner.solid()? {
             Some(b'"' | b'\'') => self.scanner.string(),
             Some(byte) if is_letter(byte) || b"+-.".contains(&byte) => Ok(self.scanner.word(b"+-._")?.to_owned()),
@@ -278,49 +241,6 @@ impl<'a, 'b> Parser<'a, 'b> {
         let told = COMPOSED.iter().find(|(field, _)| *field == key);
         prim.composed = told.map(|(_, words)| *words).or(prim.composed);
         Ok(())
-    }
-
-    /// Other prims and files that a value names, which is passed over; none where it is not plain.
-    fn arcs(&mut self, words: &'static str) -> Result<Option<Vec<Arc>>, Fault> {
-        self.scanner.solid()?;
-        let start = self.scanner.place();
-        let (mut arcs, mut is_plain) = (Vec::new(), true);
-        let is_list = self.scanner.has(b'[')?;
-        while is_plain && !(is_list && self.scanner.solid()? == Some(b']')) {
-            let mut arc = Arc { words, ..Arc::default() };
-            if self.scanner.solid()? == Some(b'@') {
-                arc.asset = self.scanner.enclosed()?;
-                is_plain = !arc.asset.is_empty();
-            }
-            if self.scanner.solid()? == Some(b'<') {
-                arc.prim = self.scanner.enclosed()?;
-                is_plain &= !arc.prim.is_empty();
-            }
-            is_plain &= !(arc.asset.is_empty() && arc.prim.is_empty()) && arcs.len() < MOST_ARCS;
-            if is_plain && self.scanner.has(b'(')? {
-                while is_plain && !self.scanner.has(b')')? {
-                    let key = self.word()?;
-                    match key.as_str() {
-                        "offset" => {
-                            self.scanner.expect(b'=')?;
-                            arc.times.offset = self.scanner.number()?;
-                        }
-                        "scale" => {
-                            self.scanner.expect(b'=')?;
-                            arc.times.scale = self.scanner.number()?;
-                        }
-                        _ => is_plain = false,
-                    }
-                }
-            }
-            arcs.push(arc);
-            if !is_list || !self.scanner.has(b',')? {
-                break;
-            }
-        }
-        self.scanner.go(start)?;
-        self.scanner.pass()?;
-        Ok(Some(arcs).filter(|_| is_plain))
     }
 
     /// A property behind its type, or an order of names, which has none.
