@@ -1,5 +1,6 @@
 /** What the parts of the page hand to each other: a capture's static part, and its frames as they come. */
 
+import type { SplitMesh } from './codec/surface/splitMesh';
 import type { Source } from './container/source';
 
 /** Coordinate systems a container can name; docs/FORMAT.md defines them. */
@@ -42,6 +43,43 @@ export interface StaticPart {
   readonly up?: UpAxis;
   /** Boundary elements that harmonic coordinates were solved on (`ELEM` in docs/FORMAT.md), where the file has them. */
   readonly elements?: Uint8Array;
+}
+
+/** One mesh of a scene: a part of the model. */
+export interface ModelPart {
+  /** Names from the root of the scene down to the mesh with `/` between them. */
+  readonly path: string;
+  readonly firstPoint: number;
+  readonly points: number;
+  /** From which frame to which it is shown, the last one not included; null where it always is. */
+  readonly shown: readonly (readonly [start: number, end: number])[] | null;
+}
+
+/** What pictures say of a material, as far as it is drawn. */
+export type TextureChannel = 'base_color' | 'opacity' | 'roughness' | 'metalness';
+
+export interface Texture {
+  readonly channel: TextureChannel;
+  /** Its file as the source names it. */
+  readonly path: string;
+}
+
+/** What a surface looks like. Pictures stand in place of the numbers. */
+export interface Material {
+  readonly name: string;
+  /** Linear red, green and blue. */
+  readonly baseColor: readonly [number, number, number];
+  readonly opacity: number;
+  readonly roughness: number;
+  readonly metalness: number;
+  readonly textures: readonly Texture[];
+}
+
+/** What lies on the faces of the model (`surf` in docs/FORMAT.md), as far as it is drawn. */
+export interface ModelSurface {
+  readonly parts: readonly ModelPart[];
+  readonly materials: readonly Material[];
+  readonly mesh: SplitMesh;
 }
 
 /** Frames that follow one another, decoded from what a file or a service sent. */
@@ -153,6 +191,10 @@ export interface Capture {
   block(frame: number, signal?: AbortSignal): Promise<FrameBlock>;
   /** Whether {@link block} gives a frame as it was coded from now on, where it was preliminary before; fires `change` when that may differ. */
   hasFinal?(frame: number): boolean;
+  /** Parts and materials of the model, where the file has any. */
+  surface?(signal?: AbortSignal): Promise<ModelSurface | null>;
+  /** Files of the pictures that the materials name, by their paths, as far as the file has them. */
+  pictures?(signal?: AbortSignal): Promise<ReadonlyMap<string, Uint8Array<ArrayBuffer>>>;
   /** Φ, points × columns, from the service; for coordinate systems that the page does not compute itself. */
   coordinates?(onProgress?: (fraction: number) => void, signal?: AbortSignal): Promise<Float32Array>;
   /** Φ, points × columns, where decoding cages computes it anyway. */

@@ -10,6 +10,8 @@ import { type Hierarchy, vertexHierarchy } from './hierarchy';
 import { type Polygons } from './polygons';
 import { decodePositions } from './positions';
 import { decodeResidual } from './residual';
+import { decodeSurface, type PartSize } from './surface/decodeSurface';
+import { type SplitMesh, splitMesh } from './surface/splitMesh';
 
 export class GroupDecoder {
   private model: { polygons: Polygons; points: number } | null = null;
@@ -22,6 +24,17 @@ export class GroupDecoder {
 
   positions(bytes: Uint8Array, faces: Polygons, points: number): Float64Array {
     return decodePositions(bytes, faces, points);
+  }
+
+  /** What lies on faces, as a mesh to draw; {@link decodeSurface}, {@link splitMesh}. */
+  surface(
+    bytes: Uint8Array,
+    parts: readonly PartSize[],
+    isTiled: readonly boolean[],
+    faces: Polygons,
+    points: number,
+  ): SplitMesh {
+    return splitMesh(decodeSurface(bytes, parts, isTiled.length, faces, points), points, isTiled);
   }
 
   errors(bytes: Uint8Array, frames: number): FrameErrors {

@@ -47,6 +47,24 @@ export function byVertex(vertices: ArrayLike<number>, size: number, points: numb
   return { starts, items };
 }
 
+/** The triangles around each of some owners: those of owner k are `fans[2·fanStarts[k] … 2·fanStarts[k + 1])`, the other two corners of each, in order. */
+export interface Fans {
+  readonly fanStarts: Uint32Array;
+  readonly fans: Uint32Array;
+}
+
+/** @param owners whose each corner of the triangles is, one of `count` */
+export function fansOf(triangles: Uint32Array, owners: Uint32Array, count: number): Fans {
+  const { starts: fanStarts, items } = byVertex(owners, 1, count);
+  const fans = new Uint32Array(2 * triangles.length);
+  items.forEach((corner, k) => {
+    const first = corner - (corner % 3);
+    fans[2 * k] = triangles[first + ((corner + 1) % 3)];
+    fans[2 * k + 1] = triangles[first + ((corner + 2) % 3)];
+  });
+  return { fanStarts, fans };
+}
+
 /** The vertices that edges of these faces join each vertex to, each once and in no certain order. */
 export function adjacency(faces: Polygons, points: number): ByVertex {
   const starts = new Uint32Array(points + 1);

@@ -15,6 +15,9 @@ export const STATIC_TAGS: readonly string[] = ['ORIG', 'RPTS', 'RFAC', 'CVTX', '
 /** Sections of model and cage without which they can be shown: where one is damaged, it is left out. */
 export const OPTIONAL_TAGS: readonly string[] = ['unit', 'rcol'];
 
+/** Sections with what lies on the faces of the model, which is read once the model can be seen. */
+export const SURFACE_TAGS: readonly string[] = ['surf', 'pict'];
+
 const AXES: readonly (UpAxis | undefined)[] = [undefined, 'y', 'z'];
 
 /** A section and its payload as it is in the file, whose checksum and sizes were checked. */

@@ -1,6 +1,6 @@
 /** Captures in containers that are read at random: what is asked for is read, decoded and kept for a while. */
 
-import type { Capture, EditLayer, FrameBlock, FrameErrors, StaticPart } from '../capture';
+import type { Capture, EditLayer, FrameBlock, FrameErrors, ModelSurface, StaticPart } from '../capture';
 import { type Codec, createCodec } from '../codec/client';
 import { computePhi } from '../coordinates/pool';
 import { BlockCache } from './blockCache';
@@ -11,9 +11,11 @@ import { checkSize, type Chunk, type Layout } from './layout';
 import { decodePayload } from './codecs';
 import { decodeLayer, withLayers, withoutErrors } from './layers';
 import { decodeStatic, OPTIONAL_TAGS, type Section, STATIC_TAGS } from './meshes';
+import { parsePictures, type Pictures } from './pictures';
 import { readContents, readSections, scanSections } from './sectionReader';
 import { checkPrelude, CODEC, type Entry, PRELUDE_BYTES, KNOWN_TAGS } from './section';
 import { EndsCache, type Source } from './source';
+import { decodeSurface } from './surface';
 import { decodeErrors, decodeFrameNumbers, decodeReport, heldToBound, NO_ERRORS } from './tail';
 
 /** Bytes at either end that are read at once: most of the static part of coded captures, and all that comes behind the frames of most. */
@@ -164,6 +166,22 @@ class FileCapture implements ContainerCapture {
   phi(onProgress: (fraction: number) => void, signal: AbortSignal): Promise<Float32Array> {
     const isCoded = this.layout.chunks.some(({ frames }) => frames.fields.codec === CODEC.coded);
     return isCoded ? this.blocks.phi(onProgress, signal) : computePhi(this.static, { onProgress, signal });
+  }
+
+  /** Damage is told as {@link problem}: frames can be seen without it. */
+  async surface(signal?: AbortSignal): Promise<ModelSurface | null> {
+    let surface: ModelSurface | null = null;
+    const take = async (section: Section) => {
+      surface = await decodeSurface(section, this.head, this.static, this.codec);
+    };
+    await this.readOptional(this.layout.get('surf'), take, signal);
+    return surface;
+  }
+
+  async pictures(signal?: AbortSignal): Promise<Pictures> {
+    let pictures: Pictures = new Map();
+    await this.readOptional(this.layout.get('pict'), (section) => (pictures = parsePictures(section)), signal);
+    return pictures;
   }
 
   readTogether(frame: number): { readonly first: number; readonly count: number } {

@@ -6,7 +6,7 @@ import { decodePayload } from './codecs';
 import { checksumDamage, damaged, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize } from './layout';
-import { decodeStatic, OPTIONAL_TAGS, type Section, STATIC_TAGS } from './meshes';
+import { decodeStatic, OPTIONAL_TAGS, type Section, STATIC_TAGS, SURFACE_TAGS } from './meshes';
 import { type Entry, HEADER_BYTES, KNOWN_TAGS } from './section';
 import { type Arrival, SectionParser } from './sectionParser';
 
@@ -91,7 +91,7 @@ export class ContainerStream {
     else if (KNOWN_TAGS.has(tag)) {
       checkSize(entry, this.headBefore(entry.offset), layout.frames, layout.end);
       // Colours and unit may be among the sections of the static part, or anywhere else.
-      this.isBegun ||= !STATIC_TAGS.includes(tag) && !OPTIONAL_TAGS.includes(tag);
+      this.isBegun ||= ![STATIC_TAGS, OPTIONAL_TAGS, SURFACE_TAGS].some((tags) => tags.includes(tag));
     }
     if (tag === 'resi' || tag === 'FRAM')
       this.begun = { frames: first + count, bytes: this.begun.bytes + HEADER_BYTES + payloadBytes };
@@ -101,6 +101,8 @@ export class ContainerStream {
     const { entry, payload } = section;
     const { tag } = entry.fields;
     const isOptional = OPTIONAL_TAGS.includes(tag);
+    // What lies on the faces is read from the container of a completed session.
+    if (SURFACE_TAGS.includes(tag)) return null;
     try {
       if (!isIntact) throw checksumDamage(entry.offset);
       if (isOptional) decodePayload(entry, payload);

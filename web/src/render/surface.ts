@@ -1,14 +1,11 @@
 import type { StaticPart } from '../capture';
-import { byVertex, type Polygons, triangulated } from '../codec/polygons';
+import { type Fans, fansOf, type Polygons, triangulated } from '../codec/polygons';
 
-export interface Surface {
+export interface Surface extends Fans {
   /** Three points of each triangle; polygons are cut into fans. */
   readonly triangles: Uint32Array;
   /** Two points of each edge of the polygons, each edge once. */
   readonly edges: Uint32Array;
-  /** The triangles around point p are `fans[2·fanStarts[p] … 2·fanStarts[p + 1])`: the other two corners of each, in order. */
-  readonly fanStarts: Uint32Array;
-  readonly fans: Uint32Array;
 }
 
 /** Prepares the polygons of a model. Throws where a corner names a point that does not exist. */
@@ -20,7 +17,7 @@ export function surfaceOf(model: Pick<StaticPart, 'rest' | 'cornerCounts' | 'cor
       throw new Error(`A face names point ${corners[k]}, but the model has ${points}; encode it again.`);
   }
   const triangles = triangulated({ counts: cornerCounts, corners });
-  return { triangles, edges: edgesOf({ counts: cornerCounts, corners }, points), ...fansOf(triangles, points) };
+  return { triangles, edges: edgesOf({ counts: cornerCounts, corners }, points), ...fansOf(triangles, triangles, points) };
 }
 
 /** Two points of each edge of polygons, each edge once and in ascending order. */
@@ -39,15 +36,4 @@ export function edgesOf({ counts, corners }: Polygons, points: number): Uint32Ar
     const key = unique[k >> 1];
     return k % 2 === 0 ? Math.floor(key / points) : key % points;
   });
-}
-
-function fansOf(triangles: Uint32Array, points: number): Pick<Surface, 'fanStarts' | 'fans'> {
-  const { starts: fanStarts, items } = byVertex(triangles, 1, points);
-  const fans = new Uint32Array(2 * triangles.length);
-  items.forEach((corner, k) => {
-    const first = corner - (corner % 3);
-    fans[2 * k] = triangles[first + ((corner + 1) % 3)];
-    fans[2 * k + 1] = triangles[first + ((corner + 2) % 3)];
-  });
-  return { fanStarts, fans };
 }
