@@ -2,7 +2,8 @@
 
 import type { GroupDecoder } from './groupDecoder';
 
-export type Method = 'faces' | 'positions' | 'surface' | 'errors' | 'setModel' | 'addCoordinates' | 'cages' | 'residual';
+export type Method =
+  'faces' | 'positions' | 'surface' | 'errors' | 'setModel' | 'addCoordinates' | 'cages' | 'residual';
 
 export interface Call {
   readonly id: number;

@@ -53,7 +53,7 @@ export function parseSurface({ entry, payload }: Section, head: Head): SurfaceNa
   const named = partList.map((part, k): ModelPart => {
     const { points } = sizes[k];
     firstPoint += points;
-    const shown = part.shown == null ? null : list(part.shown).map((range) => rangeOf(range, cannotBeRead));
+    const shown = (part.shown ?? null) === null ? null : list(part.shown).map((range) => rangeOf(range, cannotBeRead));
     return { path: textOf(part.path), firstPoint: firstPoint - points, points, shown };
   });
   return { parts: named, sizes, materials: list(materials).map((each) => materialOf(each, list)), numbers: rest };

@@ -14,7 +14,7 @@ import {
 import type { PhiLayout } from './packing';
 import { WIDTH } from './packing';
 import { FAN_WIDTH } from './decodeShaders';
-import type { Surface } from './surface';
+import type { Fans } from '../codec/polygons';
 
 /** Φ as it was packed, 16-bit integers or full floats. */
 export function phiTexture(texels: Int16Array | Float32Array, layout: PhiLayout): DataArrayTexture {
@@ -55,11 +55,7 @@ export function pointColorTexture(colors: Uint8Array, bands: number): DataTextur
 }
 
 /** The triangles around each point: where they begin and how many, and the list of their other corners. */
-export function fanTextures(
-  surface: Surface,
-  bands: number,
-  limit: number,
-): { starts: DataTexture; fans: DataTexture } {
+export function fanTextures(surface: Fans, bands: number, limit: number): { starts: DataTexture; fans: DataTexture } {
   const points = surface.fanStarts.length - 1;
   const ranges = new Uint32Array(2 * WIDTH * bands);
   for (let p = 0; p < points; p++) {
@@ -71,6 +67,13 @@ export function fanTextures(
   const padded = new Uint32Array(2 * FAN_WIDTH * height);
   padded.set(surface.fans);
   return { starts: pairTexture(ranges, WIDTH, bands), fans: pairTexture(padded, FAN_WIDTH, height) };
+}
+
+/** The point of each normal, in the arrangement of {@link pointValueTexture}. */
+export function ownerTexture(points: Uint32Array, bands: number): DataTexture {
+  const data = new Uint32Array(2 * WIDTH * bands);
+  points.forEach((point, k) => (data[2 * k] = point));
+  return pairTexture(data, WIDTH, bands);
 }
 
 function pairTexture(data: Uint32Array<ArrayBuffer>, width: number, height: number): DataTexture {

@@ -76,9 +76,9 @@ void main() {
 }`;
 }
 
-/** The normal of each point: the normals of the triangles around it, weighted by their areas. */
-export const normalShader = `${header}
+const normalsAround = (own: string): string => `${header}
 uniform sampler2D positions;
+uniform usampler2D owners;
 uniform usampler2D fanStarts;
 uniform usampler2D fans;
 out vec4 normal;
@@ -87,7 +87,7 @@ vec3 place(uint point) {
 }
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  vec3 own = texelFetch(positions, at, 0).xyz;
+  vec3 own = ${own};
   uvec2 range = texelFetch(fanStarts, at, 0).xy;
   uint end = range.x + min(range.y, ${MAX_TRIANGLES}u);
   vec3 sum = vec3(0.0);
@@ -98,3 +98,9 @@ void main() {
   float size = length(sum);
   normal = vec4(size > 0.0 ? sum / size : vec3(0.0), 1.0);
 }`;
+
+/** The normal of each point: the normals of the triangles around it, weighted by their areas. */
+export const normalShader = normalsAround('texelFetch(positions, at, 0).xyz');
+
+/** The same for normals of which a point may have several; `owners` are the points. */
+export const splitNormalShader = normalsAround('place(texelFetch(owners, at, 0).x)');

@@ -9,6 +9,8 @@ export interface Layers {
   readonly ground: boolean;
   /** Colours of the model's points, where it has any. */
   readonly colors: boolean;
+  /** Materials of the model's faces, where it has any. */
+  readonly materials: boolean;
 }
 
 /** Colours of the picture, as CSS colours in sRGB. */

@@ -1,4 +1,5 @@
 import {
+  type BufferGeometry,
   Camera,
   Color,
   LinearFilter,
@@ -13,6 +14,7 @@ import {
   type WebGLRenderer,
 } from 'three';
 import { numberedGeometry, shaderMaterial } from './materials';
+import { materialsOf } from './modelView';
 import { Pass } from './pass';
 import {
   blurShader,
@@ -37,13 +39,14 @@ export class Ground {
   private readonly strength = { value: 0.5 };
   private readonly sharp = shadowTarget();
   private readonly soft = shadowTarget();
-  private readonly caster: Mesh;
+  readonly caster: Mesh;
   private readonly blurred = { source: { value: null as Texture | null }, way: { value: new Vector2() } };
   private readonly blur = new Pass(blurShader, this.blurred);
   private readonly turn = { value: new Matrix3() };
   private readonly eye = new Camera();
 
-  constructor(positions: Texture, triangles: Uint32Array) {
+  /** @param geometry the triangles that cast the shadow, of points of the model */
+  constructor(positions: Texture, geometry: BufferGeometry) {
     this.mesh = new Mesh(
       numberedGeometry(Uint32Array.of(0, 1, 2, 2, 1, 3)),
       shaderMaterial(
@@ -68,10 +71,7 @@ export class Ground {
       reach: { value: SHADOW_REACH },
       height: { value: SHADOW_HEIGHT },
     };
-    this.caster = new Mesh(
-      numberedGeometry(triangles),
-      shaderMaterial(shadowVertexShader, shadowFragmentShader, casting),
-    );
+    this.caster = new Mesh(geometry, shaderMaterial(shadowVertexShader, shadowFragmentShader, casting));
     for (const mesh of [this.mesh, this.caster]) mesh.frustumCulled = false;
   }
 
@@ -100,10 +100,8 @@ export class Ground {
     this.sharp.dispose();
     this.soft.dispose();
     this.blur.dispose();
-    for (const mesh of [this.mesh, this.caster]) {
-      mesh.geometry.dispose();
-      (mesh.material as { dispose(): void }).dispose();
-    }
+    this.mesh.geometry.dispose();
+    for (const material of [this.mesh, this.caster].flatMap(materialsOf)) material.dispose();
   }
 
   private pass(renderer: WebGLRenderer, from: WebGLRenderTarget, to: WebGLRenderTarget, x: number, y: number) {

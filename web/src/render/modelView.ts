@@ -35,6 +35,12 @@ export class ModelView {
   private hasHeat = false;
   private colors: DataTexture | null = null;
   private showsColors = true;
+  private isPainted = false;
+  /** The surface in its materials, where the model has any. */
+  readonly materials = new Group();
+  isSurfaceShown = true;
+  private showsMaterials = true;
+  private isGhost = false;
 
   /** @param ownColors red, green and blue of each point, in sRGB */
   constructor(
@@ -67,8 +73,8 @@ export class ModelView {
       numberedGeometry(new Uint32Array(0)),
       drawn({ towards: { value: 0.004 }, asPoints: { value: true }, pointSize: this.handleSize, ink: this.handleInk }),
     );
-    this.group.add(this.surface, this.points, this.wireframe, this.handles);
-    for (const object of this.group.children) object.frustumCulled = false;
+    this.group.add(this.surface, this.materials, this.points, this.wireframe, this.handles);
+    for (const object of [this.surface, this.points, this.wireframe, this.handles]) object.frustumCulled = false;
   }
 
   setHandles(handles: Uint32Array) {
@@ -87,6 +93,20 @@ export class ModelView {
     this.uniforms.heatScale.value = largest > 0 ? 1 / largest : 0;
     this.hasHeat = values !== null;
     this.uniforms.heatShare.value = this.hasHeat ? 1 : 0;
+    this.arrange();
+  }
+
+  /** Takes what draws the surface in its materials. */
+  addMaterials(mesh: Mesh) {
+    this.materials.add(mesh);
+    this.arrange();
+  }
+
+  /** Shows the surface or not; in its materials, if it is to be and has any, where no colours stand for something else. */
+  showSurface(isShown: boolean, inMaterials: boolean) {
+    this.isSurfaceShown = isShown;
+    this.showsMaterials = inMaterials;
+    this.arrange();
   }
 
   /** Shows the model in the colours of its points where it has any, or in one colour. */
@@ -99,9 +119,11 @@ export class ModelView {
   paint(colors: Uint8Array | null) {
     this.colors?.dispose();
     const taken = colors ?? this.ownColors;
+    this.isPainted = colors !== null;
     this.colors = taken ? pointColorTexture(taken, this.decoder.bands) : null;
     (this.uniforms.colors as { value: unknown }).value = this.colors;
     this.showColors(this.showsColors);
+    this.arrange();
   }
 
   /** Shows the frame that the decoder was given as positions, in the model's own colour; or what it decoded. */
@@ -117,10 +139,18 @@ export class ModelView {
   setPass(pass: 'depth' | 'ghost' | null) {
     this.wireframe.layers.mask = this.handles.layers.mask = pass ? 0 : 1;
     this.uniforms.transparency.value = pass ? GHOST_TRANSPARENCY : 0;
-    for (const { material } of [this.surface, this.points]) {
-      (material as Material).colorWrite = pass !== 'depth';
-      (material as Material).transparent = pass === 'ghost';
+    for (const material of [this.surface, this.points].flatMap(materialsOf)) {
+      material.colorWrite = pass !== 'depth';
+      material.transparent = pass === 'ghost';
     }
+    this.isGhost = pass !== null;
+    this.arrange();
+  }
+
+  private arrange() {
+    const hasMaterials = this.materials.children.length > 0 && !this.hasHeat && !this.isPainted && !this.isGhost;
+    this.materials.visible = this.isSurfaceShown && this.showsMaterials && hasMaterials;
+    this.surface.visible = this.isSurfaceShown && !this.materials.visible;
   }
 
   setColors(model: Color, wire: Color, wireOpacity: number, handle: Color) {
@@ -144,10 +174,15 @@ export class ModelView {
   dispose() {
     for (const object of [this.surface, this.wireframe, this.points, this.handles]) {
       object.geometry.dispose();
-      (object.material as { dispose(): void }).dispose();
+      for (const material of materialsOf(object)) material.dispose();
     }
     this.uniforms.heatColors.value.dispose();
     this.heat?.dispose();
     this.colors?.dispose();
   }
+}
+
+/** One, or several where parts are drawn by themselves. */
+export function materialsOf({ material }: { readonly material: Material | Material[] }): Material[] {
+  return [material].flat();
 }

@@ -1,12 +1,12 @@
 import { FIELD_OF_VIEW } from './camera';
 import { WIDTH, WIDTH_BITS } from './packing';
 
-const header = `precision highp float;
+export const header = `precision highp float;
 precision highp int;
 precision highp sampler2D;
 `;
 
-const lookUp = `
+export const lookUp = `
 ivec2 texelOf(int point) { return ivec2(point & ${WIDTH - 1}, point >> ${WIDTH_BITS}); }
 `;
 
@@ -18,10 +18,20 @@ float awayOf(float z) {
 `;
 
 /** Light to sRGB, with a shoulder that keeps highlights from clipping. */
-const tone = `
+export const tone = `
 vec3 toned(vec3 light) {
   vec3 mapped = light * (1.0 + light * 0.12) / (1.0 + light * 0.34);
   return pow(clamp(mapped, 0.0, 1.0), vec3(1.0 / 2.2));
+}
+`;
+
+/** Soft light fixed to the camera, by a normal and how far that points up. */
+export const studio = `
+vec3 studio(vec3 normal, float up) {
+  float key = max(0.0, dot(normal, vec3(0.42, 0.66, 0.62)) * 0.82 + 0.18);
+  float fill = max(0.0, dot(normal, vec3(-0.83, 0.12, 0.54)) * 0.7 + 0.3);
+  vec3 light = vec3(1.04, 0.98, 0.90) * key * key * 0.86 + vec3(0.60, 0.74, 0.98) * fill * fill * 0.24;
+  return light + mix(vec3(0.13, 0.115, 0.105), vec3(0.33, 0.37, 0.43), up * 0.5 + 0.5) * 0.62;
 }
 `;
 
@@ -69,7 +79,7 @@ in vec3 viewNormal;
 in float heatValue;
 in vec3 ownColor;
 out vec4 shade;
-${tone}
+${tone}${studio}
 void main() {
   vec3 normal = viewNormal;
   vec3 eye = normalize(-viewPosition);
@@ -95,10 +105,7 @@ void main() {
   float cavity = asPoints ? 1.0 : 1.0 + clamp(bend * 0.006, -0.22, 0.14);
   float facing = max(0.0, dot(normal, eye));
   float up = dot(normal, skyDirection);
-  float key = max(0.0, dot(normal, vec3(0.42, 0.66, 0.62)) * 0.82 + 0.18);
-  float fill = max(0.0, dot(normal, vec3(-0.83, 0.12, 0.54)) * 0.7 + 0.3);
-  vec3 light = vec3(1.04, 0.98, 0.90) * key * key * 0.86 + vec3(0.60, 0.74, 0.98) * fill * fill * 0.24;
-  light += mix(vec3(0.13, 0.115, 0.105), vec3(0.33, 0.37, 0.43), up * 0.5 + 0.5) * 0.62;
+  vec3 light = studio(normal, up);
   vec3 halfway = normalize(eye + vec3(0.42, 0.66, 0.62));
   // To the powers of 26 and of 3.5: a processor that draws multiplies in a fraction of the time of pow().
   float towards = max(0.0, dot(normal, halfway));

@@ -10,7 +10,7 @@ import {
   Vector3,
   type WebGLRenderer,
 } from 'three';
-import type { StaticPart } from '../capture';
+import type { ModelSurface, StaticPart } from '../capture';
 import type { Surface } from '../observed/surface';
 import { boundsOf } from '../coordinates/topology';
 import { Backdrop, Ground } from './ground';
@@ -21,6 +21,7 @@ import { type Covered, type Layers, type Side, type StageColors, drawSide } from
 import { ModelView } from './modelView';
 import { ObservedView } from './observedView';
 import { surfaceOf } from './surface';
+import type { SurfaceView } from './surfaceView';
 import { createRenderer, isSoftwareRendered } from './webgl';
 
 /** Pictures that may show the same shadow where they must come fast. */
@@ -46,6 +47,9 @@ export class Stage {
   private readonly ground: Ground;
   private readonly backdrop = new Backdrop();
   private readonly hasFaces: boolean;
+  /** Parts and materials of the model, where it has any. */
+  private surface: SurfaceView | null = null;
+  private isDisposed = false;
   private observed: ObservedView | null = null;
   private observedColor = new Color();
   /** Pixels of the picture that something as large as its distance has, and those of a CSS pixel. */
@@ -82,7 +86,7 @@ export class Stage {
     this.decoder = new Decoder(this.renderer, capture, surface, isSoftwareRendered() ? 'page' : 'graphics');
     this.model = new ModelView(this.decoder, surface, capture.colors);
     this.cage = new CageView(capture.cage);
-    this.ground = new Ground(this.decoder.positions, surface.triangles);
+    this.ground = new Ground(this.decoder.positions, this.model.surface.geometry);
     this.cageVertices = new Float32Array(capture.cage.positions.length);
     this.upright.matrixAutoUpdate = false;
     this.upright.add(this.model.group, this.cage.group);
@@ -90,6 +94,7 @@ export class Stage {
     this.showRest();
     canvas.addEventListener('webglcontextrestored', () => {
       this.isAtRest = false;
+      this.surface?.renew();
       this.setPose(this.pose);
     });
   }
@@ -128,7 +133,7 @@ export class Stage {
   setLayers(layers: Layers) {
     this.pictureIsOld = true;
     const hasModel = !this.isCageAlone;
-    this.model.surface.visible = hasModel && layers.model && this.hasFaces;
+    this.model.showSurface(hasModel && layers.model && this.hasFaces, layers.materials);
     this.model.wireframe.visible = hasModel && layers.wireframe;
     this.model.points.visible = hasModel && (layers.points || (layers.model && !this.hasFaces));
     this.model.handles.visible = hasModel && layers.handles;
@@ -195,6 +200,27 @@ export class Stage {
     this.pictureIsOld = true;
   }
 
+  /** Takes parts and materials of the model; what draws them is loaded when it is needed. */
+  async setSurface(surface: ModelSurface): Promise<void> {
+    const { SurfaceView } = await import('./surfaceView');
+    if (this.isDisposed) return;
+    this.surface = new SurfaceView(this.renderer, surface, this.model, this.ground.caster, this.decoder.positions);
+    this.pictureIsOld = true;
+  }
+
+  /** Takes files of pictures for the materials; gives the paths of those that cannot be shown. */
+  async setPictures(files: ReadonlyMap<string, Uint8Array<ArrayBuffer>>): Promise<string[]> {
+    const refused = await this.surface?.setPictures(files);
+    this.pictureIsOld = true;
+    return refused ?? [];
+  }
+
+  /** Draws these parts of the model alone. */
+  showParts(shown: readonly boolean[]) {
+    this.surface?.showParts(shown);
+    this.shadowIsOld = this.pictureIsOld = true;
+  }
+
   setHandles(handles: Uint32Array) {
     this.model.setHandles(handles);
     this.pictureIsOld = true;
@@ -229,6 +255,7 @@ export class Stage {
     this.showCage(pose.rows);
     if (!this.decoder.ready) return;
     this.decoder.decode(pose);
+    this.surface?.renew();
     this.shadowIsOld = true;
     if (this.grounded) return;
     this.grounded = true;
@@ -276,11 +303,12 @@ export class Stage {
     const camera = (this.camera = state.isParallel ? this.parallel : this.perspective);
     this.model.setSky(new Vector3(0, 1, 0).transformDirection(camera.matrixWorldInverse));
     const isDue = !hurried || ++this.picturesWithShadow >= SHADOW_EVERY;
-    if (isDue && this.shadowIsOld && this.ground.mesh.visible && this.model.surface.visible) {
+    if (isDue && this.shadowIsOld && this.ground.mesh.visible && this.model.isSurfaceShown) {
       this.picturesWithShadow = 0;
       this.ground.castShadow(this.renderer, new Matrix3().setFromMatrix4(this.upright.matrix));
       this.shadowIsOld = false;
     }
+    this.surface?.prepare();
     this.renderer.setRenderTarget(null);
     this.renderer.clear();
     const side = this.decoder.placedTextures && !this.observed ? this.side : 'decoded';
@@ -331,6 +359,8 @@ export class Stage {
   }
 
   dispose() {
+    this.isDisposed = true;
+    this.surface?.dispose();
     this.model.dispose();
     this.observed?.dispose();
     this.cage.dispose();
@@ -343,11 +373,16 @@ export class Stage {
   private drawOriginal() {
     const [cage, handles] = [this.cage.group.visible, this.model.handles.visible];
     this.cage.group.visible = this.model.handles.visible = false;
-    this.model.showPlaced(true);
+    this.showPlaced(true);
     this.renderer.render(this.scene, this.camera);
-    this.model.showPlaced(false);
+    this.showPlaced(false);
     this.cage.group.visible = cage;
     this.model.handles.visible = handles;
+  }
+
+  private showPlaced(isPlaced: boolean) {
+    this.model.showPlaced(isPlaced);
+    this.surface?.showPlaced(isPlaced);
   }
 
   /** The original's surface, translucent over all that was drawn. */

@@ -17,7 +17,11 @@ export function surfaceOf(model: Pick<StaticPart, 'rest' | 'cornerCounts' | 'cor
       throw new Error(`A face names point ${corners[k]}, but the model has ${points}; encode it again.`);
   }
   const triangles = triangulated({ counts: cornerCounts, corners });
-  return { triangles, edges: edgesOf({ counts: cornerCounts, corners }, points), ...fansOf(triangles, triangles, points) };
+  return {
+    triangles,
+    edges: edgesOf({ counts: cornerCounts, corners }, points),
+    ...fansOf(triangles, triangles, points),
+  };
 }
 
 /** Two points of each edge of polygons, each edge once and in ascending order. */

@@ -50,6 +50,8 @@ export function perform(action: Action, viewer: CagerViewer) {
     handles: () => toggle('handles'),
     ground: () => toggle('ground'),
     colors: () => toggle('colors'),
+    materials: () => toggle('materials'),
+    parts: () => viewer.togglePanel('parts'),
     heat: () => player.setHeat(nextHeat(player)),
     compare: () => compare(player),
     picture: () => void savePicture(viewer, player),

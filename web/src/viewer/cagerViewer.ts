@@ -20,6 +20,7 @@ import { overlayStyle } from './overlayStyle';
 import { helpSheet } from './helpSheet';
 import { deck, legend, titleBox, writeReadout } from './parts';
 import type { Player } from './player';
+import { partsPanel } from './partsPanel';
 import { PointMarks } from './pointMarks';
 import { PoseMode } from './poseMode';
 import { correspondenceOf, readReport, trackingOf } from './reports';
@@ -31,7 +32,7 @@ import { toolbar } from './toolbar';
 import { viewsPanel } from './viewsPanel';
 import { viewerStyle } from './viewerStyle';
 
-type Panel = 'figures' | 'views' | 'export';
+type Panel = 'figures' | 'views' | 'export' | 'parts';
 
 /** How long what was done is said. */
 const SAID_MILLISECONDS = 2000;
@@ -269,6 +270,8 @@ export class CagerViewer extends CaptureElement {
       ${toolbar(player, act, {
         colors:
           this.pair.isPainted || [player, this.pair.player].some((shown) => shown?.capture.static.colors !== undefined),
+        materials: [player, this.pair.player].some((shown) => shown?.hasMaterials === true),
+        parts: player.parts ? this.panel === 'parts' : null,
         figures: this.panel === 'figures',
         views: this.panel === 'views',
         editing: this.editing.isOn,
@@ -281,6 +284,7 @@ export class CagerViewer extends CaptureElement {
       ${this.editing.panel(stem(this))} ${this.poses.panel()}
       ${this.panel === 'figures' ? figuresPanel(player, close) : nothing}
       ${this.panel === 'views' ? viewsPanel(player, this, close) : nothing}
+      ${this.panel === 'parts' && player.parts ? partsPanel(player, player.parts, close) : nothing}
       ${this.panel === 'export' ? exportPanel(player, this, close) : nothing}
       ${legend(player, this.comparisonActs, this.panelShare > 0)}
       <div class="messages">

@@ -27,6 +27,30 @@ export const overlayStyle = css`
     width: 100%;
     font-weight: 500;
   }
+  .parts ul {
+    margin: 0 -8px var(--cager-space-3);
+  }
+  .parts li {
+    min-height: var(--cager-control);
+    padding: 0 8px;
+    border-radius: var(--cager-radius-small);
+    user-select: none;
+    -webkit-touch-callout: none;
+  }
+  .parts li:hover {
+    background: var(--cager-hover);
+  }
+  .parts li:focus-within {
+    outline: 2px solid var(--cager-accent);
+  }
+  .parts label {
+    min-width: 0;
+    min-height: inherit;
+    cursor: pointer;
+  }
+  .parts li.off :is(label, .figures) {
+    opacity: 0.55;
+  }
   .panel > h2 {
     margin: var(--cager-space-3) 0 4px;
   }

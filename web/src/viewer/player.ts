@@ -5,10 +5,12 @@ import { framed, HOME, nearlySame, shifted, zoomed, type CameraState } from '../
 import { CameraControls } from '../render/cameraControls';
 import type { Covered, Layers } from '../render/drawn';
 import type { FrameEdit } from '../render/frameStore';
+import { hasMaterials } from '../render/hasMaterials';
 import { Motion, surveyMotion } from '../render/motion';
 import { Stage } from '../render/stage';
 import type { Comparison } from './comparison';
 import type { Heat, HeatMap, HeatRange } from './heatMap';
+import { PartChoice, unshown } from './partChoice';
 import { Playback } from './playback';
 import { Quality, Resolution } from './quality';
 import { sentence } from '../text';
@@ -65,6 +67,9 @@ export class Player {
   private isPrepared = false;
   private readonly quality: Quality;
   private upAxis: UpAxis = 'y';
+  /** Which parts are shown, of a capture that has several. */
+  parts: PartChoice | null = null;
+  hasMaterials = false;
 
   /**
    * Throws one sentence for a person where the browser cannot draw the capture.
@@ -239,7 +244,7 @@ export class Player {
   /** Takes the size of the canvas in CSS pixels, and how much of it is covered. */
   resize(width: number, height: number, pixelRatio: number, covered: Covered) {
     this.resolution.resize(width, height, pixelRatio, covered, this.isMoving ? this.quality.moving : this.resting);
-    if (this.stage.wasEmptied) this.stage.draw(this.camera);
+    if (this.stage.wasEmptied) this.draw();
     this.wake();
   }
 
@@ -275,7 +280,7 @@ export class Player {
   /** The canvas with its picture, which lasts until the browser shows it. */
   drawn(): HTMLCanvasElement {
     this.stage.renew();
-    this.stage.draw(this.camera);
+    this.draw();
     return this.stage.canvas;
   }
 
@@ -328,6 +333,27 @@ export class Player {
     this.isPrepared = true;
     this.report(null);
     this.refresh();
+    await this.prepareSurface();
+  }
+
+  /** Adds parts, materials and pictures to a model that can be seen already. */
+  private async prepareSurface() {
+    const { signal } = this.stop;
+    const { capture, stage } = this;
+    try {
+      const surface = (await capture.surface?.(signal)) ?? null;
+      if (!surface || signal.aborted) return;
+      await stage.setSurface(surface);
+      this.hasMaterials = hasMaterials(surface);
+      if (surface.parts.length > 1) this.parts = new PartChoice(surface.parts, () => this.refresh());
+      this.refresh();
+      if (!this.hasMaterials) return;
+      const refused = await stage.setPictures((await capture.pictures?.(signal)) ?? new Map());
+      this.refresh();
+      if (refused.length > 0) this.onProblem(unshown(refused));
+    } catch (error) {
+      if (!signal.aborted) this.onProblem(sentence(error));
+    }
   }
 
   private async fetchHandles() {
@@ -375,7 +401,7 @@ export class Player {
     // Pictures become fine again one picture after everything has come to rest.
     this.resolution.share = this.isMoving || wasMoving ? this.quality.moving : this.resting;
     if (!this.motion.isEmpty) this.stage.moveGround(this.centre());
-    this.stage.draw(this.camera, this.resolution.share < 1);
+    this.draw(this.resolution.share < 1);
     playback.companion?.show();
     this.onTick(position);
     if (waited !== playback.buffering) this.onState();
@@ -388,7 +414,16 @@ export class Player {
     this.playback.follow(transport);
     this.resolution.share = lead.resolution.share;
     if (!this.motion.isEmpty) this.stage.moveGround(this.centre());
-    this.stage.draw(this.camera, lead.resolution.share < 1);
+    this.draw(lead.resolution.share < 1);
+  }
+
+  private draw(hurried = false) {
+    const shown = this.parts?.news(Math.floor(this.transport.position));
+    if (shown) {
+      this.stage.showParts(shown);
+      this.onState();
+    }
+    this.stage.draw(this.camera, hurried);
   }
 
   private get followReach(): number {

@@ -53,6 +53,8 @@ const TABLE = [
       { action: 'handles', keys: ['5'], label: 'Handles: points that place the cage' },
       { action: 'ground', keys: ['6', 'g'], label: 'Ground' },
       { action: 'colors', keys: ['7'], label: 'Colours' },
+      { action: 'materials', keys: ['*'], label: 'Materials' },
+      { action: 'parts', keys: ['#'], label: 'Parts' },
       { action: 'heat', keys: ['h'], label: 'Heat map' },
       { action: 'compare', keys: ['o'], label: 'Decoded, both, ghost or original' },
       { action: 'figures', keys: ['i'], label: 'Statistics' },

@@ -55,6 +55,9 @@ export function upButton(up: UpAxis, choose: (up: UpAxis) => void) {
 
 export interface Tools {
   readonly colors: boolean;
+  readonly materials: boolean;
+  /** Whether the panel of parts is open; null where there are none to choose among. */
+  readonly parts: boolean | null;
   readonly figures: boolean;
   readonly views: boolean;
   readonly editing: boolean;
@@ -71,6 +74,7 @@ export function toolbar(player: Player, act: Act, shown: Tools) {
   const isPossible: Partial<Record<keyof Layers, boolean>> = {
     handles: player.capture.handles !== undefined,
     colors: shown.colors,
+    materials: shown.materials,
   };
   const layers = (Object.keys(player.layers) as (keyof Layers)[]).filter((layer) => isPossible[layer] ?? true);
   const record = shown.recording ? 'Stop recording' : undefined;
@@ -80,6 +84,7 @@ export function toolbar(player: Player, act: Act, shown: Tools) {
       tool('heat', 'heat', act, player.heatMap.kind !== 'none', HEAT_NAMES[player.heatMap.kind]),
     ])}
     ${group('Inspect', [
+      shown.parts === null ? nothing : tool('parts', 'parts', act, shown.parts),
       tool('figures', 'figures', act, shown.figures),
       tool('beside', 'beside', act, shown.beside),
       tool('frame', 'frame', act),

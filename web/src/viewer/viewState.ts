@@ -25,6 +25,7 @@ export const USUAL_LAYERS: Layers = {
   handles: false,
   ground: true,
   colors: true,
+  materials: true,
 };
 
 const LETTERS: Readonly<Record<keyof Layers, string>> = {
@@ -35,8 +36,14 @@ const LETTERS: Readonly<Record<keyof Layers, string>> = {
   handles: 'h',
   ground: 'g',
   colors: 'k',
+  // Links of captures without materials do not name them, so that theirs says that they are off.
+  materials: 'x',
 };
 const NAMES = Object.keys(LETTERS) as (keyof Layers)[];
+
+function isToldWhenOn(name: keyof Layers): boolean {
+  return name !== 'materials';
+}
 
 /** Reads `frame=12&camera=…&up=z&besideUp=z&follow=1&show=mcg&heat=motion`; what is missing or wrong is as usual. */
 export function viewFromText(text: string): ViewState {
@@ -51,7 +58,7 @@ export function viewFromText(text: string): ViewState {
     up: axisFrom(parameters.get('up')),
     besideUp: axisFrom(parameters.get('besideUp')),
     follow: follow === '1' ? true : follow === '0' ? false : null,
-    layers: show === null ? USUAL_LAYERS : layersOf((name) => show.includes(LETTERS[name])),
+    layers: show === null ? USUAL_LAYERS : layersOf((name) => show.includes(LETTERS[name]) === isToldWhenOn(name)),
     heat: heat === 'motion' || heat === 'error' ? heat : 'none',
   };
 }
@@ -65,7 +72,7 @@ export function viewText({ frame, camera, up, besideUp, follow, layers, heat }: 
   if (besideUp) parameters.set('besideUp', besideUp);
   if (follow !== null) parameters.set('follow', follow ? '1' : '0');
   if (NAMES.some((name) => layers[name] !== USUAL_LAYERS[name])) {
-    const shown = NAMES.filter((name) => layers[name]).map((name) => LETTERS[name]);
+    const shown = NAMES.filter((name) => layers[name] === isToldWhenOn(name)).map((name) => LETTERS[name]);
     parameters.set('show', shown.join(''));
   }
   if (heat !== 'none') parameters.set('heat', heat);

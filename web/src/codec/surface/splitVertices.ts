@@ -45,7 +45,8 @@ export class SplitVertices {
   /** What was found, for triangles of three vertices each: point, texture coordinate and normal of each vertex. */
   finish(triangles: Uint32Array) {
     const [points, uvs] = [Uint32Array.from(this.points), Float32Array.from(this.uvs)];
-    if (new Set(this.normalPoints).size === this.normalPoints.length) return { points, uvs, normals: points, split: null };
+    if (new Set(this.normalPoints).size === this.normalPoints.length)
+      return { points, uvs, normals: points, split: null };
     const normals = Uint32Array.from(this.normalOf);
     const corners = triangles.map((vertex) => points[vertex]);
     const owners = triangles.map((vertex) => normals[vertex]);
