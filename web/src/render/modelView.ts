@@ -51,7 +51,6 @@ export class ModelView {
     const uniforms = this.uniforms as Record<string, { value: unknown }>;
     uniforms.positions.value = decoder.positions satisfies Texture;
     uniforms.normals.value = decoder.normals;
-    this.paint(null);
     const all = Uint32Array.from({ length: decoder.points }, (_, p) => p);
     const still = { towards: { value: 0 }, asPoints: { value: false }, pointSize: { value: 1 } };
     const shaded = (own: Record<string, { value: unknown }>) =>
@@ -75,6 +74,7 @@ export class ModelView {
     );
     this.group.add(this.surface, this.materials, this.points, this.wireframe, this.handles);
     for (const object of [this.surface, this.points, this.wireframe, this.handles]) object.frustumCulled = false;
+    this.paint(null);
   }
 
   setHandles(handles: Uint32Array) {

@@ -374,9 +374,10 @@ export class CagerViewer extends CaptureElement {
     return Math.max(this.editing.panelShare, this.poses.panelShare);
   }
 
-  /** The same with the panel of a comparison. */
+  /** The same with the panel of a comparison, and with that of parts, which are to be seen as they are switched. */
   private get coveredShare(): number {
-    return Math.max(this.panelShare, this.player?.comparison.isOpen ? 0.2 : 0);
+    const ofParts = this.panel === 'parts' && this.player?.parts ? 0.34 : 0;
+    return Math.max(this.panelShare, this.player?.comparison.isOpen ? 0.2 : 0, ofParts);
   }
 
   private resize() {

@@ -40,7 +40,7 @@ export const overlayStyle = css`
   .parts li:hover {
     background: var(--cager-hover);
   }
-  .parts li:focus-within {
+  .parts li:has(:focus-visible) {
     outline: 2px solid var(--cager-accent);
   }
   .parts label {
@@ -279,6 +279,9 @@ export const overlayStyle = css`
       inset: auto calc(var(--cager-control) + 18px + var(--cager-space-2)) var(--above-deck) var(--cager-space-2);
       width: auto;
       max-height: 55%;
+    }
+    .panel.parts {
+      max-height: 34%;
     }
     .legend.comparison {
       left: var(--cager-space-2);

@@ -26,6 +26,13 @@ describe('view in a link', () => {
     expect(read.camera!.azimuth).toBeCloseTo(0.5, 2);
   });
 
+  it('shows materials unless it says otherwise, so that links from before there were any do', () => {
+    expect(viewFromText('show=mg').layers).toMatchObject({ model: true, colors: false, materials: true });
+    const off = { ...USUAL_LAYERS, materials: false };
+    expect(viewFromText('show=mgkx').layers).toEqual(off);
+    expect(viewText({ ...viewFromText(''), layers: off })).toBe('show=mgkx');
+  });
+
   it('says nothing where everything is as usual', () => {
     const usual = {
       frame: null,
