@@ -1,14 +1,16 @@
 /** A container that is read from front to back while it arrives, as that of a session that is still running. */
 
-import type { StaticPart } from '../capture';
+import type { ModelSurface, StaticPart } from '../capture';
 import type { Codec } from '../codec/client';
 import { decodePayload } from './codecs';
 import { checksumDamage, damaged, isTolerable } from './error';
 import { checkHeadSection, type Head, parseHead } from './head';
 import { checkSize } from './layout';
 import { decodeStatic, OPTIONAL_TAGS, type Section, STATIC_TAGS, SURFACE_TAGS } from './meshes';
+import { parsePictures, type Pictures } from './pictures';
 import { type Entry, HEADER_BYTES, KNOWN_TAGS } from './section';
 import { type Arrival, SectionParser } from './sectionParser';
+import { decodeSurface } from './surface';
 
 /** A section and its header as it is in the file. */
 export interface StoredSection extends Section {
@@ -64,6 +66,18 @@ export class ContainerStream {
     return decodeStatic(head, this.sections, codec);
   }
 
+  /** Parts and materials that came with model and cage; null where there are none, or they are damaged. */
+  async surface(part: StaticPart, codec: Codec): Promise<ModelSurface | null> {
+    const section = this.sections.get('surf');
+    return section ? unlessDamaged(section, () => decodeSurface(section, this.head!, part, codec)) : null;
+  }
+
+  /** Their pictures, as far as {@link surface}. */
+  async pictures(): Promise<Pictures> {
+    const section = this.sections.get('pict');
+    return (section && (await unlessDamaged(section, () => parsePictures(section)))) ?? new Map();
+  }
+
   /**
    * Takes a piece; gives the chunks that are whole.
    *
@@ -101,17 +115,16 @@ export class ContainerStream {
     const { entry, payload } = section;
     const { tag } = entry.fields;
     const isOptional = OPTIONAL_TAGS.includes(tag);
-    // What lies on the faces is read from the container of a completed session.
-    if (SURFACE_TAGS.includes(tag)) return null;
+    const isOfSurface = SURFACE_TAGS.includes(tag);
     try {
       if (!isIntact) throw checksumDamage(entry.offset);
       if (isOptional) decodePayload(entry, payload);
       if (tag === 'HEAD') this.head = parseHead(decodePayload(entry, payload), entry.offset);
     } catch (error) {
-      if (!isOptional || !isTolerable(error, tag)) throw error;
+      if (!(isOptional || isOfSurface) || !isTolerable(error, tag)) throw error;
       return null;
     }
-    if (isOptional || STATIC_TAGS.includes(tag)) this.sections.set(tag, section);
+    if (isOptional || isOfSurface || STATIC_TAGS.includes(tag)) this.sections.set(tag, section);
     // Harmonic coordinates may have one more section, behind the others.
     this.isBegun ||= tag === (this.head?.system === 'harmonic' ? 'ELEM' : 'CTRI');
     const { residual } = this;
@@ -124,5 +137,15 @@ export class ContainerStream {
   private headBefore(offset: number): Head {
     if (this.head === null) throw damaged(offset, 'the section HEAD is missing');
     return this.head;
+  }
+}
+
+/** What a section has that the model can be shown without. */
+async function unlessDamaged<T>(section: Section, decode: () => T | Promise<T>): Promise<T | null> {
+  try {
+    return await decode();
+  } catch (error) {
+    if (!isTolerable(error, section.entry.fields.tag)) throw error;
+    return null;
   }
 }

@@ -1,6 +1,8 @@
 /** A session that is still running, as a {@link Capture}: what is solved so far, live, until it is completed and read from its container. */
 
-import type { Capture, FrameBlock, FrameErrors, LiveStatus, StaticPart } from '../capture';
+import type { Capture, FrameBlock, FrameErrors, LiveStatus, ModelSurface, StaticPart } from '../capture';
+import { createCodec } from '../codec/client';
+import type { Pictures } from '../container/pictures';
 import type { Source } from '../container/source';
 import { computePhi } from '../coordinates/pool';
 import { nextEvent, persistently } from './backoff';
@@ -64,9 +66,10 @@ export class LiveCapture implements SessionCapture {
   constructor(
     private readonly service: Service,
     session: Session,
-    { part, connection }: RunningContainer,
+    private readonly running: RunningContainer,
     private readonly openFinished: OpenFinished,
   ) {
+    const { part, connection } = running;
     this.id = session.id;
     this.name = session.name ?? session.id;
     this.static = part;
@@ -95,6 +98,19 @@ export class LiveCapture implements SessionCapture {
 
   get errors(): FrameErrors {
     return this.finished?.errors ?? this.measured.upTo(this.frames);
+  }
+
+  async surface(): Promise<ModelSurface | null> {
+    const codec = createCodec();
+    try {
+      return await this.running.connection.stream.surface(this.static, codec);
+    } finally {
+      codec.close();
+    }
+  }
+
+  pictures(): Promise<Pictures> {
+    return this.running.connection.stream.pictures();
   }
 
   get frameNumbers(): Float64Array | null {
