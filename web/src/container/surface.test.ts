@@ -54,7 +54,10 @@ describe('what lies on faces', () => {
     ]);
     expect(materials.map(({ name }) => name)).toEqual(['painted', 'glass']);
     expect(materials[0].textures).toEqual([{ channel: 'base_color', path: 'painted.png' }]);
-    expect(materials[1]).toMatchObject({ opacity: expect.closeTo(0.4) as number, metalness: expect.closeTo(0.25) as number });
+    expect(materials[1]).toMatchObject({
+      opacity: expect.closeTo(0.4) as number,
+      metalness: expect.closeTo(0.25) as number,
+    });
     const found = new Map(
       mesh.ranges.map(({ part, material, start, count }) => [
         `${part} ${materials[material - 1].name}`,
