@@ -270,8 +270,8 @@ export class CagerViewer extends CaptureElement {
       ${toolbar(player, act, {
         colors:
           this.pair.isPainted || [player, this.pair.player].some((shown) => shown?.capture.static.colors !== undefined),
-        materials: [player, this.pair.player].some((shown) => shown?.hasMaterials === true),
-        parts: player.parts ? this.panel === 'parts' : null,
+        materials: [player, this.pair.player].some((shown) => shown?.surface.hasMaterials === true),
+        parts: player.surface.parts ? this.panel === 'parts' : null,
         figures: this.panel === 'figures',
         views: this.panel === 'views',
         editing: this.editing.isOn,
@@ -284,7 +284,7 @@ export class CagerViewer extends CaptureElement {
       ${this.editing.panel(stem(this))} ${this.poses.panel()}
       ${this.panel === 'figures' ? figuresPanel(player, close) : nothing}
       ${this.panel === 'views' ? viewsPanel(player, this, close) : nothing}
-      ${this.panel === 'parts' && player.parts ? partsPanel(player, player.parts, close) : nothing}
+      ${this.panel === 'parts' && player.surface.parts ? partsPanel(player, player.surface.parts, close) : nothing}
       ${this.panel === 'export' ? exportPanel(player, this, close) : nothing}
       ${legend(player, this.comparisonActs, this.panelShare > 0)}
       <div class="messages">
@@ -376,7 +376,7 @@ export class CagerViewer extends CaptureElement {
 
   /** The same with the panel of a comparison, and with that of parts, which are to be seen as they are switched. */
   private get coveredShare(): number {
-    const ofParts = this.panel === 'parts' && this.player?.parts ? 0.34 : 0;
+    const ofParts = this.panel === 'parts' && this.player?.surface.parts ? 0.34 : 0;
     return Math.max(this.panelShare, this.player?.comparison.isOpen ? 0.2 : 0, ofParts);
   }
 

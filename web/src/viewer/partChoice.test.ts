@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { PartChoice, unshown } from './partChoice';
+import { PartChoice } from './partChoice';
+import { unshown } from './playedSurface';
 
 const part = (shown: [number, number][] | null = null) => ({ path: '/a', firstPoint: 0, points: 1, shown });
 

@@ -52,11 +52,3 @@ export class PartChoice {
     return (this.shown = next);
   }
 }
-
-/** What is said of pictures that no browser shows. */
-export function unshown(paths: readonly string[]): string {
-  const names = paths.map((path) => path.slice(path.lastIndexOf('/') + 1));
-  const kinds = [...new Set(names.map((name) => name.slice(name.lastIndexOf('.') + 1).toUpperCase()))].join(', ');
-  const what = paths.length === 1 ? `The texture ${names[0]} is` : `${paths.length} textures (${kinds}) are`;
-  return `${what} not shown: browsers read PNG, JPEG and WebP.`;
-}

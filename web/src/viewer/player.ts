@@ -5,13 +5,12 @@ import { framed, HOME, nearlySame, shifted, zoomed, type CameraState } from '../
 import { CameraControls } from '../render/cameraControls';
 import type { Covered, Layers } from '../render/drawn';
 import type { FrameEdit } from '../render/frameStore';
-import { hasMaterials } from '../render/hasMaterials';
 import { Motion, surveyMotion } from '../render/motion';
 import { Stage } from '../render/stage';
 import type { Comparison } from './comparison';
 import type { Heat, HeatMap, HeatRange } from './heatMap';
-import { PartChoice, unshown } from './partChoice';
 import { Playback } from './playback';
+import { PlayedSurface } from './playedSurface';
 import { Quality, Resolution } from './quality';
 import { sentence } from '../text';
 import { advanced, type Transport } from './transport';
@@ -67,9 +66,8 @@ export class Player {
   private isPrepared = false;
   private readonly quality: Quality;
   private upAxis: UpAxis = 'y';
-  /** Which parts are shown, of a capture that has several. */
-  parts: PartChoice | null = null;
-  hasMaterials = false;
+  /** Parts and materials, which come after the model. */
+  readonly surface: PlayedSurface;
 
   /**
    * Throws one sentence for a person where the browser cannot draw the capture.
@@ -101,6 +99,10 @@ export class Player {
       changed: () => this.onState(),
       problem: (problem) => this.onProblem(problem),
       recovered: (problem) => this.onRecovery(problem),
+    });
+    this.surface = new PlayedSurface(capture, this.stage, {
+      refresh: () => this.refresh(),
+      problem: (problem) => this.onProblem(problem),
     });
     this.heatMap = this.playback.heatMap;
     this.comparison = this.playback.comparison;
@@ -333,27 +335,7 @@ export class Player {
     this.isPrepared = true;
     this.report(null);
     this.refresh();
-    await this.prepareSurface();
-  }
-
-  /** Adds parts, materials and pictures to a model that can be seen already. */
-  private async prepareSurface() {
-    const { signal } = this.stop;
-    const { capture, stage } = this;
-    try {
-      const surface = (await capture.surface?.(signal)) ?? null;
-      if (!surface || signal.aborted) return;
-      await stage.setSurface(surface);
-      this.hasMaterials = hasMaterials(surface);
-      if (surface.parts.length > 1) this.parts = new PartChoice(surface.parts, () => this.refresh());
-      this.refresh();
-      if (!this.hasMaterials) return;
-      const refused = await stage.setPictures((await capture.pictures?.(signal)) ?? new Map());
-      this.refresh();
-      if (refused.length > 0) this.onProblem(unshown(refused));
-    } catch (error) {
-      if (!signal.aborted) this.onProblem(sentence(error));
-    }
+    await this.surface.load(this.stop.signal);
   }
 
   private async fetchHandles() {
@@ -418,11 +400,7 @@ export class Player {
   }
 
   private draw(hurried = false) {
-    const shown = this.parts?.news(Math.floor(this.transport.position));
-    if (shown) {
-      this.stage.showParts(shown);
-      this.onState();
-    }
+    if (this.surface.showPartsOf(this.transport.position)) this.onState();
     this.stage.draw(this.camera, hurried);
   }
 
