@@ -63,15 +63,16 @@ mod tests {
 
     #[test]
     fn frames_in_which_a_part_is_shown_are_ranges() {
+        let one = |range: Range<u32>| Some(Vec::from([range]));
         let of = |text: &str| shown_in(text.chars().map(|c| c == '1'));
         assert_eq!((of("1111"), of("")), (None, None));
-        assert_eq!(of("0011"), Some(vec![2..4]));
+        assert_eq!(of("0011"), one(2..4));
         assert_eq!(of("10010"), Some(vec![0..1, 3..4]));
         assert_eq!(of("00"), Some(Vec::new()));
         let part = Part { shown: of("10010"), ..Part::default() };
         let mut surface = Surface { parts: vec![part], ..Surface::default() };
         surface.take_frames(&[1, 3, 4]);
-        assert_eq!(surface.parts[0].shown, Some(vec![1..2]));
+        assert_eq!(surface.parts[0].shown, one(1..2));
         surface.take_frames(&[1]);
         assert_eq!(surface.parts[0].shown, None);
     }

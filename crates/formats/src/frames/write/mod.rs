@@ -11,6 +11,7 @@ mod sequence;
 mod single;
 mod textures;
 
+use std::ffi::OsStr;
 use std::path::{MAIN_SEPARATOR, Path};
 
 use cager_geometry::mesh::Polygons;
@@ -117,7 +118,7 @@ fn names_pictures(target: &Target) -> bool {
     let is_named = match CacheFormat::from_path(path) {
         Some(format) => matches!(format, CacheFormat::Usdc | CacheFormat::Usd | CacheFormat::Gltf | CacheFormat::Glb),
         None => {
-            let extension = path.extension().map(|found| found.to_ascii_lowercase());
+            let extension = path.extension().map(OsStr::to_ascii_lowercase);
             extension.is_none_or(|found| found == "obj" || found == "ply")
         }
     };
