@@ -163,6 +163,8 @@ struct Chosen<'a> {
     numbers_lost: bool,
     /// The points that are written, where these are not all.
     points: Option<Vec<Range<usize>>>,
+    /// What the user should know of what is read.
+    notes: Vec<String>,
 }
 
 impl<'a> Chosen<'a> {
@@ -204,7 +206,18 @@ impl<'a> Chosen<'a> {
             // Decoding does not need it, but a damaged file is refused wherever the damage is.
             container.report().map_err(fail)?;
         }
-        Ok(Self { container, path, what, wanted, options, change, damaged, numbers_lost, points: None })
+        Ok(Self {
+            container,
+            path,
+            what,
+            wanted,
+            options,
+            change,
+            damaged,
+            numbers_lost,
+            points: None,
+            notes: Vec::new(),
+        })
     }
 
     /// How a `.glb` holds the frames: where nothing is asked, to what a guaranteed error leaves.
@@ -228,13 +241,21 @@ impl<'a> Chosen<'a> {
         let (mut surface, faces) = match self.what.model {
             Some((_, model)) => (model.surface.clone(), model.faces.clone()),
             None => match self.container.surface() {
-                Err(container::Error::Corrupt { .. }) if self.what.salvage => own(),
+                Err(container::Error::Corrupt { .. }) if self.what.salvage => {
+                    self.notes.push("its parts, and what lies on their faces, are damaged and left out".to_owned());
+                    own()
+                }
                 found => found.map_err(|cause| DecodeError::container(self.path, cause))?.unwrap_or_else(own),
             },
         };
-        if self.what.model.is_none() && !self.what.salvage {
-            let pictures = self.container.pictures();
-            surface.pictures = pictures.map_err(|cause| DecodeError::container(self.path, cause))?;
+        if self.what.model.is_none() && !surface.is_empty() {
+            surface.pictures = match self.container.pictures() {
+                Err(container::Error::Corrupt { .. }) if self.what.salvage => {
+                    self.notes.push("its pictures are damaged and left out".to_owned());
+                    Vec::new()
+                }
+                found => found.map_err(|cause| DecodeError::container(self.path, cause))?,
+            };
         }
         if self.what.has_own_frames() {
             surface.take_frames(&self.wanted);
@@ -355,7 +376,8 @@ pub fn decode(
     let (points, frames) = (chosen.points(bound.rest.points.len()), chosen.wanted.len());
     let mut writer = create_frames(output, points, frames, &faces, &chosen.options)?;
     chosen.write(&bound, &mut writer, progress)?;
-    let mut notes = writer.notes();
+    let mut notes: Vec<String> = chosen.notes.iter().map(|note| format!("{}: {note}", input.display())).collect();
+    notes.extend(writer.notes());
     notes.extend(units::notes(&path, chosen.options.units, chosen.what.units));
     if !dry_run {
         writer.finish()?;

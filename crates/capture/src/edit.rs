@@ -162,6 +162,12 @@ fn rewritten(
     let refused = |cause: container::Error| refused(output.path(), cause);
     let (mut rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
     rest.colors = container.colors().map_err(fail)?;
+    if let Some((mut surface, faces)) = container.surface().map_err(fail)? {
+        // Of these frames nothing says when parts are shown.
+        surface.parts.iter_mut().for_each(|part| part.shown = None);
+        surface.pictures = container.pictures().map_err(fail)?;
+        (rest.faces, rest.surface) = (faces, surface);
+    }
     let report = container.report().map_err(fail)?;
     // The residual belongs to the cages as they were; without it the errors are others.
     let loses = container.has_residual();

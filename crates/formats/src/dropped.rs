@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cager_geometry::mesh::Model;
-use cager_geometry::surface::{Part, Surface};
+use cager_geometry::surface::{Part, Subdivision, Surface};
 
 /// Names that a list shows, and characters of each.
 const LISTED: usize = 4;
@@ -89,6 +89,15 @@ pub(crate) fn phrases_of(surface: &Surface, is_kept: bool) -> Vec<String> {
     }
     if most(|part| part.color_sets.len()) > 0 {
         phrases.push("colours of corners".to_owned());
+    }
+    if parts.iter().any(|part| part.subdivision != Subdivision::None) {
+        phrases.push("subdivision".to_owned());
+    }
+    if most(|part| part.creases.len()) > 0 {
+        phrases.push("creases".to_owned());
+    }
+    if parts.iter().any(|part| part.shown.is_some()) {
+        phrases.push("the frames in which parts are shown".to_owned());
     }
     if is_kept {
         return phrases;

@@ -278,6 +278,13 @@ impl Part {
         for set in &self.color_sets {
             set.check(count).map_err(|what| format!("colours {:?}: {what}", set.name))?;
         }
+        let is_apart = |shown: &Vec<Range<u32>>| {
+            shown.iter().all(|range| range.start < range.end)
+                && shown.windows(2).all(|pair| pair[0].end <= pair[1].start)
+        };
+        if !self.shown.as_ref().is_none_or(is_apart) {
+            return Err("the frames in which it is shown do not ascend".to_owned());
+        }
         if !self.normals.is_empty() && self.normals.len() != count {
             return Err(format!("{} normals for {count} corners", self.normals.len()));
         }

@@ -70,7 +70,8 @@ impl<R: Read + Seek> ContainerReader<R> {
             let is_apart = known.keys().all(|&(start, count)| {
                 (start, count) == (first, bytes) || first >= start + count || start >= first + bytes
             });
-            let bytes = known.entry((first, bytes)).or_insert(all.get(range)?.into());
+            let there = all.get(range)?;
+            let bytes = known.entry((first, bytes)).or_insert_with(|| there.into());
             is_apart.then(|| Picture { path, bytes: Arc::clone(bytes) })
         };
         let pictures =

@@ -25,6 +25,11 @@ impl<R: Read + Seek> ContainerReader<R> {
         let (length, rest) = raw.split_first_chunk::<4>().ok_or_else(|| corrupt("is cut"))?;
         let (names, numbers) =
             rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| corrupt("is cut"))?;
+        // Before any is made: parts have points, faces have materials, creases and groups.
+        let things = self.header.points.saturating_add(self.header.rest_corners).saturating_mul(8);
+        if names.iter().filter(|&&b| b == b'{').count() as u64 > things.saturating_add(1 << 16) {
+            return Err(corrupt("names more than lies on them"));
+        }
         let outline = serde_json::from_slice(names).map_err(|e| corrupt(&format!("cannot be read ({e})")))?;
         let coded = CodedSurface { outline, bytes: numbers.to_vec() };
         let rest = self.rest()?;

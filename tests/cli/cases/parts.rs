@@ -151,3 +151,65 @@ fn pictures_that_were_taken_in_are_put_beside_what_is_decoded() {
     dir.cager("decode cast.cager -o plain.usdc").succeeds();
     assert!(!dir.path("plain_textures").exists());
 }
+
+#[test]
+fn a_layer_on_top_of_the_source_moves_its_meshes() {
+    let dir = encoded();
+    dir.cager("decode cast.cager -o hero.usdc").succeeds();
+    let line = "encode --rest hero.usdc --frames hero.usdc --cage-vertices 30 --max-error 0.001 -o hero.cager";
+    dir.cager(line).succeeds();
+    dir.cager("decode hero.cager --onto hero.usdc -o out/walk.usdc").succeeds();
+    dir.cager("decode hero.cager -o walk.npy").succeeds();
+    let (layer, plain) = (open_frames(dir.path("out/walk.usdc"), 16), open_frames(dir.path("walk.npy"), 16));
+    let (mut layer, mut plain) = (layer.expect("a layer"), plain.expect("frames"));
+    let (mut moved, mut expected) = (Vec::new(), Vec::new());
+    for _ in 0..4 {
+        assert!(layer.read_next(&mut moved).expect("a frame") && plain.read_next(&mut expected).expect("a frame"));
+        assert!(moved.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{moved:?} {expected:?}");
+    }
+    // What is not moved stays as it is in the source.
+    let surface = model(&dir, "out/walk.usdc").surface;
+    assert_eq!((surface.parts[1].path.as_str(), surface.materials.len()), ("/hero/hat", 2));
+    dir.cager("decode hero.cager --part hat -o hat.usdc").succeeds();
+    let refused = dir.cager("decode hero.cager --onto hat.usdc -o no.usdc").run();
+    assert!(
+        refused.status == Some(1) && refused.stderr.contains("hat.usdc: has no mesh /hero/body"),
+        "{}",
+        refused.stderr
+    );
+    let refused = dir.cager("decode hero.cager --onto hero.usdc -o no.abc").run();
+    assert!(refused.status == Some(1) && refused.stderr.contains("end the name in .usdc"), "{}", refused.stderr);
+}
+
+#[test]
+fn edited_cages_keep_parts_and_pictures_and_damage_is_said() {
+    let dir = encoded();
+    dir.cager("decode cast.cager --cages -o cages.npy").succeeds();
+    dir.cager("edit cast.cager --with-cages cages.npy --flatten -o edited.cager").succeeds();
+    let said = dir.cager("inspect edited.cager").succeeds().stdout;
+    assert!(said.contains("/hat: 8 points from 8") && said.contains("pict"), "{said}");
+    // An intact file loses nothing where what can be is taken out of it.
+    dir.cager("decode cast.cager --salvage -o saved.usdc").succeeds();
+    assert_eq!(dir.read("saved_textures/skin.png"), PICTURE);
+    let bytes = dir.read("cast.cager");
+    let at = bytes.windows(4).position(|tag| tag == b"surf").expect("the section");
+    let mut damaged = bytes.clone();
+    damaged[at + 60] ^= 0xff;
+    dir.write("damaged.cager", damaged);
+    let said = dir.cager("decode damaged.cager --salvage -o damaged.npy").succeeds();
+    let said = said.stdout + &said.stderr;
+    assert!(said.contains("what lies on their faces, are damaged and left out"), "{said}");
+}
+
+#[test]
+fn files_that_are_no_pictures_are_not_taken_in() {
+    let dir = encoded();
+    dir.write("maps/skin.png", "root:x:0:0");
+    let line =
+        "encode --rest cast.obj --frames take --cage-vertices 30 --max-error 0.001 -o again.cager --textures embed";
+    let said = dir.cager(line).succeeds().stderr;
+    assert!(
+        said.contains("skin.png that its materials name is not taken in (it is no picture that is known)"),
+        "{said}"
+    );
+}

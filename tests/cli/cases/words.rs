@@ -19,6 +19,7 @@ fn refused(dir: &Dir, line: &str, words: &[&str]) {
 fn scenes_that_are_not_read_name_the_way_out() {
     let dir = Dir::with_case(CASE);
     dir.write("scene.blend", "BLENDER");
+    dir.write("walk.dae", "<COLLADA");
     dir.write("scenes/f1.dae", "<COLLADA");
     dir.write("scenes/f2.dae", "<COLLADA");
     for frames in ["walk.dae", "scene.blend", "scenes", "scenes/*.dae"] {

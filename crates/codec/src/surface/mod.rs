@@ -15,7 +15,7 @@ use values::{decode_values, encode_values};
 const UV_STEP: f64 = 1.0 / 16_384.0;
 /// Colours of eight bits are kept to half of their step.
 const COLOR_STEP: f64 = 1.0 / 1_020.0;
-/// Most corner sets and groups of all parts together.
+/// Most corner sets and groups of all parts together, unless there are bytes for the lengths of more.
 const MAX_STREAMS: usize = 1 << 16;
 /// Numbers that are decoded at the most for each face and corner, and for each byte.
 const NUMBERS_OF_CORNERS: usize = 64;
@@ -60,7 +60,7 @@ impl CodedSurface {
         }
         let faces = face_order::decode(order, coded)?;
         let most = NUMBERS_OF_CORNERS * (coded.len() + coded.indices().len()) + NUMBERS_OF_BYTES * streams.len();
-        let streams = Streams { bytes: streams, numbers_left: most, streams_left: MAX_STREAMS };
+        let streams = Streams { bytes: streams, numbers_left: most, streams_left: MAX_STREAMS.max(streams.len() / 4) };
         let surface = decode_parts(streams, self.outline, &faces)?;
         surface.check(points, &faces).map_err(|_| Error::Damaged("what lies on the faces does not fit them"))?;
         Ok((surface, faces))

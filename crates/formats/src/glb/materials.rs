@@ -11,6 +11,9 @@ use super::document::items;
 const NAMES_OF_ANY_FILE: usize = 1 << 16;
 const NAMES_PER_BYTE: usize = 4;
 
+/// Images whose names are compared.
+const MOST_NAMED: usize = 1 << 10;
+
 /// A material of a file.
 pub(super) struct Look {
     pub(super) material: Material,
@@ -144,6 +147,17 @@ fn picture(document: &Value, texture: usize) -> Option<(String, Option<Option<us
     };
     let name = image["name"].as_str().filter(|name| !name.is_empty());
     let name = name.map_or_else(|| format!("image_{source}"), |name| name.replace(['/', '\\'], "_"));
+    // Many programs call all of them the same.
+    let is_taken = |other: &Value| other["name"].as_str() == image["name"].as_str();
+    let others = items(document, "images").iter().take(MOST_NAMED.min(source));
+    let name = if image["name"].is_string() && others.into_iter().any(is_taken) {
+        match name.rsplit_once('.') {
+            Some((stem, end)) => format!("{stem}_{source}.{end}"),
+            None => format!("{name}_{source}"),
+        }
+    } else {
+        name
+    };
     let has_extension = name.rsplit_once('.').is_some_and(|(_, end)| end.eq_ignore_ascii_case(extension));
     Some((if has_extension { name } else { format!("{name}.{extension}") }, Some(index(&image["bufferView"]))))
 }

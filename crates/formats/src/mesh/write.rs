@@ -148,7 +148,7 @@ pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
         if !texture.corners.is_empty() {
             writeln!(out, "property list {} float texcoord", if small_lists { "uchar" } else { "uint" })?;
         }
-        if texture.pictures.len() > 1 {
+        if texture.is_numbered() {
             writeln!(out, "property int texnumber")?;
         }
     }
@@ -179,8 +179,8 @@ pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
                 out.write_all(&uv.to_le_bytes())?;
             }
         }
-        if texture.pictures.len() > 1 {
-            out.write_all(&texture.faces.get(k).copied().unwrap_or(0).to_le_bytes())?;
+        if texture.is_numbered() {
+            out.write_all(&texture.faces.get(k).copied().unwrap_or(-1).to_le_bytes())?;
         }
     }
     Ok(())
@@ -191,10 +191,16 @@ pub(crate) fn write_ply(out: &mut impl Write, model: &Model) -> io::Result<()> {
 struct PlyTexture {
     corners: Vec<[f32; 2]>,
     pictures: Vec<String>,
-    faces: Vec<u32>,
+    /// Its number, −1 for none.
+    faces: Vec<i32>,
 }
 
 impl PlyTexture {
+    /// Whether faces say which picture they have.
+    fn is_numbered(&self) -> bool {
+        self.pictures.len() > 1 || !self.pictures.is_empty() && self.faces.contains(&-1)
+    }
+
     fn of(model: &Model) -> Self {
         let (mut texture, surface) = (Self::default(), &model.surface);
         if surface.parts.iter().all(|part| part.uv_sets.is_empty()) {
@@ -214,7 +220,9 @@ impl PlyTexture {
         for (part, range) in surface.ranges(&model.faces) {
             let uv = |k: usize| part.uv_sets.first().and_then(|set| set.values.get(*set.corners.get(k)? as usize));
             texture.corners.extend((0..range.corners.len()).map(|k| uv(k).copied().unwrap_or_default()));
-            texture.faces.extend((0..part.faces).map(|k| number(part.materials.get(k)).unwrap_or(0) as u32));
+            texture
+                .faces
+                .extend((0..part.faces).map(|k| number(part.materials.get(k)).map_or(-1, |number| number as i32)));
         }
         texture
     }

@@ -15,7 +15,7 @@ mod transform;
 
 pub(crate) use bytes::{Allowance, Fields, Reader, Source, damaged};
 pub(crate) use deform::Deformer;
-pub(crate) use faces::most_corners;
+pub(crate) use faces::{faces, most_corners};
 pub(crate) use mesh::{MeshTracks, bounds};
 pub(crate) use moving::{MovingScene, SceneTracks, no_points};
 pub use node::chosen_parts;

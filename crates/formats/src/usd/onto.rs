@@ -1,16 +1,18 @@
 //! What a layer has that another one is to move: the meshes of its parts, and what of these would
 //! contradict other points.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use cager_geometry::surface::Surface;
+use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::{Part, Surface};
 use cager_geometry::units::Units;
 
 use super::layer::{Kind, Layer};
 use super::{compose, mesh, open_layer};
 use crate::error::{Error, Fault};
-use crate::scene;
+use crate::scene::{self, most_corners};
 
 /// Attributes that hold at the points of the source alone, or move them once more.
 const BLOCKED: [&str; 8] = [
@@ -30,8 +32,20 @@ pub(crate) struct Onto {
     /// The file, as the layer on top of it names it.
     pub(crate) file: String,
     pub(crate) units: Units,
-    /// Of each part of the model its path, and the attributes of the mesh that are blocked, with their types.
-    pub(crate) meshes: Vec<(String, Vec<(String, String)>)>,
+    /// Those of the parts of the model.
+    pub(crate) meshes: Vec<Moved>,
+}
+
+/// A mesh that gets other points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Moved {
+    pub(crate) path: String,
+    /// Attributes that are blocked, with their types.
+    pub(crate) blocked: Vec<(String, String)>,
+    /// Whether its faces are those of the part in the opposite order of corners.
+    pub(crate) is_turned: bool,
+    /// Whether its faces are those of the part, none left out.
+    pub(crate) has_all_faces: bool,
 }
 
 impl Onto {
@@ -39,7 +53,7 @@ impl Onto {
     ///
     /// # Errors
     /// A file that is not USD, or lacks a part.
-    pub(crate) fn find(source: &Path, output: &Path, surface: &Surface) -> Result<Self, Error> {
+    pub(crate) fn find(source: &Path, output: &Path, (surface, faces): (&Surface, &Polygons)) -> Result<Self, Error> {
         let read = |cause| Error::read(source, cause);
         let file = File::open(source).map_err(read)?;
         let length = file.metadata().map_err(read)?.len();
@@ -47,7 +61,14 @@ impl Onto {
             let ((layer, _), is_package) = open_layer(Box::new(file), length, false)?;
             let mut layer = compose::compose(layer, length, source.parent().filter(|_| !is_package))?;
             let units = mesh::units(&layer.stage);
-            let meshes = surface.parts.iter().map(|part| found(&mut layer, &part.path, part.points));
+            let mut paths = HashMap::new();
+            for mesh in (0..layer.prims.len()).filter(|&k| layer.prims[k].kind == Kind::Mesh) {
+                paths.insert(scene::path(&layer.nodes, mesh), mesh);
+            }
+            let meshes = surface.ranges(faces).map(|(part, range)| {
+                let mesh = paths.get(&part.path).copied();
+                found(&mut layer, mesh, part, &range.local(faces))
+            });
             Ok(Self { file: relative(source, output), units, meshes: meshes.collect::<Result<_, _>>()? })
         };
         if surface.is_empty() {
@@ -59,25 +80,37 @@ impl Onto {
 }
 
 /// A part's mesh in a layer.
-fn found(layer: &mut Layer<'_>, path: &str, points: usize) -> Result<(String, Vec<(String, String)>), Fault> {
-    let is_mesh = |&k: &usize| layer.prims[k].kind == Kind::Mesh && scene::path(&layer.nodes, k) == path;
-    let Some(mesh) = (0..layer.prims.len()).find(is_mesh) else {
-        return Err(Fault::invalid(format!(
-            "has no mesh {path}, a part of the model; give the file that it was encoded from"
-        )));
+fn found(layer: &mut Layer<'_>, mesh: Option<usize>, part: &Part, faces: &Polygons) -> Result<Moved, Fault> {
+    let path = &part.path;
+    let cure = "give the file that it was encoded from";
+    let Some(mesh) = mesh else {
+        return Err(Fault::invalid(format!("has no mesh {path}, a part of the model; {cure}")));
     };
     let there = match layer.attribute(mesh, "points")?.still() {
         Some(value) => layer.source.points(value)?.count,
-        None => points,
+        None => part.points,
     };
-    if there != points {
-        return Err(Fault::invalid(format!(
-            "{path} has {there} points, and the part of the model {points}; give the file that it was encoded from"
-        )));
+    if there != part.points {
+        let own = part.points;
+        return Err(Fault::invalid(format!("{path} has {there} points, and the part of the model {own}; {cure}")));
+    }
+    let mut integers = |name| match layer.attribute(mesh, name)?.still() {
+        Some(value) => layer.source.integers(value, most_corners(there)),
+        None => Ok(Vec::new()),
+    };
+    let [counts, corners] = [integers("faceVertexCounts")?, integers("faceVertexIndices")?];
+    let read = |is_turned| {
+        let numbers = |list: &[i32]| list.iter().map(|&number| number as u32).collect::<Vec<_>>().into_iter();
+        scene::faces(numbers(&counts), numbers(&corners), there, is_turned)
+    };
+    let (own, left_out) = read(false)?;
+    let is_turned = own != *faces;
+    if is_turned && read(true)?.0 != *faces {
+        return Err(Fault::invalid(format!("{path} has other faces than the part of the model; {cure}")));
     }
     let properties = layer.source.properties(mesh);
     let blocked = properties.into_iter().filter(|(name, _)| BLOCKED.contains(&name.as_str())).collect();
-    Ok((path.to_owned(), blocked))
+    Ok(Moved { path: path.clone(), blocked, is_turned, has_all_faces: left_out == 0 })
 }
 
 /// A file as another one names it: from its own folder where that can be told.

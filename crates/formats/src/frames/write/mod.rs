@@ -106,7 +106,9 @@ pub fn create_frames(
         return Err(Fault::unsupported(what).at(path));
     }
     let mut surface = options.surface.clone();
-    let beside = (names_pictures(target) && options.onto.is_none()).then(|| Beside::of(&mut surface, target));
+    let beside =
+        (names_pictures(target) && options.onto.is_none()).then(|| Beside::of(&mut surface, target, is_folder(path)));
+    beside.as_ref().map_or(Ok(()), Beside::check)?;
     let options = &FrameOptions { surface, ..options.clone() };
     let output = begin(&all, target, faces, options)?;
     Ok(FrameWriter::new(all, output, &options.surface, beside))
@@ -118,7 +120,7 @@ fn names_pictures(target: &Target) -> bool {
     let is_named = match CacheFormat::from_path(path) {
         Some(format) => matches!(format, CacheFormat::Usdc | CacheFormat::Usd | CacheFormat::Gltf | CacheFormat::Glb),
         None => {
-            let extension = path.extension().map(OsStr::to_ascii_lowercase);
+            let extension = path.extension().map(OsStr::to_ascii_lowercase).filter(|_| !is_folder(path));
             extension.is_none_or(|found| found == "obj" || found == "ply")
         }
     };

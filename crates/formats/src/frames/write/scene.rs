@@ -45,7 +45,7 @@ impl SceneWriter {
         }
         let codes = (0..announced.frames).map(|frame| options.number(frame)).collect();
         if let Some(source) = &options.onto {
-            let onto = usd::Onto::find(source, path, &options.surface)?;
+            let onto = usd::Onto::find(source, path, (&options.surface, faces))?;
             if !options.units.change_to(onto.units).is_none() {
                 let what = "has another unit or upward axis than what is written; bring it there with --up and --unit";
                 return Err(Fault::invalid(what).at(source));

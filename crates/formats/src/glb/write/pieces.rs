@@ -9,6 +9,9 @@ use cager_geometry::surface::{CornerSet, NO_MATERIAL, Part, PartRange, SharedNor
 
 use crate::normals::{unit, vertex_normals};
 
+/// Names of a path that become nodes; of longer ones those before the last are left out.
+const DEEPEST: usize = 64;
+
 /// A mesh of the file.
 pub(crate) struct Piece {
     /// Names of nodes from the root down to its own.
@@ -78,7 +81,10 @@ impl Piece {
         let Split { vertices, firsts, of_corners } = Split::of(part.points, corners, sets);
         let of_vertices = shared.as_ref().map(|shared| at_vertices(&firsts, |corner| shared.corners[corner]));
         let normals = shared.map(|shared| From::Shared(shared, range.points.start)).zip(of_vertices);
-        let path: Vec<String> = part.path.split('/').filter(|name| !name.is_empty()).map(str::to_owned).collect();
+        let mut path: Vec<String> = part.path.split('/').filter(|name| !name.is_empty()).map(str::to_owned).collect();
+        if path.len() > DEEPEST {
+            path.drain(DEEPEST - 1..path.len() - 1);
+        }
         Self {
             path: if path.is_empty() { vec![name.to_owned()] } else { path },
             vertices: vertices.iter().map(|&point| point + range.points.start as u32).collect(),

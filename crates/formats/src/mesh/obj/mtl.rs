@@ -1,5 +1,7 @@
 //! Materials of Wavefront files (`.mtl`), with the lines for roughness and metalness that Blender and others write.
 
+use std::collections::HashSet;
+
 use cager_geometry::surface::{Channel, Material, Texture};
 
 use crate::text::{Lines, number, words};
@@ -81,15 +83,12 @@ fn file_of(line: &[u8]) -> String {
 /// Materials as a file.
 pub(crate) fn materials_text(materials: &[Material]) -> String {
     let mut text = String::new();
-    for material in materials {
+    for (material, name) in materials.iter().zip(names(materials)) {
         let [red, green, blue] = material.base_color;
         let exponent = SHARPEST * (1.0 - f64::from(material.roughness)).powi(2);
         text += &format!(
             "newmtl {}\nKd {red} {green} {blue}\nd {}\nNs {exponent}\nPr {}\nPm {}\nillum 2\n",
-            one_line(&material.name),
-            material.opacity,
-            material.roughness,
-            material.metalness
+            name, material.opacity, material.roughness, material.metalness
         );
         for texture in &material.textures {
             let name = MAPS.iter().find(|(_, channel)| *channel == texture.channel).map_or("map_Kd", |(name, _)| name);
@@ -98,6 +97,19 @@ pub(crate) fn materials_text(materials: &[Material]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The names of materials in a file, each once.
+pub(super) fn names(materials: &[Material]) -> Vec<String> {
+    let mut taken = HashSet::new();
+    let mut unique = |(k, material): (usize, &Material)| {
+        let mut name = one_line(&material.name);
+        while !taken.insert(name.clone()) {
+            name = format!("{name}_{k}");
+        }
+        name
+    };
+    materials.iter().enumerate().map(&mut unique).collect()
 }
 
 /// A name as one line has it.

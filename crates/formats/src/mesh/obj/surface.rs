@@ -7,6 +7,9 @@ use cager_geometry::surface::{CornerSet, FaceGroup, Material, NO_MATERIAL, Part,
 
 use crate::text::{integer, number, words};
 
+/// Groups that faces may be in on average, beside those of any mesh.
+const MOST_GROUPS_OF_FACE: usize = 16;
+const MOST_GROUPS: usize = 1 << 16;
 /// Of a corner that names none.
 const NONE: u32 = u32::MAX;
 
@@ -168,7 +171,7 @@ impl SurfaceLines {
             let corners = &model.faces.indices()[corner..corner + count];
             corner += count;
             let points = bound[0].points..bound[1].points;
-            count > 0 && corners.iter().all(|&point| points.contains(&(point as usize)))
+            corners.iter().all(|&point| points.contains(&(point as usize)))
         });
         if is_whole && own {
             return list;
@@ -198,6 +201,11 @@ impl SurfaceLines {
     fn groups_of(&self, faces: &[(u32, u32)]) -> Vec<FaceGroup> {
         let groups = |line: u32| line.checked_sub(1).map_or(&[][..], |line| &self.group_lines[line as usize]);
         if faces.windows(2).all(|pair| groups(pair[0].1) == groups(pair[1].1)) {
+            return Vec::new();
+        }
+        // Of more groups than a mesh has at its faces, none is kept.
+        let memberships: usize = faces.iter().map(|&(_, line)| groups(line).len()).sum();
+        if memberships > MOST_GROUPS_OF_FACE * faces.len() + MOST_GROUPS {
             return Vec::new();
         }
         let mut found: Vec<FaceGroup> = Vec::new();

@@ -6,7 +6,7 @@ use std::ops::Range;
 use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::surface::{NO_MATERIAL, Part, SharedNormals, Surface};
 
-use super::mtl::one_line;
+use super::mtl::{names, one_line};
 
 /// The `f` lines of faces without anything on them.
 pub(crate) fn write_obj_faces(out: &mut impl Write, faces: &Polygons) -> io::Result<()> {
@@ -41,6 +41,7 @@ impl ObjText {
         if let Some(library) = library {
             head.extend(format!("mtllib {}\n", one_line(library)).into_bytes());
         }
+        let names = names(&surface.materials);
         let (mut uvs, mut normals) = (0, 0);
         let parts = surface.ranges(faces).map(|(part, range)| {
             let local = range.local(faces);
@@ -49,7 +50,7 @@ impl ObjText {
             let shared = (!part.normals.is_empty()).then(|| SharedNormals::new(local.clone(), &part.normals));
             let mut tail = Vec::new();
             let bases = [range.points.start, uvs, normals];
-            write_faces(&mut tail, &local, (part, shared.as_ref()), surface, bases);
+            write_faces(&mut tail, &local, (part, shared.as_ref()), &names, bases);
             uvs += part.uv_sets.first().map_or(0, |set| set.values.len());
             normals += shared.as_ref().map_or(0, |shared| shared.count);
             PartText { head: head.into_bytes(), points: range.points, normals: shared, tail }
@@ -85,7 +86,7 @@ fn write_faces(
     out: &mut Vec<u8>,
     faces: &Polygons,
     (part, normals): (&Part, Option<&SharedNormals>),
-    surface: &Surface,
+    materials: &[String],
     [point, uv, normal]: [usize; 3],
 ) {
     let set = part.uv_sets.first();
@@ -108,8 +109,8 @@ fn write_faces(
         let of_face = part.materials.get(k).copied().unwrap_or(NO_MATERIAL);
         if of_face != material {
             material = of_face;
-            let name = surface.materials.get(material as usize).map_or("None", |material| &material.name);
-            line(format!("usemtl {}\n", one_line(name)));
+            let name = materials.get(material as usize).map_or("None", String::as_str);
+            line(format!("usemtl {name}\n"));
         }
         line("f".to_owned());
         for &index in face {

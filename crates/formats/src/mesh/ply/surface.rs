@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use cager_geometry::mesh::Model;
-use cager_geometry::surface::{Channel, CornerSet, Material, Part, Surface, Texture};
+use cager_geometry::surface::{Channel, CornerSet, Material, NO_MATERIAL, Part, Surface, Texture};
 
 /// Names of a texture coordinate of vertices, in the order of `s` and `t`.
 const NAMES: [[&str; 4]; 2] = [["s", "u", "texture_u", "texture_s"], ["t", "v", "texture_v", "texture_t"]];
@@ -28,7 +28,7 @@ pub(super) struct Coordinates {
 impl Coordinates {
     /// Takes those of a face of so many corners, and the number of its picture.
     pub(super) fn face(&mut self, corners: usize, values: &[f64], picture: f64) {
-        self.numbers.push(picture.max(0.0) as u32);
+        self.numbers.push(if picture < 0.0 { NO_MATERIAL } else { picture as u32 });
         self.lacks_some |= values.len() != 2 * corners;
         if !self.lacks_some {
             self.corners.extend(values.as_chunks().0.iter().map(|uv: &[f64; 2]| uv.map(|x| x as f32)));
@@ -63,7 +63,8 @@ impl Coordinates {
         let materials: Vec<Material> = pictures.iter().map(material).collect();
         let most = (materials.len() as u32).saturating_sub(1);
         let numbers = if self.numbers.len() == faces { self.numbers } else { vec![0; faces] };
-        let of_faces = numbers.iter().map(|&number| number.min(most)).collect();
+        let of_faces =
+            numbers.iter().map(|&number| if number == NO_MATERIAL { number } else { number.min(most) }).collect();
         let part = Part {
             points: model.points.len(),
             faces,

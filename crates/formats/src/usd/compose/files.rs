@@ -116,11 +116,12 @@ impl<'a> Files<'a> {
                 "is composed of more than {MOST_FILES} files, or of files that name each other more than {DEEPEST} times in a row; write all into one file"
             )));
         }
-        let Ok(file) = File::open(folder.join(&path)) else { return Ok(None) };
-        let found = file.metadata()?;
-        if !found.is_file() {
+        // Before it is opened, as a pipe would wait.
+        if !folder.join(&path).is_file() {
             return Ok(None);
         }
+        let Ok(file) = File::open(folder.join(&path)) else { return Ok(None) };
+        let found = file.metadata()?;
         let source: Reader<'a> = Box::new(file);
         let name = path.display().to_string();
         let (layer, _) = open_layer(source, found.len(), false).map_err(|fault| fault.within(&name))?.0;

@@ -74,9 +74,10 @@ impl Mesh {
         part: &Part,
         range: &PartRange,
         faces: &Polygons,
+        has_normals: bool,
     ) -> io::Result<Self> {
         let bare = Part {
-            normals: part.normals.clone(),
+            normals: if has_normals { part.normals.clone() } else { Vec::new() },
             points: part.points,
             subdivision: part.subdivision,
             ..Part::default()

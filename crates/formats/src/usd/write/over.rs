@@ -45,8 +45,10 @@ impl<W: Write + Seek> OverWriter<W> {
     ) -> io::Result<Self> {
         let mut encoder = Encoder::new(Sink::new(out, None)?);
         let mut meshes = Vec::new();
-        for (part, range) in surface.ranges(faces) {
-            meshes.push(Mesh::moved(&mut encoder, part, &range, &range.local(faces))?);
+        for ((part, range), moved) in surface.ranges(faces).zip(&onto.meshes) {
+            // Normals of corners are in the order of the faces that they are of.
+            let has_normals = moved.has_all_faces && !moved.is_turned;
+            meshes.push(Mesh::moved(&mut encoder, part, &range, &range.local(faces), has_normals)?);
         }
         let units = onto.units;
         Ok(Self { encoder, onto, meshes, fps, codes, units, origin })
@@ -61,8 +63,8 @@ impl<W: Write + Seek> OverWriter<W> {
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let times = self.encoder.times(&self.codes)?;
         let mut root = Node::default();
-        for (mesh, (path, _)) in self.onto.meshes.iter().enumerate() {
-            let names = path.split('/').filter(|name| !name.is_empty());
+        for (mesh, moved) in self.onto.meshes.iter().enumerate() {
+            let names = moved.path.split('/').filter(|name| !name.is_empty());
             let node = names.fold(&mut root, |node, name| node.children.entry(name.to_owned()).or_default());
             node.mesh = Some(mesh);
         }
@@ -98,11 +100,14 @@ impl<W: Write + Seek> OverWriter<W> {
         if let Some(mesh) = node.mesh {
             properties = self.meshes[mesh].moved_properties(&mut self.encoder, times)?;
             let has = |properties: &[Property], name: &str| properties.iter().any(|property| property.is_called(name));
-            for (name, type_name) in &self.onto.meshes[mesh].1 {
+            for (name, type_name) in &self.onto.meshes[mesh].blocked {
                 if !has(&properties, name) {
                     properties.push(Property::new(type_name.clone(), name.as_str()).value(Encoder::<W>::BLOCK));
                 }
             }
+            // What mirrored the mesh moves it no more.
+            let orientation = if self.onto.meshes[mesh].is_turned { "leftHanded" } else { "rightHanded" };
+            properties.push(Property::fixed("orientation", orientation));
             // Points are where they are in the scene, whatever is above them.
             let mut order = vec!["!resetXformStack!"];
             if let Some(origin) = self.origin {
