@@ -67,7 +67,9 @@ void main() {
   // A highlight of Blinn and Phong that is as wide as one of this roughness.
   float power = 2.0 / (spread * spread) - 2.0;
   vec3 key = vec3(0.42, 0.66, 0.62);
-  float highlight = (power + 8.0) * 0.04 * pow(max(0.0, dot(normal, normalize(eye + key))), power) * max(0.0, dot(normal, key));
+  // Its lobe as a Gaussian, which a processor that draws computes faster than a power.
+  float lobe = exp2(1.442695 * power * (dot(normal, normalize(eye + key)) - 1.0));
+  float highlight = (power + 8.0) * 0.04 * lobe * max(0.0, dot(normal, key));
   // What is around is bright above and dark below, and a rough surface mixes both.
   float seen = dot(reflect(-eye, normal), skyDirection);
   float sky = smoothstep(-0.15 - spread, 0.35 + spread, seen);

@@ -4,6 +4,7 @@ import { LinearMipmapLinearFilter, NoColorSpace, RepeatWrapping, SRGBColorSpace,
 import type { Material, TextureChannel } from '../capture';
 import { TILES } from '../container/surface';
 import type { MaterialTexture } from './materialView';
+import { isSoftwareRendered } from './webgl';
 
 /** Most pixels along a side, and most of all pictures together; larger ones are made smaller. */
 const [MAX_SIDE, MAX_PIXELS] = [4096, 1 << 26];
@@ -101,7 +102,7 @@ function textureOf(bitmap: ImageBitmap, isColor: boolean): Texture {
   texture.colorSpace = isColor ? SRGBColorSpace : NoColorSpace;
   texture.wrapS = texture.wrapT = RepeatWrapping;
   texture.minFilter = LinearMipmapLinearFilter;
-  texture.anisotropy = 4;
+  texture.anisotropy = isSoftwareRendered() ? 1 : 4;
   texture.flipY = false;
   texture.needsUpdate = true;
   return texture;
