@@ -158,6 +158,7 @@ fn a_layer_on_top_of_the_source_moves_its_meshes() {
     dir.cager("decode cast.cager -o hero.usdc").succeeds();
     let line = "encode --rest hero.usdc --frames hero.usdc --cage-vertices 30 --max-error 0.001 -o hero.cager";
     dir.cager(line).succeeds();
+    dir.write("out/there.txt", "");
     dir.cager("decode hero.cager --onto hero.usdc -o out/walk.usdc").succeeds();
     dir.cager("decode hero.cager -o walk.npy").succeeds();
     let (layer, plain) = (open_frames(dir.path("out/walk.usdc"), 16), open_frames(dir.path("walk.npy"), 16));

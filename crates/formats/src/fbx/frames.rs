@@ -28,7 +28,8 @@ pub(crate) fn open_frames<'a>(
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let open = || {
         let scene = Scene::load(&read_all(source)?, folder)?;
-        let wanted = Wanted { prims: &selection.prims, points: Some(expected_points) };
+        let parts = selection.rest.as_ref().map_or(&[][..], |rest| &rest.surface.parts);
+        let wanted = Wanted { prims: &selection.prims, points: Some(expected_points), parts };
         MeshFrames::open(scene, wanted, selection, None)
     };
     scene::open(path, open().map_err(|failure: Fault| failure.at(path))?, expected_points)

@@ -27,7 +27,8 @@ pub(super) fn open<'a>(
     folder: Option<&Path>,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let prim = selection.prim();
-    let wanted = Wanted { prims: &selection.prims, points: Some(expected_points) };
+    let parts = selection.rest.as_ref().map_or(&[][..], |rest| &rest.surface.parts);
+    let wanted = Wanted { prims: &selection.prims, points: Some(expected_points), parts };
     let read = |cause| Error::read(path, cause);
     let mut head = Vec::new();
     source.by_ref().take(LONGEST_HEADER as u64).read_to_end(&mut head).map_err(read)?;

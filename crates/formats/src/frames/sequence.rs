@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use cager_geometry::mesh::Polygons;
+use cager_geometry::mesh::{Model, Polygons};
 use cager_geometry::surface::shown_in;
 use cager_geometry::units::Units;
 
@@ -34,6 +35,7 @@ pub(super) struct SequenceReader {
     merged: Merged,
     /// Of the rest pose, where it has several.
     parts: Option<Parts>,
+    rest: Option<Arc<Model>>,
 }
 
 impl SequenceReader {
@@ -48,7 +50,7 @@ impl SequenceReader {
         let (frame_rate, units) = (None, Units::UNKNOWN);
         let is_array_named = first.zip(prims.first()).is_some_and(|(path, name)| npz::holds(path, name));
         let (next, before) = (0, None);
-        let parts = Parts::of(selection.rest.as_ref(), points);
+        let (parts, rest) = (Parts::of(selection.rest.as_ref(), points), selection.rest.clone());
         let mut opened = Self {
             sequence,
             points,
@@ -62,6 +64,7 @@ impl SequenceReader {
             faces,
             merged,
             parts,
+            rest,
         };
         let first = opened.sequence.files.first();
         // All files are of one format. What is wrong with one is said when it is read.
@@ -75,7 +78,8 @@ impl SequenceReader {
 
     /// Opens a file that is no mesh.
     fn open(&self, path: &Path) -> Result<Box<dyn FrameReader>, Error> {
-        let selection = FrameSelection { prims: self.prims.clone(), ..FrameSelection::default() };
+        let selection =
+            FrameSelection { prims: self.prims.clone(), rest: self.rest.clone(), ..FrameSelection::default() };
         single::open_cache(path, self.points, &selection, true)
     }
 

@@ -18,7 +18,7 @@ pub(super) fn choose(root: &Root, scene: &Scene, prims: &[String]) -> Result<Ran
         return Ok(all);
     }
     let (mut tree, meshes) = Meshes::of(root, scene);
-    let chosen = choose_meshes(&mut tree, &meshes, Wanted { prims, points: None })?;
+    let chosen = choose_meshes(&mut tree, &meshes, Wanted { prims, ..Wanted::default() })?;
     let [first, last] = [chosen[0], chosen[chosen.len() - 1]].map(|mesh| mesh - root.nodes.len());
     Ok(first..last + 1)
 }

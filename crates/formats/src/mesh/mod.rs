@@ -287,7 +287,7 @@ fn read_scene(
         let kind = glb::Source { is_text: true, folder, ..glb::Source::default() };
         return finished(format, name, &bytes, glb::read(&bytes, &kind, prims).map(Parsed::of_gltf));
     }
-    let wanted = Wanted { prims, points: None };
+    let wanted = Wanted { prims, ..Wanted::default() };
     if format == MeshFormat::Fbx {
         let (model, left_out, units, dropped) = fbx::read(name, (source, length), wanted, folder)?;
         return Ok(Parsed { left_out, units, dropped, ..Parsed::from(model) });

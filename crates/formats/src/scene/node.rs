@@ -1,6 +1,9 @@
 //! The tree of a scene, and which of its meshes is meant.
 
+use std::collections::HashMap;
 use std::sync::Arc;
+
+use cager_geometry::surface::Part;
 
 use crate::dropped::listed;
 use crate::error::Fault;
@@ -39,6 +42,8 @@ pub(crate) struct Wanted<'a> {
     pub(crate) prims: &'a [String],
     /// Points that they have together, where that is known.
     pub(crate) points: Option<usize>,
+    /// The parts of the rest pose, in whose order meshes of the same paths are read.
+    pub(crate) parts: &'a [Part],
 }
 
 /// Of `all` meshes, at least one, those that are wanted, in the order of the scene. The only mesh
@@ -62,6 +67,7 @@ pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], wanted: Wanted<'_>) -
     }
     chosen.sort_unstable();
     chosen.dedup();
+    in_order_of(wanted.parts, scene.nodes(), &mut chosen);
     let Some(points) = wanted.points else { return Ok(chosen) };
     let counts: Vec<_> = chosen.iter().map(|&mesh| scene.points(mesh)).collect();
     let sum = counts.iter().copied().sum::<Option<u64>>();
@@ -77,6 +83,18 @@ pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], wanted: Wanted<'_>) -
             list(scene, &chosen),
             sum.unwrap_or_default()
         ))),
+    }
+}
+
+/// Sorts meshes as parts of the same paths are; leaves them where these are others.
+fn in_order_of(parts: &[Part], nodes: &[Node], meshes: &mut [usize]) {
+    let places: HashMap<&str, usize> = parts.iter().enumerate().map(|(k, part)| (part.path.as_str(), k)).collect();
+    if places.len() != meshes.len() || meshes.len() < 2 {
+        return;
+    }
+    let place = |mesh: &usize| places.get(path(nodes, *mesh).as_str()).copied();
+    if meshes.iter().all(|mesh| place(mesh).is_some()) {
+        meshes.sort_by_cached_key(place);
     }
 }
 
