@@ -92,9 +92,8 @@ fn attributes_materials_and_skins_of_a_gltf_are_told() {
     assert_eq!(uvs, "a.glb: texture coordinates (TEXCOORD_0 and TEXCOORD_1) are not kept");
     let look = of(r#","TANGENT":0,"_ID":0"#, r#","material":0"#, r#","materials":[{"occlusionTexture":{"index":0}}]"#);
     assert_eq!(look, "a.glb: textures of occlusion, tangents (TANGENT) and attributes of its own are not kept");
-    let picture =
-        r#","materials":[{"normalTexture":{"index":0}}],"textures":[{"source":0}],"images":[{"bufferView":0}]"#;
-    assert_eq!(of("", r#","material":0"#, picture), "a.glb: 1 texture within the file is not kept");
+    let picture = r#","materials":[{"normalTexture":{"index":0}}],"textures":[{"source":0}],"images":[{"uri":"data:image/png;base64,AAAA"}]"#;
+    assert_eq!(of("", r#","material":0"#, picture), "a.glb: 1 texture as text within the file is not kept");
     let skin = r#","nodes":[{"mesh":0,"skin":0},{}],"skins":[{"joints":[1]}]"#;
     assert_eq!(
         of("", r#","targets":[{"POSITION":0}]"#, skin),
