@@ -158,10 +158,9 @@ fn a_layer_on_top_of_the_source_moves_its_meshes() {
     dir.cager("decode cast.cager -o hero.usdc").succeeds();
     let line = "encode --rest hero.usdc --frames hero.usdc --cage-vertices 30 --max-error 0.001 -o hero.cager";
     dir.cager(line).succeeds();
-    dir.write("out/there.txt", "");
-    dir.cager("decode hero.cager --onto hero.usdc -o out/walk.usdc").succeeds();
+    dir.cager("decode hero.cager --onto hero.usdc -o walk.usdc").succeeds();
     dir.cager("decode hero.cager -o walk.npy").succeeds();
-    let (layer, plain) = (open_frames(dir.path("out/walk.usdc"), 16), open_frames(dir.path("walk.npy"), 16));
+    let (layer, plain) = (open_frames(dir.path("walk.usdc"), 16), open_frames(dir.path("walk.npy"), 16));
     let (mut layer, mut plain) = (layer.expect("a layer"), plain.expect("frames"));
     let (mut moved, mut expected) = (Vec::new(), Vec::new());
     for _ in 0..4 {
@@ -169,7 +168,7 @@ fn a_layer_on_top_of_the_source_moves_its_meshes() {
         assert!(moved.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{moved:?} {expected:?}");
     }
     // What is not moved stays as it is in the source.
-    let surface = model(&dir, "out/walk.usdc").surface;
+    let surface = model(&dir, "walk.usdc").surface;
     assert_eq!((surface.parts[1].path.as_str(), surface.materials.len()), ("/hero/hat", 2));
     dir.cager("decode hero.cager --part hat -o hat.usdc").succeeds();
     let refused = dir.cager("decode hero.cager --onto hat.usdc -o no.usdc").run();
