@@ -622,6 +622,22 @@ fn a_shot_from_1001_plays_at_once_and_keeps_its_numbers() {
 }
 
 #[test]
+fn a_shot_from_frame_1_keeps_its_times() {
+    let options = FrameOptions { numbers: vec![1.0, 2.0, 3.0], fps: 25.0, ..FrameOptions::default() };
+    let (_folder, path, notes) = written("a.glb", &waves(3), &strip(), &options);
+    assert!(!notes.iter().any(|note| note.contains("is at 0 s")), "{notes:?}");
+    let times = [0.04, 0.12].map(|seconds: f32| Some(f64::from(seconds)));
+    let root = Root::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let of_times = |accessor: &gltf::json::Accessor| {
+        let ends = [&accessor.min, &accessor.max].map(|end| end.as_ref().and_then(|end| end[0].as_f64()));
+        ends == times && accessor.count.0 == 3
+    };
+    assert!(root.accessors.iter().any(of_times), "{:?}", root.accessors);
+    let reader = open_frames(&path, 48).unwrap();
+    assert_eq!((numbers(&*reader), reader.frame_rate()), (options.numbers, Some(25.0)));
+}
+
+#[test]
 fn keys_that_are_far_apart_are_told_once_with_the_option() {
     let mut built = Built::default();
     built.points();

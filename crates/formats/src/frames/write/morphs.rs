@@ -129,19 +129,24 @@ fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(),
     check_faces(faces, points, "")
 }
 
-/// The seconds of frames from the first one on, in single precision, and what is to be said of
-/// them: programs play from 0 s, and would stand still until a late first key.
+/// The latest time of a first frame that is kept, in seconds: shots often begin with frame 1.
+const LATEST_BEGIN: f64 = 1.0;
+
+/// The seconds of frames, in single precision, and what is to be said of them: programs play from
+/// 0 s, and would stand still until a late first key, so such frames begin at 0.
 fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<String>), Fault> {
     if frames < 2 {
         return Ok((Vec::new(), None));
     }
     let first = options.number(0);
-    let seconds: Vec<f32> = (0..frames).map(|k| ((options.number(k) - first) / options.fps) as f32).collect();
+    let is_kept = (0.0..=LATEST_BEGIN).contains(&(first / options.fps));
+    let begin = if is_kept { 0.0 } else { first };
+    let seconds: Vec<f32> = (0..frames).map(|k| ((options.number(k) - begin) / options.fps) as f32).collect();
     if seconds.windows(2).any(|pair| pair[1] <= pair[0]) {
         return Err(Fault::unsupported(
             "has times in single precision, which cannot tell these frames apart; give a smaller --fps, or write .npy",
         ));
     }
     let note = || format!("frame {first} is at 0 s, where programs begin to play; its number is kept in extras");
-    Ok((seconds, (first != 0.0).then(note)))
+    Ok((seconds, (!is_kept).then(note)))
 }
