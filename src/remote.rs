@@ -1,5 +1,5 @@
-//! Encoding by a service: another machine computes, from frames in single precision, the container that [`mod@cager_capture::encode`]
-//! gives of such frames.
+//! Encoding by a service: another machine computes, from frames in single precision, the container
+//! that [`mod@cager_capture::encode`] gives of such frames.
 
 mod cage;
 mod error;
@@ -71,8 +71,8 @@ pub enum RemoteProgress<'a> {
 /// A capture that a service has encoded.
 #[derive(Debug)]
 pub struct EncodedRemotely {
-    /// Report and container, as of an encoding on this machine. Of its times `invert` is that of uploading and solving, which
-    /// overlap, and `write` that of completing and downloading.
+    /// Report and container, as of an encoding on this machine. Of its times `invert` is that of
+    /// uploading and solving, which overlap, and `write` that of completing and downloading.
     pub encoded: Encoded,
     /// The session, which stays on the service.
     pub session: String,
@@ -96,7 +96,8 @@ pub struct Steps {
 /// Encodes a capture on a service, which also designs the cage if there is none.
 ///
 /// # Errors
-/// See [`RemoteError`]. What is on the service stays there, and the error says how to go on with it, or how to look at it.
+/// See [`RemoteError`]. What is on the service stays there, and the error says how to go on with
+/// it, or how to look at it.
 pub fn encode_remotely<F: FrameSource + 'static>(
     job: RemoteJob<'_, F>,
     progress: &mut (dyn FnMut(RemoteProgress<'_>) + Send),

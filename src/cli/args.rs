@@ -28,9 +28,9 @@ use std::time::Duration;
 
 /// Turns animated mesh captures into light, editable, streamable cages.
 ///
-/// A capture is the same mesh in every frame; a cage is a coarse closed mesh around its rest pose. `encode` recovers the
-/// cage of every frame and writes one small .cager file; `decode` turns it back into positions. Try `cager demo` first: it
-/// needs no files.
+/// A capture is the same mesh in every frame; a cage is a coarse closed mesh around its rest pose.
+/// `encode` recovers the cage of every frame and writes one small .cager file; `decode` turns it
+/// back into positions. Try `cager demo` first: it needs no files.
 #[derive(Parser)]
 #[command(name = "cager", version = env!("CAGER_VERSION"), max_term_width = 100, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -73,7 +73,8 @@ pub(crate) enum Command {
     #[command(flatten)]
     Service(ServiceCommand),
     Health(HealthArgs),
-    /// List the file formats of meshes and captures: whether they are written as well as read, and what they say of units and times.
+    /// List the file formats of meshes and captures: whether they are written as well as read, and
+    /// what they say of units and times.
     ///
     /// Example: cager formats
     Formats,
@@ -91,16 +92,18 @@ pub(crate) struct EncodeArgs {
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
-    /// Closed cage around the rest pose, same formats, polygons are triangulated; or the .cager file of another take, whose cage is taken [default: one is designed from the capture].
+    /// Closed cage around the rest pose, same formats, polygons are triangulated; or the .cager
+    /// file of another take, whose cage is taken [default: one is designed from the capture].
     #[arg(long, value_name = "CAGE", hide_default_value = true)]
     pub(crate) cage: Option<PathBuf>,
 
     #[command(flatten)]
     pub(crate) design: DesignArgs,
 
-    /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of
-    /// mesh files (2.obj comes before 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd, .mcx,
-    /// .abc, .usdc, .usda or animated .glb.
+    /// Capture, points in the order of the rest pose: a folder, quoted glob or numbered name
+    /// (walk.%04d.obj, walk.####.obj, frame_%04d/mesh.obj) of mesh files (2.obj comes before
+    /// 10.obj) or of one .npy a frame, .npy (frames × points × 3), .npz, .pc2, .mdd, .mcx, .abc,
+    /// .usdc, .usda or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
@@ -121,15 +124,18 @@ pub(crate) struct EncodeArgs {
     #[command(flatten)]
     pub(crate) solver: SolverArgs,
 
-    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to the same result, but groups of coded
-    /// frames are shorter where a whole one does not fit. The model itself and its analysis, half a gigabyte with a cage of 350 vertices, come on top [default: half of what is free].
+    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to
+    /// the same result, but groups of coded frames are shorter where a whole one does not fit. The
+    /// model itself and its analysis, half a gigabyte with a cage of 350 vertices, come on top
+    /// [default: half of what is free].
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
 
     #[command(flatten)]
     pub(crate) coding: CodingArgs,
 
-    /// link: the pictures of materials stay the files that the rest pose names; embed: their bytes are taken in, and decode writes them beside its output.
+    /// link: the pictures of materials stay the files that the rest pose names; embed: their bytes
+    /// are taken in, and decode writes them beside its output.
     #[arg(long, value_enum, value_name = "HOW", default_value = "link")]
     pub(crate) textures: Textures,
 
@@ -141,15 +147,18 @@ pub(crate) struct EncodeArgs {
     #[arg(long, requires = "cage")]
     pub(crate) flip_cage: bool,
 
-    /// Have a service compute: its address, such as http://127.0.0.1:8080. Frames are sent in single precision and numbered from 0.
+    /// Have a service compute: its address, such as http://127.0.0.1:8080. Frames are sent in
+    /// single precision and numbered from 0.
     #[arg(long, value_name = "URL")]
     pub(crate) server: Option<String>,
 
-    /// Token to show to the service [default: the environment's CAGER_TOKEN, which other users of this machine do not see].
+    /// Token to show to the service [default: the environment's CAGER_TOKEN, which other users of
+    /// this machine do not see].
     #[arg(long, value_name = "T", requires = "server", hide_default_value = true)]
     pub(crate) token: Option<String>,
 
-    /// Go on with a session whose upload broke: what it has is not sent again, but compared. Give the files and options that it was made with.
+    /// Go on with a session whose upload broke: what it has is not sent again, but compared. Give
+    /// the files and options that it was made with.
     #[arg(long, value_name = "ID", requires = "server")]
     pub(crate) session: Option<String>,
 
@@ -169,7 +178,8 @@ pub(crate) enum Textures {
 #[derive(Args, Debug)]
 pub(crate) struct DesignArgs {
     /// Most vertices of the designed cage [default: 350].
-    #[arg(long, value_name = "N", conflicts_with_all = ["cage", "mean_error"], value_parser = clap::value_parser!(u32).range(4..=1_500))]
+    #[arg(long, value_name = "N", conflicts_with_all = ["cage", "mean_error"],
+          value_parser = clap::value_parser!(u32).range(4..=1_500))]
     pub(crate) cage_vertices: Option<u32>,
 
     /// What the designed cage is for [default: free with mean value coordinates, editable with others].
@@ -195,7 +205,8 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_parser = names::handles())]
     pub(crate) handles: Option<Handles>,
 
-    /// How many points rectangular and spread read: from the number of the cage's unknowns to that of the model's points
+    /// How many points rectangular and spread read: from the number of the cage's unknowns to that
+    /// of the model's points
     /// [default: twice the unknowns].
     #[arg(long, value_name = "K")]
     pub(crate) handle_count: Option<usize>,
@@ -204,14 +215,16 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_parser = names::regularizer(), default_value = Regularizer::default().name())]
     pub(crate) regularizer: Regularizer,
 
-    /// The matrix of --regularizer matrix: sparse, in the Matrix Market format (coordinate), one column per vertex of the cage
-    /// in its order.
+    /// The matrix of --regularizer matrix: sparse, in the Matrix Market format (coordinate), one
+    /// column per vertex of the cage in its order.
     #[arg(long, value_name = "FILE.mtx")]
     pub(crate) regularizer_matrix: Option<PathBuf>,
 
-    /// Spectrum threshold: how many of the last singular directions are regularised; "all" of them; or "auto": as many as
-    /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a sixteenth of the unknowns where that is less; where frames are
-    /// coded, except with green, all with a λ of 0.001, unless λ or another regulariser is given].
+    /// Spectrum threshold: how many of the last singular directions are regularised; "all" of them;
+    /// or "auto": as many as
+    /// --spectrum-bound allows, measured on frames of the capture [default: 20, or a sixteenth of
+    /// the unknowns where that is less; where frames are coded, except with green, all with a λ of
+    /// 0.001, unless λ or another regulariser is given].
     #[arg(long, value_name = "S", value_parser = spectrum, allow_negative_numbers = true)]
     pub(crate) spectrum: Option<SpectrumArg>,
 
@@ -219,8 +232,9 @@ pub(crate) struct SolverArgs {
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     pub(crate) spectrum_bound: Option<f64>,
 
-    /// Weight of the regularisation beside the mean square error of the points, whichever points are read; 0 is the same as --spectrum 0
-    /// (for tikhonov it is the damping α) [default: 1; with the default spectrum of frames that are coded 0.001].
+    /// Weight of the regularisation beside the mean square error of the points, whichever points
+    /// are read; 0 is the same as --spectrum 0 (for tikhonov it is the damping α) [default: 1; with
+    /// the default spectrum of frames that are coded 0.001].
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     pub(crate) lambda: Option<f64>,
 }
@@ -234,9 +248,10 @@ pub(crate) struct DecodeArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Where to write: .npy, .pc2, .mdd, .mcx (with its .xml), .abc, .usdc, .glb or .gltf (morph targets), OUT.vat/ (textures for engines), or a folder that is to hold one .obj per frame ('FOLDER/*.ply' for .ply,
-    /// FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your own), of one frame (--frame) .obj, .ply, .off or .stl, or - for .npy on
-    /// standard output.
+    /// Where to write: .npy, .pc2, .mdd, .mcx (with its .xml), .abc, .usdc, .glb or .gltf (morph
+    /// targets), OUT.vat/ (textures for engines), or a folder that is to hold one .obj per frame
+    /// ('FOLDER/*.ply' for .ply, FOLDER/walk.%04d.obj or FOLDER/walk.####.obj for names of your
+    /// own), of one frame (--frame) .obj, .ply, .off or .stl, or - for .npy on standard output.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 
@@ -246,8 +261,8 @@ pub(crate) struct DecodeArgs {
     #[command(flatten)]
     pub(crate) timing: TimingArgs,
 
-    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to the same result [default: half of what
-    /// is free].
+    /// Memory for frames and coordinates, such as 1GB; what does not fit is computed in parts, to
+    /// the same result [default: half of what is free].
     #[arg(long, value_name = "SIZE", value_parser = memory, hide_default_value = true)]
     pub(crate) memory: Option<Memory>,
 
@@ -255,12 +270,13 @@ pub(crate) struct DecodeArgs {
     #[arg(long, value_enum, value_name = "LAYER", default_value = "all", conflicts_with = "cages")]
     pub(crate) layer: Layer,
 
-    /// Write a layer of USD on top of this file, which the capture came from: the points of its meshes in each frame alone, so that materials, groups and
-    /// bindings stay those of the file.
+    /// Write a layer of USD on top of this file, which the capture came from: the points of its
+    /// meshes in each frame alone, so that materials, groups and bindings stay those of the file.
     #[arg(long, value_name = "SOURCE.usd", conflicts_with_all = ["cages", "model"])]
     pub(crate) onto: Option<PathBuf>,
 
-    /// Write these parts of the model alone: their paths, names, or globs of these, such as 'eye*'; may be given several times.
+    /// Write these parts of the model alone: their paths, names, or globs of these, such as 'eye*';
+    /// may be given several times.
     #[arg(long, value_name = "NAME", conflicts_with = "cages")]
     pub(crate) part: Vec<String>,
 
@@ -293,25 +309,29 @@ pub(crate) struct InspectArgs {
 
 /// Compare ways to invert a capture, with the figures of the paper, in one HTML file.
 ///
-/// Every method is run on the capture: the report shows its errors, how smoothly its cages move, spectra, times and pictures, and
-/// which options the figures advise. On two cores, 120 frames of 20,000 points in a cage of 330 vertices take some minutes with all
-/// coordinates, and 10 seconds with --coordinates mvc. Example: cager compare --rest rest.obj --cage cage.obj --frames walk.npy -o walk.html
+/// Every method is run on the capture: the report shows its errors, how smoothly its cages move,
+/// spectra, times and pictures, and which options the figures advise. On two cores, 120 frames of
+/// 20,000 points in a cage of 330 vertices take some minutes with all coordinates, and 10 seconds
+/// with --coordinates mvc. Example: cager compare --rest rest.obj --cage cage.obj --frames walk.npy
+/// -o walk.html
 #[derive(Args)]
 pub(crate) struct CompareArgs {
     /// Model in its rest pose: .obj .ply .off .stl .glb .abc .usdc; a point cloud will do.
     #[arg(long, value_name = "REST")]
     pub(crate) rest: PathBuf,
 
-    /// Closed cage around the rest pose, same formats, polygons are triangulated; or a .cager file, whose cage is taken.
+    /// Closed cage around the rest pose, same formats, polygons are triangulated; or a .cager file,
+    /// whose cage is taken.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: PathBuf,
 
-    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of mesh files, .npy, .npz, .pc2, .mdd, .mcx, .abc, .usdc or animated .glb.
+    /// Capture, points in the order of the rest pose, as for encode: a folder or quoted glob of
+    /// mesh files, .npy, .npz, .pc2, .mdd, .mcx, .abc, .usdc or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: PathBuf,
 
-    /// Report to write, or - for standard output; it appears whole or not at all, and needs no other file and no network to be
-    /// read.
+    /// Report to write, or - for standard output; it appears whole or not at all, and needs no
+    /// other file and no network to be read.
     #[arg(short, long, value_name = "REPORT.html")]
     pub(crate) output: PathBuf,
 
@@ -348,7 +368,8 @@ pub(crate) struct CompareArgs {
 /// Example: cager health --address 127.0.0.1:8080
 #[derive(Args, Debug)]
 pub(crate) struct HealthArgs {
-    /// Address and port [default: the environment's CAGER_LISTEN, or 127.0.0.1:8080; the loopback address for 0.0.0.0 and [::]].
+    /// Address and port [default: the environment's CAGER_LISTEN, or 127.0.0.1:8080; the loopback
+    /// address for 0.0.0.0 and [::]].
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(crate) address: Option<SocketAddr>,
 

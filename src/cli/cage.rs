@@ -76,7 +76,10 @@ pub(super) fn run(args: &CageArgs) -> Result<()> {
     let mut warnings = Vec::new();
     let most = if args.general.is_some() || args.frames.is_some() { vertices } else { rest.points.len().max(4) };
     if vertices > most {
-        warnings.push(format!("--vertices: the {most} points of the model tell no more than {most} vertices apart, which the cage gets at the most"));
+        warnings.push(format!(
+            "--vertices: the {most} points of the model tell no more than {most} vertices apart, \
+             which the cage gets at the most"
+        ));
     }
     let vertices = vertices.min(most);
     warnings.extend(args.improve.as_deref().and_then(dropped_of_cage));
@@ -207,7 +210,8 @@ pub(super) fn judged(design: &DesignReport) -> String {
             grouped(design.unseen_frames)
         ),
         None => format!(
-            "L2 {:.4} % of the diagonal on the frames between those it was made from, which chose it: there are too few to hold stretches of time back",
+            "L2 {:.4} % of the diagonal on the frames between those it was made from, which chose it: there are too \
+             few to hold stretches of time back",
             100.0 * design.held_back_error
         ),
     }

@@ -11,17 +11,20 @@ use std::time::Duration;
 
 /// Make a cage around a model, design one from its motion, or check, repair or improve one.
 ///
-/// With --rest alone, a closed cage around the rest pose. With --frames too, a cage whose vertices lie where the motion needs them:
-/// several times more accurate. With --check, --repair or --improve, what becomes of a cage of your own.
-/// Example: cager cage --rest rest.obj --frames walk.npy -o cage.obj
+/// With --rest alone, a closed cage around the rest pose. With --frames too, a cage whose vertices
+/// lie where the motion needs them: several times more accurate. With --check, --repair or
+/// --improve, what becomes of a cage of your own. Example: cager cage --rest rest.obj --frames
+/// walk.npy -o cage.obj
 #[derive(Args, Debug)]
 #[command(group(ArgGroup::new("work").args(["check", "repair", "improve", "general"])))]
 pub(crate) struct CageArgs {
-    /// Model in its rest pose: .obj .ply .off .stl .glb .abc .usdc; a point cloud will do. More than once with --general: one cage around all.
+    /// Model in its rest pose: .obj .ply .off .stl .glb .abc .usdc; a point cloud will do. More
+    /// than once with --general: one cage around all.
     #[arg(long, value_name = "REST", required = true)]
     pub(crate) rest: Vec<PathBuf>,
 
-    /// Capture to design the cage from, as for encode: a folder or quoted glob of mesh files, .npy, .pc2, .mdd, .mcx, .abc, .usdc or animated .glb.
+    /// Capture to design the cage from, as for encode: a folder or quoted glob of mesh files, .npy,
+    /// .pc2, .mdd, .mcx, .abc, .usdc or animated .glb.
     #[arg(long, value_name = "FRAMES")]
     pub(crate) frames: Option<PathBuf>,
 
@@ -64,7 +67,8 @@ pub(crate) struct CageArgs {
     #[arg(long, value_name = "CAGE", conflicts_with_all = ["frames", "vertices", "clearance"])]
     pub(crate) repair: Option<PathBuf>,
 
-    /// Move the vertices of this cage, a mesh or that of a .cager file, to where the motion needs them; its faces, quads among them, stay. Needs --frames.
+    /// Move the vertices of this cage, a mesh or that of a .cager file, to where the motion needs
+    /// them; its faces, quads among them, stay. Needs --frames.
     #[arg(long, value_name = "CAGE", requires = "frames", conflicts_with_all = ["vertices", "mean_error"])]
     pub(crate) improve: Option<PathBuf>,
 

@@ -76,7 +76,8 @@ fn picture(path: &Path, outputs: &mut Outputs) -> Result<Target> {
     let is_page = path.extension().is_some_and(|end| ["html", "htm"].iter().any(|page| end.eq_ignore_ascii_case(page)));
     if !is_page && path.as_os_str() != "-" {
         bail!(
-            "--picture: {} does not end with .html; the picture is a page for a browser, in which model and cage turn: name it cage.html, and save the view as PNG there",
+            "--picture: {} does not end with .html; the picture is a page for a browser, in which model and cage turn: \
+             name it cage.html, and save the view as PNG there",
             path.display()
         );
     }

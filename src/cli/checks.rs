@@ -1,4 +1,5 @@
-//! Checks before an encoding or a design that rest pose, cage and capture match. A mismatch is an error, or a warning with --force.
+//! Checks before an encoding or a design that rest pose, cage and capture match. A mismatch is an
+//! error, or a warning with --force.
 
 use super::{warn, warning};
 use anyhow::Result;
@@ -21,7 +22,8 @@ pub(crate) struct CaptureArgs {
     #[command(flatten)]
     pub(super) checks: CheckArgs,
 
-    /// Axis that points up in the capture, where another one does in the rest pose: frames are turned to the rest pose's axes.
+    /// Axis that points up in the capture, where another one does in the rest pose: frames are
+    /// turned to the rest pose's axes.
     #[arg(long = "up", id = "capture_up", value_name = "AXIS", value_parser = up)]
     pub(super) up: Option<Up>,
 
@@ -36,16 +38,20 @@ pub(crate) struct CaptureArgs {
 /// What is accepted of a capture.
 #[derive(Args, Debug)]
 pub(crate) struct CheckArgs {
-    /// The meshes to take of Alembic archives, USD files, glTF and FBX (rest pose and capture): paths, such as /walk/body, names, or globs of these, such as '/walk/**/eye*';
-    /// may be given several times [default: all that are rendered]. An only mesh is taken whatever it is called. Of .npz with several arrays that fit, the name of one.
+    /// The meshes to take of Alembic archives, USD files, glTF and FBX (rest pose and capture):
+    /// paths, such as /walk/body, names, or globs of these, such as '/walk/**/eye*'; may be given
+    /// several times [default: all that are rendered]. An only mesh is taken whatever it is called.
+    /// Of .npz with several arrays that fit, the name of one.
     #[arg(long, value_name = "PATH", hide_default_value = true)]
     pub(super) prim: Vec<String>,
 
-    /// Frames to take for each second of an animated .glb, .gltf or .fbx, which has keys instead of frames [default: those at its keys; of .fbx at the rate of its scene].
+    /// Frames to take for each second of an animated .glb, .gltf or .fbx, which has keys instead of
+    /// frames [default: those at its keys; of .fbx at the rate of its scene].
     #[arg(long, value_name = "F", value_parser = rate, allow_negative_numbers = true, hide_default_value = true)]
     pub(super) sample_rate: Option<f64>,
 
-    /// The animation to take of a .glb, .gltf or .fbx with several: its name, or its number from 0 [default: the first that moves the mesh].
+    /// The animation to take of a .glb, .gltf or .fbx with several: its name, or its number from 0
+    /// [default: the first that moves the mesh].
     #[arg(long, value_name = "NAME", hide_default_value = true)]
     pub(super) animation: Option<String>,
 
@@ -53,11 +59,13 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     pub(super) allow_gaps: bool,
 
-    /// Take all files where their names look like several sequences, in natural order: poses with names of their own, say.
+    /// Take all files where their names look like several sequences, in natural order: poses with
+    /// names of their own, say.
     #[arg(long)]
     pub(super) all_files: bool,
 
-    /// Go on where rest pose, cage and capture look as if they did not belong together: other units, axes, handedness or order of points.
+    /// Go on where rest pose, cage and capture look as if they did not belong together: other
+    /// units, axes, handedness or order of points.
     #[arg(long)]
     pub(super) force: bool,
 }
@@ -70,7 +78,8 @@ pub(crate) struct TimingArgs {
     pub(super) fps: Option<f64>,
 
     /// Number of the first frame [default: what the files tell].
-    #[arg(long, value_name = "T", value_parser = frame_number, allow_negative_numbers = true, hide_default_value = true)]
+    #[arg(long, value_name = "T", value_parser = frame_number, allow_negative_numbers = true,
+          hide_default_value = true)]
     pub(super) start: Option<f64>,
 }
 
@@ -162,7 +171,8 @@ pub(super) fn explained_with_options(
             _ => explained(EncodeError::Mismatch { what, found }, frames, is_flipped),
         },
         EncodeError::Seams { rest, cause: PointCount { path: capture, expected, found, .. } } => anyhow::anyhow!(
-            "{}: has {found} points where {} has {expected}, {} of them doubles along seams that flat shading or UVs split; pass --weld",
+            "{}: has {found} points where {} has {expected}, {} of them doubles along seams that flat shading or UVs \
+             split; pass --weld",
             capture.display(),
             rest.display(),
             expected as u64 - found

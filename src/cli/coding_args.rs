@@ -11,27 +11,29 @@ use std::str::FromStr;
 /// How exactly and how small frames are stored. Without any of these, cages are stored as they are solved for.
 #[derive(Args, Debug)]
 pub(crate) struct CodingArgs {
-    /// Guarantee that no point of any frame is farther than E from where it was captured: a fraction of the rest pose's diagonal, such as
+    /// Guarantee that no point of any frame is farther than E from where it was captured: a
+    /// fraction of the rest pose's diagonal, such as
     /// 0.001, or a length such as 0.2mm, with --unit.
-    #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["target_size", "quality", "mean_error"])]
+    #[arg(long, value_name = "E", allow_hyphen_values = true,
+          conflicts_with_all = ["target_size", "quality", "mean_error"])]
     pub(crate) max_error: Option<ErrorBound>,
 
     /// Write at most so many bytes, such as 500KB, or so many bits for each point and frame, such as 0.5bpvf.
     #[arg(long, value_name = "SIZE", allow_hyphen_values = true, conflicts_with_all = ["quality", "mean_error"])]
     pub(crate) target_size: Option<TargetSize>,
 
-    /// preview: cages alone; standard: errors that are not seen; master: a guaranteed maximum error of 0.0001 of the rest pose's
-    /// diagonal.
+    /// preview: cages alone; standard: errors that are not seen; master: a guaranteed maximum error
+    /// of 0.0001 of the rest pose's diagonal.
     #[arg(long, value_enum, value_name = "QUALITY", conflicts_with = "mean_error")]
     pub(crate) quality: Option<Quality>,
 
-    /// Write the smallest file whose mean L2 error is at most E, a fraction of the rest pose's diagonal; where a cage is designed, the smallest
-    /// cage of which that holds.
+    /// Write the smallest file whose mean L2 error is at most E, a fraction of the rest pose's
+    /// diagonal; where a cage is designed, the smallest cage of which that holds.
     #[arg(long, value_name = "E", allow_negative_numbers = true)]
     pub(crate) mean_error: Option<f64>,
 
-    /// What one unit of the positions is in files that do not say it: for lengths given to --max-error, and for programs that read
-    /// what is decoded.
+    /// What one unit of the positions is in files that do not say it: for lengths given to
+    /// --max-error, and for programs that read what is decoded.
     #[arg(long, value_enum, value_name = "UNIT")]
     pub(crate) unit: Option<Unit>,
 
@@ -141,7 +143,8 @@ impl FromStr for TargetSize {
     }
 }
 
-/// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked. A mean error is met by coding, or by a cage that is designed for it.
+/// What the file is to meet, for this rest pose and so many frames; `None` where nothing is asked.
+/// A mean error is met by coding, or by a cage that is designed for it.
 pub(super) fn goal(
     coding: &CodingArgs,
     units: Units,
@@ -162,7 +165,8 @@ pub(super) fn goal(
             let error = length / unit / diagonal;
             if error.is_nan() || error >= 1.0 {
                 bail!(
-                    "--max-error: is {error:.3} times the rest pose's diagonal, {diagonal:.4} units; check --unit, or give a shorter length"
+                    "--max-error: is {error:.3} times the rest pose's diagonal, {diagonal:.4} units; check --unit, or \
+                     give a shorter length"
                 );
             }
             Some(Goal::MaxError(error))

@@ -104,7 +104,8 @@ fn figures_path(report: &Path) -> PathBuf {
     if report.as_os_str() == "-" { report.to_owned() } else { report.with_extension("json") }
 }
 
-/// Shows a step, and the time left: as long as little is done, more by what was `expected` of the whole than by what has passed.
+/// Shows a step, and the time left: as long as little is done, more by what was `expected` of the
+/// whole than by what has passed.
 fn show(bar: &ProgressBar, step: &str, done: f64, expected: f64) {
     let by_now = bar.elapsed().as_secs_f64() / done.max(1e-3);
     let left = (1.0 - done) * (done * by_now + (1.0 - done) * expected);

@@ -108,7 +108,8 @@ pub(super) fn run(args: &DecodeArgs) -> Result<()> {
     }
     if let (Some(path), true) = (&transfer.model, found.bound > 0) {
         warn(&[format!(
-            "{}: {} of {} points lie beside poles of the cage's coordinates, where these follow nothing; they follow the nearest places of the file's own model",
+            "{}: {} of {} points lie beside poles of the cage's coordinates, where these follow nothing; they follow \
+             the nearest places of the file's own model",
             path.display(),
             grouped(found.bound),
             grouped(found.points)

@@ -9,7 +9,8 @@ use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// What the number of vertices of a cage around so many points follows from: what is asked for, as far as the points determine so many.
+/// What the number of vertices of a cage around so many points follows from: what is asked for, as
+/// far as the points determine so many.
 pub(super) fn goal(vertices: Option<u32>, mean_error: Option<f64>, points: usize) -> Result<Goal> {
     let vertices = vertices.filter(|&vertices| vertices as usize <= points);
     match mean_error {

@@ -13,7 +13,8 @@ use cager_proto::container::{self, EditLayer, LayerSource};
 use std::path::Path;
 
 /// Said where a container has more than cages and its frames are others.
-pub(super) const DETAIL_LOST: &str = "the corrections of points that the container keeps beside its cages belong to its own frames and are left out: errors are those of the cages alone";
+pub(super) const DETAIL_LOST: &str = "the corrections of points that the container keeps beside its cages belong to \
+                                      its own frames and are left out: errors are those of the cages alone";
 
 pub(super) fn run(args: &EditArgs) -> Result<()> {
     // The input is read before its new version takes its name.

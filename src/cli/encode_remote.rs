@@ -24,8 +24,8 @@ use std::time::Instant;
 /// Bytes of an origin and of units in a container, rather too many.
 const PLACEMENT_BYTES: u64 = 256;
 
-/// The files are read and the options checked here as well, so that what is wrong with them is told before anything is sent, in
-/// words that name them.
+/// The files are read and the options checked here as well, so that what is wrong with them is told
+/// before anything is sent, in words that name them.
 pub(super) fn run(
     args: &EncodeArgs,
     targets: &Targets,
@@ -101,8 +101,9 @@ pub(super) fn run(
     let job = RemoteJob {
         address,
         token: token.as_deref(),
-        // A service reads a rest pose as it is, with the doubles along seams, and where it is; of an archive it would get all meshes and all frames, and
-        // of a file without those beside it neither materials nor pictures.
+        // A service reads a rest pose as it is, with the doubles along seams, and where it is; of
+        // an archive it would get all meshes and all frames, and of a file without those beside it
+        // neither materials nor pictures.
         rest: if !rest.surface.is_empty() {
             MeshFile::new("rest.cager", pack_model(rest, Units::UNKNOWN)?)
         } else if args.capture.weld
@@ -192,7 +193,8 @@ pub(super) fn coding_options(goal: Option<Goal>, exact_rest: bool) -> SessionOpt
 pub(super) fn refuse_choosing(args: &SolverArgs) -> Result<()> {
     if args.spectrum == Some(SpectrumArg::Auto) {
         bail!(
-            "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without --server"
+            "--spectrum auto: a service prepares before it sees a frame to measure; give a number, or encode without \
+             --server"
         );
     }
     Ok(())

@@ -1,4 +1,5 @@
-//! What is the same wherever a capture is encoded, here or by a service: where files go, options that are checked, the design of a cage.
+//! What is the same wherever a capture is encoded, here or by a service: where files go, options
+//! that are checked, the design of a cage.
 
 use super::args::EncodeArgs;
 use super::coding_args::goal;
@@ -91,7 +92,8 @@ pub(super) fn sized_design(args: &EncodeArgs, files: &CaptureFiles, rest: &Model
     Ok(options)
 }
 
-/// How many vertices a designed cage should have for a bound or a size, where neither they nor an error of the cage are given.
+/// How many vertices a designed cage should have for a bound or a size, where neither they nor an
+/// error of the cage are given.
 fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<Option<usize>> {
     let mut reader = files.open()?;
     let total = reader.frames();
@@ -112,7 +114,8 @@ fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Resu
     Ok(best)
 }
 
-/// What the arguments say of the inversion, and what is usual for this rest pose and cage, which a [mean error](goal) is coded with or not.
+/// What the arguments say of the inversion, and what is usual for this rest pose and cage, which a
+/// [mean error](goal) is coded with or not.
 pub(super) fn solver_options(args: &EncodeArgs, rest: &Model, cage: &Cage, codes_mean: bool) -> Result<SolverOptions> {
     let unknowns = args.solver.coordinates.values(cage).unknowns();
     // The number of frames says how large a file may be, not whether it is coded.

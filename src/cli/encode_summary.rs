@@ -42,7 +42,8 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
         )
     });
     let alone = if report.coding.is_none() {
-        "  cages   only, no error limit; --max-error 0.001 keeps every point within 0.1 % of the diagonal, usually in a smaller file\n"
+        "  cages   only, no error limit; --max-error 0.001 keeps every point within 0.1 % of the diagonal, usually in \
+         a smaller file\n"
     } else {
         ""
     };
@@ -58,7 +59,8 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     let designed = if s.design > 0.0 { format!(", {:.3} s of it for the cage", s.design) } else { String::new() };
     let steps = if is_verbose() {
         format!(
-            "  steps   read {:.3} s, cage {:.3} s, coordinates {:.3} s, handles {:.3} s, SVD {:.3} s, inversion {:.3} s, errors {:.3} s, coding {:.3} s, writing {:.3} s\n",
+            "  steps   read {:.3} s, cage {:.3} s, coordinates {:.3} s, handles {:.3} s, SVD {:.3} s, inversion {:.3} \
+             s, errors {:.3} s, coding {:.3} s, writing {:.3} s\n",
             s.read, s.design, s.coordinates, s.maxvol, s.svd, s.invert, s.measure, s.code, s.write
         )
     } else {

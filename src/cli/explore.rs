@@ -22,8 +22,9 @@ use std::path::{Path, PathBuf};
 
 /// Find shapes between poses of one model, and beyond them.
 ///
-/// The poses have the same points and faces in the same order: meshes, or frames of .cager files, of which walk.cager@12 is frame 12, counted from 0. They give a
-/// path from each to the next one, or one shape by --weights.
+/// The poses have the same points and faces in the same order: meshes, or frames of .cager files,
+/// of which walk.cager@12 is frame 12, counted from 0. They give a path from each to the next one,
+/// or one shape by --weights.
 ///
 /// Example: cager explore stand.obj sit.obj --steps 24 -o between.npy
 #[derive(Args)]
@@ -36,19 +37,24 @@ pub(crate) struct ExploreArgs {
     #[arg(long, value_enum, value_name = "ON", default_value = "mesh")]
     on: On,
 
-    /// With --on cage, a closed cage, a mesh or that of a .cager file, around the first pose, or around the rest pose of its .cager file [default: that of the .cager file, or one that is made].
+    /// With --on cage, a closed cage, a mesh or that of a .cager file, around the first pose, or
+    /// around the rest pose of its .cager file [default: that of the .cager file, or one that is
+    /// made].
     #[arg(long, value_name = "CAGE", hide_default_value = true)]
     cage: Option<PathBuf>,
 
     /// Shapes from each pose to the next one, both ends included.
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=100_000), conflicts_with = "weights")]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=100_000),
+          conflicts_with = "weights")]
     steps: u32,
 
-    /// One shape: a weight for each pose, with commas between them, which sum to 1; below 0 and above 1 they lead beyond the poses.
+    /// One shape: a weight for each pose, with commas between them, which sum to 1; below 0 and
+    /// above 1 they lead beyond the poses.
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = weight)]
     weights: Option<Vec<f64>>,
 
-    /// Where to write: .npy .pc2 .mdd .mcx .abc .usdc .glb, a folder (OUT/) of .obj files, or for one shape .obj .ply .off .stl.
+    /// Where to write: .npy .pc2 .mdd .mcx .abc .usdc .glb, a folder (OUT/) of .obj files, or for
+    /// one shape .obj .ply .off .stl.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
 
@@ -133,7 +139,8 @@ fn refuse_one_mesh(output: &Path, count: usize) -> Result<()> {
     if count > 1 && is_mesh && frames_path(output) == output && !output.is_dir() {
         let folder = output.with_extension("");
         bail!(
-            "{}: holds one mesh, and there are {} shapes; give --weights for one shape, or name a folder for all, such as {}",
+            "{}: holds one mesh, and there are {} shapes; give --weights for one shape, or name a folder for all, such \
+             as {}",
             output.display(),
             grouped(count),
             folder.join("").display()

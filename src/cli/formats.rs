@@ -18,6 +18,7 @@ pub(super) fn run() -> Result<()> {
         let holds = if *animated { "all frames" } else { "one mesh or frame" };
         text += &row([&format!(".{extension}"), name, files, holds, says]);
     }
-    text += "\nUnits and axes that files say are kept, and a capture is brought to those of its rest pose; --unit and --up are for files that say none.\n";
+    text += "\nUnits and axes that files say are kept, and a capture is brought to those of its rest pose; --unit and \
+             --up are for files that say none.\n";
     print(&text)
 }

@@ -99,7 +99,8 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// What clap says, and a hint where a shell expanded a pattern: then files follow each other without an option between them.
+/// What clap says, and a hint where a shell expanded a pattern: then files follow each other
+/// without an option between them.
 fn refused(error: &clap::Error) -> ExitCode {
     let _ = error.print();
     let stray = match error.get(clap::error::ContextKind::InvalidArg) {
@@ -118,7 +119,8 @@ fn refused(error: &clap::Error) -> ExitCode {
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
-/// Writes to stdout, or to stderr where stdout holds an output; a reader that has seen enough, as `head` has, is no failure.
+/// Writes to stdout, or to stderr where stdout holds an output; a reader that has seen enough, as
+/// `head` has, is no failure.
 fn print(text: &str) -> anyhow::Result<()> {
     if global_args::stdout_is_taken() {
         // As for errors, nowhere is left to report a closed stderr to.

@@ -8,18 +8,22 @@ use std::path::Path;
 #[derive(Args, Debug)]
 pub(crate) struct MorphArgs {
     /// Morph targets of a .glb at the most; what they lose is told [default: 64, or 255 with --max-error].
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(1..), hide_default_value = true, conflicts_with = "cages")]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(1..), hide_default_value = true,
+          conflicts_with = "cages")]
     targets: Option<u8>,
 
-    /// As few morph targets of a .glb as keep every point of every frame within E, a fraction of the rest pose's diagonal.
+    /// As few morph targets of a .glb as keep every point of every frame within E, a fraction of
+    /// the rest pose's diagonal.
     #[arg(long, value_name = "E", value_parser = share, allow_negative_numbers = true, conflicts_with = "cages")]
     max_error: Option<f64>,
 
-    /// Positions of a .glb as floats instead of whole numbers of 16 bits (KHR_mesh_quantization): larger, and more exact.
+    /// Positions of a .glb as floats instead of whole numbers of 16 bits (KHR_mesh_quantization):
+    /// larger, and more exact.
     #[arg(long, conflicts_with = "cages")]
     float: bool,
 
-    /// Normals in a .glb as well, of the mean shape and of each morph target: smooth shading, and 12 bytes more for each point of them.
+    /// Normals in a .glb as well, of the mean shape and of each morph target: smooth shading, and
+    /// 12 bytes more for each point of them.
     #[arg(long, conflicts_with = "cages")]
     normals: bool,
 }

@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 
 /// Move the motion of one model onto another that shares nothing with it: other points, other faces, another body.
 ///
-/// The source's cage is laid onto the target, which says what corresponds to what; the target then follows on its own mesh, and the result is one .cager file as
-/// encode writes it, with a cage of the target's own. --method public and rigid are the paper's ways, for comparison.
+/// The source's cage is laid onto the target, which says what corresponds to what; the target then
+/// follows on its own mesh, and the result is one .cager file as encode writes it, with a cage of
+/// the target's own. --method public and rigid are the paper's ways, for comparison.
 ///
 /// Example: cager transfer --source-rest man.obj --source-frames walk.npy --target woman.obj -o walk.cager
 #[derive(Args)]
@@ -39,16 +40,20 @@ pub(crate) struct TransferMotionArgs {
     pub(super) target: PathBuf,
 
     /// How the motion is moved.
-    #[arg(long, value_parser = word::<TransferMethod>(&["fitted", "public", "rigid"]), value_name = "METHOD", default_value = "fitted")]
+    #[arg(long, value_parser = word::<TransferMethod>(&["fitted", "public", "rigid"]), value_name = "METHOD",
+          default_value = "fitted")]
     pub(super) method: TransferMethod,
 
-    /// Closed cage, a mesh or a .cager file: with fitted around the source, with public and rigid around both, in the target's space [default: one is made].
+    /// Closed cage, a mesh or a .cager file: with fitted around the source, with public and rigid
+    /// around both, in the target's space [default: one is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "public")]
     pub(super) cage: Option<PathBuf>,
 
-    /// The cage around both, with --method public or rigid: a box, an icosahedron (ico), a sphere of 162 vertices, the convex hull (42), or an offset surface (350)
+    /// The cage around both, with --method public or rigid: a box, an icosahedron (ico), a sphere
+    /// of 162 vertices, the convex hull (42), or an offset surface (350)
     /// [default: sphere].
-    #[arg(long, value_parser = word::<PublicShape>(&["box", "ico", "sphere", "hull", "offset"]), value_name = "SHAPE", hide_default_value = true)]
+    #[arg(long, value_parser = word::<PublicShape>(&["box", "ico", "sphere", "hull", "offset"]),
+          value_name = "SHAPE", hide_default_value = true)]
     pub(super) public: Option<PublicShape>,
 
     /// Coordinates in the cage around both, with --method public or rigid [default: mvc].
@@ -59,17 +64,20 @@ pub(crate) struct TransferMotionArgs {
     #[arg(long, value_name = "MU", value_parser = weight)]
     pub(super) rigidity: Option<f64>,
 
-    /// Bring the detail of the target at rest, which a cage around both loses, back to every frame, with --method public or rigid.
+    /// Bring the detail of the target at rest, which a cage around both loses, back to every frame,
+    /// with --method public or rigid.
     #[arg(long)]
     pub(super) detail: bool,
 
-    /// With fitted, relative: what the source does to its rest pose, the target does to its own; absolute: limbs take the source's directions, for like bodies that stand
-    /// differently at rest; auto decides by how alike the shapes are [default: auto].
+    /// With fitted, relative: what the source does to its rest pose, the target does to its own;
+    /// absolute: limbs take the source's directions, for like bodies that stand differently at
+    /// rest; auto decides by how alike the shapes are [default: auto].
     #[arg(long, value_parser = word::<RestPose>(&["auto", "relative", "absolute"]), value_name = "POSE")]
     pub(super) pose: Option<RestPose>,
 
-    /// How the source is laid onto the target at first: pca by their surfaces, none as they stand, or a file or list of the 16 numbers, row by row, of the matrix
-    /// that turns, scales and moves it there.
+    /// How the source is laid onto the target at first: pca by their surfaces, none as they stand,
+    /// or a file or list of the 16 numbers, row by row, of the matrix that turns, scales and moves
+    /// it there.
     #[arg(long, value_name = "pca|none|MATRIX", default_value = "pca", allow_hyphen_values = true)]
     align: String,
 
@@ -77,8 +85,8 @@ pub(crate) struct TransferMotionArgs {
     #[arg(long, value_parser = word::<UpAxis>(&["x", "y", "z"]), value_name = "AXIS")]
     pub(super) up: Option<UpAxis>,
 
-    /// With fitted, vertices that correspond, where some are known: a text file with a vertex of the source and one of the target on each line, both counted from 0; # begins
-    /// a comment.
+    /// With fitted, vertices that correspond, where some are known: a text file with a vertex of
+    /// the source and one of the target on each line, both counted from 0; # begins a comment.
     #[arg(long, value_name = "PAIRS.txt")]
     pub(super) pairs: Option<PathBuf>,
 
@@ -90,7 +98,8 @@ pub(crate) struct TransferMotionArgs {
     pub(super) outputs: OutputArgs,
 
     /// Most vertices of the target's cage, which is designed from its new motion [default: 350].
-    #[arg(long, value_name = "N", conflicts_with = "mean_error", value_parser = clap::value_parser!(u32).range(4..=1_500))]
+    #[arg(long, value_name = "N", conflicts_with = "mean_error",
+          value_parser = clap::value_parser!(u32).range(4..=1_500))]
     pub(super) cage_vertices: Option<u32>,
 
     #[command(flatten)]
@@ -142,7 +151,8 @@ impl TransferMotionArgs {
         self.refuse_strangers()?;
         if self.method == TransferMethod::Rigid && self.system().name() == "green" {
             bail!(
-                "--coordinates: with --method rigid, green has normals that follow from the vertices; take mvc or harmonic"
+                "--coordinates: with --method rigid, green has normals that follow from the vertices; take mvc or \
+                 harmonic"
             );
         }
         Ok(words::method(self.method, (self.cage.is_some(), self.public), self.rigidity))
@@ -183,7 +193,8 @@ fn matrix(text: &str) -> Result<[f64; 16]> {
     };
     if words::align(None, Some(matrix)).is_none() {
         bail!(
-            "--align: {text}: does more than turn, scale evenly and move; give a matrix without mirroring and shear, whose last row is 0 0 0 1"
+            "--align: {text}: does more than turn, scale evenly and move; give a matrix without mirroring and shear, \
+             whose last row is 0 0 0 1"
         );
     }
     Ok(matrix)

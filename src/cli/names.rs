@@ -16,11 +16,13 @@ const COORDINATES: &Names = &[
     ("mvc", "Mean value coordinates: defined everywhere, fast"),
     (
         "harmonic",
-        "Harmonic coordinates: between 0 and 1 up to about 1e-3, with influence through the inside of the cage only, where all points must be; seconds to prepare",
+        "Harmonic coordinates: between 0 and 1 up to about 1e-3, with influence through the inside of the cage only, \
+         where all points must be; seconds to prepare",
     ),
     (
         "green",
-        "Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by iterating",
+        "Green coordinates: the model keeps its angles better; normals of the cage follow from its vertices, found by \
+         iterating",
     ),
     (
         "green-free",

@@ -24,7 +24,8 @@ pub(crate) struct Ignored {
 impl ServiceCommand {
     pub(super) fn run(&self) -> Result<()> {
         bail!(
-            "this program was built without the service, which serve, store and demo need; build it with its default features"
+            "this program was built without the service, which serve, store and demo need; build it with its default \
+             features"
         )
     }
 }

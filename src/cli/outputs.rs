@@ -23,7 +23,8 @@ pub(crate) struct OutputArgs {
     pub(super) dry_run: bool,
 }
 
-/// The outputs of a command, each checked when it is named: before the work, so that one that cannot be written costs no waiting.
+/// The outputs of a command, each checked when it is named: before the work, so that one that
+/// cannot be written costs no waiting.
 pub(super) struct Outputs {
     overwrite: bool,
     inputs: Vec<PathBuf>,
@@ -46,7 +47,8 @@ impl Outputs {
         Ok(target)
     }
 
-    /// A container, refused on a terminal with a hint to redirect it as in `example`, and under the name of another format.
+    /// A container, refused on a terminal with a hint to redirect it as in `example`, and under the
+    /// name of another format.
     pub(super) fn container(&mut self, path: &Path, example: &str) -> Result<Target> {
         refuse_terminal(path, example)?;
         let target = self.text(path)?;
@@ -70,7 +72,8 @@ impl Outputs {
         let target = self.target(path, place)?;
         if is_numbered_in_vain(path) {
             warn(&[format!(
-                "{}: a file of this format holds all frames, so one of just this name is written; end the name in .obj or .ply for one of each frame",
+                "{}: a file of this format holds all frames, so one of just this name is written; end the name in .obj \
+                 or .ply for one of each frame",
                 path.display()
             )]);
         }
@@ -83,7 +86,8 @@ impl Outputs {
         }
         if !self.overwrite && fs::read_dir(place).is_ok_and(|mut files| files.next().is_some()) {
             bail!(
-                "{}: is a folder that is not empty; name another, or give --overwrite to replace it as a whole, where it holds only such frames",
+                "{}: is a folder that is not empty; name another, or give --overwrite to replace it as a whole, where \
+                 it holds only such frames",
                 path.display()
             );
         }
@@ -102,7 +106,8 @@ impl Outputs {
         if let Some(file) = there.filter(|file| is_one(file)).min().filter(|_| !self.overwrite) {
             let file = file.strip_prefix(".").unwrap_or(&file);
             bail!(
-                "{}: is there already; name other files than {shown}, or give --overwrite to replace those that are written",
+                "{}: is there already; name other files than {shown}, or give --overwrite to replace those that are \
+                 written",
                 file.display()
             );
         }

@@ -181,7 +181,8 @@ fn refuse_other_order((file, points): (&PoseFile, &[Point]), (first, model): (&P
     }
     let Some(Mismatch::Order(longer)) = found.first() else { return Ok(()) };
     bail!(
-        "{file}: does not look like a pose of {first}: its points come in another order: edges of that are {longer:.0} times longer in this; export both from one program with the order of the points kept"
+        "{file}: does not look like a pose of {first}: its points come in another order: edges of that are {longer:.0} \
+         times longer in this; export both from one program with the order of the points kept"
     )
 }
 

@@ -102,7 +102,8 @@ fn refuse_several(args: &RecoverArgs) -> Result<()> {
     let (templates, cages) = (args.template.len(), args.cage.len());
     if cages > 0 && cages != templates {
         bail!(
-            "--cage: there are {templates} templates and {cages} cages; give one for each template in their order, or none"
+            "--cage: there are {templates} templates and {cages} cages; give one for each template in their order, or \
+             none"
         );
     }
     if templates > 1 {
@@ -184,8 +185,9 @@ fn frames(args: &RecoverArgs) -> Result<MeshSequence> {
     Ok(files)
 }
 
-/// The look of the surfaces that the template does not get, by the first of them; what is wrong with it is told when it is followed. Their colours are asked for by
-/// an option, and their normals are followed.
+/// The look of the surfaces that the template does not get, by the first of them; what is wrong
+/// with it is told when it is followed. Their colours are asked for by an option, and their normals
+/// are followed.
 fn dropped_of_first(files: &MeshSequence) -> Option<String> {
     let path = files.files.first()?;
     let dropped = read_mesh(path, &[]).ok()?.dropped_with_appearance().appearance();

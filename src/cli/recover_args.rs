@@ -10,24 +10,30 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
-/// Recover one animation of a template from meshes or point clouds that have no correspondence: scans, reconstructions, visual hulls.
+/// Recover one animation of a template from meshes or point clouds that have no correspondence:
+/// scans, reconstructions, visual hulls.
 ///
-/// Every frame is a surface of its own, with other points and other faces. The template is laid onto each by its cage, as rigid as the surfaces allow, and the
-/// result is one .cager file as encode writes it. The template should stand about as the first frame does.
-/// Example: cager recover --template scan_0001.ply --frames 'scan_*.ply' -o dance.cager
+/// Every frame is a surface of its own, with other points and other faces. The template is laid
+/// onto each by its cage, as rigid as the surfaces allow, and the result is one .cager file as
+/// encode writes it. The template should stand about as the first frame does. Example: cager
+/// recover --template scan_0001.ply --frames 'scan_*.ply' -o dance.cager
 #[derive(Args)]
 pub(crate) struct RecoverArgs {
-    /// Mesh that is to move: .obj .ply .off .stl .glb .abc .usdc, with faces; one of the frames will do. Where the topology changes for good, go on with another one from
-    /// that frame: --template first.obj --template 120:second.obj. Then out-1.cager, out-2.cager and a list of them, out.stretches.json, are written.
-    #[arg(long, value_name = "[FRAME:]TEMPLATE", required = true, value_parser = OsStringValueParser::new().map(KeyTemplate::from))]
+    /// Mesh that is to move: .obj .ply .off .stl .glb .abc .usdc, with faces; one of the frames
+    /// will do. Where the topology changes for good, go on with another one from that frame:
+    /// --template first.obj --template 120:second.obj. Then out-1.cager, out-2.cager and a list of
+    /// them, out.stretches.json, are written.
+    #[arg(long, value_name = "[FRAME:]TEMPLATE", required = true,
+          value_parser = OsStringValueParser::new().map(KeyTemplate::from))]
     pub(super) template: Vec<KeyTemplate>,
 
-    /// Surfaces, in the order of their numbers: a folder, quoted glob or numbered name (scan.%04d.ply) of mesh files or of point clouds with or without
-    /// normals.
+    /// Surfaces, in the order of their numbers: a folder, quoted glob or numbered name
+    /// (scan.%04d.ply) of mesh files or of point clouds with or without normals.
     #[arg(long, value_name = "FRAMES")]
     pub(super) frames: PathBuf,
 
-    /// Closed cage around the template, a mesh or a .cager file, or one for each template in their order [default: one of about 350 vertices is made].
+    /// Closed cage around the template, a mesh or a .cager file, or one for each template in their
+    /// order [default: one of about 350 vertices is made].
     #[arg(long, value_name = "CAGE", hide_default_value = true, conflicts_with = "rig")]
     pub(super) cage: Vec<PathBuf>,
 
@@ -58,7 +64,8 @@ pub(crate) struct RecoverArgs {
     #[command(flatten)]
     pub(super) outputs: OutputArgs,
 
-    /// Let points of the template leave the cage to meet the surfaces, smoothly; give an error (--max-error) to store where they are.
+    /// Let points of the template leave the cage to meet the surfaces, smoothly; give an error
+    /// (--max-error) to store where they are.
     #[arg(long)]
     pub(super) offsets: bool,
 
@@ -79,7 +86,8 @@ pub(crate) struct RecoverArgs {
     pub(super) up: Option<Up>,
 
     /// Points of each surface that are looked at.
-    #[arg(long, value_name = "N", default_value_t = 15_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 15_000,
+          value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     pub(super) points: u32,
 
     #[command(flatten)]

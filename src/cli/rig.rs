@@ -22,9 +22,9 @@ use std::path::{Path, PathBuf};
 
 /// Place a rig of oriented quads in a person: the cage that `recover --rig` poses.
 ///
-/// The person should stand upright in a T- or A-pose. The rig is a JSON file that may be corrected by hand: 21 quads with the joints that they turn about. After a
-/// first recovery, --motion puts joints where the parts of the body turn about them.
-/// Example: cager rig body.obj -o rig.json
+/// The person should stand upright in a T- or A-pose. The rig is a JSON file that may be corrected
+/// by hand: 21 quads with the joints that they turn about. After a first recovery, --motion puts
+/// joints where the parts of the body turn about them. Example: cager rig body.obj -o rig.json
 #[derive(Args, Debug)]
 pub(crate) struct RigArgs {
     /// Mesh of a person: .obj .ply .off .stl .glb .abc .usdc, with faces.
@@ -39,18 +39,21 @@ pub(crate) struct RigArgs {
     outputs: OutputArgs,
 
     /// Axis that points up.
-    #[arg(long = "up", id = "rig_up", value_name = "AXIS", value_parser = super::checks::up, default_value = "y", conflicts_with = "rig")]
+    #[arg(long = "up", id = "rig_up", value_name = "AXIS", value_parser = super::checks::up, default_value = "y",
+          conflicts_with = "rig")]
     up: Up,
 
     /// Axis that the person looks along: x, -x, y, -y, z or -z [default: as the feet tell].
-    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true, hide_default_value = true, conflicts_with = "rig")]
+    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true, hide_default_value = true,
+          conflicts_with = "rig")]
     forward: Option<Point>,
 
     /// Distance between the person and the cage, where there is room, as a fraction of the height.
     #[arg(long, value_name = "F", default_value_t = 0.003, value_parser = margin, allow_negative_numbers = true)]
     margin: f64,
 
-    /// Correct joints by how this template moves: a .cager file of it, as a first `recover` writes it. Learn the manifold anew for the corrected rig.
+    /// Correct joints by how this template moves: a .cager file of it, as a first `recover` writes
+    /// it. Learn the manifold anew for the corrected rig.
     #[arg(long, value_name = "FIRST.cager")]
     motion: Option<PathBuf>,
 
@@ -61,7 +64,8 @@ pub(crate) struct RigArgs {
 
 /// Learn which poses are usual from motion capture: the manifold of `recover --manifold`.
 ///
-/// Clips are BVH files whose joints are named as CMU's or Mixamo's, or by --names. Example: cager manifold walk.bvh --rig rig.json -o walk.manifold.json
+/// Clips are BVH files whose joints are named as CMU's or Mixamo's, or by --names. Example: cager
+/// manifold walk.bvh --rig rig.json -o walk.manifold.json
 #[derive(Args, Debug)]
 pub(crate) struct ManifoldArgs {
     /// Motion capture: .bvh files.
@@ -147,7 +151,8 @@ pub(super) fn run(args: &RigArgs) -> Result<()> {
     let outside = placed.enclosure.outside.len();
     if outside > 0 {
         warn(&[format!(
-            "{}: {} of {} points lie outside of the rig's cage, by up to {:.2} % of the height; move the quads there outwards in the file, or go on",
+            "{}: {} of {} points lie outside of the rig's cage, by up to {:.2} % of the height; move the quads there \
+             outwards in the file, or go on",
             args.template.display(),
             grouped(outside),
             grouped(template.points.len()),
@@ -191,7 +196,8 @@ fn frames_of(path: &Path, template_path: &Path, template: &Model) -> Result<Vec<
     let other = rest.points.iter().zip(&template.points).position(|(a, b)| distance(add(*a, origin), *b) > near);
     if let Some(point) = other {
         bail!(
-            "{}: its rest pose is not {}: point {point} is elsewhere; give the template that this was recovered with, in its units and place",
+            "{}: its rest pose is not {}: point {point} is elsewhere; give the template that this was recovered with, \
+             in its units and place",
             path.display(),
             template_path.display()
         );

@@ -1,4 +1,5 @@
-//! Stretches of frames that have a template each: how they are told and cut, what their files are called, and the list of them.
+//! Stretches of frames that have a template each: how they are told and cut, what their files are
+//! called, and the list of them.
 
 use anyhow::{Context, Result, bail};
 use cager_capture::decode::{self, Container, DecodeError};
@@ -116,7 +117,8 @@ impl StretchList {
             let (first, count) = (numbers.first().copied().unwrap_or(0.0), container.frames());
             if (first, count) != (*first_frame, *frames) {
                 bail!(
-                    "{named}: has {frames} frames of {shown} from {first_frame} on, but that has {count} from {first} on; recover them again"
+                    "{named}: has {frames} frames of {shown} from {first_frame} on, but that has {count} from {first} \
+                     on; recover them again"
                 );
             }
             let rate = container.header().frame_rate;
@@ -125,7 +127,8 @@ impl StretchList {
             }
             if first <= last {
                 bail!(
-                    "{named}: {shown} begins with frame {first}, and what is listed before it ends with frame {last}; list files in the order of their frames, each frame once"
+                    "{named}: {shown} begins with frame {first}, and what is listed before it ends with frame {last}; \
+                     list files in the order of their frames, each frame once"
                 );
             }
             last = numbers.last().copied().unwrap_or(count.saturating_sub(1) as f64);

@@ -19,16 +19,18 @@ pub(crate) struct TransferArgs {
     #[arg(long, conflicts_with_all = ["with_cages", "model"])]
     pub(crate) cages: bool,
 
-    /// Move the model by these cages instead: those of --cages, edited; folder, quoted glob or numbered name of mesh files, .npy,
-    /// .pc2, .mdd, .mcx, .abc or .usdc, of any number of frames.
+    /// Move the model by these cages instead: those of --cages, edited; folder, quoted glob or
+    /// numbered name of mesh files, .npy, .pc2, .mdd, .mcx, .abc or .usdc, of any number of frames.
     #[arg(long, value_name = "EDITED")]
     pub(crate) with_cages: Option<PathBuf>,
 
-    /// Keep the cage beside the model, as a second mesh that programs show as a guide and do not render; .usdc and .usdz alone.
+    /// Keep the cage beside the model, as a second mesh that programs show as a guide and do not
+    /// render; .usdc and .usdz alone.
     #[arg(long, conflicts_with = "cages")]
     pub(crate) with_cage: bool,
 
-    /// Move another model instead, which lies in the same rest cage: another resolution, garments, eyes; .obj .ply .off .stl .glb .abc .usdc.
+    /// Move another model instead, which lies in the same rest cage: another resolution, garments,
+    /// eyes; .obj .ply .off .stl .glb .abc .usdc.
     #[arg(long, value_name = "OTHER")]
     pub(crate) model: Option<PathBuf>,
 
@@ -68,7 +70,8 @@ impl TransferArgs {
         let only = match self.frame.map(|frame| (frame, usize::try_from(frame))) {
             Some((_, Ok(frame))) => Some(FrameRange::only(frame)),
             Some((frame, Err(_))) => bail!(
-                "{}: --frame {frame}: frames are counted from 0, and the last one of {frames} is frame {}; give that number",
+                "{}: --frame {frame}: frames are counted from 0, and the last one of {frames} is frame {}; give that \
+                 number",
                 source.display(),
                 frames.saturating_sub(1)
             ),
@@ -87,9 +90,10 @@ impl TransferArgs {
 
 /// Add edited cages to a .cager file as a layer, or take layers back, switch them and write them into the cages.
 ///
-/// `cager decode --cages` writes the cages to edit. A layer says by how much vertices of the cage are moved in which frames; all else in the file stays as it is,
-/// details beside the cages too, so that a layer can be taken back.
-/// Example: cager edit walk.cager --with-cages edited.npy --name smile -o edited.cager
+/// `cager decode --cages` writes the cages to edit. A layer says by how much vertices of the cage
+/// are moved in which frames; all else in the file stays as it is, details beside the cages too, so
+/// that a layer can be taken back. Example: cager edit walk.cager --with-cages edited.npy --name
+/// smile -o edited.cager
 #[derive(Args, Debug)]
 #[command(group = ArgGroup::new("what").required(true).multiple(true).args(["with_cages", "flatten", "remove", "on", "off", "up", "unit"]))]
 pub(crate) struct EditArgs {
@@ -97,8 +101,9 @@ pub(crate) struct EditArgs {
     #[arg(value_name = "IN.cager")]
     pub(crate) input: PathBuf,
 
-    /// Edited cages: folder, quoted glob or numbered name of mesh files, .npy, .pc2, .mdd, .mcx, .abc or .usdc. Of another number of frames than the file has, they
-    /// take the place of all its frames.
+    /// Edited cages: folder, quoted glob or numbered name of mesh files, .npy, .pc2, .mdd, .mcx,
+    /// .abc or .usdc. Of another number of frames than the file has, they take the place of all its
+    /// frames.
     #[arg(long, value_name = "EDITED")]
     pub(crate) with_cages: Option<PathBuf>,
 
@@ -115,7 +120,8 @@ pub(crate) struct EditArgs {
     pub(crate) flatten: bool,
 
     /// Take back the last layer, the one with this number (from 1), or all.
-    #[arg(long, value_name = "LAYER|all", num_args = 0..=1, default_missing_value = "last", conflicts_with_all = ["with_cages", "flatten", "on", "off"])]
+    #[arg(long, value_name = "LAYER|all", num_args = 0..=1, default_missing_value = "last",
+          conflicts_with_all = ["with_cages", "flatten", "on", "off"])]
     pub(crate) remove: Option<LayerChoice>,
 
     /// Switch the layer with this number on.
@@ -126,11 +132,13 @@ pub(crate) struct EditArgs {
     #[arg(long, value_name = "LAYER", conflicts_with_all = ["with_cages", "flatten"])]
     pub(crate) off: Option<usize>,
 
-    /// The axis that points up in EDITED, y or z, where its file does not say it: it is turned to that of IN. Without --with-cages, the one in IN, which keeps it.
+    /// The axis that points up in EDITED, y or z, where its file does not say it: it is turned to
+    /// that of IN. Without --with-cages, the one in IN, which keeps it.
     #[arg(long, value_name = "AXIS", value_parser = up, conflicts_with_all = ["flatten", "remove", "on", "off"])]
     pub(crate) up: Option<Up>,
 
-    /// The unit of EDITED, where its file does not say it: it is scaled to that of IN. Without --with-cages, the one of IN, which keeps it.
+    /// The unit of EDITED, where its file does not say it: it is scaled to that of IN. Without
+    /// --with-cages, the one of IN, which keeps it.
     #[arg(long, value_name = "UNIT", value_enum, conflicts_with_all = ["flatten", "remove", "on", "off"])]
     pub(crate) unit: Option<Unit>,
 

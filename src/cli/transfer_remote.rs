@@ -79,7 +79,8 @@ pub(super) fn run(
     ))
 }
 
-/// A model for a service, which would get all meshes and all frames of a scene: of those, the meshes alone that are named.
+/// A model for a service, which would get all meshes and all frames of a scene: of those, the
+/// meshes alone that are named.
 fn model_file(path: &Path, prims: &[String]) -> Result<MeshFile> {
     if !is_scene(path) && prims.is_empty() {
         return Ok(mesh_file(path)?);
@@ -123,7 +124,8 @@ fn array(frames: &mut dyn FrameReader) -> Result<Vec<u8>> {
     let first = frames.number(0);
     if let Some(frame) = (1..count).find(|&frame| frames.number(frame) != first + frame as f64) {
         bail!(
-            "--server: frame {} follows frame {}, and a service counts frames one by one; number the files so, or leave --server out",
+            "--server: frame {} follows frame {}, and a service counts frames one by one; number the files so, or \
+             leave --server out",
             frames.number(frame),
             frames.number(frame - 1)
         );

@@ -23,7 +23,8 @@ pub enum RemoteCage<'a> {
     Designed(&'a DesignOptions),
 }
 
-/// Has the service design a cage; returns the finished design, which stays on the service. Reads `frames` from the beginning.
+/// Has the service design a cage; returns the finished design, which stays on the service. Reads
+/// `frames` from the beginning.
 pub(super) async fn design(
     client: &Client,
     address: &str,

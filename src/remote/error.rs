@@ -15,11 +15,13 @@ pub enum RemoteError {
     Formats(#[from] cager_formats::Error),
     /// What the service sent is not a container.
     #[error(
-        "the container from the service cannot be read ({0}); encode again, and look at the service's log if that gives the same"
+        "the container from the service cannot be read ({0}); encode again, and look at the service's log if that \
+         gives the same"
     )]
     Container(container::Error),
     /// The session to go on with is of something else.
-    #[error("{0}; give what session {session} was made with, or leave out --session for a new one", session = .0.session)]
+    #[error("{0}; give what session {session} was made with, or leave out --session for a new one",
+            session = .0.session)]
     Different(Difference),
     /// It broke off for a reason that passes, and the service keeps what it has.
     #[error("{cause}; session {session} keeps what was sent: the same command with --session {session} goes on")]
@@ -31,7 +33,8 @@ pub enum RemoteError {
     },
     /// It broke off for a reason that somebody has to remove first, and the service keeps what it has.
     #[error(
-        "{cause}; session {session} keeps what was sent: once that is put right, the same command with --session {session} goes on"
+        "{cause}; session {session} keeps what was sent: once that is put right, the same command with --session \
+         {session} goes on"
     )]
     Stopped {
         /// The session.
@@ -49,7 +52,8 @@ pub enum RemoteError {
     },
     /// Trying again would end the same way.
     #[error(
-        "{cause}; session {session} cannot be gone on with: {address}/v1/sessions/{session} shows it until you delete it there"
+        "{cause}; session {session} cannot be gone on with: {address}/v1/sessions/{session} shows it until you delete \
+         it there"
     )]
     Ended {
         /// The session.
@@ -67,7 +71,8 @@ pub enum RemoteError {
     },
     /// It broke off while a cage was being designed, or after that.
     #[error(
-        "{cause}; cage design {design} stays on the service: fetch its cage from {address}/v1/cages/{design}/cage.obj and give it with --cage, or delete it there"
+        "{cause}; cage design {design} stays on the service: fetch its cage from {address}/v1/cages/{design}/cage.obj \
+         and give it with --cage, or delete it there"
     )]
     Designed {
         /// The design.

@@ -79,7 +79,8 @@ impl FrameSource for FileFrames {
             Some(at) => Err(io::Error::other(Error::Invalid {
                 path: self.files.path.clone(),
                 what: format!(
-                    "frame {frame}: point {} is too large for single precision, in which frames are sent; scale the capture down",
+                    "frame {frame}: point {} is too large for single precision, in which frames are sent; scale the \
+                     capture down",
                     at / 3
                 ),
             })),

@@ -73,7 +73,8 @@ async fn recover(
     }
 }
 
-/// Whether the service refuses what was sent, so that what it has is of no use. A proxy's limit can be raised, and the same call goes on then.
+/// Whether the service refuses what was sent, so that what it has is of no use. A proxy's limit can
+/// be raised, and the same call goes on then.
 fn is_refusal(error: &RemoteError) -> bool {
     match error {
         RemoteError::Client(error) if error.is_body_limit() => false,

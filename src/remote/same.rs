@@ -6,7 +6,8 @@ use cager_client::{Client, ClientError, FrameSource, MeshFile, NewSession};
 use serde_json::{Map, Value};
 use std::io;
 
-/// Options that say nothing about what a session is of: its name is that of the output, and how a cage came about is compared as a file.
+/// Options that say nothing about what a session is of: its name is that of the output, and how a
+/// cage came about is compared as a file.
 const LEFT_OUT: [&str; 2] = ["name", "cage"];
 
 /// Compares a session with what one would be made of now. Reads the frames that it has from `frames`.

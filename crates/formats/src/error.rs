@@ -63,7 +63,8 @@ pub enum Error {
         found: u64,
     },
     /// A frame has a NaN or an infinity: leave the frame out or repair it.
-    #[error("{}: frame {frame}: point {point} has a coordinate that is NaN or infinite; repair the frame or leave it out", .path.display())]
+    #[error("{}: frame {frame}: point {point} has a coordinate that is NaN or infinite; repair the frame or leave it \
+             out", .path.display())]
     NonFinite {
         /// The file.
         path: PathBuf,

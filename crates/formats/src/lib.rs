@@ -17,6 +17,7 @@ mod glb;
 mod listing;
 mod matrix;
 pub mod mesh;
+mod names;
 mod natural;
 mod normals;
 mod pictures;

@@ -60,7 +60,8 @@ fn read(file: &Path, most: u64) -> Result<Vec<u8>, String> {
     if has_signature || is_targa { Ok(bytes) } else { Err("it is no picture that is known".to_owned()) }
 }
 
-/// What pictures begin with, and where: PNG, JPEG, WebP, KTX2, KTX, OpenEXR, TIFF, Radiance, BMP, GIF, DDS, PSD, JPEG 2000, AVIF.
+/// What pictures begin with, and where: PNG, JPEG, WebP, KTX2, KTX, OpenEXR, TIFF, Radiance, BMP,
+/// GIF, DDS, PSD, JPEG 2000, AVIF.
 const SIGNATURES: [(usize, &[u8]); 15] = [
     (0, b"\x89PNG"),
     (0, b"\xff\xd8\xff"),

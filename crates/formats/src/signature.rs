@@ -94,7 +94,8 @@ impl Signature {
     pub fn other_than(extension: &str, bytes: &[u8]) -> Option<String> {
         let found = Self::of(bytes)?;
         if extension == "abc" && found == Self::Scene("HDF5") {
-            let what = "is an Alembic archive of the old kind, HDF5, which is not read; write it as Ogawa with abcconvert -toOgawa, or export it again";
+            let what = "is an Alembic archive of the old kind, HDF5, which is not read; write it as Ogawa with \
+                        abcconvert -toOgawa, or export it again";
             return Some(what.to_owned());
         }
         let is_own = match found {

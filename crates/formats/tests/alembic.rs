@@ -562,7 +562,8 @@ fn objects_that_contain_themselves_are_refused() {
     let place = |name, child| transform(name, &[0x10], 0, &[vec![0.0; 3]], vec![child]);
     let whole = archive("", &[EVEN], &[place("outer", place("inner", triangle(1)))]);
     let number = |at: usize| u64::from_le_bytes(whole[at..at + 8].try_into().unwrap());
-    // Where a group has the offset of one of its children, and that offset; the first child of an object are its properties.
+    // Where a group has the offset of one of its children, and that offset; the first child of an
+    // object are its properties.
     let slot = |group: u64, child: usize| group as usize + 8 + 8 * child;
     let child = |group: u64| number(slot(group, 1));
     let top = number(slot(number(8), 2));

@@ -10,9 +10,9 @@ use std::process::Command;
 use cager_formats::{FrameOptions, MeshFormat, Target, create_frames, open_frames, read_mesh, read_mesh_bytes};
 use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::{
-    Channel, CornerSet, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface, Texture, numbered,
+    Channel, CornerSet, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface, numbered,
 };
-use support::{all, archive, polygons, wide};
+use support::{all, archive, by_corner, data, polygons, set, texture, wide};
 use tempfile::tempdir;
 
 fn only(range: Range<u32>) -> Option<Vec<Range<u32>>> {
@@ -22,28 +22,16 @@ fn only(range: Range<u32>) -> Option<Vec<Range<u32>>> {
 /// A roof of two quads that meet at a ridge, a flag below it that is hidden in the first and the last of three frames,
 /// and a triangle without a path.
 fn scene() -> (Surface, Polygons, Vec<Vec<f32>>) {
-    let mut faces = Polygons::new();
-    for face in [&[0, 1, 2, 3][..], &[3, 2, 4, 5], &[6, 7, 8], &[9, 10, 11]] {
-        faces.push(face);
-    }
-    let set = |name: &str, values: Vec<[f32; 2]>, corners: &[u32]| CornerSet {
-        name: name.to_owned(),
-        values,
-        corners: corners.to_vec(),
-    };
+    let faces = polygons(&[&[0, 1, 2, 3], &[3, 2, 4, 5], &[6, 7, 8], &[9, 10, 11]]);
     let roof = Part {
         path: "/house/top/roof/roof_mesh".to_owned(),
         points: 6,
         faces: 2,
         uv_sets: vec![
-            set("UV;Map", vec![[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]], &[0, 1, 2, 3, 0, 1, 2, 3]),
-            set("light", vec![[0.25, 0.75], [0.5, 0.125]], &[0, 0, 0, 0, 1, 1, 1, 0]),
+            set("UV;Map", &[[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]], &[0, 1, 2, 3, 0, 1, 2, 3]),
+            set("light", &[[0.25, 0.75], [0.5, 0.125]], &[0, 0, 0, 0, 1, 1, 1, 0]),
         ],
-        color_sets: vec![CornerSet {
-            name: "light".to_owned(),
-            values: vec![[1.0, 0.0, 0.0, 1.0], [0.0, 0.5, 0.0, 0.25]],
-            corners: vec![0, 0, 0, 0, 1, 1, 1, 0],
-        }],
+        color_sets: vec![set("light", &[[1.0, 0.0, 0.0, 1.0], [0.0, 0.5, 0.0, 0.25]], &[0, 0, 0, 0, 1, 1, 1, 0])],
         normals: vec![0, 0, 0, 0, 1, 1, 1, 1],
         materials: vec![1, 0],
         groups: vec![FaceGroup { name: "tiles".to_owned(), faces: vec![0, 1] }],
@@ -62,7 +50,7 @@ fn scene() -> (Surface, Polygons, Vec<Vec<f32>>) {
     let bare =
         Part { shown: Some(vec![0..1, 2..3]), points: 3, faces: 1, subdivision: Subdivision::Loop, ..Part::default() };
     let named = |name: &str| Material { name: name.to_owned(), ..Material::default() };
-    let picture = Texture { channel: Channel::BaseColor, path: "tiles.png".to_owned() };
+    let picture = texture(Channel::BaseColor, "tiles.png");
     let materials = vec![named("glass"), Material { textures: vec![picture], ..named("tiles") }];
     let rest = [
         [0.0, 0.0, 0.0],
@@ -118,8 +106,8 @@ fn written(folder: &Path) -> PathBuf {
     path
 }
 
-fn by_corner<const N: usize>(set: &CornerSet<N>) -> (&str, Vec<[f32; N]>) {
-    (&set.name, set.corners.iter().map(|&k| set.values[k as usize]).collect())
+fn named<const N: usize>(set: &CornerSet<N>) -> (&str, Vec<[f32; N]>) {
+    (&set.name, by_corner(set))
 }
 
 #[test]
@@ -133,11 +121,11 @@ fn what_was_written_comes_back() {
     let [expected, expected_flag, _] = &surface.parts[..] else { panic!() };
     assert_eq!(roof.path, expected.path);
     assert_eq!((bare.path.as_str(), bare.subdivision), ("/house_fire/house_fireShape", Subdivision::Loop));
-    let uvs: Vec<_> = roof.uv_sets.iter().map(by_corner).collect();
-    let expected_uvs: Vec<_> = expected.uv_sets.iter().map(by_corner).collect();
+    let uvs: Vec<_> = roof.uv_sets.iter().map(named).collect();
+    let expected_uvs: Vec<_> = expected.uv_sets.iter().map(named).collect();
     assert_eq!(uvs, [("UV_Map", expected_uvs[0].1.clone()), expected_uvs[1].clone()]);
-    let colors: Vec<_> = roof.color_sets.iter().map(by_corner).collect();
-    assert_eq!(colors, [("light_1", by_corner(&expected.color_sets[0]).1)]);
+    let colors: Vec<_> = roof.color_sets.iter().map(named).collect();
+    assert_eq!(colors, [("light_1", named(&expected.color_sets[0]).1)]);
     let same = |part: &Part| numbered(&polygons(&[&[0, 1, 2, 3], &[3, 2, 4, 5]]), &part.normals).0;
     assert_eq!(same(roof), same(expected));
     assert_eq!((&roof.materials, &flag.materials), (&expected.materials, &Vec::new()));
@@ -164,13 +152,13 @@ fn points_faces_and_corners_have_values_as_programs_write_them() {
     assert_eq!((part.path.as_str(), part.subdivision), ("/cloth", Subdivision::Bilinear));
     let [first, second] = &part.uv_sets[..] else { panic!("{:?}", part.uv_sets) };
     let [a, b, c, d] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-    assert_eq!(by_corner(first), ("map1", vec![d, c, b, a, d, c, b]));
+    assert_eq!(named(first), ("map1", vec![d, c, b, a, d, c, b]));
     let expected = [0.0, 0.1, 0.2, 0.3, 0.1, 0.4, 0.2].map(|u: f32| [u, 0.0]).to_vec();
-    assert_eq!(by_corner(second), ("map2", expected));
+    assert_eq!(named(second), ("map2", expected));
     let [tint, all] = &part.color_sets[..] else { panic!("{:?}", part.color_sets) };
     let (red, green) = ([1.0, 0.0, 0.0, 1.0], [0.0, 0.5, 0.0, 1.0]);
-    assert_eq!(by_corner(tint), ("tint", vec![red, red, red, red, green, green, green]));
-    assert_eq!(by_corner(all), ("all", vec![[0.25, 0.5, 0.75, 1.0]; 7]));
+    assert_eq!(named(tint), ("tint", vec![red, red, red, red, green, green, green]));
+    assert_eq!(named(all), ("all", vec![[0.25, 0.5, 0.75, 1.0]; 7]));
     // At the edge between both faces one corner of two is hard.
     let [.., one, two, three, four] = numbered(&read.model.faces, &part.normals).0[..] else { panic!() };
     assert_eq!((one, two, three, four), (3, 4, 5, 2));
@@ -184,13 +172,11 @@ fn points_faces_and_corners_have_values_as_programs_write_them() {
 #[test]
 #[ignore = "needs the captures: make captures"]
 fn a_character_of_blender_comes_back_from_an_archive() {
-    let captures = std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    let path = captures.join("character/robin.abc");
+    let path = data().join("character/robin.abc");
     let read = read_mesh(&path, &[]).unwrap();
     let model = read.model;
     model.surface.check(1183, &model.faces).unwrap();
-    let told = fs::read_to_string(captures.join("character/truth.json")).unwrap();
+    let told = fs::read_to_string(data().join("character/truth.json")).unwrap();
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     let mut reader = open_frames(&path, 1183).unwrap();
     assert_eq!(told["parts"].as_array().unwrap().len(), model.surface.parts.len());
@@ -245,7 +231,7 @@ fn names_of_any_number_and_length_are_kept() {
         path: format!("/all/{}", name(k)),
         points: 3,
         faces: 1,
-        uv_sets: vec![CornerSet { name: name(k), values: vec![[0.5, 0.25]], corners: vec![0; 3] }],
+        uv_sets: vec![set(&name(k), &[[0.5, 0.25]], &[0; 3])],
         ..Part::default()
     };
     let surface = Surface { parts: (0..300).map(part).collect(), ..Surface::default() };

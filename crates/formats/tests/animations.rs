@@ -15,59 +15,9 @@ use gltf::json::Root;
 use gltf::json::accessor::Type;
 use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
-use support::{POINTS, all, glb_file, message, numbers, polygons, wide};
+use support::document::Built;
+use support::{POINTS, all, message, numbers, polygons, wide};
 use tempfile::{TempDir, tempdir};
-
-/// A document that grows: each accessor has a view of its own.
-#[derive(Default)]
-struct Built {
-    views: Vec<String>,
-    accessors: Vec<String>,
-    data: Vec<u8>,
-}
-
-impl Built {
-    fn view(&mut self, bytes: &[u8]) -> usize {
-        self.views.push(format!(r#"{{"buffer":0,"byteOffset":{},"byteLength":{}}}"#, self.data.len(), bytes.len()));
-        self.data.extend(bytes);
-        self.data.resize(self.data.len().next_multiple_of(4), 0);
-        self.views.len() - 1
-    }
-
-    fn add(&mut self, kind: u32, count: usize, shape: &str, bytes: &[u8]) -> usize {
-        let view = self.view(bytes);
-        self.accessors.push(format!(
-            r#"{{"bufferView":{view},"componentType":{kind},"count":{count},"type":"{shape}","normalized":{}}}"#,
-            kind != 5126 && shape == "VEC4"
-        ));
-        self.accessors.len() - 1
-    }
-
-    fn floats(&mut self, shape: &str, numbers: &[f32]) -> usize {
-        let width = match shape {
-            "VEC3" => 3,
-            "VEC4" => 4,
-            "MAT4" => 16,
-            _ => 1,
-        };
-        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-        self.add(5126, numbers.len() / width, shape, &bytes)
-    }
-
-    fn points(&mut self) -> usize {
-        self.floats("VEC3", &POINTS.map(|p| p.map(|x| x as f32)).concat())
-    }
-
-    fn file(&self, rest: &str) -> Vec<u8> {
-        let json = format!(
-            r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{}}}],"bufferViews":[{}],"accessors":[{}],{rest}}}"#,
-            self.data.len(),
-            self.views.join(","),
-            self.accessors.join(",")
-        );
-        glb_file(&json, &self.data)
-    }
-}
 
 fn open(bytes: &[u8], points: usize) -> Result<Box<dyn FrameReader + '_>, Error> {
     open_frames_bytes(CacheFormat::Glb, Path::new("a.glb"), bytes, points)
@@ -707,11 +657,7 @@ fn files_that_end_early_or_are_changed_are_errors_at_the_most() {
     assert!(try_all(&whole));
     assert!((0..64).all(|k| !try_all(&whole[..whole.len() * k / 64])));
     let json = 20..20 + u32::from_le_bytes(*whole[12..].first_chunk().unwrap()) as usize;
-    let mut state = 1_u64;
-    let mut random = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize
-    };
+    let mut random = support::random(1);
     let mut good = 0;
     for round in 0..1000 {
         let mut bytes = whole.clone();

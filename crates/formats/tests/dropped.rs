@@ -30,12 +30,14 @@ fn what_is_not_kept_of_an_obj_is_told() {
     let text = "v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\ns off\nf 1 2 3\ns 2\nf 1 3 2\nl 1 2\n#MRGB ff\n";
     assert_eq!(
         told("rest.obj", text),
-        "rest.obj: vertex colours, which not all points have, smoothing groups (s), 1 line (l) and painted colours (#MRGB) are not kept"
+        "rest.obj: vertex colours, which not all points have, smoothing groups (s), 1 line (l) and painted colours \
+         (#MRGB) are not kept"
     );
     let path = Path::new("rest.obj");
     let read = read_mesh_bytes(MeshFormat::Obj, path, text.as_bytes()).unwrap();
     assert!(read.dropped.sentence(path, true).unwrap().contains("nor is the order of faces and of their corners"));
-    let text = "o body\ng left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl red\nf 1/1 2/1 3/1\ng right\nusemtl blue\nf 1/1 3/1 2/1\n";
+    let text = "o body\ng left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl red\nf 1/1 2/1 3/1\ng right\nusemtl blue\nf \
+                1/1 3/1 2/1\n";
     let read = read_mesh_bytes(MeshFormat::Obj, path, text.as_bytes()).unwrap();
     assert_eq!(read.dropped.sentence(path, false), None);
     assert_eq!(
@@ -48,7 +50,8 @@ fn what_is_not_kept_of_an_obj_is_told() {
 fn properties_of_a_splat_are_counted_and_the_first_ones_named() {
     let rest: String = (0..45).map(|k| format!("property float f_rest_{k}\n")).collect();
     let header = format!(
-        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n{rest}property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\nproperty float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n"
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty float \
+         nx\nproperty float ny\nproperty float nz\nproperty float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n{rest}property float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float scale_2\nproperty float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n"
     );
     let line = vec!["0"; 62].join(" ");
     assert_eq!(
@@ -61,9 +64,11 @@ fn properties_of_a_splat_are_counted_and_the_first_ones_named() {
 fn other_properties_and_elements_of_a_ply_are_told() {
     assert_eq!(
         told("a.ply", ply_ascii()),
-        "a.ply: 1 of 4 properties (red) of its vertices, 1 item of extra and 1 property (quality) of its faces are not kept"
+        "a.ply: 1 of 4 properties (red) of its vertices, 1 item of extra and 1 property (quality) of its faces are not \
+         kept"
     );
-    let text = "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\nend_header\n0 0 0 1 2 3 4\n";
+    let text = "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 1\nproperty float x\nproperty float \
+                y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\nend_header\n0 0 0 1 2 3 4\n";
     assert_eq!(
         told("b.ply", text),
         "b.ply: 1 of 7 properties (alpha) of its vertices and its texture (TextureFile) are not kept"

@@ -6,14 +6,14 @@ mod support;
 
 use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cager_formats::{
     CacheFormat, FrameSelection, MeshFormat, ReadModel, Up, create_frames, open_frames, open_frames_bytes,
     open_selected_frames, read_mesh, read_mesh_bytes,
 };
 use cager_geometry::surface::{Channel, Part, Subdivision};
-use support::{arrays, message};
+use support::{arrays, character, message};
 use tempfile::tempdir;
 
 const CUBE: &str = include_str!("fbx/cube.fbx");
@@ -317,20 +317,9 @@ fn a_file_that_unpacks_to_far_more_than_its_size_is_refused() {
     assert!(error.contains("takes more than 33 MiB, far more than its size"), "{error}");
 }
 
-/// A character that Blender wrote, beside the repository.
-fn character() -> Option<PathBuf> {
-    let data = std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    let found = Some(data.join("character")).filter(|folder| folder.join("robin.fbx").is_file());
-    if found.is_none() {
-        eprintln!("skipped: no character");
-    }
-    found
-}
-
 #[test]
 fn a_character_of_blender_comes_whole() {
-    let Some(folder) = character() else { return };
+    let Some(folder) = character("robin.fbx") else { return };
     let truth = arrays(&folder.join("truth.npz"));
     let told: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("truth.json")).unwrap()).unwrap();
     let path = folder.join("robin.fbx");

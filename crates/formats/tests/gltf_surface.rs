@@ -9,49 +9,11 @@ use cager_formats::{
     CacheFormat, FrameOptions, MorphOptions, create_frames, open_frames, open_frames_bytes, read_mesh, read_split_mesh,
 };
 use cager_geometry::mesh::{Model, Polygons};
-use cager_geometry::surface::{
-    Channel, CornerSet, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface, Texture,
-};
+use cager_geometry::surface::{Channel, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface};
 use gltf::json::Value;
-use support::{all, glb_file, polygons, read};
+use support::document::Built;
+use support::{all, by_corner, glb_file, polygons, read, set, texture};
 use tempfile::tempdir;
-
-/// A document that grows: each accessor has a view of its own.
-#[derive(Default)]
-struct Built {
-    views: Vec<String>,
-    accessors: Vec<String>,
-    data: Vec<u8>,
-}
-
-impl Built {
-    fn add(&mut self, kind: u32, count: usize, shape: &str, bytes: &[u8]) -> usize {
-        let (start, length) = (self.data.len(), bytes.len());
-        self.views.push(format!(r#"{{"buffer":0,"byteOffset":{start},"byteLength":{length}}}"#));
-        self.data.extend(bytes);
-        self.data.resize(self.data.len().next_multiple_of(4), 0);
-        let view = self.views.len() - 1;
-        self.accessors
-            .push(format!(r#"{{"bufferView":{view},"componentType":{kind},"count":{count},"type":"{shape}"}}"#));
-        self.accessors.len() - 1
-    }
-
-    fn floats<const N: usize>(&mut self, numbers: &[[f32; N]]) -> usize {
-        let shape = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N];
-        let bytes: Vec<u8> = numbers.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
-        self.add(5126, numbers.len(), shape, &bytes)
-    }
-
-    fn file(&self, rest: &str) -> Vec<u8> {
-        let json = format!(
-            r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{}}}],"bufferViews":[{}],"accessors":[{}],{rest}}}"#,
-            self.data.len(),
-            self.views.join(","),
-            self.accessors.join(",")
-        );
-        glb_file(&json, &self.data)
-    }
-}
 
 /// A square folded along its diagonal, a primitive for each half: A B C, and A C D.
 const HALVES: [[[f32; 3]; 3]; 2] =
@@ -71,9 +33,9 @@ fn folded(built: &mut Built, of_half: [&str; 2], rest: &str) -> Vec<u8> {
     let mut primitives = Vec::new();
     for half in 0..2 {
         let [points, uvs, normals] =
-            [built.floats(&HALVES[half]), built.floats(&uvs[half]), built.floats(&normals[half])];
+            [built.vectors(&HALVES[half]), built.vectors(&uvs[half]), built.vectors(&normals[half])];
         let color =
-            if half == 0 { format!(r#","COLOR_0":{}"#, built.floats(&[[0.25, 0.5, 1.0]; 3])) } else { String::new() };
+            if half == 0 { format!(r#","COLOR_0":{}"#, built.vectors(&[[0.25, 0.5, 1.0]; 3])) } else { String::new() };
         primitives.push(format!(
             r#"{{"attributes":{{"POSITION":{points},"TEXCOORD_0":{uvs},"NORMAL":{normals}{color}{}}},"material":{}}}"#,
             of_half[half],
@@ -94,11 +56,10 @@ fn primitives_of_a_mesh_are_a_part_whose_seams_are_closed() {
     let [part] = &model.surface.parts[..] else { panic!("{:?}", model.surface.parts) };
     assert_eq!((part.path.as_str(), part.points, part.faces), ("/rig/a_b", 4, 2));
     let uvs = &part.uv_sets[0];
-    let at = |corner: usize| uvs.values[uvs.corners[corner] as usize];
     assert_eq!(uvs.name, "TEXCOORD_0");
     // Upwards here, downwards there.
     let wanted = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.75], [0.0, 0.0], [0.5, 0.5], [0.0, 1.0]];
-    assert_eq!([0, 1, 2, 3, 4, 5].map(at), wanted);
+    assert_eq!(by_corner(uvs), wanted);
     // A has one value in both halves, C two.
     assert_eq!((uvs.values.len(), uvs.corners[0], uvs.corners[3]), (5, 0, 0));
     let colors = &part.color_sets[0];
@@ -129,7 +90,7 @@ fn points_that_move_apart_are_not_merged() {
     {
         let mut built = Built::default();
         let [[a, c], [other_a, other_c]] = moved.map(|moved| moved.map(|z: f32| [0.0, 0.0, z]));
-        let targets = [built.floats(&[a, [0.0; 3], c]), built.floats(&[other_a, other_c, [0.0; 3]])];
+        let targets = [built.vectors(&[a, [0.0; 3], c]), built.vectors(&[other_a, other_c, [0.0; 3]])];
         let file = folded(&mut built, [""; 2], NODES);
         let (json, _) = split(&file);
         let mut text = json.to_string();
@@ -144,7 +105,7 @@ fn points_that_move_apart_are_not_merged() {
         let mut built = Built::default();
         let of_half = joints.map(|joint: u8| {
             let joints = built.add(5121, 3, "VEC4", &[joint, 0, 0, 0].repeat(3));
-            let weights = built.floats(&[[1.0, 0.0, 0.0, 0.0]; 3]);
+            let weights = built.vectors(&[[1.0, 0.0, 0.0, 0.0]; 3]);
             format!(r#","JOINTS_0":{joints},"WEIGHTS_0":{weights}"#)
         });
         assert_eq!(points(folded(&mut built, of_half.each_ref().map(String::as_str), nodes)), wanted, "{joints:?}");
@@ -154,8 +115,8 @@ fn points_that_move_apart_are_not_merged() {
 #[test]
 fn frames_have_the_points_of_their_rest_pose_merged_or_as_stored() {
     let mut built = Built::default();
-    let times = built.floats(&[[0.0], [1.0]]);
-    let places = built.floats(&[[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]]);
+    let times = built.vectors(&[[0.0], [1.0]]);
+    let places = built.vectors(&[[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]]);
     let animation = format!(
         r#"{NODES},"animations":[{{"channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}}],"samplers":[{{"input":{times},"output":{places}}}]}}]"#
     );
@@ -182,7 +143,7 @@ fn frames_have_the_points_of_their_rest_pose_merged_or_as_stored() {
 #[test]
 fn points_without_anything_on_their_faces_stay_as_they_are() {
     let mut built = Built::default();
-    let points = built.floats(HALVES.as_flattened());
+    let points = built.vectors(HALVES.as_flattened());
     let of = |attributes: &str, mode: u8| {
         let primitive = format!(r#"{{"attributes":{{"POSITION":{points}{attributes}}},"mode":{mode}}}"#);
         read("a.glb", built.file(&format!(r#""meshes":[{{"primitives":[{primitive}]}}]"#))).unwrap()
@@ -206,8 +167,7 @@ fn pictures_that_are_placed_alike_place_the_texture_coordinates() {
         fs::write(&path, file).unwrap();
         let read = read_mesh(&path, &[]).unwrap();
         let set = &read.model.surface.parts[0].uv_sets[0];
-        let values: Vec<[f32; 2]> = set.corners.iter().map(|&k| set.values[k as usize]).collect();
-        (values, read.dropped.sentence(&path, false).unwrap_or_default())
+        (by_corner(set), read.dropped.sentence(&path, false).unwrap_or_default())
     };
     let (values, told) = uvs(&format!(r#""baseColorTexture":{{"index":0,{place}}}"#));
     // The corner at 1, 1 of the file is at 2, 1, then at 1, −2, then at 1.5, −2, which is 3 upwards.
@@ -226,11 +186,6 @@ fn scene() -> (Model, Surface) {
     let points =
         [[0, 0, 0], [1, 0, 0], [2, 0, 1], [0, 1, 0], [1, 1, 0], [2, 1, 1], [5, 5, 5], [0, 0, 3], [1, 0, 3], [0, 1, 3]];
     let faces = polygons(&[&[0, 1, 4, 3], &[1, 2, 5, 4], &[7, 9, 8]]);
-    let set = |name: &str, values: &[[f32; 2]], corners: &[u32]| CornerSet {
-        name: name.to_owned(),
-        values: values.to_vec(),
-        corners: corners.to_vec(),
-    };
     let strip = Part {
         path: "/rig/strip".to_owned(),
         points: 7,
@@ -239,11 +194,7 @@ fn scene() -> (Model, Surface) {
             set("UVMap", &[[0.0, 0.0], [1.0, 0.0], [1.0, 0.75], [0.0, 1.0], [0.25, 0.5]], &[0, 1, 2, 3, 4, 1, 2, 3]),
             set("detail", &[[0.5, 0.5]], &[0; 8]),
         ],
-        color_sets: vec![CornerSet {
-            name: "Col".to_owned(),
-            values: vec![[0.25, 0.5, 1.0, 1.0], [0.0, 0.0, 0.0, 0.5]],
-            corners: vec![0, 0, 0, 0, 1, 0, 0, 0],
-        }],
+        color_sets: vec![set("Col", &[[0.25, 0.5, 1.0, 1.0], [0.0, 0.0, 0.0, 0.5]], &[0, 0, 0, 0, 1, 0, 0, 0])],
         normals: vec![0, 0, 0, 0, 1, 1, 1, 1],
         subdivision: Subdivision::CatmullClark,
         creases: vec![Crease { edge: [0, 1], sharpness: 2.0 }],
@@ -259,7 +210,6 @@ fn scene() -> (Model, Surface) {
         shown: Some(vec![1..2, 3..4]),
         ..Part::default()
     };
-    let texture = |channel, path: &str| Texture { channel, path: path.to_owned() };
     let gold = Material {
         name: "gold".to_owned(),
         base_color: [1.0; 3],
@@ -323,7 +273,8 @@ fn what_is_written_is_read_again() {
     let folder = tempdir().unwrap();
     let floats = MorphOptions { floats: true, ..MorphOptions::default() };
     let (path, notes) = written(folder.path(), floats, 4);
-    let lost = "a.glb: has no place for subdivision, creases, 1 group (left) and faces of more than three corners of the model";
+    let lost = "a.glb: has no place for subdivision, creases, 1 group (left) and faces of more than three corners of \
+                the model";
     assert!(notes.iter().any(|note| note.ends_with(lost)), "{notes:?}");
     let (model, surface) = scene();
     let back = read_mesh(&path, &[]).unwrap().model;
@@ -336,13 +287,13 @@ fn what_is_written_is_read_again() {
     let fan = |k: usize| [0, 1, 2, 0, 2, 3].map(|corner| 4 * k + corner);
     let corners: Vec<usize> = fan(0).into_iter().chain(fan(1)).collect();
     for (set, source) in strip.uv_sets.iter().zip(&surface.parts[0].uv_sets) {
-        let found: Vec<[f32; 2]> = set.corners.iter().map(|&k| set.values[k as usize]).collect();
+        let found = by_corner(set);
         let wanted: Vec<[f32; 2]> = corners.iter().map(|&k| source.values[source.corners[k] as usize]).collect();
         assert_eq!(found, wanted, "{}", source.name);
     }
     assert_eq!(strip.uv_sets.len(), 2);
     let (set, source) = (&strip.color_sets[0], &surface.parts[0].color_sets[0]);
-    let found: Vec<[f32; 4]> = set.corners.iter().map(|&k| set.values[k as usize]).collect();
+    let found = by_corner(set);
     assert_eq!(found, corners.iter().map(|&k| source.values[source.corners[k] as usize]).collect::<Vec<_>>());
     let hard = |corner: usize, other: usize| strip.normals[corner] != strip.normals[other];
     // The edge between both squares is hard, the diagonals are not.

@@ -1,4 +1,5 @@
-//! What users rely on when Maya's geometry caches are read and written: Maya's own files are read, and what is written is laid out as they are.
+//! What users rely on when Maya's geometry caches are read and written: Maya's own files are read,
+//! and what is written is laid out as they are.
 
 #[path = "../../../proto/tests/support/memory.rs"]
 mod memory;
@@ -171,7 +172,8 @@ fn chunk(is_wide: bool, tag: &[u8; 4], payload: &[u8]) -> Vec<u8> {
     chunk
 }
 
-/// A cache of these channels of single vectors, at 12.5 and 25 frames per second, as Maya writes several meshes into one file.
+/// A cache of these channels of single vectors, at 12.5 and 25 frames per second, as Maya writes
+/// several meshes into one file.
 fn as_of_maya(is_wide: bool, channels: &[(&str, u32)], times: &[i32]) -> Vec<u8> {
     let group: &[u8; 4] = if is_wide { b"FOR8" } else { b"FOR4" };
     let part = |tag, payload: &[u8]| chunk(is_wide, tag, payload);

@@ -25,7 +25,8 @@ fn every_format_gives_the_same_tetrahedron() {
 fn obj_points_keep_their_order_and_polygons_their_corners() {
     let model = read(
         "a.obj",
-        "mtllib x\no thing\nf 5 1 2 \\\n 3 4\r\nv\t1 2 3 0.5 0.5 0.5\nv 1 2 3 1.0\nvn 0 0 1\nvt 0 0\nv 0.1 1e-3 +4 # c\n\
+        "mtllib x\no thing\nf 5 1 2 \\\n 3 4\r\nv\t1 2 3 0.5 0.5 0.5\nv 1 2 3 1.0\nvn 0 0 1\nvt 0 0\nv 0.1 1e-3 +4 # \
+         c\n\
          v -0.0 5. .5\ng side\nusemtl m\ns off\nv 9 9 9\nf 1 2 3 4 # quad\nl 1 2\np 1\nf -1/2/3 -2 -3/-1\nvp 1 2 3",
     )
     .unwrap();
@@ -54,7 +55,8 @@ fn a_point_cloud_is_a_model_without_faces() {
         ("a.off", "OFF 1 0 0\n1 2 3"),
         (
             "a.ply",
-            "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 3",
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 \
+             3",
         ),
     ];
     for (name, text) in files {
@@ -230,7 +232,8 @@ fn ply_faces_may_come_before_their_vertices() {
 
 #[test]
 fn ply_elements_without_properties_take_no_time_whatever_they_promise() {
-    let text = "ply\nformat ascii 1.0\nelement nothing 18446744073709551615\nelement vertex 1\nproperty int x\nproperty int y\n\
+    let text = "ply\nformat ascii 1.0\nelement nothing 18446744073709551615\nelement vertex 1\nproperty int \
+                x\nproperty int y\n\
                 property int z\nend_header\n1 2 3";
     assert_eq!(read("a.ply", text).unwrap().points.len(), 1);
 }
@@ -389,7 +392,8 @@ fn unknown_formats_are_answered_with_the_known_ones() {
     let error = message(MeshFormat::from_path("scan.dae".as_ref()));
     assert_eq!(
         error,
-        "scan.dae: .dae is not a mesh format that is read; convert it to one of .obj .ply .off .stl .glb .abc .usdc .usdz .usda .usd .gltf .fbx"
+        "scan.dae: .dae is not a mesh format that is read; convert it to one of .obj .ply .off .stl .glb .abc .usdc \
+         .usdz .usda .usd .gltf .fbx"
     );
     assert!(message(MeshFormat::from_path("scan".as_ref())).contains("has no file name extension"));
     assert_eq!(MeshFormat::from_path("A.OBJ".as_ref()).unwrap(), MeshFormat::Obj);

@@ -1,18 +1,15 @@
 //! Real captures, where they are at hand: `CAGER_CAPTURES` or `shared/data` beside the repository.
 
+mod support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use cager_formats::{
     CacheFormat, FrameOptions, MorphOptions, create_frames, open_frames, open_frames_bytes, read_model, write_model,
 };
-use cager_geometry::mesh::Model;
-use cager_geometry::mesh::Polygons;
-
-fn data() -> PathBuf {
-    std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
-}
+use cager_geometry::mesh::{Model, Polygons};
+use support::data;
 
 fn obj_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
@@ -223,11 +220,8 @@ fn morph_targets_of_captures_lose_what_is_told() {
 #[ignore = "needs the captures: make captures"]
 fn damaged_archives_of_blender_are_answered() {
     let bytes = fs::read(data().join("studio/arm.abc")).unwrap();
-    let mut state = 1_u64;
-    let mut random = |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % below
-    };
+    let mut next = support::random(1);
+    let mut random = |below: usize| next() % below;
     let mut answered = [0, 0];
     for _ in 0..500 {
         let mut bytes = bytes.clone();

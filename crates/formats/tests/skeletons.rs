@@ -3,7 +3,8 @@
 use cager_formats::biovision::{Channel, Clip, bvh_bytes, read_bvh, read_bvh_bytes};
 use std::path::{Path, PathBuf};
 
-const ARM: &str = "HIERARCHY\nROOT hip\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n \
+const ARM: &str = "HIERARCHY\nROOT hip\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation \
+                   Yrotation Xrotation\n \
                    JOINT upper arm {\n  OFFSET 0 2 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  {\n   OFFSET 0 1.5 0\n  }\n }\n}\n\
                    MOTION\nFrames: 2\nFrame Time: .01\n1 2 3 0 0 0 0 0 0\n0 0 0 90 0 0 0 90 0\n";
 

@@ -157,7 +157,8 @@ fn a_ply_has_texture_coordinates_of_corners_or_vertices_and_names_its_pictures()
 fn what_does_not_fit_the_faces_is_left_out() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("odd.obj");
-    // Texture coordinates that are not there, a normal without a corner, an object that shares its points, an empty group.
+    // Texture coordinates that are not there, a normal without a corner, an object that shares its
+    // points, an empty group.
     let text = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 1\ng\nf 1/9/1 2/-1 3/1/\no b\nusemtl\nf 2 3 4\nf 1 2\n";
     fs::write(&path, text).unwrap();
     let read = read_mesh(&path, &[]).unwrap();

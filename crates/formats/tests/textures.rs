@@ -1,4 +1,5 @@
-//! What users rely on when frames are written as vertex animation textures: engines put points where the frames have them.
+//! What users rely on when frames are written as vertex animation textures: engines put points
+//! where the frames have them.
 
 mod support;
 

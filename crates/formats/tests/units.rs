@@ -1,4 +1,5 @@
-//! What users rely on when files say what their coordinates mean: a mesh is as large in one program as in the other, and stands as upright.
+//! What users rely on when files say what their coordinates mean: a mesh is as large in one program
+//! as in the other, and stands as upright.
 
 mod support;
 

@@ -11,7 +11,7 @@ use cager_formats::{
     create_frames, open_frames, open_frames_bytes, open_selected_frames, read_mesh, read_model, read_model_bytes,
 };
 use cager_geometry::mesh::Polygons;
-use support::{all, message, numbers, polygons, wide};
+use support::{all, data, message, numbers, polygons, wide};
 use tempfile::{TempDir, tempdir};
 
 const CENTIMETRES: Units = Units::new(Up::Z, 0.01);
@@ -184,11 +184,7 @@ fn files_that_end_early_or_are_changed_are_errors_at_the_most() {
         let whole = fs::read(path).unwrap();
         assert!(try_all(name, &whole));
         assert!((0..64).all(|k| !try_all(name, &whole[..whole.len() * k / 64])));
-        let mut state = 1_u64;
-        let mut random = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as usize
-        };
+        let mut random = support::random(1);
         let mut good = 0;
         for _ in 0..500 {
             let mut bytes = whole.clone();
@@ -370,12 +366,8 @@ fn the_library_of_usd_reads_cages_as_guides() {
     }
 }
 
-fn data() -> PathBuf {
-    std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
-}
-
-/// Files of usd-core; their points are those of the arrays, turned so that z is up. The rest pose is the first frame, whatever stands there by default.
+/// Files of usd-core; their points are those of the arrays, turned so that z is up. The rest pose
+/// is the first frame, whatever stands there by default.
 #[test]
 #[ignore = "needs the captures: make captures"]
 fn files_of_the_library_read_back_to_their_truth() {

@@ -96,7 +96,8 @@ fn instancers_that_are_too_large_or_wrong_are_refused() {
     let points = vec!["(0, 0, 0)"; 1000].join(",");
     let places = vec!["(1, 0, 0)"; 8000].join(",");
     let text = format!(
-        "#usda 1.0\ndef PointInstancer \"i\" {{\nrel prototypes = </i/m>\nint[] protoIndices = [{}]\npoint3f[] positions = [{places}]\n\
+        "#usda 1.0\ndef PointInstancer \"i\" {{\nrel prototypes = </i/m>\nint[] protoIndices = [{}]\npoint3f[] \
+         positions = [{places}]\n\
          def Mesh \"m\" {{\n{}\n}}\n}}\n",
         many(8000),
         TRIANGLE.replace("(0, 0, 0)", &points)
@@ -112,7 +113,8 @@ fn references_that_lead_in_circles_or_to_nothing_are_refused() {
     );
     assert!(message(open(&itself, 3)).contains("nests deeper than 256"));
     let circle = format!(
-        "#usda 1.0\ndef \"a\" ( references = </b> ) {{ }}\ndef \"b\" ( references = </a> ) {{ }}\ndef Mesh \"m\" {{\n{TRIANGLE}}}\n"
+        "#usda 1.0\ndef \"a\" ( references = </b> ) {{ }}\ndef \"b\" ( references = </a> ) {{ }}\ndef Mesh \"m\" \
+         {{\n{TRIANGLE}}}\n"
     );
     assert!(message(open(&circle, 3)).contains("one that refers to itself"));
     let nothing = format!("#usda 1.0\ndef \"a\" ( references = </b> ) {{ }}\ndef Mesh \"m\" {{\n{TRIANGLE}}}\n");
@@ -120,7 +122,10 @@ fn references_that_lead_in_circles_or_to_nothing_are_refused() {
     // Twice as many in each step.
     let steps = (0..40).map(|k| {
         let next = k + 1;
-        format!("over \"p{k}\" {{\ndef \"x\" ( references = </p{next}> ) {{ }}\ndef \"y\" ( references = </p{next}> ) {{ }}\n}}\n")
+        format!(
+            "over \"p{k}\" {{\ndef \"x\" ( references = </p{next}> ) {{ }}\ndef \"y\" ( references = </p{next}> ) \
+             {{ }}\n}}\n"
+        )
     });
     let doubling = format!(
         "#usda 1.0\ndef \"a\" ( references = </p0> ) {{ }}\n{}def Mesh \"p40\" {{\n{TRIANGLE}}}\n",
@@ -142,8 +147,10 @@ fn folder(files: &[(&str, &str)]) -> TempDir {
 
 const SHOT: &str = "#usda 1.0\n(\ntimeCodesPerSecond = 48\nupAxis = \"Z\"\n)\n\
     def \"one\" ( references = @./parts/shot.usda@</root> (offset = 5) ) {\n\
-    over \"aside\" {\nover \"free\" {\ndouble3 xformOp:translate = (1, 2, 3)\nuniform token[] xformOpOrder = [\"xformOp:translate\"]\n}\n}\n}\n\
-    def Xform \"two\" {\ndouble3 xformOp:translate = (1000, 0, 0)\nuniform token[] xformOpOrder = [\"xformOp:translate\"]\n\
+    over \"aside\" {\nover \"free\" {\ndouble3 xformOp:translate = (1, 2, 3)\nuniform token[] xformOpOrder = \
+           [\"xformOp:translate\"]\n}\n}\n}\n\
+    def Xform \"two\" {\ndouble3 xformOp:translate = (1000, 0, 0)\nuniform token[] xformOpOrder = \
+                [\"xformOp:translate\"]\n\
     def \"in\" ( payload = @parts/body.usda@ ) { }\n}\n";
 const PART: &str = "#usda 1.0\n( subLayers = [@./over.usda@, @../lib/arm.usda@ (offset = 10; scale = 2)] )\n";
 const OVER: &str = "#usda 1.0\nover \"root\" {\nover \"aside\" {\nover \"box\" ( active = false ) { }\n}\n}\n";
@@ -155,7 +162,8 @@ fn files_below_a_layer_are_read_with_it() {
          def Material \"skin\" {{\ntoken outputs:surface.connect = </body/skin/s.outputs:surface>\n\
          def Shader \"s\" {{\nuniform token info:id = \"UsdPreviewSurface\"\n\
          color3f inputs:diffuseColor.connect = </body/skin/t.outputs:rgb>\ntoken outputs:surface\n}}\n\
-         def Shader \"t\" {{\nuniform token info:id = \"UsdUVTexture\"\nasset inputs:file = @./skin.png@\nfloat3 outputs:rgb\n}}\n}}\n}}\n"
+         def Shader \"t\" {{\nuniform token info:id = \"UsdUVTexture\"\nasset inputs:file = @./skin.png@\nfloat3 \
+                      outputs:rgb\n}}\n}}\n}}\n"
     );
     let files = [
         ("shot.usda", SHOT),

@@ -2,14 +2,14 @@
 
 mod support;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cager_formats::{
     CacheFormat, Error, FrameSelection, MeshFormat, Units, Up, open_frames_bytes, open_selected_frames, read_mesh,
     read_mesh_bytes,
 };
 use cager_geometry::surface::Part;
-use support::{all, arrays, message, numbers};
+use support::{all, arrays, character, message, numbers};
 
 /// Two joints along x, of which the second turns by 90° about z; three meshes that lie aside.
 const ARM: &str = include_str!("usd/arm.usda");
@@ -114,11 +114,7 @@ fn what_cannot_be_read_is_named() {
 
 #[test]
 fn damaged_skeletons_are_errors_at_the_most() {
-    let mut state = 7_u64;
-    let mut random = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize
-    };
+    let mut random = support::random(7);
     for _ in 0..500 {
         for (format, whole) in [(CacheFormat::Usda, ARM.as_bytes()), (CacheFormat::Usdc, ARM_BINARY)] {
             let mut bytes = whole.to_vec();
@@ -133,20 +129,9 @@ fn damaged_skeletons_are_errors_at_the_most() {
     }
 }
 
-/// Blender's export of a rigged character as it is set up, beside the repository.
-fn character() -> Option<PathBuf> {
-    let data = std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    let found = Some(data.join("character")).filter(|folder| folder.join("robin_skel.usdc").is_file());
-    if found.is_none() {
-        eprintln!("skipped: no character");
-    }
-    found
-}
-
 #[test]
 fn a_character_of_blender_moves_as_its_author_says() {
-    let Some(folder) = character() else { return };
+    let Some(folder) = character("robin_skel.usdc") else { return };
     let (truth, path) = (arrays(&folder.join("truth.npz")), folder.join("robin_skel.usdc"));
     // All, as Blender says that the lantern is hidden.
     let prims = vec!["/root".to_owned()];

@@ -10,9 +10,9 @@ use std::sync::Arc;
 use cager_formats::{CageMesh, FrameOptions, MeshFormat, create_frames, read_mesh, read_mesh_bytes};
 use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::{
-    Channel, CornerSet, Crease, FaceGroup, Material, NO_MATERIAL, Part, Picture, Subdivision, Surface, Texture,
+    Channel, Crease, FaceGroup, Material, NO_MATERIAL, Part, Picture, Subdivision, Surface, Texture,
 };
-use support::polygons;
+use support::{by_corner, data, polygons, set, texture};
 use tempfile::tempdir;
 
 /// Two quads with a hard ridge, then two triangles apart.
@@ -35,32 +35,19 @@ fn faces() -> Polygons {
     polygons(&[&[0, 1, 2, 3], &[3, 2, 4, 5], &[6, 7, 8], &[9, 10, 11]])
 }
 
-fn texture(channel: Channel, path: &str) -> Texture {
-    Texture { channel, path: path.to_owned() }
-}
-
 /// With something of each kind.
 fn surface() -> Surface {
-    let uvs = |name: &str, values: &[[f32; 2]], corners: &[u32]| CornerSet {
-        name: name.to_owned(),
-        values: values.to_vec(),
-        corners: corners.to_vec(),
-    };
     let roof = Part {
         path: "/house/top/roof".to_owned(),
         points: 6,
         faces: 2,
         uv_sets: vec![
-            uvs("UVMap", &[[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5], [0.25, 0.75]], &[0, 1, 2, 3, 0, 2, 4, 4]),
-            uvs("detail", &[[0.5, 2.0], [0.25, -1.0]], &[0, 0, 0, 0, 1, 1, 1, 1]),
+            set("UVMap", &[[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5], [0.25, 0.75]], &[0, 1, 2, 3, 0, 2, 4, 4]),
+            set("detail", &[[0.5, 2.0], [0.25, -1.0]], &[0, 0, 0, 0, 1, 1, 1, 1]),
         ],
         color_sets: vec![
-            CornerSet {
-                name: "dirt".to_owned(),
-                values: vec![[1.0, 0.5, 0.0, 1.0], [0.0, 1.0, 0.25, 1.0]],
-                corners: vec![0, 1, 1, 0, 0, 1, 1, 0],
-            },
-            CornerSet { name: "wet".to_owned(), values: vec![[0.0, 0.0, 1.0, 0.5]], corners: vec![0; 8] },
+            set("dirt", &[[1.0, 0.5, 0.0, 1.0], [0.0, 1.0, 0.25, 1.0]], &[0, 1, 1, 0, 0, 1, 1, 0]),
+            set("wet", &[[0.0, 0.0, 1.0, 0.5]], &[0; 8]),
         ],
         normals: vec![0, 1, 2, 3, 4, 5, 6, 7],
         materials: vec![0, NO_MATERIAL],
@@ -176,12 +163,13 @@ fn files_of_the_library_have_what_it_wrote() {
         // Binary layers have their prims by name.
         let part = |path: &str| model.surface.parts.iter().find(|part| part.path == path).unwrap();
         let (roof, strip) = (part("/root/roof"), part("/root/group/strip"));
-        let uvs: Vec<(&str, Vec<[f32; 2]>)> = roof.uv_sets.iter().map(|set| (set.name.as_str(), spread(set))).collect();
+        let uvs: Vec<(&str, Vec<[f32; 2]>)> =
+            roof.uv_sets.iter().map(|set| (set.name.as_str(), by_corner(set))).collect();
         let of_points = [0, 1, 2, 3, 3, 2, 4, 5].map(|k: u8| [f32::from(k) / 8.0, 1.0 - f32::from(k) / 8.0]);
         let (a, b) = ([0.0, 0.0], [0.5, 0.25]);
         assert_eq!(uvs, [("st", of_points.to_vec()), ("detail", vec![a, b, a, b, b, b, b, a])]);
         let mut colors: Vec<(&str, Vec<[f32; 4]>)> =
-            roof.color_sets.iter().map(|set| (set.name.as_str(), spread(set))).collect();
+            roof.color_sets.iter().map(|set| (set.name.as_str(), by_corner(set))).collect();
         colors.sort_by_key(|(name, _)| *name);
         let (red, blue) = ([1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]);
         assert_eq!(colors[0], ("all", vec![[0.5, 0.5, 0.5, 0.25]; 8]));
@@ -210,11 +198,6 @@ fn files_of_the_library_have_what_it_wrote() {
         assert!(model.surface.materials.contains(&paint) && model.surface.materials.contains(&metal));
         assert_eq!((model.surface.materials.len(), model.surface.parts.len()), (2, 2));
     }
-}
-
-fn data() -> PathBuf {
-    std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
 }
 
 /// Written by Blender, with what its author says of it beside it.
@@ -272,11 +255,6 @@ fn a_character_has_what_its_author_gave_it() {
     }
 }
 
-/// The value of each corner.
-fn spread<const N: usize>(set: &CornerSet<N>) -> Vec<[f32; N]> {
-    set.corners.iter().map(|&corner| set.values[corner as usize]).collect()
-}
-
 #[test]
 fn files_that_are_changed_are_errors_or_hold_what_fits() {
     let folder = tempdir().unwrap();
@@ -284,11 +262,7 @@ fn files_that_are_changed_are_errors_or_hold_what_fits() {
     let mut given = surface();
     given.pictures = vec![Picture { path: "pictures/base.png".to_owned(), bytes: Arc::from(&b"first"[..]) }];
     write(&path, given);
-    let mut state = 1_u64;
-    let mut random = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize
-    };
+    let mut random = support::random(1);
     let files = [fs::read(&path).unwrap(), fs::read(made("usdc")).unwrap(), fs::read(made("usda")).unwrap()];
     let mut changed = 0;
     for (whole, name) in files.iter().zip(["a.usdz", "a.usdc", "a.usda"]) {
@@ -326,7 +300,8 @@ fn the_library_of_usd_reads_what_lies_on_faces() {
     for line in [
         "/house/top/roof none None",
         "UVMap texCoord2f[] faceVarying (0, 0) (1, 0) (1, 0.5) (0, 0.5) (0, 0) (1, 0.5) (0.25, 0.75) (0.25, 0.75)",
-        "dirt color3f[] faceVarying (1, 0.5, 0) (0, 1, 0.25) (0, 1, 0.25) (1, 0.5, 0) (1, 0.5, 0) (0, 1, 0.25) (0, 1, 0.25) (1, 0.5, 0)",
+        "dirt color3f[] faceVarying (1, 0.5, 0) (0, 1, 0.25) (0, 1, 0.25) (1, 0.5, 0) (1, 0.5, 0) (0, 1, 0.25) (0, 1, \
+         0.25) (1, 0.5, 0)",
         "tiles materialBind 0 /house/_materials/tiles",
         "left groups 0 1 None",
         "/house/flag none /house/_materials/glass",

@@ -1,15 +1,16 @@
-//! What users rely on when USD as text is read: what the library writes, what people write by hand, and what is damaged.
+//! What users rely on when USD as text is read: what the library writes, what people write by hand,
+//! and what is damaged.
 
 mod support;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cager_formats::{
     CacheFormat, Error, FrameReader, MeshFormat, ReadModel, Units, Up, create_frames, open_frames, open_frames_bytes,
     read_mesh, read_mesh_bytes, read_model_bytes,
 };
 use cager_geometry::mesh::Polygons;
-use support::{all, message, numbers, polygons};
+use support::{all, data, message, numbers, polygons};
 
 const NAME: &str = "a.usda";
 
@@ -55,7 +56,8 @@ fn open(text: &str, points: usize) -> Result<Box<dyn FrameReader + '_>, Error> {
 /// A layer with a mesh of three points that has these properties beside its faces.
 fn mesh(properties: &str) -> String {
     format!(
-        "#usda 1.0\ndef Mesh \"m\" {{\nint[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\n{properties}\n}}\n"
+        "#usda 1.0\ndef Mesh \"m\" {{\nint[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, \
+         2]\n{properties}\n}}\n"
     )
 }
 
@@ -196,7 +198,8 @@ fn the_rest_pose_is_the_first_frame_whatever_the_defaults() {
 #[test]
 fn what_is_not_read_of_a_mesh_is_named() {
     let inside = "normal3f[] normals = [(0, 0, 1)]\n\
-        texCoord2f[] primvars:st = [(0, 0)] ( interpolation = \"faceVarying\" )\nint[] primvars:st:indices = [0, 0, 0]\n\
+        texCoord2f[] primvars:st = [(0, 0)] ( interpolation = \"faceVarying\" )\nint[] primvars:st:indices = [0, 0, \
+            0]\n\
         texCoord2f[] primvars:wrong = [(0, 0)] ( interpolation = \"faceVarying\" )\n\
         color3f[] primvars:displayColor = [(1, 0, 0)]\nfloat[] primvars:age = [1]\n\
         uniform token subdivisionScheme = \"catmullClark\"\nrel material:binding = </m>\n\
@@ -207,7 +210,8 @@ fn what_is_not_read_of_a_mesh_is_named() {
     let sentence = read.dropped.sentence(Path::new(NAME), false).unwrap();
     assert_eq!(
         sentence,
-        "a.usda: texture coordinates (primvars:wrong), primvars (primvars:age) and materials (material:binding) are not kept"
+        "a.usda: texture coordinates (primvars:wrong), primvars (primvars:age) and materials (material:binding) are \
+         not kept"
     );
     let plain =
         read_mesh_bytes(MeshFormat::Usda, Path::new(NAME), format!("#usda 1.0\n{}", mesh_at("a", 3, "")).as_bytes());
@@ -232,11 +236,7 @@ fn texts_that_end_early_or_are_changed_are_errors_at_the_most() {
     let whole = HAND.trim_end().as_bytes();
     assert!(try_all(whole));
     assert!((0..whole.len()).all(|end| !try_all(&whole[..end])));
-    let mut state = 1_u64;
-    let mut random = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize
-    };
+    let mut random = support::random(1);
     for _ in 0..2000 {
         let mut bytes = whole.to_vec();
         for _ in 0..=random() % 4 {
@@ -252,11 +252,6 @@ fn text_is_not_written() {
     let folder = tempfile::tempdir().unwrap();
     let error = message(create_frames(folder.path().join(NAME), 3, 1, &Polygons::new(), &Default::default()));
     assert!(error.contains("is written in binary alone; end the name in .usdc"), "{error}");
-}
-
-fn data() -> PathBuf {
-    std::env::var_os("CAGER_CAPTURES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
 }
 
 /// Those of the horse have every other frame.

@@ -36,7 +36,8 @@ pub(crate) struct DemoArgs {
     output: PathBuf,
 
     /// Points of the capture, about.
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=4_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 20_000,
+          value_parser = clap::value_parser!(u32).range(100..=4_000_000))]
     points: u32,
 
     /// Frames of the capture.
@@ -140,7 +141,8 @@ fn compare(capture: &Capture, decoded: &Path, report: &Report) -> Result<Sted> {
         let (l2, linf) = ((sum / n as f64).sqrt() / size, max.sqrt() / size);
         ensure!(
             (l2 - said.l2).abs() <= 1e-6 * said.l2 && (linf - said.linf).abs() <= 1e-6 * said.linf,
-            "frame {t}: the report says L2 {:e} and L∞ {:e}, but the decoded file has {l2:e} and {linf:e}; please report this",
+            "frame {t}: the report says L2 {:e} and L∞ {:e}, but the decoded file has {l2:e} and {linf:e}; please \
+             report this",
             said.l2,
             said.linf
         );

@@ -12,7 +12,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Look after what a service has stored, while it does not run: how much that is, whether it is whole, copies of its containers.
+/// Look after what a service has stored, while it does not run: how much that is, whether it is
+/// whole, copies of its containers.
 ///
 /// Example: cager store verify --data /srv/cager
 #[derive(Args)]
@@ -52,7 +53,8 @@ pub(crate) enum StoreCommand {
     Usage,
     /// Read everything, and name what is damaged; exit status 1 if something is.
     Verify,
-    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager; those that are there are passed over, damaged ones are named and left out, with exit status 1.
+    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager; those that
+    /// are there are passed over, damaged ones are named and left out, with exit status 1.
     Export {
         /// Where to; it may be there.
         #[arg(value_name = "DIR")]
@@ -216,7 +218,8 @@ fn verify(all: &[Opened], only: Option<u32>) -> Result<()> {
     tell(&format!("read {bytes} bytes of {objects_read} sessions and jobs and {models} models{of_shards}\n"))?;
     if damaged > 0 {
         bail!(
-            "{damaged} of them are damaged; complete the sessions again whose containers are, restore the others from a backup, or delete them"
+            "{damaged} of them are damaged; complete the sessions again whose containers are, restore the others from \
+             a backup, or delete them"
         );
     }
     match only {
@@ -252,7 +255,8 @@ fn export(all: &[Opened], output: &Path, wanted: &[String]) -> Result<()> {
         }
     }
     tell(&format!(
-        "wrote {written} containers, and {there} were there already; {running} sessions are not completed and have none\n"
+        "wrote {written} containers, and {there} were there already; {running} sessions are not completed and have \
+         none\n"
     ))?;
     if left > 0 {
         bail!("containers left out, for the reasons above: {left}");

@@ -1,8 +1,7 @@
 //! What an archive says of polygon meshes and the transforms above them.
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::io::{Read, Seek};
+use std::sync::Arc;
 
 use cager_geometry::surface::Part;
 
@@ -14,8 +13,8 @@ use super::surface::{self, Materials};
 use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::scene::{
-    Chain, MOST_OPERATIONS, MeshTracks, MovingScene, Operation, SceneTracks, Steps, Timeline, Tree, Wanted, ancestry,
-    check_held, choose, damaged, named, no_points, path, shown, shown_path, union,
+    Chain, MOST_OPERATIONS, MeshTracks, MovingScene, Operation, SceneTracks, Steps, Timeline, Track, Tree, Visibility,
+    Wanted, ancestry, check_held, choose, damaged, named, no_points, path, said, shown, shown_path, union,
 };
 
 /// Bytes of the path of what an instance is of.
@@ -39,11 +38,13 @@ pub(crate) fn open<'a>(
     let (objects, note) = find_meshes(&mut archive, wanted)?;
     let mut tracks = SceneTracks { notes: note.into_iter().collect(), ..SceneTracks::default() };
     let (mut moving, mut held, several) = (Vec::new(), Vec::new(), objects.len() > 1);
+    let mut visibility = Visibility::default();
     for &object in &objects {
         let name = path(archive.nodes(), object);
         let named = |fault: Fault| if several { fault.within(&name) } else { fault };
         archive.container.allow(4);
-        let (mesh, positions) = read_mesh(&mut archive, object, &mut moving).map_err(named)?;
+        let (mut mesh, positions) = read_mesh(&mut archive, object, &mut moving).map_err(named)?;
+        mesh.shown = visible(&mut archive, object, &mut visibility).map_err(named)?;
         held.push(positions);
         tracks.meshes.push(mesh);
     }
@@ -94,7 +95,6 @@ fn read_mesh(
         all.for_each(|value| value.0 |= DOUBLES);
     }
     tracks.faces = [archive.track(&parts[0])?, archive.track(&parts[1])?];
-    tracks.shown = visible(archive, object)?;
     tracks.part.path = path(archive.nodes(), object);
     Ok((tracks, positions))
 }
@@ -131,28 +131,17 @@ fn find_meshes(archive: &mut Archive<'_>, wanted: Wanted<'_>) -> Result<(Vec<usi
 }
 
 /// When an object is shown: what is hidden hides what is below it, unless that says otherwise.
-fn visible(archive: &mut Archive<'_>, object: usize) -> Result<Steps, Fault> {
-    let mut tracks = Vec::new();
-    for object in ancestry(&archive.nodes, object).collect::<Vec<_>>() {
+fn visible(archive: &mut Archive<'_>, object: usize, known: &mut Visibility) -> Result<Arc<Steps>, Fault> {
+    let above: Vec<usize> = ancestry(&archive.nodes, object).collect();
+    known.of(&above, |object| {
         let properties = archive.top_properties(object)?;
-        let Some(told) = find(&properties, "visible", Kind::Scalar).filter(|told| told.samples > 0) else { continue };
-        let track = archive.track(told)?;
-        let mut values = HashMap::new();
-        for value in track.values.iter().chain(&track.default) {
-            if let Entry::Vacant(place) = values.entry(value.0) {
-                place.insert(
-                    archive.container.small(*value, 8, "visible")?.first().map_or(DEFERRED, |&byte| byte as i8),
-                );
-            }
-        }
-        tracks.push((track, values));
-    }
-    let times = tracks.iter().flat_map(|(track, _)| track.times.iter().copied().chain(track.default.map(|_| 0.0)));
-    let is_shown = |time| {
-        let said = tracks.iter().map(|(track, values)| track.at(time).map_or(DEFERRED, |(value, ..)| values[&value.0]));
-        Ok(said.into_iter().find(|&said| said != DEFERRED) != Some(0))
-    };
-    Steps::of(times.collect(), is_shown)
+        let told = find(&properties, "visible", Kind::Scalar).filter(|told| told.samples > 0);
+        let track = told.map_or(Ok(Track::default()), |told| archive.track(told))?;
+        said(&track, |value| {
+            let bytes = archive.container.small(value, 8, "visible")?;
+            Ok(bytes.first().filter(|&&byte| byte as i8 != DEFERRED).map(|&byte| byte != 0))
+        })
+    })
 }
 
 impl Tree for Archive<'_> {
@@ -277,7 +266,8 @@ fn sparse(times: &[f64], told: Option<f64>) -> Option<String> {
     let frame = 1.0 / told.unwrap_or(USUAL_RATE).min(USUAL_RATE);
     (longest > 1.01 * frame).then(|| {
         format!(
-            "its transforms have samples up to {longest:.4} s apart, and the motion between them is not read; export it with a sample of each frame"
+            "its transforms have samples up to {longest:.4} s apart, and the motion between them is not read; export \
+             it with a sample of each frame"
         )
     })
 }

@@ -1,13 +1,11 @@
 //! Parameters of a mesh: values by corner, point or face, with indices or without.
 
-use std::collections::HashMap;
-
 use cager_geometry::surface::CornerSet;
 
 use super::objects::{Archive, told};
 use super::properties::{F32, Kind, Property, U32, find};
 use crate::error::Fault;
-use crate::scene::Values;
+use crate::scene::{Values, merged};
 
 /// How many points a mesh has, the corners of its faces, and how many each face has.
 pub(super) struct Topology {
@@ -69,22 +67,6 @@ impl Topology {
     }
 }
 
-/// A set in which equal values are one, as programs write the value of each corner.
-fn merged<const N: usize>(name: String, values: &[[f32; N]], corners: Vec<u32>) -> CornerSet<N> {
-    let mut set = CornerSet { name, ..CornerSet::default() };
-    let mut numbers = HashMap::new();
-    for corner in corners {
-        let value = values[corner as usize];
-        // 0 and −0 too.
-        let number = *numbers.entry(value.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
-            set.values.push(value);
-            set.values.len() as u32 - 1
-        });
-        set.corners.push(number);
-    }
-    set
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,7 +84,5 @@ mod tests {
         for (scope, count) in [(&b"fvr"[..], 4), (b"vtx", 5), (b"uni", 3), (b"con", 2), (b"", 2)] {
             assert_eq!(by(scope, count), None, "{count}");
         }
-        let set = merged("a".to_owned(), &[[1.0], [-0.0], [1.0], [0.0]], vec![0, 2, 3, 1]);
-        assert_eq!((set.values, set.corners), (vec![[1.0], [0.0]], vec![0, 0, 1, 1]));
     }
 }

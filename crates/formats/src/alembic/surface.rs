@@ -11,7 +11,7 @@ use super::properties::{F32, I32, Kind, Property, TEXT, U32, find};
 use super::unread;
 use crate::dropped::{Dropped, listed};
 use crate::error::Fault;
-use crate::scene::{Values, damaged};
+use crate::scene::{Values, creases, damaged};
 
 /// Bytes of the name of a scheme of subdivision.
 const LONGEST_SCHEME: u64 = 64;
@@ -60,7 +60,7 @@ pub(super) fn read(
     }
     if archive.objects[mesh].kind == ObjectKind::Subdivision {
         part.subdivision = scheme(archive, &properties)?;
-        part.creases = creases(archive, &properties, topology.points)?;
+        part.creases = read_creases(archive, &properties, topology.points)?;
     }
     if let Some(normals) = own("N") {
         match archive.parameter::<3>(normals, &topology)? {
@@ -135,8 +135,7 @@ fn scheme(archive: &mut Archive<'_>, properties: &[Property]) -> Result<Subdivis
     })
 }
 
-/// The edges of chains of points, which have a sharpness each.
-fn creases(archive: &mut Archive<'_>, properties: &[Property], points: usize) -> Result<Vec<Crease>, Fault> {
+fn read_creases(archive: &mut Archive<'_>, properties: &[Property], points: usize) -> Result<Vec<Crease>, Fault> {
     let named = |name, number| {
         find(properties, name, Kind::Array).filter(|found: &&Property| found.number == number && found.samples > 0)
     };
@@ -145,21 +144,13 @@ fn creases(archive: &mut Archive<'_>, properties: &[Property], points: usize) ->
     else {
         return Ok(Vec::new());
     };
-    let (chains, lengths) = (integers(archive, chains)?, integers(archive, lengths)?);
+    let mut integers = |property: &Property| {
+        let first = property.first(&mut archive.container)?;
+        archive.container.integers(first, u64::MAX)
+    };
+    let (chains, lengths) = (integers(chains)?, integers(lengths)?);
     let sharp = sharp.first(&mut archive.container)?;
-    let sharp = archive.container.vectors::<1>(sharp)?;
-    let (mut rest, mut creases) = (chains.as_slice(), Vec::new());
-    for (length, [sharpness]) in lengths.into_iter().zip(sharp) {
-        let Some((chain, others)) = rest.split_at_checked(length as usize) else { break };
-        rest = others;
-        for pair in chain.windows(2) {
-            let edge = [pair[0].min(pair[1]), pair[0].max(pair[1])];
-            if edge[0] != edge[1] && (edge[1] as usize) < points && sharpness > 0.0 && sharpness.is_finite() {
-                creases.push(Crease { edge, sharpness });
-            }
-        }
-    }
-    Ok(creases)
+    creases(&chains, &lengths, archive.container.vectors::<1>(sharp)?.as_flattened(), points)
 }
 
 /// Reads the sets of so many faces. Those that say that no face is in two are materials; where none

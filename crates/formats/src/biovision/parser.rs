@@ -136,7 +136,8 @@ impl<'a> Parser<'a> {
         let (line, joints, shown) = (self.lines.number(), self.skeleton.joints.len(), quoted(name.as_bytes()));
         if joints == MAX_JOINTS || self.open.len() == MAX_DEPTH {
             return Err(Fault::unsupported(format!(
-                "line {line}: more than {MAX_JOINTS} joints, or {MAX_DEPTH} below each other; leave out what does not move"
+                "line {line}: more than {MAX_JOINTS} joints, or {MAX_DEPTH} below each other; leave out what does not \
+                 move"
             )));
         }
         if name.is_empty() {

@@ -13,7 +13,8 @@ use crate::scene::Wanted;
 
 fn fault() -> Fault {
     Fault::unsupported(
-        "is an FBX scene, which is not read by this program, as it was built without the feature fbx; export the animated mesh as USD or Alembic, or open it in Blender and export it there",
+        "is an FBX scene, which is not read by this program, as it was built without the feature fbx; export the \
+         animated mesh as USD or Alembic, or open it in Blender and export it there",
     )
 }
 

@@ -8,12 +8,8 @@ use ufbx::{Anim, AnimCurve, AnimStack, Node, Scene};
 use crate::dropped::listed;
 use crate::error::Fault;
 use crate::frames::{RATES, Times, nominal};
-use crate::scene::{Timeline, check_held, shown};
+use crate::scene::{Timeline, shown, whole_frames};
 
-/// Frames by which the first and the last may miss whole ones.
-const SLACK: f64 = 1e-3;
-/// Frames past which the number of one says nothing.
-const FARTHEST: f64 = 1e9;
 const VISIBILITY: &str = "Visibility";
 
 /// The stack that `wanted` names or has as its number, or else the first that moves anything, and
@@ -29,7 +25,8 @@ pub(super) fn choose<'a>(
     let Some(wanted) = wanted.filter(|_| moving.len() > 1) else {
         let note = (moving.len() > 1).then(|| {
             format!(
-                "of its {} animations {} is read, {} left out; choose one with --animation, where the command has it, or export them merged into one (in Blender: without All Actions)",
+                "of its {} animations {} is read, {} left out; choose one with --animation, where the command has it, \
+                 or export them merged into one (in Blender: without All Actions)",
                 moving.len(),
                 listed(moving.iter().take(1).map(name)),
                 listed(moving.iter().skip(1).map(name))
@@ -64,18 +61,8 @@ pub(super) fn timeline(scene: &Scene, stack: Option<&AnimStack>, rate: Option<f6
                 (begin.min(curve.min_time), end.max(curve.max_time))
             }),
     };
-    let first = (begin * frame_rate - SLACK).ceil();
-    let last = (end * frame_rate + SLACK).floor().max(first);
-    if ![first, last].iter().all(|number| number.abs() < FARTHEST) {
-        return Err(Fault::invalid(format!(
-            "has an animation from {begin} s to {end} s, too far for {frame_rate} frames per second; export it again with times near 0 s"
-        )));
-    }
-    let count = (last - first) as usize + 1;
     let keys = curves(stack).map(|curve| curve.keyframes.len()).max().unwrap_or(0);
-    check_held(count, keys >= count / 2)?;
-    let at = (0..count).map(|frame| (first + frame as f64) / frame_rate).collect();
-    Ok(Timeline { times: Times { frame_rate: Some(frame_rate), first, ..Times::default() }, at })
+    whole_frames([begin, end], frame_rate, keys)
 }
 
 fn curves(stack: &AnimStack) -> impl Iterator<Item = &AnimCurve> {

@@ -104,7 +104,8 @@ impl MeshFrames {
             info.shown.push(shown_in(anim, stack, &above, &at));
             if mesh.cache_deformers.iter().any(|cache| cache.external_channel.is_none()) {
                 info.notes.push(format!(
-                    "{name} is moved by a geometry cache that is not there, and is read without it; put its .xml and .mcx files beside the scene"
+                    "{name} is moved by a geometry cache that is not there, and is read without it; put its .xml and \
+                     .mcx files beside the scene"
                 ));
             }
             if let Some((surface, dropped)) = &mut all {

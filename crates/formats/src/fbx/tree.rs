@@ -75,7 +75,8 @@ impl<'a> Nodes<'a> {
         let once: usize = all.iter().map(|&(_, size)| size).sum();
         if (total - once).saturating_mul(ITEM) > COPIES || total > u32::MAX as usize {
             return Err(Fault::unsupported(
-                "has copies of meshes that take more than 512 MiB, or more than 4294967295 points; export fewer, or choose some with --prim",
+                "has copies of meshes that take more than 512 MiB, or more than 4294967295 points; export fewer, or \
+                 choose some with --prim",
             ));
         }
         Ok((chosen, note))

@@ -69,7 +69,8 @@ impl<R: Read + Seek + Send> Animation for Blocks<R> {
                 for (point, &[x, y, z, w]) in stored.as_chunks().0.iter().enumerate() {
                     if w != 1.0 {
                         return Err(Fault::unsupported(format!(
-                            "point {point} has the fourth coordinate {w} where only 1 has a meaning; save the first three of them"
+                            "point {point} has the fourth coordinate {w} where only 1 has a meaning; save the first \
+                             three of them"
                         )));
                     }
                     out.extend([x, y, z]);

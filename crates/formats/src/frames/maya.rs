@@ -157,7 +157,8 @@ fn layout<R: Read + Seek>(
         let (found, points) = (array.points, *points.get_or_insert(array.points));
         if found != points || points == 0 {
             let what = format!(
-                "has {found} points in frame {frame}, and {points} in frame 0; export a mesh with all its points in every frame"
+                "has {found} points in frame {frame}, and {points} in frame 0; export a mesh with all its points in \
+                 every frame"
             );
             return Err(Fault::invalid(what));
         }
@@ -191,7 +192,8 @@ fn choose(channels: Vec<Channel>, prim: Option<&str>) -> Result<Channel, Fault> 
     let told = |(name, array): &Channel| format!("{} ({} points)", shown(&String::from_utf8_lossy(name)), array.points);
     let names: Vec<String> = meant.iter().take(LISTED).map(told).collect();
     Err(Fault::invalid(format!(
-        "holds {} channels of positions{}; export the one mesh alone, or name its channel with --prim, where the command has it",
+        "holds {} channels of positions{}; export the one mesh alone, or name its channel with --prim, where the \
+         command has it",
         meant.len(),
         if names.is_empty() { String::new() } else { format!(", among them {}", names.join(", ")) }
     )))

@@ -45,7 +45,8 @@ impl Merged {
             let (place, point) = (&mut merged[to as usize], model.points[from as usize]);
             if place.is_some_and(|known| known != point) {
                 let what = format!(
-                    "point {to} lies in two places, which an .stl of the rest pose has as one; export both as .ply or .obj, which keep vertices"
+                    "point {to} lies in two places, which an .stl of the rest pose has as one; export both as .ply or \
+                     .obj, which keep vertices"
                 );
                 return Err(Fault::invalid(what).at(path));
             }

@@ -93,7 +93,8 @@ fn scalar(header: &Header, points: u64, place: Place<'_>) -> Result<Scalar, Faul
             "|O" if header.shape.is_empty() => {
                 let load = place.load(", allow_pickle=True");
                 format!(
-                    "holds one Python object, not an array; save the frames in it, where {load}.item() is a dictionary with numpy.save(\"converted.npy\", {load}.item()[NAME])"
+                    "holds one Python object, not an array; save the frames in it, where {load}.item() is a dictionary \
+                     with numpy.save(\"converted.npy\", {load}.item()[NAME])"
                 )
             }
             "|O" => {
@@ -160,7 +161,8 @@ fn axes(shape: &[u64], expected: u64, place: Place<'_>) -> Result<(u64, u64, Ord
         [frames, values] if values > 4 && values % 3 == 0 => (frames, values / 3, Order::Points),
         _ => {
             return Err(Fault::unsupported(format!(
-                "has the shape {}, not (frames, points, 3) or (frames, 3 × points) with {expected} points; bring its axes into this order with numpy.transpose",
+                "has the shape {}, not (frames, points, 3) or (frames, 3 × points) with {expected} points; bring its \
+                 axes into this order with numpy.transpose",
                 listed(shape)
             )));
         }

@@ -129,7 +129,8 @@ fn chosen(
     let names: Vec<&str> = found.iter().filter(|array| fits(array)).map(|array| array.name.as_str()).collect();
     let what = if let (Some((name, method)), true) = (unreadable, names.is_empty()) {
         format!(
-            "{name:?} is packed with {method}, which is not unpacked here; pack it again in Python with numpy.savez_compressed(\"converted.npz\", **{file})"
+            "{name:?} is packed with {method}, which is not unpacked here; pack it again in Python with \
+             numpy.savez_compressed(\"converted.npz\", **{file})"
         )
     } else if found.is_empty() {
         "has no arrays; save the frames with numpy.save".to_owned()
@@ -145,7 +146,8 @@ fn chosen(
         // Arrays such as `arr_0`, `arr_1` are frames; a posed body and a canonical one are not.
         let join = if !is_frame && numbers::of_names(&names).is_some() {
             format!(
-                ", or join them in Python with a = {file}; numpy.save(\"converted.npy\", [a[k] for k in sorted(a.files, key=lambda k: (len(k), k)) if a[k].shape == a[{:?}].shape])",
+                ", or join them in Python with a = {file}; numpy.save(\"converted.npy\", [a[k] for k in \
+                 sorted(a.files, key=lambda k: (len(k), k)) if a[k].shape == a[{:?}].shape])",
                 names[0]
             )
         } else {
@@ -160,7 +162,8 @@ fn chosen(
     } else {
         let all = found.iter().map(|array| format!("{}: {}", array.name, array.described));
         format!(
-            "has {} arrays ({}), and none of them is frames of {points} points as 32- or 64-bit floats; save the frames alone with numpy.save",
+            "has {} arrays ({}), and none of them is frames of {points} points as 32- or 64-bit floats; save the \
+             frames alone with numpy.save",
             found.len(),
             listed(all)
         )
@@ -218,7 +221,8 @@ fn list<R: Read + Seek>(path: &Path, archive: &mut ZipArchive<R>, length: u64) -
         let start = file.data_start().filter(|start| start.checked_add(packed).is_some_and(|end| end <= length));
         let Some(start) = start.filter(|_| file.size() <= most) else {
             let what = format!(
-                "announces {} bytes for {name:?}, more than the {packed} bytes in which it is packed can hold; copy the file again",
+                "announces {} bytes for {name:?}, more than the {packed} bytes in which it is packed can hold; copy \
+                 the file again",
                 file.size()
             );
             return Err(Fault::damaged(what).at(path));

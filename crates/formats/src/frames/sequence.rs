@@ -107,7 +107,8 @@ impl SequenceReader {
                 "export one frame to each file"
             };
             let what = format!(
-                "frame {frame}: has {} frames, where a folder of several files has one in each; name this file alone, or {cure}",
+                "frame {frame}: has {} frames, where a folder of several files has one in each; name this file alone, \
+                 or {cure}",
                 reader.frames()
             );
             return Err(Fault::unsupported(what).at(path));

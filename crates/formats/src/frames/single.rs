@@ -52,7 +52,8 @@ pub(super) fn unknown(path: &Path) -> Error {
     let what = match way_out(path) {
         Some(way_out) => way_out,
         None => format!(
-            "is not a capture that is read; give .npy .pc2 .mdd .mcx .abc .usdc .usdz .glb .fbx .npz, or {} files in a folder",
+            "is not a capture that is read; give .npy .pc2 .mdd .mcx .abc .usdc .usdz .glb .fbx .npz, or {} files in a \
+             folder",
             extensions(&MeshFormat::STILL)
         ),
     };
@@ -79,6 +80,7 @@ pub(super) fn way_out(path: &Path) -> Option<String> {
         _ => return None,
     };
     Some(format!(
-        "is {kind}, which is not read; export the animated mesh as Alembic, USD or a point cache, .abc, .usdc, .pc2 or .mdd, or open it in Blender and encode it there with the extension of docs/BLENDER.md"
+        "is {kind}, which is not read; export the animated mesh as Alembic, USD or a point cache, .abc, .usdc, .pc2 or \
+         .mdd, or open it in Blender and encode it there with the extension of docs/BLENDER.md"
     ))
 }

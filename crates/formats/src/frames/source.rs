@@ -186,7 +186,8 @@ fn check_frames(files: &[PathBuf], points: usize, selection: &FrameSelection) ->
     let count = files.len();
     if let Some((kinds, most)) = kinds(&files) {
         return Err(Fault::invalid(format!(
-            "has {count} captures of several kinds ({kinds}); name one of them, or where each is one frame, pick these with a pattern such as '*.{most}'"
+            "has {count} captures of several kinds ({kinds}); name one of them, or where each is one frame, pick these \
+             with a pattern such as '*.{most}'"
         )));
     }
     let frames = |path: &PathBuf| single::open_cache(path, points, selection, true).ok().map(|found| found.frames());
@@ -201,7 +202,8 @@ fn check_frames(files: &[PathBuf], points: usize, selection: &FrameSelection) ->
     let has_numbers = Sequence::of(files.clone()).map_or(true, |sequence| sequence.numbers.is_some());
     if !has_numbers && !selection.join_sequences {
         return Err(Fault::invalid(format!(
-            "has {count} captures of one frame each, such as {} and {}, whose names have no numbers that tell the order; name one of them, number them as the frames of one capture, or take them by name with --all-files",
+            "has {count} captures of one frame each, such as {} and {}, whose names have no numbers that tell the \
+             order; name one of them, number them as the frames of one capture, or take them by name with --all-files",
             name(&files[0]),
             name(&files[1])
         )));
@@ -286,7 +288,8 @@ fn no_frames_in(source: &Path, others: &[PathBuf]) -> Error {
         return Fault::unsupported(way_out).at(file);
     }
     if let Some(capture) = others.iter().find(|path| single::is_cache(path)) {
-        let what = "is a capture whose points correspond already, so encode it with cager encode; for surfaces give a folder or pattern of mesh files";
+        let what = "is a capture whose points correspond already, so encode it with cager encode; for surfaces give a \
+                    folder or pattern of mesh files";
         return Fault::unsupported(what).at(capture);
     }
     let folders = fs::read_dir(source).into_iter().flatten().flatten().map(|entry| entry.path());

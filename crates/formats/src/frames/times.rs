@@ -87,7 +87,8 @@ impl Times {
         let ascend = rounded.windows(2).all(|pair| pair[0] < pair[1]);
         found.numbers = Some(if ascend { rounded } else { times.iter().map(|time| rate * time).collect() });
         found.note = Some(format!(
-            "its times are not evenly spaced, {shortest:.4} s to {longest:.4} s apart; they are kept as the numbers of its frames, at {rate} frames per second"
+            "its times are not evenly spaced, {shortest:.4} s to {longest:.4} s apart; they are kept as the numbers of \
+             its frames, at {rate} frames per second"
         ));
         Ok(found)
     }

@@ -78,7 +78,8 @@ impl Clip {
         let others: Vec<usize> = moving.into_iter().filter(|&k| k != first).collect();
         let note = (!others.is_empty() && wanted.is_none()).then(|| {
             format!(
-                "of its {} animations {} is read, {} left out; choose one with --animation, where the command has it, or export them merged into one (in Blender: Animation mode, Active actions merged)",
+                "of its {} animations {} is read, {} left out; choose one with --animation, where the command has it, \
+                 or export them merged into one (in Blender: Animation mode, Active actions merged)",
                 others.len() + 1,
                 name(root, first),
                 names(root, &others)
@@ -130,7 +131,8 @@ fn find(root: &Root, moving: &[usize], wanted: &str) -> Result<usize, Fault> {
     let numbered = || moving.iter().find(|&&k| wanted.parse() == Ok(k));
     called.or_else(numbered).copied().ok_or_else(|| {
         Fault::invalid(format!(
-            "holds no animation {} that moves the mesh, but {}; give one of these with --animation, by its name or number",
+            "holds no animation {} that moves the mesh, but {}; give one of these with --animation, by its name or \
+             number",
             shown(wanted),
             names(root, moving)
         ))

@@ -16,14 +16,11 @@ use super::scene::Scene;
 use crate::error::{Error, Fault};
 use crate::faces::Contents;
 use crate::frames::{FrameReader, FrameSelection, Times};
-use crate::scene::{self, Animation, MeshInfo, Timeline, check_held};
+use crate::scene::{self, Animation, MeshInfo, Timeline, check_held, whole_frames};
 
 /// Frames per second that programs have.
 const RATES: [f64; 10] =
     [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0, 24_000.0 / 1001.0, 30_000.0 / 1001.0, 60_000.0 / 1001.0];
-/// Frames past which the number of one says nothing.
-const FARTHEST: f64 = 1e9;
-
 /// Opens the frames of the mesh that is selected of several, or else of all as one.
 pub(crate) fn open_frames<'a>(
     path: &Path,
@@ -93,7 +90,8 @@ impl MeshFrames {
         }
         if points != expected_points && chosen.len() > 1 {
             let what = format!(
-                "holds {} meshes, {}, which together have {points} points, and {expected_points} are expected; choose one by its path with --prim, where the command has it, or export the one mesh alone",
+                "holds {} meshes, {}, which together have {points} points, and {expected_points} are expected; choose \
+                 one by its path with --prim, where the command has it, or export the one mesh alone",
                 chosen.len(),
                 listed(&buffers.root, &scene)
             );
@@ -163,18 +161,7 @@ fn timeline(
         };
         return Ok(Timeline { times, at: keys });
     };
-    const SLACK: f64 = 1e-3;
-    let [start, end] =
-        [(first * rate - SLACK).ceil(), (last * rate + SLACK).floor().max((first * rate - SLACK).ceil())];
-    if [start, end].iter().any(|number| number.abs() > FARTHEST) {
-        return Err(Fault::invalid(format!(
-            "has times from {first} s to {last} s, too far for {rate} frames per second; export it again with times in seconds"
-        )));
-    }
-    let count = (end - start) as usize + 1;
-    check_held(count, keys.len() >= count / 2)?;
-    let at = (0..count).map(|frame| (start + frame as f64) / rate).collect();
-    let mut times = Times { frame_rate: Some(rate), first: start, ..Times::default() };
+    let Timeline { mut times, at } = whole_frames([first, last], rate, keys.len())?;
     if let Some([first, _]) = said.filter(|[_, told]| (told - rate).abs() < 1e-9 * rate) {
         times.begin_at(first);
     }
@@ -192,7 +179,8 @@ fn far_keys(keys: &[f64]) -> Option<String> {
     let gap = keys.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
     (gap > FAR).then(|| {
         format!(
-            "its keys are up to {gap:.3} s apart, and the {} frames at them have none of the motion between; --sample-rate 24, where the command has it, reads that too",
+            "its keys are up to {gap:.3} s apart, and the {} frames at them have none of the motion between; \
+             --sample-rate 24, where the command has it, reads that too",
             keys.len()
         )
     })

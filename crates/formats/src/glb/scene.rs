@@ -79,7 +79,8 @@ impl Scene {
         } else if placements.is_empty() {
             let scene = root.scene.map_or(0, |scene| scene.value());
             return Err(Fault::invalid(format!(
-                "has meshes, but none in the scene that it shows, scene {scene}; make the scene with the mesh the active one and export again"
+                "has meshes, but none in the scene that it shows, scene {scene}; make the scene with the mesh the \
+                 active one and export again"
             )));
         }
         Ok(Self { placements, places })

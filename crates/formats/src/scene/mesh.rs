@@ -1,5 +1,7 @@
 //! One mesh of a scene, whatever file it is in: its points and faces at any time.
 
+use std::sync::Arc;
+
 use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::Part;
 
@@ -21,7 +23,7 @@ pub(crate) struct MeshTracks {
     /// What moves them before the transforms above do.
     pub(crate) deformer: Option<Box<dyn Deformer>>,
     pub(crate) chain: Chain,
-    pub(crate) shown: Steps,
+    pub(crate) shown: Arc<Steps>,
     /// The path; where a model is read, what lies on the faces too, of all faces and their corners
     /// in the order of the file. Numbers of points and faces are not looked at.
     pub(crate) part: Part,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cager_geometry::surface::Part;
 
-use crate::dropped::listed;
+use crate::dropped::{joined, listed};
 use crate::error::Fault;
 
 /// Meshes that a message lists, and characters of the name of each.
@@ -78,7 +78,8 @@ pub(crate) fn choose(scene: &mut impl Tree, all: &[usize], wanted: Wanted<'_>) -
     match (fitting.next(), fitting.next()) {
         (Some((&only, _)), None) => Ok(vec![only]),
         _ => Err(Fault::invalid(format!(
-            "holds {} meshes, {}, which together have {} points, and {points} are expected; choose by paths with --prim, where the command has it, or export those meshes alone",
+            "holds {} meshes, {}, which together have {} points, and {points} are expected; choose by paths with \
+             --prim, where the command has it, or export those meshes alone",
             chosen.len(),
             list(scene, &chosen),
             sum.unwrap_or_default()
@@ -188,8 +189,7 @@ pub(crate) fn list(scene: &mut impl Tree, meshes: &[usize]) -> String {
     if meshes.len() > LISTED {
         words.push(format!("{} more", meshes.len() - LISTED));
     }
-    let last = words.pop().unwrap_or_default();
-    if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) }
+    joined(&words).unwrap_or_default()
 }
 
 /// The names from the top to a node, each after a `/`, as messages have them.

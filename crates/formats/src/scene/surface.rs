@@ -1,7 +1,51 @@
 //! What lies on the faces of a mesh, as its faces are read: without those of fewer than three
 //! corners, and with corners in the opposite order where faces are turned around.
 
-use cager_geometry::surface::{CornerSet, Part};
+use std::collections::HashMap;
+
+use cager_geometry::surface::{CornerSet, Crease, Part};
+
+use super::bytes::damaged;
+use crate::error::Fault;
+
+/// A set in which equal values are one, as programs write the value of each corner.
+pub(crate) fn merged<const N: usize>(name: String, values: &[[f32; N]], corners: Vec<u32>) -> CornerSet<N> {
+    let mut set = CornerSet { name, ..CornerSet::default() };
+    let mut numbers = HashMap::new();
+    for corner in corners {
+        // 0 and −0 too.
+        let value = values[corner as usize].map(|x| x + 0.0);
+        let number = *numbers.entry(value.map(f32::to_bits)).or_insert_with(|| {
+            set.values.push(value);
+            set.values.len() as u32 - 1
+        });
+        set.corners.push(number);
+    }
+    set
+}
+
+/// The edges of chains of so many points each, with a sharpness for each chain or for each edge, in
+/// a mesh of `count` points; without those that are not sharp.
+pub(crate) fn creases(
+    mut chains: &[i32],
+    lengths: &[i32],
+    sharpnesses: &[f32],
+    count: usize,
+) -> Result<Vec<Crease>, Fault> {
+    let (of_chains, mut creases, mut edges) = (sharpnesses.len() == lengths.len(), Vec::new(), 0);
+    for (k, &length) in lengths.iter().enumerate() {
+        let chain = chains.split_off(..length.max(0) as usize);
+        for pair in chain.ok_or_else(|| damaged("a crease has more points than are there"))?.windows(2) {
+            let sharpness = sharpnesses.get(if of_chains { k } else { edges }).copied().unwrap_or(0.0);
+            edges += 1;
+            let edge = [pair[0].min(pair[1]) as u32, pair[0].max(pair[1]) as u32];
+            if edge[0] < edge[1] && (edge[1] as usize) < count && sharpness > 0.0 && sharpness.is_finite() {
+                creases.push(Crease { edge, sharpness });
+            }
+        }
+    }
+    Ok(creases)
+}
 
 /// A part of all faces of a file, which have so many corners each, for the faces that are kept.
 /// What is not as long as these say is dropped.
@@ -71,5 +115,22 @@ mod tests {
         assert_eq!(arranged.uv_sets[0].corners, [2, 1, 0, 8, 7, 6, 5]);
         assert_eq!(arranged.normals, [12, 11, 10, 18, 17, 16, 15]);
         assert_eq!((arranged.materials, arranged.groups[0].faces.clone()), (vec![7, 9], vec![0, 1]));
+    }
+
+    #[test]
+    fn values_of_corners_are_one_where_they_are_equal() {
+        let set = merged("a".to_owned(), &[[1.0], [-0.0], [1.0], [0.0]], vec![0, 2, 3, 1]);
+        assert_eq!((set.values, set.corners), (vec![[1.0], [0.0]], vec![0, 0, 1, 1]));
+    }
+
+    #[test]
+    fn chains_are_edges_with_a_sharpness_of_their_own_or_of_the_chain() {
+        let edges = |sharpnesses: &[f32]| {
+            let found = creases(&[2, 1, 0, 3, 3, 9], &[3, 2, 1], sharpnesses, 4);
+            found.unwrap().iter().map(|crease| (crease.edge, crease.sharpness)).collect::<Vec<_>>()
+        };
+        assert_eq!(edges(&[2.0, 1.0, 1.0]), [([1, 2], 2.0), ([0, 1], 2.0)]);
+        assert_eq!(edges(&[2.0, f32::NAN]), [([1, 2], 2.0)]);
+        assert!(creases(&[0, 1], &[3], &[1.0], 4).is_err());
     }
 }

@@ -15,7 +15,8 @@ pub(crate) fn check_held(frames: usize, is_held: bool) -> Result<(), Fault> {
         return Ok(());
     }
     Err(Fault::unsupported(format!(
-        "promises {frames} frames, of which it holds fewer than half; export {MOST_REPEATED} frames at the most, or all of them as positions"
+        "promises {frames} frames, of which it holds fewer than half; export {MOST_REPEATED} frames at the most, or \
+         all of them as positions"
     )))
 }
 
@@ -71,6 +72,25 @@ pub(crate) struct Timeline {
     pub(crate) times: Times,
     /// The time of each frame, as the tracks of the scene count it.
     pub(crate) at: Vec<f64>,
+}
+
+/// Whole frames of a rate from one time to another, in seconds, where so many keys are.
+pub(crate) fn whole_frames([begin, end]: [f64; 2], rate: f64, keys: usize) -> Result<Timeline, Fault> {
+    // Frames by which the first and the last may miss whole ones, and past which numbers say nothing.
+    const SLACK: f64 = 1e-3;
+    const FARTHEST: f64 = 1e9;
+    let first = (begin * rate - SLACK).ceil();
+    let last = (end * rate + SLACK).floor().max(first);
+    if ![first, last].iter().all(|number| number.abs() < FARTHEST) {
+        return Err(Fault::invalid(format!(
+            "has times from {begin} s to {end} s, too far for {rate} frames per second; export it again with times \
+             near 0 s"
+        )));
+    }
+    let count = (last - first) as usize + 1;
+    check_held(count, keys >= count / 2)?;
+    let at = (0..count).map(|frame| (first + frame as f64) / rate).collect();
+    Ok(Timeline { times: Times { frame_rate: Some(rate), first, ..Times::default() }, at })
 }
 
 /// An array of points, which lies in the file as it is.

@@ -140,7 +140,8 @@ impl Chain {
             self.0.push(link);
         }
         if self.0.iter().map(|link| link.operations.len()).sum::<usize>() > MOST_ABOVE {
-            let what = "the transforms above a mesh have more operations than any program writes, so the file is damaged; copy or export it again";
+            let what = "the transforms above a mesh have more operations than any program writes, so the file is \
+                        damaged; copy or export it again";
             return Err(Fault::damaged(what));
         }
         Ok(())
@@ -162,7 +163,8 @@ impl Chain {
             product = matrix * product;
         }
         if !product.is_finite() {
-            let what = "has a transform that is NaN or infinite, or undone where it cannot be; repair it or bake it into the points";
+            let what = "has a transform that is NaN or infinite, or undone where it cannot be; repair it or bake it \
+                        into the points";
             return Err(Fault::invalid(what));
         }
         Ok(Some(product).filter(|matrix| *matrix != DAffine3::IDENTITY))

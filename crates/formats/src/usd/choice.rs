@@ -1,11 +1,19 @@
-//! Which meshes of a layer are meant.
+//! Which meshes of a layer are meant, and when they are shown.
 
-use super::layer::{Kind, Layer, Prim, composed};
+use std::sync::Arc;
+
+use super::layer::{Instance, Kind, Layer, Prim, composed};
 use crate::error::Fault;
-use crate::scene::{Node, Tree, Wanted, ancestry, choose as choose_meshes, list, named, shown_path};
+use crate::scene::{
+    Node, Steps, Tree, Visibility, Wanted, ancestry, choose as choose_meshes, list, named, said, shown_path,
+};
 
 /// The meshes that are wanted, and what the user should know of others.
-pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<usize>, Vec<String>), Fault> {
+pub(super) fn choose(
+    layer: &mut Layer<'_>,
+    wanted: Wanted<'_>,
+    visibility: &mut Visibility,
+) -> Result<(Vec<usize>, Vec<String>), Fault> {
     let is_there = |&k: &usize| ancestry(&layer.nodes, k).all(|k| layer.prims[k].is_there);
     let there: Vec<usize> = (0..layer.prims.len()).filter(is_there).collect();
     let is_a = |k: usize, kind: Kind| layer.prims[k].kind == kind;
@@ -19,7 +27,7 @@ pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<u
     meshes.retain(is_placed);
     let mut notes = Vec::new();
     if wanted.prims.is_empty() && meshes.len() > 1 {
-        let (mut rendered, mut others) = shown(layer, &meshes)?;
+        let (mut rendered, mut others) = shown(layer, &meshes, visibility)?;
         // A part of the rest pose may be hidden in the file of a frame.
         if wanted.points.is_some_and(|points| count(layer, &rendered) != points && count(layer, &meshes) == points) {
             (rendered, others) = (meshes, Vec::new());
@@ -34,7 +42,8 @@ pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<u
         return Err(match (first_composed(&layer.prims, &there), instancer) {
             (Some((prim, of)), _) => composed(&shown_path(&layer.nodes, prim), of),
             (None, Some(instancer)) if !is_none => Fault::unsupported(format!(
-                "has its meshes as prototypes of {}, a PointInstancer, whose instances are not read; make them real where it is exported, or export the mesh alone",
+                "has its meshes as prototypes of {}, a PointInstancer, whose instances are not read; make them real \
+                 where it is exported, or export the mesh alone",
                 shown_path(&layer.nodes, instancer)
             )),
             _ => Fault::unsupported("holds no polygon mesh; export the mesh itself as USD"),
@@ -74,22 +83,38 @@ fn count(layer: &mut Layer<'_>, meshes: &[usize]) -> usize {
 
 /// Meshes that are rendered, where there are any, and others: cages and other helpers say that they
 /// are guides or proxies, and what is switched off is invisible.
-fn shown(layer: &mut Layer<'_>, meshes: &[usize]) -> Result<(Vec<usize>, Vec<usize>), Fault> {
+fn shown(
+    layer: &mut Layer<'_>,
+    meshes: &[usize],
+    visibility: &mut Visibility,
+) -> Result<(Vec<usize>, Vec<usize>), Fault> {
     let (mut rendered, mut others) = (Vec::new(), Vec::new());
     for &mesh in meshes {
-        let (mut purpose, mut is_hidden) = (None, false);
+        let mut purpose = None;
         for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
-            // The innermost purpose counts.
-            purpose = match purpose {
-                None => constant(layer, prim, "purpose")?,
-                known => known,
-            };
-            is_hidden = is_hidden || constant(layer, prim, "visibility")?.as_deref() == Some("invisible");
+            purpose = constant(layer, prim, "purpose")?;
+            // The innermost counts.
+            if purpose.is_some() {
+                break;
+            }
         }
-        let is_rendered = !is_hidden && !matches!(purpose.as_deref(), Some("guide" | "proxy"));
+        let is_helper = matches!(purpose.as_deref(), Some("guide" | "proxy"));
+        let is_rendered = !is_helper && !visible(layer, mesh, visibility)?.is_never();
         if is_rendered { rendered.push(mesh) } else { others.push(mesh) }
     }
     Ok(if rendered.is_empty() { (others, rendered) } else { (rendered, others) })
+}
+
+/// When a prim is shown: what is invisible hides all below it.
+pub(super) fn visible(layer: &mut Layer<'_>, prim: usize, known: &mut Visibility) -> Result<Arc<Steps>, Fault> {
+    let above: Vec<usize> = ancestry(&layer.nodes, prim).collect();
+    known.of(&above, |prim| {
+        if let Some(Instance { hidden: (track, values), .. }) = layer.instances.get(&prim) {
+            return said(track, |value| Ok(values.contains(&value.0).then_some(false)));
+        }
+        let track = layer.attribute(prim, "visibility")?;
+        said(&track, |value| Ok((layer.source.tokens(value, 1)? == ["invisible"]).then_some(false)))
+    })
 }
 
 /// The token that an attribute of a prim is at all times.

@@ -184,6 +184,18 @@ impl Layer<'_> {
         value.map(|value| self.source.numbers(value)).transpose()
     }
 
+    /// The whole numbers of the first value of an attribute, at most so many; none without a value.
+    pub(super) fn integers(&mut self, prim: usize, name: &str, most: u64) -> Result<Vec<i32>, Fault> {
+        let value = self.first(prim, name)?;
+        value.map_or(Ok(Vec::new()), |value| self.source.integers(value, most))
+    }
+
+    /// The vectors of the first value of an attribute, at most so many of `width` numbers each.
+    pub(super) fn floats(&mut self, prim: usize, name: &str, width: usize, most: u64) -> Result<Vec<f32>, Fault> {
+        let value = self.first(prim, name)?;
+        value.map_or(Ok(Vec::new()), |value| self.source.floats(value, width, most))
+    }
+
     /// The tokens that an attribute of a prim is at all times, or first.
     pub(super) fn tokens(&mut self, prim: usize, name: &str, most: usize) -> Result<Option<Vec<String>>, Fault> {
         let value = self.attribute(prim, name)?.still();
@@ -257,7 +269,9 @@ pub(super) trait Attributes: Values {
 /// The fault of what is composed of other prims or files.
 pub(super) fn composed(what: &str, of: &str) -> Fault {
     Fault::unsupported(format!(
-        "{what} has {of}, which are not read; write all into one file in Python (pip install usd-core): from pxr import Usd; s = Usd.Stage.Open(\"in.usd\"); [p.SetInstanceable(False) for _ in range(9) for p in list(s.TraverseAll()) if p and p.IsInstance()]; s.Export(\"out.usdc\")"
+        "{what} has {of}, which are not read; write all into one file in Python (pip install usd-core): from pxr \
+         import Usd; s = Usd.Stage.Open(\"in.usd\"); [p.SetInstanceable(False) for _ in range(9) for p in \
+                                          list(s.TraverseAll()) if p and p.IsInstance()]; s.Export(\"out.usdc\")"
     ))
 }
 

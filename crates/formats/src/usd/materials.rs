@@ -160,10 +160,7 @@ fn read_material(layer: &mut Layer<'_>, prim: usize) -> Result<Option<Material>,
         }
         // The value of the surface itself, where a picture takes its place.
         let at = if attribute.starts_with("outputs:") { (shader, name) } else { (prim, attribute.as_str()) };
-        let numbers = match layer.first(at.0, at.1)? {
-            Some(value) => layer.source.numbers(value)?,
-            None => Vec::new(),
-        };
+        let numbers = layer.numbers(at.0, at.1)?.unwrap_or_default();
         let numbers: Vec<f32> = numbers.into_iter().map(|x| x as f32).filter(|x| x.is_finite()).collect();
         match (channel, numbers.as_slice()) {
             (Channel::BaseColor, &[red, green, blue]) => material.base_color = [red, green, blue],

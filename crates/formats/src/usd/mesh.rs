@@ -1,11 +1,9 @@
 //! What a layer says of meshes and the transforms above them.
 
-use std::collections::HashSet;
-
 use cager_geometry::surface::{Part, Picture};
 use cager_geometry::units::{Units, Up};
 
-use super::choice::choose;
+use super::choice::{choose, visible};
 use super::layer::{Layer, Stage};
 use super::materials::Materials;
 use super::skel::Rigs;
@@ -14,7 +12,7 @@ use super::unread::Unread;
 use super::{surface, transform};
 use crate::dropped::Dropped;
 use crate::error::Fault;
-use crate::scene::{Deformer, MeshTracks, MovingScene, SceneTracks, Steps, Track, Wanted, ancestry, path};
+use crate::scene::{Deformer, MeshTracks, MovingScene, SceneTracks, Visibility, Wanted, path};
 
 /// The unit of layers that do not say theirs: a centimetre.
 const USUAL_UNIT: f64 = 0.01;
@@ -26,13 +24,16 @@ pub(super) fn open<'a>(
     wanted: Wanted<'_>,
     model: Option<(&mut Dropped, Vec<Picture>)>,
 ) -> Result<MovingScene<'a>, Fault> {
-    let (prims, notes) = choose(&mut layer, wanted)?;
+    let mut visibility = Visibility::default();
+    let (prims, notes) = choose(&mut layer, wanted, &mut visibility)?;
     let mut tracks = SceneTracks { notes, units: units(&layer.stage), ..SceneTracks::default() };
     let mut rigs = Rigs::default();
     for &prim in &prims {
         let name = path(&layer.nodes, prim);
         let named = |fault: Fault| if prims.len() > 1 { fault.within(&name) } else { fault };
-        tracks.meshes.push(read_mesh(&mut layer, prim, &mut rigs).map_err(named)?);
+        let mut mesh = read_mesh(&mut layer, prim, &mut rigs).map_err(named)?;
+        mesh.shown = visible(&mut layer, prim, &mut visibility).map_err(named)?;
+        tracks.meshes.push(mesh);
     }
     let of_mesh = |mesh: &MeshTracks| {
         let moved = mesh.chain.moving().flatten();
@@ -71,34 +72,7 @@ fn read_mesh(layer: &mut Layer<'_>, prim: usize, rigs: &mut Rigs) -> Result<Mesh
     is_clockwise ^= bound.as_ref().is_some_and(|bound| bound.is_mirrored);
     let deformer = bound.map(|bound| Box::new(bound.skin) as Box<dyn Deformer>);
     let part = Part { path: path(&layer.nodes, prim), ..Part::default() };
-    Ok(MeshTracks { positions, faces, is_clockwise, deformer, chain, shown: visible(layer, prim)?, part })
-}
-
-/// When a prim is shown: what is invisible hides all below it.
-fn visible(layer: &mut Layer<'_>, prim: usize) -> Result<Steps, Fault> {
-    let mut tracks = Vec::new();
-    for prim in ancestry(&layer.nodes, prim).collect::<Vec<_>>() {
-        let track = layer.attribute(prim, "visibility")?;
-        let mut hidden = HashSet::new();
-        for value in track.values.iter().chain(&track.default) {
-            if layer.source.tokens(*value, 1)? == ["invisible"] {
-                hidden.insert(value.0);
-            }
-        }
-        if !hidden.is_empty() {
-            tracks.push((track, hidden));
-        }
-        if let Some(instance) = layer.instances.get(&prim).filter(|instance| !instance.hidden.1.is_empty()) {
-            tracks.push(instance.hidden.clone());
-        }
-    }
-    let times = tracks.iter().flat_map(|(track, _)| track.times.iter().copied().chain(track.default.map(|_| 0.0)));
-    Steps::of(times.collect(), |time| {
-        let is_hidden = |(track, hidden): &(Track, HashSet<u64>)| {
-            track.at(time).is_some_and(|(value, ..)| hidden.contains(&value.0))
-        };
-        Ok(!tracks.iter().any(is_hidden))
-    })
+    Ok(MeshTracks { positions, faces, is_clockwise, deformer, chain, part, ..MeshTracks::default() })
 }
 
 pub(super) fn units(stage: &Stage) -> Units {

@@ -86,7 +86,7 @@ fn found(layer: &mut Layer<'_>, mesh: Option<usize>, part: &Part, faces: &Polygo
     let Some(mesh) = mesh else {
         return Err(Fault::invalid(format!("has no mesh {path}, a part of the model; {cure}")));
     };
-    let there = match layer.attribute(mesh, "points")?.still() {
+    let there = match layer.first(mesh, "points")? {
         Some(value) => layer.source.points(value)?.count,
         None => part.points,
     };
@@ -94,10 +94,7 @@ fn found(layer: &mut Layer<'_>, mesh: Option<usize>, part: &Part, faces: &Polygo
         let own = part.points;
         return Err(Fault::invalid(format!("{path} has {there} points, and the part of the model {own}; {cure}")));
     }
-    let mut integers = |name| match layer.attribute(mesh, name)?.still() {
-        Some(value) => layer.source.integers(value, most_corners(there)),
-        None => Ok(Vec::new()),
-    };
+    let mut integers = |name| layer.integers(mesh, name, most_corners(there));
     let [counts, corners] = [integers("faceVertexCounts")?, integers("faceVertexIndices")?];
     let read = |is_turned| {
         let numbers = |list: &[i32]| list.iter().map(|&number| number as u32).collect::<Vec<_>>().into_iter();

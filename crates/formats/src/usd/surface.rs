@@ -1,14 +1,14 @@
 //! What lies on the faces of a mesh: primvars, normals, creases and the scheme of subdivision.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
-use cager_geometry::surface::{CornerSet, Crease, Part, Subdivision, sharing};
+use cager_geometry::surface::{Crease, Part, Subdivision, sharing};
 
 use super::layer::Layer;
 use super::materials::Materials;
 use super::unread::kind;
 use crate::error::Fault;
-use crate::scene::{damaged, most_corners};
+use crate::scene::{creases, damaged, merged, most_corners};
 
 /// Names of texture coordinates that come before others, as programs call the first ones.
 const FIRST_UVS: [&str; 4] = ["primvars:st", "primvars:UVMap", "primvars:map1", "primvars:uv"];
@@ -26,10 +26,7 @@ impl Faces {
             Some(points) => layer.source.points(points)?.count,
             None => 0,
         };
-        let mut integers = |name| match layer.first(prim, name)? {
-            Some(value) => layer.source.integers(value, most_corners(points)),
-            None => Ok(Vec::new()),
-        };
+        let mut integers = |name| layer.integers(prim, name, most_corners(points));
         let (arities, corners) = (integers("faceVertexCounts")?, integers("faceVertexIndices")?);
         let corners = corners.into_iter().map(|corner| corner as u32).collect();
         Ok(Self { points, arities, corners })
@@ -73,11 +70,11 @@ pub(super) fn read(
         let is_read = match kind(name, type_name) {
             Some("texture coordinates") => {
                 let set = read_set(layer, (prim, name), &faces);
-                set.map(|(values, corners)| part.uv_sets.push(merged(plain(), &values, &corners))).is_ok()
+                set.map(|(values, corners)| part.uv_sets.push(merged(plain(), &values, corners))).is_ok()
             }
             Some("colours") => {
                 let set = read_colors(layer, (prim, name), &faces);
-                set.map(|(values, corners)| part.color_sets.push(merged(plain(), &values, &corners))).is_ok()
+                set.map(|(values, corners)| part.color_sets.push(merged(plain(), &values, corners))).is_ok()
             }
             _ => false,
         };
@@ -157,44 +154,9 @@ fn read_normals(layer: &mut Layer<'_>, at: (usize, &str), faces: &Faces, part: &
     Ok(())
 }
 
-/// A set in which equal values are one, as not all programs write indices.
-fn merged<const N: usize>(name: String, values: &[[f32; N]], corners: &[u32]) -> CornerSet<N> {
-    let mut set = CornerSet { name, ..CornerSet::default() };
-    let mut numbers = HashMap::new();
-    for &corner in corners {
-        // 0 and −0 too.
-        let value = values[corner as usize].map(|x| x + 0.0);
-        let number = *numbers.entry(value.map(f32::to_bits)).or_insert_with(|| {
-            set.values.push(value);
-            set.values.len() as u32 - 1
-        });
-        set.corners.push(number);
-    }
-    set
-}
-
-/// Edges of chains of points, with a sharpness for each chain or for each edge.
 fn read_creases(layer: &mut Layer<'_>, prim: usize, faces: &Faces) -> Result<Vec<Crease>, Fault> {
-    let mut integers = |name| match layer.first(prim, name)? {
-        Some(value) => layer.source.integers(value, faces.most()),
-        None => Ok(Vec::new()),
-    };
-    let (points, lengths) = (integers("creaseIndices")?, integers("creaseLengths")?);
-    let sharpnesses = match layer.first(prim, "creaseSharpnesses")? {
-        Some(value) => layer.source.floats(value, 1, faces.most())?,
-        None => Vec::new(),
-    };
-    let of_chains = sharpnesses.len() == lengths.len();
-    let (mut rest, mut creases) = (&points[..], Vec::new());
-    for (chain, &length) in lengths.iter().enumerate() {
-        let chain_points = rest.split_off(..length.max(0) as usize);
-        for pair in chain_points.ok_or_else(|| damaged("a crease has more points than are there"))?.windows(2) {
-            let sharpness = sharpnesses.get(if of_chains { chain } else { creases.len() }).copied().unwrap_or(0.0);
-            let mut edge = [pair[0] as u32, pair[1] as u32];
-            edge.sort_unstable();
-            creases.push(Crease { edge, sharpness });
-        }
-    }
-    creases.retain(|crease| (crease.edge[1] as usize) < faces.points && crease.sharpness.is_finite());
-    Ok(creases)
+    let mut integers = |name| layer.integers(prim, name, faces.most());
+    let (chains, lengths) = (integers("creaseIndices")?, integers("creaseLengths")?);
+    let sharpnesses = layer.floats(prim, "creaseSharpnesses", 1, faces.most())?;
+    creases(&chains, &lengths, &sharpnesses, faces.points)
 }

@@ -57,7 +57,10 @@ pub(super) fn timeline(stage: &Stage, samples: Vec<f64>) -> Result<Timeline, Fau
 
 fn even(rate: f64, (first, distance, frames): (f64, f64, usize), step: f64, stored: usize) -> Timeline {
     let note = (stored < frames && stored > 1).then(|| {
-        format!("it stores {stored} of its {frames} frames; those between are interpolated, and before and after nothing moves")
+        format!(
+            "it stores {stored} of its {frames} frames; those between are interpolated, and before and after \
+             nothing moves"
+        )
     });
     let times = Times { frame_rate: Some(rate), first: first / step, step: distance / step, numbers: None, note };
     Timeline { times, at: (0..frames).map(|frame| first + distance * frame as f64).collect() }

@@ -21,7 +21,8 @@ impl Layout {
         if blocks.saturating_mul(frames) > LARGEST {
             let most = LARGEST / blocks;
             return Err(Fault::unsupported(format!(
-                "cannot hold {frames} frames of {points} points in an image of {LARGEST} × {LARGEST} texels; take {most} frames at the most (--range), or write .usdc or .abc"
+                "cannot hold {frames} frames of {points} points in an image of {LARGEST} × {LARGEST} texels; take \
+                 {most} frames at the most (--range), or write .usdc or .abc"
             )));
         }
         Ok(Self { points, frames, width: points.div_ceil(blocks), blocks })

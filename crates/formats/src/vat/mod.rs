@@ -117,7 +117,8 @@ impl<'a> Textures<'a> {
         let Scene { name, fps, .. } = self.scene;
         let (low, high, frames) = (self.low, self.high, self.layout.frames);
         format!(
-            "{{\n    \"os-remap\": {{\"Min\": {low:?}, \"Max\": {high:?}, \"Frames\": {frames}}},\n    \"animations\": {{\"{name}\": {{\"startFrame\": 0, \"endFrame\": {}, \"framerate\": {fps}, \"looping\": true}}}}\n}}\n",
+            "{{\n    \"os-remap\": {{\"Min\": {low:?}, \"Max\": {high:?}, \"Frames\": {frames}}},\n    \"animations\": \
+             {{\"{name}\": {{\"startFrame\": 0, \"endFrame\": {}, \"framerate\": {fps}, \"looping\": true}}}}\n}}\n",
             frames - 1
         )
     }

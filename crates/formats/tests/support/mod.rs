@@ -3,14 +3,16 @@
 #![allow(dead_code, unreachable_pub)]
 
 pub mod archive;
+pub mod document;
 
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cager_formats::{Error, FrameReader, MeshFormat, read_model_bytes};
 use cager_geometry::mesh::{Model, Polygons};
+use cager_geometry::surface::{Channel, CornerSet, Texture};
 
 pub const POINTS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0, -2.25]];
 pub const FACES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
@@ -53,7 +55,8 @@ fn ply_header(encoding: &str) -> String {
 }
 
 pub fn ply_ascii() -> Vec<u8> {
-    let body = "0 0 0 255\n1 0 0 255\n0 1.5 0 255\n0 0 -2.25 255\n2 7 -8 9\n3 0 2 1 0.5\n3 0 1 3 0.5\n3 0 3 2 0.5\n3 1 2 3 0.5\n";
+    let body = "0 0 0 255\n1 0 0 255\n0 1.5 0 255\n0 0 -2.25 255\n2 7 -8 9\n3 0 2 1 0.5\n3 0 1 3 0.5\n3 0 3 2 0.5\n3 1 \
+                2 3 0.5\n";
     (ply_header("ascii") + body).into_bytes()
 }
 
@@ -277,6 +280,43 @@ pub fn arrays(path: &Path) -> HashMap<String, Vec<f64>> {
             continue;
         };
         found.insert(name, values);
+    }
+    found
+}
+
+/// Numbers that look like chance, the same in every run.
+pub fn random(seed: u64) -> impl FnMut() -> usize {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    }
+}
+
+pub fn set<const N: usize>(name: &str, values: &[[f32; N]], corners: &[u32]) -> CornerSet<N> {
+    CornerSet { name: name.to_owned(), values: values.to_vec(), corners: corners.to_vec() }
+}
+
+/// The value of each corner.
+pub fn by_corner<const N: usize>(set: &CornerSet<N>) -> Vec<[f32; N]> {
+    set.corners.iter().map(|&corner| set.values[corner as usize]).collect()
+}
+
+pub fn texture(channel: Channel, path: &str) -> Texture {
+    Texture { channel, path: path.to_owned() }
+}
+
+/// Captures beside the repository, or where the environment says.
+pub fn data() -> PathBuf {
+    std::env::var_os("CAGER_CAPTURES")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from)
+}
+
+/// The folder of a character that Blender wrote, where it has this file.
+pub fn character(file: &str) -> Option<PathBuf> {
+    let found = Some(data().join("character")).filter(|folder| folder.join(file).is_file());
+    if found.is_none() {
+        eprintln!("skipped: no character");
     }
     found
 }

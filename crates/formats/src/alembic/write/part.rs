@@ -10,9 +10,9 @@ use cager_geometry::surface::{NO_MATERIAL, Part, PartRange, SharedNormals, Subdi
 use super::ogawa::Sink;
 use super::parameter::{Parameter, clockwise};
 use super::tables::{Child, Compound, Metadata, Values, Written, write_object};
-use super::tree::Names;
 use super::{DATA, FRAMES};
 use crate::alembic::properties::{F32, F64, I32, Kind, TEXT, U32};
+use crate::names::Names;
 use crate::scene::bounds;
 
 const MESH: &str = "schema=AbcGeom_PolyMesh_v1;schemaBaseType=AbcGeom_GeomBase_v1";
@@ -65,10 +65,10 @@ impl PartWriter {
                 uv = Some(Parameter::new(sink, "uv", &local, set)?.with_source(&set.name));
                 continue;
             }
-            others.push(Parameter::new(sink, &names.unique(None, named(&set.name, "uv")), &local, set)?);
+            others.push(Parameter::new(sink, &names.add(&named(&set.name, "uv")), &local, set)?);
         }
         for set in &part.color_sets {
-            others.push(Parameter::new(sink, &names.unique(None, named(&set.name, "Cd")), &local, set)?);
+            others.push(Parameter::new(sink, &names.add(&named(&set.name, "Cd")), &local, set)?);
         }
         let mut normals = None;
         if part.subdivision == Subdivision::None {
@@ -162,16 +162,17 @@ impl PartWriter {
     }
 }
 
-fn named<'a>(name: &'a str, otherwise: &'a str) -> &'a str {
-    if name.is_empty() { otherwise } else { name }
+/// A name without `/`, or another one where there is none.
+fn named(name: &str, otherwise: &str) -> String {
+    if name.is_empty() { otherwise.to_owned() } else { name.replace('/', "_") }
 }
 
 /// Writes the faces of each material of a part, and of its groups.
 fn sets<W: Write + Seek>(sink: &mut Sink<W>, part: &Part, surface: &Surface) -> io::Result<Vec<FaceSet>> {
     let (mut found, mut names) = (Vec::new(), Names::default());
-    let mut add = |name: &str, is_material, faces: &[u32]| {
+    let mut add = |name: String, is_material, faces: &[u32]| {
         let bytes: Vec<u8> = faces.iter().flat_map(|face| face.to_le_bytes()).collect();
-        found.push(FaceSet { name: names.unique(None, name), faces: sink.sample(&bytes)?, is_material });
+        found.push(FaceSet { name: names.add(&name), faces: sink.sample(&bytes)?, is_material });
         io::Result::Ok(())
     };
     let mut of_material = BTreeMap::<u32, Vec<u32>>::new();

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use cager_geometry::surface::Part;
 
+use crate::names::Names;
+
 /// Names of a path that are kept, the last ones: readers go no deeper than 256.
 const DEEPEST: usize = 100;
 
@@ -18,29 +20,12 @@ pub(super) struct Node {
     pub(super) has_others: bool,
 }
 
-/// Names that are taken, by what they lie below: how often one was wanted, and the transform that has it.
-#[derive(Default)]
-pub(super) struct Names(HashMap<(Option<usize>, String), (u32, Option<usize>)>);
-
-impl Names {
-    /// A name like this one that no sibling has, without `/`.
-    pub(super) fn unique(&mut self, parent: Option<usize>, wanted: &str) -> String {
-        let wanted = wanted.replace('/', "_");
-        let mut name = wanted.clone();
-        while self.0.contains_key(&(parent, name.clone())) {
-            let times = &mut self.0.entry((parent, wanted.clone())).or_default().0;
-            *times += 1;
-            name = format!("{wanted}_{times}");
-        }
-        self.0.insert((parent, name.clone()), (0, None));
-        name
-    }
-}
-
 /// The transforms of parts: the last name of a path is that of the mesh. One without others, or
 /// `name` where there is none, is that of a transform, and the mesh has `Shape` behind it.
 pub(super) fn transforms(parts: &[Part], name: &str) -> Vec<Node> {
-    let (mut nodes, mut names) = (Vec::<Node>::new(), Names::default());
+    let (mut nodes, mut groups) = (Vec::<Node>::new(), HashMap::<(Option<usize>, &str), usize>::new());
+    // Those that are taken, at the top and below each transform.
+    let mut names: HashMap<Option<usize>, Names> = HashMap::new();
     for (k, part) in parts.iter().enumerate() {
         let mut path: Vec<&str> = part.path.split('/').filter(|name| !name.is_empty()).collect();
         if path.is_empty() {
@@ -51,17 +36,15 @@ pub(super) fn transforms(parts: &[Part], name: &str) -> Vec<Node> {
             _ => path.pop().unwrap_or_default().to_owned(),
         };
         let mut above = None;
-        for name in &path[path.len().saturating_sub(DEEPEST)..] {
-            let known = names.0.get(&(above, (*name).to_owned())).and_then(|&(_, node)| node);
-            above = known.or_else(|| {
-                let name = names.unique(above, name);
-                names.0.insert((above, name.clone()), (0, Some(nodes.len())));
+        for &name in &path[path.len().saturating_sub(DEEPEST)..] {
+            above = Some(*groups.entry((above, name)).or_insert_with(|| {
+                let name = names.entry(above).or_default().add(name);
                 above.into_iter().for_each(|parent| nodes[parent].has_others = true);
                 nodes.push(Node { name, parent: above, meshes: Vec::new(), has_others: false });
-                Some(nodes.len() - 1)
-            });
+                nodes.len() - 1
+            }));
         }
-        let shape = names.unique(above, &shape);
+        let shape = names.entry(above).or_default().add(&shape);
         above.into_iter().for_each(|node| nodes[node].meshes.push((k, shape.clone())));
     }
     nodes

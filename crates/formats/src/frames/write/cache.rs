@@ -60,7 +60,11 @@ impl CacheWriter {
                 } else {
                     let step = options.even_step();
                     if step.is_none() {
-                        notes.push("holds one distance between all frames, so that these, which are not evenly spaced, play at other times; .mdd, .mcx, .abc and .usdc keep them".to_owned());
+                        notes.push(
+                            "holds one distance between all frames, so that these, which are not evenly spaced, \
+                             play at other times; .mdd, .mcx, .abc and .usdc keep them"
+                                .to_owned(),
+                        );
                     }
                     let header = pc2::header(points, frames, options.number(0) as f32, step.unwrap_or(1.0) as f32);
                     (Scalar::F32Little, header)

@@ -103,7 +103,8 @@ fn ticks(frames: usize, options: &FrameOptions) -> Result<Vec<i32>, Fault> {
     let all: Vec<f64> = (0..frames).map(|frame| (options.number(frame) * TICKS / options.fps).round()).collect();
     if all.iter().any(|tick| tick.abs() > f64::from(i32::MAX)) || all.windows(2).any(|pair| pair[1] <= pair[0]) {
         return Err(Fault::unsupported(
-            "counts times in 6000ths of a second up to four days, which cannot tell these frames apart; give another --fps or --start, or write .abc",
+            "counts times in 6000ths of a second up to four days, which cannot tell these frames apart; give another \
+             --fps or --start, or write .abc",
         ));
     }
     Ok(all.into_iter().map(|tick| tick as i32).collect())

@@ -100,7 +100,8 @@ pub fn create_frames(
     let is_layer = matches!(CacheFormat::from_path(path), Some(CacheFormat::Usdc | CacheFormat::Usd));
     if let Some(source) = options.onto.as_ref().filter(|_| !is_layer || options.cage.is_some()) {
         let what = format!(
-            "is not written onto {}; end the name in .usdc, without a cage (.abc and others have the paths of the source as they are)",
+            "is not written onto {}; end the name in .usdc, without a cage (.abc and others have the paths of the \
+             source as they are)",
             source.display()
         );
         return Err(Fault::unsupported(what).at(path));
@@ -163,7 +164,8 @@ fn begin(all: &Announced, target: &Target, faces: &Polygons, options: &FrameOpti
         Some(format) if format.is_scene() => Box::new(SceneWriter::create(all, target, format, faces, options)?),
         Some(format) => Box::new(CacheWriter::create(all, target, format, options)?),
         None => return Err(Fault::unsupported(
-            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .mcx .abc .usdc .usdz .glb .gltf, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
+            "is not a format of frames that is written; end the name in one of .npy .pc2 .mdd .mcx .abc .usdc .usdz \
+             .glb .gltf, in / for a folder of .obj files, or of one frame in .obj .ply .off .stl",
         )
         .at(path)),
     })

@@ -81,7 +81,8 @@ impl Collection for MorphWriter {
         let found = morphs.deviation();
         Ok((found.targets > 0).then(|| {
             format!(
-                "its {} morph targets are {:.1e} of the diagonal from the {frames} frames at most, {:.1e} in the mean ({})",
+                "its {} morph targets are {:.1e} of the diagonal from the {frames} frames at most, {:.1e} in the mean \
+                 ({})",
                 found.targets,
                 found.share(found.largest),
                 found.share(found.rms),

@@ -110,7 +110,8 @@ pub(super) trait Output: Send {
         let folder = announced.path.with_extension("");
         let folder = if folder == Path::new("-") { Path::new("frames") } else { &folder };
         let what = format!(
-            "holds one mesh in all frames, and these have several; name a folder for mesh files, such as {}, or write the frames of each mesh to a file of their own",
+            "holds one mesh in all frames, and these have several; name a folder for mesh files, such as {}, or write \
+             the frames of each mesh to a file of their own",
             folder.join("").display()
         );
         Err(Fault::unsupported(what).at(&announced.path))
@@ -226,7 +227,8 @@ pub(super) fn check_precision(options: &FrameOptions, path: &Path) -> Result<(),
         return Ok(());
     }
     let what = format!(
-        "holds single precision, which moves points by up to {lost:.1e} units so far from the origin, where {:.1e} are allowed; write .npy, or .obj or .ply files, or .abc or .usdc, which place the model by a transform",
+        "holds single precision, which moves points by up to {lost:.1e} units so far from the origin, where {:.1e} are \
+         allowed; write .npy, or .obj or .ply files, or .abc or .usdc, which place the model by a transform",
         options.rounding
     );
     Err(Fault::unsupported(what).at(path))

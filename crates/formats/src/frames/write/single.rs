@@ -29,7 +29,8 @@ impl SingleWriter {
         if announced.frames > 1 {
             let name = announced.path.with_extension("");
             return Err(Fault::invalid(format!(
-                "holds one mesh, and there are {} frames; take one of them (--frame K), or name a folder for all, such as {} or '{}'",
+                "holds one mesh, and there are {} frames; take one of them (--frame K), or name a folder for all, such \
+                 as {} or '{}'",
                 announced.frames,
                 name.join("").display(),
                 name.join(format!("*.{}", if format == MeshFormat::Ply { "ply" } else { "obj" })).display()

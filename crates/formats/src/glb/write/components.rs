@@ -76,12 +76,14 @@ impl Components {
                 let found = format!("{} morph targets are {share:.2e} of the diagonal from the frames", found.targets);
                 return Err(Fault::unsupported(if wanted.is_guarantee {
                     format!(
-                        "cannot hold the guaranteed error of the capture: {found}; allow that with --targets {targets}, keep fewer frames (--range), or write .usdc or .abc"
+                        "cannot hold the guaranteed error of the capture: {found}; allow that with --targets \
+                         {targets}, keep fewer frames (--range), or write .usdc or .abc"
                     )
                 } else {
                     let error = wanted.max_error.unwrap_or_default();
                     format!(
-                        "cannot hold --max-error {error}: {found}; allow more, keep fewer frames, take --float where that is near, or write .usdc or .abc"
+                        "cannot hold --max-error {error}: {found}; allow more, keep fewer frames, take --float where \
+                         that is near, or write .usdc or .abc"
                     )
                 }));
             }

@@ -6,6 +6,7 @@ mod document;
 mod look;
 mod nodes;
 mod normals;
+mod numbers;
 mod pieces;
 mod stored;
 
@@ -54,7 +55,7 @@ impl<'a> Morphs<'a> {
     pub(crate) fn of(values: &[f32], points: usize, wanted: &Wanted, scene: &'a Scene) -> Result<Self, Fault> {
         let frames = Frames::new(values, points);
         // The node's place is rounded too.
-        let rounding = |stored: &stored::Stored| document::place(stored, scene).map(|x| f64::from(x as f32) - x);
+        let rounding = |stored: &stored::Stored| numbers::place(stored, scene).map(|x| f64::from(x as f32) - x);
         let components = Components::of(&frames, scene.floats, wanted, rounding)?;
         let targets = components.deviation.targets;
         let with_normals = || scene.pieces.iter().filter_map(|piece| piece.normals.as_ref());

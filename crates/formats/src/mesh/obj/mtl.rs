@@ -1,9 +1,8 @@
 //! Materials of Wavefront files (`.mtl`), with the lines for roughness and metalness that Blender and others write.
 
-use std::collections::HashSet;
-
 use cager_geometry::surface::{Channel, Material, Texture};
 
+use crate::names::Names;
 use crate::text::{Lines, number, words};
 
 /// Specular exponent of a surface without roughness, as Blender has it.
@@ -101,20 +100,13 @@ pub(crate) fn materials_text(materials: &[Material]) -> String {
 
 /// The names of materials in a file, each once.
 pub(super) fn names(materials: &[Material]) -> Vec<String> {
-    let mut taken = HashSet::new();
-    let mut unique = |(k, material): (usize, &Material)| {
-        let mut name = one_line(&material.name);
-        while !taken.insert(name.clone()) {
-            name = format!("{name}_{k}");
-        }
-        name
-    };
-    materials.iter().enumerate().map(&mut unique).collect()
+    let mut names = Names::default();
+    materials.iter().map(|material| names.add(&one_line(&material.name))).collect()
 }
 
 /// A name as one line has it.
 pub(super) fn one_line(name: &str) -> String {
-    name.trim().chars().map(|c| if c.is_control() { '_' } else { c }).collect()
+    name.trim().replace(char::is_control, "_")
 }
 
 #[cfg(test)]
@@ -123,7 +115,8 @@ mod tests {
 
     #[test]
     fn materials_come_back_and_options_of_pictures_are_passed_over() {
-        let text = b"# none\nKd 1 1 1\nnewmtl old gold\nKd 0.9 0.7 0.1\nd 0.5\nPr 0.25\nPm 1\nmap_Kd -s 2 2 1 ..\\tex\\gold base.png\n\
+        let text = b"# none\nKd 1 1 1\nnewmtl old gold\nKd 0.9 0.7 0.1\nd 0.5\nPr 0.25\nPm 1\nmap_Kd -s 2 2 1 \
+                     ..\\tex\\gold base.png\n\
             norm -bm 0.5 n.png\nmap_Kd second.png\nnewmtl b\nNs 250\nTr 0.25\nKd 1 x 2\n";
         let read_back = read(text);
         assert_eq!(read_back.len(), 2);

@@ -1,9 +1,9 @@
 //! Texture coordinates of vertices or of the corners of faces, and the pictures that comments name.
 
-use std::collections::HashMap;
-
 use cager_geometry::mesh::Model;
 use cager_geometry::surface::{Channel, CornerSet, Material, NO_MATERIAL, Part, Surface, Texture};
+
+use crate::scene::merged;
 
 /// Names of a texture coordinate of vertices, in the order of `s` and `t`.
 const NAMES: [[&str; 4]; 2] = [["s", "u", "texture_u", "texture_s"], ["t", "v", "texture_v", "texture_t"]];
@@ -40,14 +40,7 @@ impl Coordinates {
         let corners = model.faces.indices();
         let mut set = CornerSet::default();
         if !self.lacks_some && self.corners.len() == corners.len() {
-            let mut numbers = HashMap::new();
-            for uv in self.corners {
-                let number = *numbers.entry(uv.map(f32::to_bits)).or_insert_with(|| {
-                    set.values.push(uv);
-                    set.values.len() as u32 - 1
-                });
-                set.corners.push(number);
-            }
+            set = merged(String::new(), &self.corners, (0..corners.len() as u32).collect());
         } else if self.vertices.len() == model.points.len() {
             (set.values, set.corners) = (self.vertices, corners.to_vec());
         }

@@ -46,44 +46,40 @@ fn unpack(packed: &[u8], most: usize) -> Result<Vec<u8>, Fault> {
     Ok(out)
 }
 
-/// The same of numbers of eight bytes, of whose differences the shortest have two.
+/// So many whole numbers of eight bytes from their differences.
 pub(super) fn long_integers(packed: &[u8], count: usize) -> Result<Vec<i64>, Fault> {
-    let bytes = unpack(packed, 8 + count.div_ceil(4) + 8 * count)?;
-    let mut fields = Fields(&bytes);
-    let usual = i64::from_le_bytes(fields.array()?);
-    let codes = fields.take(count.div_ceil(4))?;
-    let (mut number, mut out) = (0_i64, Vec::with_capacity(count));
-    for k in 0..count {
-        number = number.wrapping_add(match codes[k / 4] >> (2 * (k % 4)) & 3 {
-            0 => usual,
-            1 => i16::from_le_bytes(fields.array()?).into(),
-            2 => i32::from_le_bytes(fields.array()?).into(),
-            _ => i64::from_le_bytes(fields.array()?),
-        });
-        out.push(number);
-    }
-    Ok(out)
+    whole(packed, count, 8, |number| number)
 }
 
-/// So many whole numbers from their differences.
+/// The same of four bytes.
 pub(super) fn integers(packed: &[u8], count: usize) -> Result<Vec<i32>, Fault> {
+    // What lies beyond four bytes is lost as they are added up.
+    whole(packed, count, 4, |number| number as i32)
+}
+
+fn whole<T>(packed: &[u8], count: usize, size: usize, of: impl Fn(i64) -> T) -> Result<Vec<T>, Fault> {
     if count == 0 {
         return Ok(Vec::new());
     }
     // The usual difference, two bits for each number, and the differences that are others.
-    let bytes = unpack(packed, 4 + count.div_ceil(4) + 4 * count)?;
+    let bytes = unpack(packed, size + count.div_ceil(4) + size * count)?;
     let mut fields = Fields(&bytes);
-    let usual = i32::from_le_bytes(fields.array()?);
+    let usual = signed(fields.take(size)?);
     let codes = fields.take(count.div_ceil(4))?;
-    let (mut number, mut out) = (0_i32, Vec::with_capacity(count));
+    let (mut number, mut out) = (0_i64, Vec::with_capacity(count));
     for k in 0..count {
-        number = number.wrapping_add(match codes[k / 4] >> (2 * (k % 4)) & 3 {
+        let difference = match codes[k / 4] >> (2 * (k % 4)) & 3 {
             0 => usual,
-            1 => i8::from_le_bytes(fields.array()?).into(),
-            2 => i16::from_le_bytes(fields.array()?).into(),
-            _ => i32::from_le_bytes(fields.array()?),
-        });
-        out.push(number);
+            code => signed(fields.take(size >> (3 - code))?),
+        };
+        number = number.wrapping_add(difference);
+        out.push(of(number));
     }
     Ok(out)
+}
+
+/// A number of as many bytes as there are.
+fn signed(bytes: &[u8]) -> i64 {
+    let sign = if bytes.last().is_some_and(|&byte| byte >= 0x80) { -1 } else { 0 };
+    bytes.iter().rev().fold(sign, |number, &byte| number << 8 | i64::from(byte))
 }

@@ -131,7 +131,8 @@ impl Sections {
         String::from_utf8_lossy(&token[..token.len().min(LONGEST_STRING)]).into_owned()
     }
 
-    /// The names down to a prim, each behind a `/`, or to its property, behind a dot; empty for the root and for no path.
+    /// The names down to a prim, each behind a `/`, or to its property, behind a dot; empty for the
+    /// root and for no path.
     pub(super) fn path(&self, index: u32) -> String {
         let mut names = Vec::new();
         let mut at = self.paths.get(index as usize).copied().unwrap_or_default();

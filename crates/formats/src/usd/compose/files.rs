@@ -86,7 +86,7 @@ impl<'a> Files<'a> {
     /// The stack of a file that a layer names, and by how much faster its time codes pass; none
     /// where it is not there or may not be read.
     pub(super) fn open(&mut self, layer: usize, asset: &str) -> Result<Option<(usize, f64)>, Fault> {
-        let Some(loaded) = self.load(layer, asset)? else { return Ok(None) };
+        let Some(loaded) = self.load(layer, asset, false)? else { return Ok(None) };
         let stack = match loaded {
             Ok(stack) => stack,
             Err((path, loaded)) => {
@@ -144,7 +144,7 @@ impl<'a> Files<'a> {
         stack.push((layer, times));
         let mut whole = true;
         for (asset, own) in self.layers[layer].layer.stage.sublayers.clone() {
-            let below = match self.load(layer, &asset)? {
+            let below = match self.load(layer, &asset, false)? {
                 Some(Err((path, loaded))) => {
                     let below = self.layers.len();
                     self.layers.push(loaded);

@@ -33,10 +33,7 @@ fn add_all(
     (left, most): (&mut usize, usize),
 ) -> Result<(), Fault> {
     let prototypes = layer.source.targets(instancer, "prototypes")?;
-    let mut integers = |name| match layer.first(instancer, name)? {
-        Some(value) => layer.source.integers(value, u32::MAX.into()),
-        None => Ok(Vec::new()),
-    };
+    let mut integers = |name| layer.integers(instancer, name, u32::MAX.into());
     let (numbers, ids) = (integers("protoIndices")?, integers("ids")?);
     if numbers.is_empty() {
         return Ok(());
@@ -44,13 +41,15 @@ fn add_all(
     let track = layer.attribute(instancer, "protoIndices")?;
     for &value in &track.values {
         if layer.source.integers(value, u32::MAX.into())? != numbers {
-            let what = "is a PointInstancer whose instances come, go or change, which is not read; make them real where it is exported";
+            let what = "is a PointInstancer whose instances come, go or change, which is not read; make them real \
+                        where it is exported";
             return Err(Fault::unsupported(what));
         }
     }
     *left = left.checked_sub(numbers.len()).ok_or_else(|| {
         Fault::unsupported(format!(
-            "is a PointInstancer of {} instances, where {MOST_INSTANCES} in all are read; export fewer, or make those real that are meant",
+            "is a PointInstancer of {} instances, where {MOST_INSTANCES} in all are read; export fewer, or make those \
+             real that are meant",
             numbers.len()
         ))
     })?;

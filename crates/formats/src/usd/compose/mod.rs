@@ -105,7 +105,8 @@ impl Builder<'_> {
             }
             if at == self.most {
                 return Err(Fault::unsupported(
-                    "is composed of more prims than its files hold and some hundred thousand; write the meshes that are meant into a file of their own",
+                    "is composed of more prims than its files hold and some hundred thousand; write the meshes that \
+                     are meant into a file of their own",
                 ));
             }
             let (mut sites, mut unread) = (Vec::new(), None);
@@ -164,7 +165,8 @@ impl Builder<'_> {
     ) -> Result<(), Fault> {
         if depth == MOST_IN_A_ROW || sites.len() == MOST_SITES {
             return Err(Fault::unsupported(format!(
-                "has a prim with more than {MOST_IN_A_ROW} references in a row or {MOST_SITES} in all, or one that refers to itself; write all into one file"
+                "has a prim with more than {MOST_IN_A_ROW} references in a row or {MOST_SITES} in all, or one that \
+                 refers to itself; write all into one file"
             )));
         }
         sites.push(site);

@@ -96,6 +96,32 @@ impl<'a> Composite<'a> {
         Ok(paths.clone())
     }
 
+    /// The paths to which the strongest site leads that names some, and its mapping.
+    fn told_paths(&mut self, prim: usize, name: &str) -> Result<(Vec<String>, usize), Fault> {
+        for site in self.sites[prim].clone() {
+            let paths = self.own_paths(site, name)?;
+            if !paths.is_empty() {
+                return Ok((paths, site.mapping));
+            }
+        }
+        Ok(Default::default())
+    }
+
+    /// What the strongest site says that says something.
+    fn first_told<T>(
+        &mut self,
+        prim: usize,
+        mut told: impl FnMut(&mut (dyn Attributes + 'a), usize) -> Result<Option<T>, Fault>,
+    ) -> Result<Option<T>, Fault> {
+        for site in &self.sites[prim] {
+            let told = told(self.layers[site.layer].layer.source.as_mut(), site.prim)?;
+            if told.is_some() {
+                return Ok(told);
+            }
+        }
+        Ok(None)
+    }
+
     /// Reads vectors once.
     fn list(&mut self, value: Value, width: usize, most: u64) -> Result<&[f64], Fault> {
         if !self.vectors.contains_key(&(value.0, width)) {
@@ -173,23 +199,15 @@ impl Attributes for Composite<'_> {
     }
 
     fn interpolation(&mut self, prim: usize, name: &str) -> Result<String, Fault> {
-        for site in self.sites[prim].clone() {
-            let told = self.layers[site.layer].layer.source.interpolation(site.prim, name)?;
-            if !told.is_empty() {
-                return Ok(told);
-            }
-        }
-        Ok(String::new())
+        let told = self.first_told(prim, |source, prim| {
+            let told = source.interpolation(prim, name)?;
+            Ok(Some(told).filter(|told| !told.is_empty()))
+        });
+        Ok(told?.unwrap_or_default())
     }
 
     fn weight(&mut self, prim: usize, name: &str) -> Result<Option<f64>, Fault> {
-        for site in self.sites[prim].clone() {
-            let told = self.layers[site.layer].layer.source.weight(site.prim, name)?;
-            if told.is_some() {
-                return Ok(told);
-            }
-        }
-        Ok(None)
+        self.first_told(prim, |source, prim| source.weight(prim, name))
     }
 
     fn element(&mut self, prim: usize, name: &str, width: usize, index: usize) -> Result<Track, Fault> {
@@ -218,24 +236,16 @@ impl Attributes for Composite<'_> {
     }
 
     fn paths(&mut self, prim: usize, name: &str) -> Result<Vec<String>, Fault> {
-        for site in self.sites[prim].clone() {
-            let paths = self.own_paths(site, name)?;
-            if !paths.is_empty() {
-                return Ok(paths);
-            }
-        }
-        Ok(Vec::new())
+        Ok(self.told_paths(prim, name)?.0)
     }
 
     fn targets(&mut self, prim: usize, name: &str) -> Result<Vec<Option<Target>>, Fault> {
-        for site in self.sites[prim].clone() {
-            let paths = self.own_paths(site, name)?;
-            if !paths.is_empty() {
-                let found = paths.iter().map(|path| self.mapped(path, site.mapping));
-                return Ok(found.map(|found| found.map(|(at, name)| (self.copied(prim, at), name))).collect());
-            }
-        }
-        Ok(Vec::new())
+        let (paths, mapping) = self.told_paths(prim, name)?;
+        let find = |path: &String| {
+            let (at, name) = self.mapped(path, mapping)?;
+            Some((self.copied(prim, at), name))
+        };
+        Ok(paths.iter().map(find).collect())
     }
 
     fn vectors(&mut self, value: Value, width: usize, most: u64) -> Result<Vec<f64>, Fault> {

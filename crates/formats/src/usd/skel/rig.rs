@@ -56,7 +56,8 @@ impl Rig {
             None => Animation { joints: vec![None; paths.len()], ..Animation::default() },
         };
         if binds.len() != paths.len() {
-            let what = "has a skeleton that does not say where its joints were as the mesh was bound to them (bindTransforms); export it again, or with its points baked";
+            let what = "has a skeleton that does not say where its joints were as the mesh was bound to them \
+                        (bindTransforms); export it again, or with its points baked";
             return Err(Fault::unsupported(what));
         }
         if rests.len() != paths.len() && animation.joints.iter().any(Option::is_none) {

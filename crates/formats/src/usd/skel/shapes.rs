@@ -37,19 +37,12 @@ pub(super) fn read(layer: &mut Layer<'_>, mesh: usize, rig: &Rig, points: usize)
 
 impl Shape {
     fn read(layer: &mut Layer<'_>, prim: usize, weight: usize, count: usize) -> Result<Self, Fault> {
-        let points = match layer.first(prim, "pointIndices")? {
-            Some(value) => layer.source.integers(value, count as u64)?,
-            None => Vec::new(),
-        };
+        let points = layer.integers(prim, "pointIndices", count as u64)?;
         let points: Vec<u32> = points.into_iter().map(|point| point as u32).collect();
         if points.iter().any(|&point| point as usize >= count) {
             return Err(damaged("a blend shape moves a point that is not there"));
         }
-        let mut offsets = |name: &str| match layer.first(prim, name)? {
-            Some(value) => layer.source.floats(value, 3, count as u64),
-            None => Ok(Vec::new()),
-        };
-        let mut steps = vec![(0.0, Vec::new()), (1.0, offsets("offsets")?)];
+        let mut steps = vec![(0.0, Vec::new()), (1.0, layer.floats(prim, "offsets", 3, count as u64)?)];
         for (name, _) in layer.source.properties(prim) {
             let is_offsets = name.strip_prefix(BETWEEN).is_some_and(|rest| !rest.contains(':'));
             let between = if is_offsets { layer.source.weight(prim, &name)? } else { None };

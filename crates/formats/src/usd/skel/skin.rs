@@ -46,14 +46,8 @@ impl Skin {
         if let Some((prim, of_weights)) = bound {
             check_method(layer, above)?;
             let most = MOST_OF_POINT.saturating_mul(points.max(1) as u64);
-            let indices = match layer.first(prim, INDICES)? {
-                Some(value) => layer.source.integers(value, most)?,
-                None => Vec::new(),
-            };
-            let weights = match layer.first(of_weights, WEIGHTS)? {
-                Some(value) => layer.source.floats(value, 1, most)?,
-                None => Vec::new(),
-            };
+            let indices = layer.integers(prim, INDICES, most)?;
+            let weights = layer.floats(of_weights, WEIGHTS, 1, most)?;
             is_rigid = !matches!(layer.source.interpolation(prim, INDICES)?.as_str(), "vertex" | "varying");
             if weights.len() != indices.len() || (!is_rigid && indices.len() % points.max(1) != 0) {
                 let what = "it has other numbers of joints (primvars:skel:jointIndices) than weights or points";

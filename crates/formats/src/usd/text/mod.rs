@@ -1,6 +1,7 @@
 //! Layers of text: read once for where values are, which are parsed when they are asked for.
 
 mod composed;
+mod fields;
 mod parser;
 mod scanner;
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::scanner::{Place, Scanner, is_letter};
 use crate::error::Fault;
 use crate::scene::{Node, Track, Value};
-use crate::usd::layer::{COMPOSED, DEEPEST, Kind, Prim, Stage, composed, too_deep};
+use crate::usd::layer::{DEEPEST, Kind, Prim, Stage, too_deep};
 
 /// Words in front of the type of a property or of the key of a field.
 const MODIFIERS: [&str; 9] =
@@ -21,7 +21,7 @@ const INSTANCING: [&str; 8] =
     ["prototypes", "protoIndices", "positions", "orientations", "orientationsf", "scales", "ids", "invisibleIds"];
 
 /// Whether an attribute or a relationship of a prim is asked for.
-fn is_wanted(kind: Kind, name: &str) -> bool {
+pub(super) fn is_wanted(kind: Kind, name: &str) -> bool {
     let of_kind = match kind {
         Kind::Mesh => name == "normals" || ["primvars:", "crease"].iter().any(|start| name.starts_with(start)),
         Kind::Subset | Kind::Shading | Kind::Skeleton | Kind::Motion => true,
@@ -106,7 +106,7 @@ impl<'a, 'b> Parser<'a, 'b> {
     }
 
     /// The next word behind those that say how it is meant, and whether that takes something away.
-    fn key(&mut self) -> Result<(String, bool), Fault> {
+    pub(super) fn key(&mut self) -> Result<(String, bool), Fault> {
         let mut is_removed = false;
         loop {
             let word = self.word()?;
@@ -146,101 +146,6 @@ impl<'a, 'b> Parser<'a, 'b> {
         }
         self.open.push(index);
         self.scanner.expect(b'{')
-    }
-
-    /// What is said in round brackets of a layer, a prim or a property.
-    pub(super) fn fields(&mut self, owner: &Owner) -> Result<(), Fault> {
-        self.scanner.expect(b'(')?;
-        while !self.scanner.has(b')')? {
-            // A comment has no key.
-            if matches!(self.scanner.solid()?, Some(b'"' | b'\'')) {
-                self.scanner.string()?;
-                continue;
-            }
-            let (key, is_removed) = self.key()?;
-            self.scanner.expect(b'=')?;
-            match (owner, self.open.last()) {
-                (Owner::Layer, _) => self.layer_field(&key)?,
-                (Owner::Prim(prim), _) => self.prim_field(*prim, &key, is_removed)?,
-                (Owner::Property(name), Some(&prim)) if key == "interpolation" => {
-                    let value = self.short()?;
-                    if is_wanted(self.contents.prims[prim].kind, name) {
-                        self.contents.interpolations.insert((prim, name.clone()), value);
-                    }
-                }
-                (Owner::Property(name), Some(&prim))
-                    if key == "weight" && self.contents.prims[prim].kind == Kind::Motion =>
-                {
-                    let weight = self.scanner.number()?;
-                    self.contents.weights.insert((prim, name.clone()), weight);
-                }
-                (Owner::Property(_), _) => {
-                    self.scanner.pass()?;
-                }
-            }
-            // The prim in another file, and by how much its times are moved.
-            while matches!(self.scanner.solid()?, Some(b'<' | b'(')) {
-                self.scanner.pass()?;
-            }
-        }
-        Ok(())
-    }
-
-    /// A value that is a word or a string; empty for others, which are passed over.
-    pub(super) fn short(&mut self) -> Result<String, Fault> {
-        match self.scanner.solid()? {
-            Some(b'"' | b'\'') => self.scanner.string(),
-            Some(byte) if is_letter(byte) || b"+-.".contains(&byte) => Ok(self.scanner.word(b"+-._")?.to_owned()),
-            _ => self.scanner.pass().map(|_| String::new()),
-        }
-    }
-
-    fn layer_field(&mut self, key: &str) -> Result<(), Fault> {
-        if key == "subLayers" {
-            let arcs = self.arcs("sublayers")?.ok_or_else(|| composed("the layer", "sublayers"))?;
-            self.contents.stage.sublayers = arcs.into_iter().map(|arc| (arc.asset, arc.times)).collect();
-            return Ok(());
-        }
-        let value = self.short()?;
-        let number = value.parse().ok();
-        let stage = &mut self.contents.stage;
-        match key {
-            "defaultPrim" => stage.default_prim = value,
-            "upAxis" => stage.up_is_z = Some(value == "Z"),
-            "metersPerUnit" => stage.metres_per_unit = number,
-            "timeCodesPerSecond" => stage.time_codes_per_second = number,
-            "framesPerSecond" => stage.frames_per_second = number,
-            "startTimeCode" => stage.start = number,
-            "endTimeCode" => stage.end = number,
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn prim_field(&mut self, prim: usize, key: &str, is_removed: bool) -> Result<(), Fault> {
-        if let Some((_, words)) = COMPOSED[..2].iter().find(|(field, _)| *field == key) {
-            match self.arcs(words)?.filter(|_| !is_removed) {
-                Some(arcs) => {
-                    let all = &mut self.contents.prims[prim].arcs;
-                    all.extend(arcs);
-                    all.sort_by_key(|arc| arc.words == "payloads");
-                }
-                None => self.contents.prims[prim].composed = Some(words),
-            }
-            return Ok(());
-        }
-        if key == "variants" {
-            return self.chosen(prim);
-        }
-        let value = self.short()?;
-        let prim = &mut self.contents.prims[prim];
-        if key == "active" {
-            prim.is_inactive = matches!(value.as_str(), "false" | "0");
-            prim.is_there &= !prim.is_inactive;
-        }
-        let told = COMPOSED.iter().find(|(field, _)| *field == key);
-        prim.composed = told.map(|(_, words)| *words).or(prim.composed);
-        Ok(())
     }
 
     /// A property behind its type, or an order of names, which has none.

@@ -1,11 +1,11 @@
 //! Values of a layer, and the prims and properties that have them.
 
-use std::borrow::Cow;
 use std::io::{self, Seek, Write};
 use std::sync::Arc;
 
+use super::property::{Prim, Property, Said};
 use super::sink::Sink;
-use super::tables::{Tables, integers};
+use super::tables::{Field, Tables, integers};
 use crate::usd::binary::{ATTRIBUTE, MAGIC, PRIM, RELATIONSHIP, kind};
 
 const VERSION: [u8; 3] = [0, 8, 0];
@@ -18,87 +18,6 @@ const PACKED_FROM: usize = 16;
 const PACKED_TO: usize = 1 << 28;
 /// Prepended items of a list.
 const PREPENDED: u8 = 1 << 5;
-
-/// Something that is defined, with all that lies below it.
-#[derive(Default)]
-pub(super) struct Prim {
-    pub(super) name: String,
-    pub(super) type_name: &'static str,
-    /// Whether it says of what material it is.
-    pub(super) is_bound: bool,
-    pub(super) properties: Vec<Property>,
-    pub(super) children: Vec<Prim>,
-}
-
-/// An attribute, or a relationship where it has no type.
-pub(super) struct Property {
-    name: String,
-    type_name: Cow<'static, str>,
-    is_uniform: bool,
-    fields: Vec<(&'static str, Said)>,
-    target: Option<String>,
-}
-
-/// What a field says.
-pub(super) enum Said {
-    Value(u64),
-    Token(String),
-}
-
-impl Property {
-    pub(super) fn new(type_name: impl Into<Cow<'static, str>>, name: impl Into<String>) -> Self {
-        Self { name: name.into(), type_name: type_name.into(), is_uniform: false, fields: Vec::new(), target: None }
-    }
-
-    /// A token that does not change.
-    pub(super) fn fixed(name: impl Into<String>, token: impl Into<String>) -> Self {
-        Self::new("token", name).uniform().token(token)
-    }
-
-    /// A relationship to what has this path.
-    pub(super) fn to(name: &str, path: String) -> Self {
-        Self::new("", name).uniform().from(path)
-    }
-
-    pub(super) fn is_called(&self, name: &str) -> bool {
-        self.name == name
-    }
-
-    pub(super) fn is_relationship(&self) -> bool {
-        self.type_name.is_empty()
-    }
-
-    pub(super) fn uniform(self) -> Self {
-        Self { is_uniform: true, ..self }
-    }
-
-    pub(super) fn value(self, value: u64) -> Self {
-        self.with("default", Said::Value(value))
-    }
-
-    pub(super) fn token(self, token: impl Into<String>) -> Self {
-        self.with("default", Said::Token(token.into()))
-    }
-
-    pub(super) fn samples(self, samples: u64) -> Self {
-        self.with("timeSamples", Said::Value(samples))
-    }
-
-    /// What its elements belong to, such as corners.
-    pub(super) fn by(self, interpolation: &str) -> Self {
-        self.with("interpolation", Said::Token(interpolation.to_owned()))
-    }
-
-    /// It has the value of the attribute of this path.
-    pub(super) fn from(self, path: String) -> Self {
-        Self { target: Some(path), ..self }
-    }
-
-    fn with(mut self, field: &'static str, said: Said) -> Self {
-        self.fields.push((field, said));
-        self
-    }
-}
 
 /// A layer that is being written.
 pub(super) struct Encoder<W> {
@@ -143,13 +62,8 @@ impl<W: Write + Seek> Encoder<W> {
     /// Begins a prim that says something of one in a layer below, and writes its properties; the
     /// prims below it follow, then the end.
     pub(super) fn over(&mut self, name: &str, properties: &[Property], children: &[&str]) -> io::Result<()> {
-        let mut fields = vec![("specifier", INLINED | value(kind::SPECIFIER, 1))];
         let names: Vec<&str> = properties.iter().map(|property| property.name.as_str()).collect();
-        for (field, names) in [("properties", names.as_slice()), ("primChildren", children)] {
-            if !names.is_empty() {
-                fields.push((field, self.tokens(names)?));
-            }
-        }
+        let fields = self.listed(1, &names, children)?;
         self.tables.begin(PRIM, name, &fields);
         properties.iter().for_each(|property| self.property(property));
         Ok(())
@@ -164,12 +78,7 @@ impl<W: Write + Seek> Encoder<W> {
         properties: &[&str],
         children: &[&str],
     ) -> io::Result<()> {
-        let mut fields = vec![("specifier", INLINED | value(kind::SPECIFIER, 0))];
-        for (field, names) in [("properties", properties), ("primChildren", children)] {
-            if !names.is_empty() {
-                fields.push((field, self.tokens(names)?));
-            }
-        }
+        let mut fields = self.listed(0, properties, children)?;
         if is_bound {
             let schema = self.tables.token("MaterialBindingAPI");
             let list = [&[PREPENDED][..], &1_u64.to_le_bytes(), &schema.to_le_bytes()].concat();
@@ -178,6 +87,17 @@ impl<W: Write + Seek> Encoder<W> {
         fields.insert(1, ("typeName", self.token(type_name)));
         self.tables.begin(PRIM, name, &fields);
         Ok(())
+    }
+
+    /// How a prim is specified, and the names of what it has.
+    fn listed(&mut self, specifier: u64, properties: &[&str], children: &[&str]) -> io::Result<Vec<Field<'static>>> {
+        let mut fields = vec![("specifier", INLINED | value(kind::SPECIFIER, specifier))];
+        for (field, names) in [("properties", properties), ("primChildren", children)] {
+            if !names.is_empty() {
+                fields.push((field, self.tokens(names)?));
+            }
+        }
+        Ok(fields)
     }
 
     pub(super) fn property(&mut self, property: &Property) {
@@ -269,6 +189,18 @@ impl<W: Write + Seek> Encoder<W> {
     pub(super) fn strings(&mut self, texts: &[&str]) -> io::Result<u64> {
         let bytes: Vec<u8> = texts.iter().flat_map(|text| self.tables.string(text).to_le_bytes()).collect();
         self.list(kind::STRINGS, texts.len(), &bytes)
+    }
+
+    /// The rate and the range of frames at these time codes.
+    pub(super) fn timing(&mut self, fps: f64, codes: &[f64]) -> io::Result<[Field<'static>; 4]> {
+        let rate = self.double(fps)?;
+        let [start, end] = [codes.first(), codes.last()].map(|code| code.copied().unwrap_or_default());
+        Ok([
+            ("endTimeCode", self.double(end)?),
+            ("framesPerSecond", rate),
+            ("startTimeCode", self.double(start)?),
+            ("timeCodesPerSecond", rate),
+        ])
     }
 
     /// That the times of one layer below are as they are.

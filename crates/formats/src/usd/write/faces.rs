@@ -5,9 +5,11 @@ use std::io::{self, Seek, Write};
 
 use cager_geometry::surface::{CornerSet, NO_MATERIAL, Part, Subdivision};
 
-use super::encoder::{Encoder, Prim, Property};
+use super::encoder::Encoder;
 use super::material::USUAL_UVS;
-use super::tree::{Names, identifier};
+use super::property::{Prim, Property};
+use super::tree::identifier;
+use crate::names::Names;
 
 /// Families of subsets, of which that of materials is the specification's.
 const MATERIALS: &str = "materialBind";

@@ -4,9 +4,11 @@ use std::io::{self, Seek, Write};
 
 use cager_geometry::surface::{Channel, Material, Surface};
 
-use super::encoder::{Encoder, Prim, Property};
+use super::encoder::Encoder;
 use super::faces::uv_names;
-use super::tree::{Names, identifier};
+use super::property::{Prim, Property};
+use super::tree::identifier;
+use crate::names::Names;
 use crate::usd::binary::kind;
 
 /// The group of all materials.
@@ -84,7 +86,7 @@ fn shaders<W: Write + Seek>(
             let is_color = matches!(channel, Channel::BaseColor | Channel::Emission);
             let mut picture = vec![
                 Property::fixed("info:id", "UsdUVTexture"),
-                Property::new("asset", "inputs:file").value(encoder.asset(&one_line(file))),
+                Property::new("asset", "inputs:file").value(encoder.asset(&file.replace(char::is_control, "_"))),
                 Property::new("token", "inputs:sourceColorSpace").token(if is_color { "sRGB" } else { "raw" }),
                 Property::new("token", "inputs:wrapS").token("repeat"),
                 Property::new("token", "inputs:wrapT").token("repeat"),
@@ -114,9 +116,4 @@ fn shaders<W: Write + Seek>(
         all.push(Prim { name: READER.to_owned(), type_name: "Shader", properties, ..Prim::default() });
     }
     Ok(all)
-}
-
-/// A path as tables of names have it.
-fn one_line(path: &str) -> String {
-    path.chars().map(|c| if c.is_control() { '_' } else { c }).collect()
 }

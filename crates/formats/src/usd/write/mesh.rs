@@ -6,8 +6,9 @@ use std::ops::Range;
 use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::{Part, PartRange, SharedNormals, Subdivision};
 
-use super::encoder::{Encoder, Prim, Property};
+use super::encoder::Encoder;
 use super::faces;
+use super::property::{Prim, Property};
 use crate::scene::bounds;
 
 /// Values of what is written of a mesh.

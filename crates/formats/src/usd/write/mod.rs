@@ -6,6 +6,7 @@ mod faces;
 mod material;
 mod mesh;
 mod over;
+mod property;
 mod sink;
 mod tables;
 mod tree;
@@ -19,9 +20,10 @@ use cager_geometry::units::{Units, Up};
 
 use super::binary::ROOT;
 use crate::pictures::rename;
-use encoder::{Encoder, Prim, Property};
+use encoder::Encoder;
 use mesh::Mesh;
 pub(crate) use over::OverWriter;
+use property::{Prim, Property};
 use sink::Sink;
 use tree::Tree;
 
@@ -119,19 +121,14 @@ impl<W: Write + Seek> MeshWriter<W> {
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let times = self.encoder.times(&self.scene.codes)?;
         let (encoder, scene, root) = (&mut self.encoder, &self.scene, &self.tree.nodes[0].name);
-        let fps = encoder.double(scene.fps)?;
-        let (start, end) = (scene.codes.first().copied(), scene.codes.last().copied());
         let up = if scene.units.up == Some(Up::Z) { "Z" } else { "Y" };
-        let fields = [
+        let mut fields = encoder.timing(scene.fps, &scene.codes)?.to_vec();
+        fields.extend([
             ("defaultPrim", encoder.token(root)),
-            ("endTimeCode", encoder.double(end.unwrap_or(0.0))?),
-            ("framesPerSecond", fps),
             ("metersPerUnit", encoder.double(scene.units.metres_per_unit.unwrap_or(1.0))?),
-            ("startTimeCode", encoder.double(start.unwrap_or(0.0))?),
-            ("timeCodesPerSecond", fps),
             ("upAxis", encoder.token(up)),
             ("primChildren", encoder.tokens(&[root])?),
-        ];
+        ]);
         encoder.tables.begin(ROOT, "", &fields);
         self.put(0, times)?;
         self.encoder.tables.end();

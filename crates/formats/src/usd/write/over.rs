@@ -3,17 +3,17 @@
 use std::collections::BTreeMap;
 use std::io::{self, Seek, Write};
 
-use cager_geometry::mesh::Polygons;
+use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::surface::Surface;
 use cager_geometry::units::{Units, Up};
 
-use super::encoder::{Encoder, Property};
+use super::encoder::Encoder;
 use super::mesh::Mesh;
+use super::property::Property;
 use super::sink::Sink;
 use super::{ORDER, TRANSLATE};
 use crate::usd::binary::ROOT;
 use crate::usd::onto::Onto;
-use cager_geometry::mesh::Point;
 
 /// Meshes of another layer whose points are being written.
 pub(crate) struct OverWriter<W> {
@@ -69,18 +69,13 @@ impl<W: Write + Seek> OverWriter<W> {
             node.mesh = Some(mesh);
         }
         let encoder = &mut self.encoder;
-        let fps = encoder.double(self.fps)?;
-        let (start, end) = (self.codes.first().copied(), self.codes.last().copied());
         let names: Vec<&str> = root.children.keys().map(String::as_str).collect();
-        let mut fields = vec![
-            ("endTimeCode", encoder.double(end.unwrap_or(0.0))?),
-            ("framesPerSecond", fps),
-            ("startTimeCode", encoder.double(start.unwrap_or(0.0))?),
+        let mut fields = encoder.timing(self.fps, &self.codes)?.to_vec();
+        fields.extend([
             ("subLayers", encoder.strings(&[&self.onto.file])?),
             ("subLayerOffsets", encoder.layer_offset()?),
-            ("timeCodesPerSecond", fps),
             ("primChildren", encoder.tokens(&names)?),
-        ];
+        ]);
         if let Some(metres) = self.units.metres_per_unit {
             fields.push(("metersPerUnit", encoder.double(metres)?));
         }

@@ -1,8 +1,9 @@
 //! Where meshes lie in a layer: below groups of their names, all of them below one root.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use super::material::GROUP;
+use crate::names::Names;
 
 /// Names of a path that become prims; of longer ones those before the last are left out.
 const DEEPEST: usize = 64;
@@ -82,27 +83,6 @@ impl Tree {
             name.push('_');
         }
         self.add(0, &name, Some(mesh));
-    }
-}
-
-/// Names beside each other, each of which is there once.
-#[derive(Default)]
-pub(super) struct Names {
-    taken: HashSet<String>,
-    /// The last number behind each.
-    numbers: HashMap<String, usize>,
-}
-
-impl Names {
-    /// Adds a name, with a number behind it where it is taken.
-    pub(super) fn add(&mut self, name: &str) -> String {
-        let mut found = name.to_owned();
-        while !self.taken.insert(found.clone()) {
-            let number = self.numbers.entry(name.to_owned()).or_default();
-            *number += 1;
-            found = format!("{name}_{number}");
-        }
-        found
     }
 }
 
