@@ -3,7 +3,7 @@
 mod support;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cager_formats::{
     CacheFormat, Error, FrameReader, MeshFormat, ReadModel, open_frames, open_frames_bytes, read_mesh, read_mesh_bytes,
@@ -250,13 +250,90 @@ fn files_elsewhere_or_that_name_each_other_are_not_followed() {
     assert!(message(open_frames(&path, 3)).contains("the layer has sublayers"));
 }
 
+/// Value clips of both kinds of layers, written by `tests/peers/usd.py clips`, and their points.
+fn clips(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/usd/clips").join(name)
+}
+
+#[test]
+fn value_clips_are_read_one_after_another() {
+    let told = fs::read_to_string(clips("shot.txt")).unwrap();
+    let expected: Vec<Vec<f64>> =
+        told.lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
+    for kind in ["usda", "usdc"] {
+        let path = clips("shot").with_extension(kind);
+        let mut reader = open_frames(&path, 3).unwrap();
+        assert_eq!(numbers(&*reader), (101..107).map(f64::from).collect::<Vec<_>>());
+        assert_eq!(reader.shown(), [Some(vec![0..2, 4..6])]);
+        assert_eq!(all(&mut *reader), expected, "{kind}");
+        let read = read_mesh(&path, &[]).unwrap();
+        assert_eq!((paths(&read), read.model.faces.len()), (vec!["/model/m"], 1));
+        // As an upload it has no files.
+        let format = MeshFormat::from_path(&path).unwrap();
+        let error = message(read_mesh_bytes(format, Path::new("a.usd"), &fs::read(&path).unwrap()));
+        assert!(error.contains("/model has value clips, which are not read"), "{error}");
+    }
+}
+
+/// A layer with the metadata of its clips, whose own points are weaker than theirs.
+fn clipped(metadata: &str) -> String {
+    format!(
+        "#usda 1.0\n( subLayers = [@base.usda@] )\ndef \"model\" (\nclips = {{\ndictionary default = {{\n{metadata}\n}}\n}}\n) {{ }}\n"
+    )
+}
+
+#[test]
+fn clips_of_a_template_are_those_that_are_there() {
+    let base = format!("#usda 1.0\ndef Xform \"model\" {{\ndef Mesh \"m\" {{\n{TRIANGLE}}}\n}}\n");
+    let clip = |z: u32| {
+        format!(
+            "#usda 1.0\nover \"model\" {{\nover \"m\" {{\npoint3f[] points.timeSamples = {{ {z}: [(0, 0, {z}), (1, 0, 0), (0, 1, 0)] }}\n}}\n}}\n"
+        )
+    };
+    let template = "string templateAssetPath = \"./in/clip.##.usda\"\ndouble templateStartTime = 7\n\
+                    double templateEndTime = 10\ndouble templateStride = 1\nstring primPath = \"/model\"";
+    let [a, b, c] = [7, 8, 10].map(clip);
+    let shot = clipped(template);
+    let folder = folder(&[
+        ("shot.usda", &shot),
+        ("base.usda", &base),
+        ("in/clip.07.usda", &a),
+        ("in/clip.08.usda", &b),
+        ("in/clip.10.usda", &c),
+    ]);
+    let path = folder.path().join("shot.usda");
+    let mut reader = open_frames(&path, 3).unwrap();
+    assert_eq!(numbers(&*reader), [7.0, 8.0, 9.0, 10.0]);
+    let heights: Vec<f64> = all(&mut *reader).iter().map(|frame| frame[2]).collect();
+    assert_eq!(heights, [7.0, 8.0, 9.0, 10.0]);
+    // One by one, the second file later and twice as fast.
+    let listed = "double2[] active = [(0, 0), (5, 1)]\nasset[] assetPaths = [@in/clip.07.usda@, @in/clip.08.usda@]\n\
+                  double2[] times = [(0, 7), (5, 7), (5, 8), (6, 8)]\nstring primPath = \"/model\"";
+    fs::write(&path, clipped(listed)).unwrap();
+    let heights: Vec<f64> = all(&mut *open_frames(&path, 3).unwrap()).iter().map(|frame| frame[2]).collect();
+    assert_eq!(heights, [7.0, 7.0, 7.0, 7.0, 7.0, 8.0, 8.0]);
+    for (from, to, what) in [
+        ("in/clip.08.usda", "in/gone.usda", "in/gone.usda: is a value clip that is not there"),
+        ("in/clip.08.usda", "../clip.08.usda", "../clip.08.usda: is a value clip that is not there"),
+        ("in/clip.08.usda", "base.usda", "base.usda: is a value clip"),
+        ("(5, 1)", "(5, 2)", "/model has value clips, which are not read"),
+        ("\"/model\"", "\"model\"", "/model has value clips, which are not read"),
+        ("double2[] times", "double2[] stage", "/model has value clips, which are not read"),
+    ] {
+        fs::write(&path, clipped(&listed.replacen(from, to, 1))).unwrap();
+        let error = message(open_frames(&path, 3));
+        assert!(error.contains(what), "{error}\nnot: {what}");
+    }
+    // A clip that lacks what the first one has.
+    fs::write(folder.path().join("in/clip.08.usda"), "#usda 1.0\nover \"model\" { }\n").unwrap();
+    fs::write(&path, clipped(listed)).unwrap();
+    let error = message(open_frames(&path, 3));
+    assert!(error.contains("has value clips of which in/clip.08.usda has no samples of points"), "{error}");
+}
+
 #[test]
 fn damaged_scenes_are_errors_at_the_most() {
-    let mut state = 5_u64;
-    let mut random = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize
-    };
+    let mut random = support::random(5);
     for _ in 0..500 {
         for (format, whole) in [
             (CacheFormat::Usda, INSTANCES.as_bytes()),

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::clips::Clips;
 use crate::error::Fault;
 use crate::scene::{Node, Track, Value, Values};
 
@@ -9,14 +10,12 @@ use crate::scene::{Node, Track, Value, Values};
 pub(super) const DEEPEST: u32 = 256;
 
 /// Fields that say what a prim is composed of, in text or in binary layers.
-pub(super) const COMPOSED: [(&str, &str); 7] = [
+pub(super) const COMPOSED: [(&str, &str); 5] = [
     ("references", "references"),
     ("payload", "payloads"),
     ("inheritPaths", "inherited prims"),
     ("inherits", "inherited prims"),
     ("specializes", "specialized prims"),
-    ("clips", "value clips"),
-    ("clipSets", "value clips"),
 ];
 
 /// What a prim is, as far as it matters here.
@@ -67,6 +66,8 @@ pub(super) struct Prim {
     /// The strongest first.
     pub(super) arcs: Vec<Arc>,
     pub(super) variants: Vec<Variant>,
+    /// Files that have its values.
+    pub(super) clips: Option<Box<Clips>>,
     /// Sets of variants, and which one of each is chosen.
     pub(super) chosen: Vec<(String, String)>,
 }
@@ -85,7 +86,7 @@ pub(super) struct Variant {
 impl Prim {
     pub(super) fn new(kind: Kind, is_there: bool) -> Self {
         let (arcs, variants, chosen) = (Vec::new(), Vec::new(), Vec::new());
-        Self { kind, is_there, is_inactive: false, composed: None, arcs, variants, chosen }
+        Self { kind, is_there, is_inactive: false, composed: None, arcs, variants, clips: None, chosen }
     }
 
     /// Adds a variant; too many are not looked at.

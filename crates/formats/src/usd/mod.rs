@@ -6,12 +6,14 @@
 
 mod binary;
 mod choice;
+mod clips;
 mod compose;
 mod layer;
 mod materials;
 mod mesh;
 mod onto;
 mod package;
+mod reopened;
 mod skel;
 mod surface;
 mod text;

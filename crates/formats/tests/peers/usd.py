@@ -1,5 +1,5 @@
 """OpenUSD beside us. `usd.py read FILE` prints what the library reads of a file of one mesh: stage, faces, then a time code and the positions of each
-sample, moved by the transforms above; `usd.py cages FILE` what each mesh is for and its positions; `usd.py surface FILE` what lies on the faces of each mesh; `usd.py make FOLDER` writes files that the library can write and we cannot, each in binary, as text of USD, and with a text of what is to be read."""
+sample, moved by the transforms above; `usd.py cages FILE` what each mesh is for and its positions; `usd.py surface FILE` what lies on the faces of each mesh; `usd.py make FOLDER` writes files that the library can write and we cannot, each in binary, as text of USD, and with a text of what is to be read; `usd.py clips FOLDER` the same of value clips."""
 
 import sys
 import zipfile
@@ -257,4 +257,38 @@ def make(folder):
         keep(stage)
 
 
-{"read": read, "cages": cages, "surface": surface, "make": make}[sys.argv[1]](sys.argv[2])
+def clips(folder):
+    """Three value clips with two samples each, in two kinds of layers that name them in two ways, and the points that are to be read."""
+    for k, kind in enumerate(["usdc", "usda", "usdc"]):
+        stage = Usd.Stage.CreateNew(f"{folder}/clip.{k + 1:03}.{kind}")
+        mesh = stage.OverridePrim("/shot/m")
+        points = mesh.CreateAttribute("points", Sdf.ValueTypeNames.Point3fArray)
+        mesh.CreateAttribute("visibility", Sdf.ValueTypeNames.Token).Set("invisible" if k == 1 else "inherited", 2 * k)
+        for code in [2 * k, 2 * k + 1]:
+            points.Set(Vt.Vec3fArray([(code, 0, 0), (1, 0, 0), (0, 1, code)]), code)
+        stage.GetRootLayer().Save()
+    for kind in ["usda", "usdc"]:
+        stage = Usd.Stage.CreateNew(f"{folder}/base.{kind}")
+        mesh = UsdGeom.Mesh.Define(stage, "/root/m")
+        mesh.CreateFaceVertexCountsAttr([3])
+        mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
+        mesh.CreatePointsAttr([(9, 0, 0), (1, 0, 0), (0, 1, 0)])
+        stage.GetRootLayer().Save()
+        stage = Usd.Stage.CreateNew(f"{folder}/shot.{kind}")
+        root = stage.DefinePrim("/model", "Xform")
+        root.GetReferences().AddReference(f"./base.{kind}", "/root")
+        api = Usd.ClipsAPI(root)
+        api.SetClipAssetPaths([Sdf.AssetPath(f"./clip.{k + 1:03}.{end}") for k, end in enumerate(["usdc", "usda", "usdc"])])
+        api.SetClipPrimPath("/shot")
+        api.SetClipActive([(101, 0), (103, 1), (105, 2)])
+        api.SetClipTimes([(101, 0), (107, 6)])
+        stage.SetStartTimeCode(101)
+        stage.SetEndTimeCode(106)
+        stage.GetRootLayer().Save()
+        points = UsdGeom.Mesh(stage.GetPrimAtPath("/model/m")).GetPointsAttr()
+        with open(f"{folder}/shot.txt", "w") as told:
+            for code in range(101, 107):
+                print(*(f"{x:g}" for point in points.Get(code) for x in point), file=told)
+
+
+{"read": read, "cages": cages, "surface": surface, "make": make, "clips": clips}[sys.argv[1]](sys.argv[2])

@@ -1,5 +1,6 @@
 //! Types of values.
 
+pub(crate) const BOOL: u8 = 1;
 pub(crate) const INT: u8 = 3;
 pub(crate) const INT64: u8 = 5;
 pub(crate) const HALF: u8 = 7;
@@ -21,6 +22,7 @@ pub(crate) const VEC3H: u8 = 25;
 pub(crate) const VEC4D: u8 = 27;
 pub(crate) const VEC4F: u8 = 28;
 pub(crate) const VEC4H: u8 = 29;
+pub(crate) const DICTIONARY: u8 = 31;
 pub(crate) const TOKEN_LIST: u8 = 32;
 pub(crate) const PATH_LIST: u8 = 34;
 pub(crate) const REFERENCE_LIST: u8 = 35;

@@ -1,6 +1,7 @@
 //! Binary layers, which OpenUSD calls crate files: values are read when they are asked for.
 
 mod arcs;
+mod clips;
 mod file;
 pub(super) mod kind;
 mod pack;
@@ -91,6 +92,10 @@ impl<'a> Binary<'a> {
                     b"typeName" => prim.kind = Kind::of(sections.token(u32::from_le_bytes(value.inlined()))),
                     b"specifier" => prim.is_there = value.inlined() == [0; 4],
                     b"variantSelection" => prim.chosen = arcs::chosen(file, sections, value)?,
+                    b"clips" => {
+                        prim.clips = clips::read(file, sections, value)?.map(Box::new);
+                        prim.composed = if prim.clips.is_none() { Some("value clips") } else { prim.composed };
+                    }
                     b"active" => prim.is_inactive = value.inlined()[0] == 0,
                     _ => {
                         let told = COMPOSED.iter().find(|(field, _)| field.as_bytes() == name);

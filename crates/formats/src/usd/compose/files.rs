@@ -7,8 +7,10 @@ use std::sync::Arc;
 
 use crate::error::Fault;
 use crate::scene::{Node, Reader};
+use crate::usd::clips::MOST_CLIPS;
 use crate::usd::layer::{Layer, Times};
 use crate::usd::open_layer;
+use crate::usd::reopened::Reopened;
 
 /// Files of one scene, and how many name each other in a row.
 pub(super) const MOST_FILES: usize = 256;
@@ -70,6 +72,8 @@ pub(super) struct Files<'a> {
     /// The folder of the first, where it is known.
     folder: Option<PathBuf>,
     known: HashMap<PathBuf, Option<usize>>,
+    /// How many layers are clips.
+    clips: usize,
     /// Bytes of all files.
     pub(super) length: u64,
 }
@@ -78,9 +82,36 @@ impl<'a> Files<'a> {
     /// Of the first layer; none where one below it cannot be had.
     pub(super) fn new(layer: Layer<'a>, length: u64, folder: Option<&Path>) -> Result<Option<Self>, Fault> {
         let folder = folder.map(Path::to_owned);
-        let mut files = Self { layers: Vec::new(), stacks: Vec::new(), folder, known: HashMap::new(), length };
+        let mut files =
+            Self { layers: Vec::new(), stacks: Vec::new(), folder, known: HashMap::new(), clips: 0, length };
         let stack = files.stack(Loaded::new(layer, PathBuf::new(), 0))?;
         Ok(stack.map(|_| files))
+    }
+
+    pub(super) fn has_folder(&self) -> bool {
+        self.folder.is_some()
+    }
+
+    /// Whether a file that a layer names may be read.
+    pub(super) fn is_there(&self, layer: usize, asset: &str) -> bool {
+        let path = resolved(&self.layers[layer].folder, asset);
+        self.folder.as_ref().zip(path).is_some_and(|(folder, path)| folder.join(path).is_file())
+    }
+
+    /// The layer of a clip that a layer names, without those below it; none where it is not there or
+    /// may not be read.
+    pub(super) fn open_clip(&mut self, layer: usize, asset: &str) -> Result<Option<usize>, Fault> {
+        match self.load(layer, asset, true)? {
+            None => Ok(None),
+            Some(Ok(known)) => Ok(known.map(|stack| self.stacks[stack][0].0)),
+            Some(Err((path, loaded))) => {
+                self.known.insert(path, Some(self.stacks.len()));
+                self.stacks.push(vec![(self.layers.len(), Times::default())]);
+                self.layers.push(loaded);
+                self.clips += 1;
+                Ok(Some(self.layers.len() - 1))
+            }
+        }
     }
 
     /// The stack of a file that a layer names, and by how much faster its time codes pass; none
@@ -105,15 +136,18 @@ impl<'a> Files<'a> {
         &mut self,
         from: usize,
         asset: &str,
+        is_clip: bool,
     ) -> Result<Option<Result<Option<usize>, (PathBuf, Loaded<'a>)>>, Fault> {
         let Loaded { folder: base, depth, .. } = &self.layers[from];
         let (Some(folder), Some(path)) = (&self.folder, resolved(base, asset)) else { return Ok(None) };
         if let Some(known) = self.known.get(&path) {
             return Ok(Some(Ok(*known)));
         }
-        if *depth == DEEPEST || self.layers.len() == MOST_FILES {
+        let is_full = if is_clip { self.clips == MOST_CLIPS } else { self.layers.len() - self.clips == MOST_FILES };
+        if *depth == DEEPEST || is_full {
             return Err(Fault::unsupported(format!(
-                "is composed of more than {MOST_FILES} files, or of files that name each other more than {DEEPEST} times in a row; write all into one file"
+                "is composed of more than {MOST_FILES} files or {MOST_CLIPS} value clips, or of files that name each \
+                 other more than {DEEPEST} times in a row; write all into one file"
             )));
         }
         // Before it is opened, as a pipe would wait.
@@ -122,7 +156,8 @@ impl<'a> Files<'a> {
         }
         let Ok(file) = File::open(folder.join(&path)) else { return Ok(None) };
         let found = file.metadata()?;
-        let source: Reader<'a> = Box::new(file);
+        // As many files as clips are cannot be open at once.
+        let source: Reader<'a> = if is_clip { Box::new(Reopened::new(folder.join(&path))) } else { Box::new(file) };
         let name = path.display().to_string();
         let (layer, _) = open_layer(source, found.len(), false).map_err(|fault| fault.within(&name))?.0;
         self.length = self.length.saturating_add(found.len());

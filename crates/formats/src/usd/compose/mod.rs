@@ -2,6 +2,7 @@
 //! taken apart. Of all that names a prim the strongest opinion counts: that of the layer itself and
 //! those below it, then those of its chosen variants, of references and of payloads, each with its own.
 
+mod clips;
 mod files;
 mod instances;
 mod source;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 use super::layer::{Arc as To, Kind, Layer, Prim, Times, Variant, composed, too_deep};
 use crate::error::Fault;
 use crate::scene::Node;
+use clips::{ClipSet, Clipped};
 use files::{Files, within};
 use source::Composite;
 
@@ -59,13 +61,18 @@ struct Builder<'a> {
     places: HashMap<(Option<usize>, Name), usize>,
     children: Vec<Vec<usize>>,
     mappings: Vec<Mapping>,
+    sets: Vec<ClipSet>,
+    clipped: Vec<Option<Clipped>>,
     most: usize,
 }
 
 /// A layer of `length` bytes with what it is composed of, where that is plain; of files those below
 /// a folder, where it is known.
 pub(super) fn compose<'a>(layer: Layer<'a>, length: u64, folder: Option<&Path>) -> Result<Layer<'a>, Fault> {
-    let is_alone = |prim: &Prim| prim.arcs.is_empty() && prim.variants.is_empty() && prim.kind != Kind::PointInstancer;
+    let is_alone = |prim: &Prim| {
+        let has_others = !prim.arcs.is_empty() || !prim.variants.is_empty() || prim.clips.is_some();
+        !has_others && prim.kind != Kind::PointInstancer
+    };
     if layer.stage.sublayers.is_empty() && layer.prims.iter().all(is_alone) {
         return Ok(layer);
     }
@@ -79,13 +86,16 @@ pub(super) fn compose<'a>(layer: Layer<'a>, length: u64, folder: Option<&Path>) 
         places: HashMap::new(),
         children: Vec::new(),
         mappings: vec![Mapping { stack: 0, root: Vec::new(), at: None, outer: None, times: Times::default() }],
+        sets: Vec::new(),
+        clipped: Vec::new(),
         most: MOST_PRIMS,
     };
     builder.build()?;
     let (length, nodes, prims) = (builder.files.length, builder.nodes, builder.prims);
     let most_points = MOST_POINTS.max(length.saturating_mul(POINTS_OF_BYTE));
     let allowance = length.saturating_mul(BYTES_OF_BYTE).saturating_add(MOST_BYTES);
-    let source = Composite::new(builder.files.layers, builder.sites, builder.places, builder.mappings, allowance);
+    let scene = (builder.sites, builder.places, builder.mappings);
+    let source = Composite::new(builder.files.layers, scene, (builder.sets, builder.clipped), allowance);
     let mut layer = Layer { most_points, ..Layer::plain(stage, nodes, prims, Box::new(source)) };
     instances::expand(&mut layer, &builder.children, builder.most)?;
     Ok(layer)
@@ -113,6 +123,8 @@ impl Builder<'_> {
             for site in direct {
                 self.follow(site, at, (&mut sites, &mut unread), 0)?;
             }
+            let clipped = self.clipped((parent, &name), &sites, &mut unread)?;
+            self.clipped.push(clipped);
             let all = || sites.iter().map(|site| &self.files.layers[site.layer].layer.prims[site.prim]);
             let is_inactive = all().any(|prim| prim.is_inactive);
             let kind = all().map(|prim| prim.kind).find(|kind| *kind != Kind::Other).unwrap_or(Kind::Other);

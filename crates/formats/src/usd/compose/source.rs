@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
+use super::clips::{ClipSet, Clipped};
 use super::files::Loaded;
 use super::instances::MOST_INSTANCES;
 use super::{Mapping, Name, Site};
@@ -17,10 +18,13 @@ const LAYER: u32 = 48;
 const IS_ELEMENT: u64 = 1 << 63;
 
 pub(super) struct Composite<'a> {
-    layers: Vec<Loaded<'a>>,
+    pub(super) layers: Vec<Loaded<'a>>,
     sites: Vec<Vec<Site>>,
     places: HashMap<(Option<usize>, Name), usize>,
     mappings: Vec<Mapping>,
+    /// Sequences of files with values, and which prims have some there.
+    pub(super) sets: Vec<ClipSet>,
+    pub(super) clipped: Vec<Option<Clipped>>,
     /// Copies of prims: the top of the original and that of the copy.
     copies: HashMap<usize, (usize, usize)>,
     /// The layer of each value, and the value there.
@@ -48,9 +52,8 @@ fn given<T: Clone>(list: &[T], most: u64, allowance: &mut Allowance) -> Result<V
 impl<'a> Composite<'a> {
     pub(super) fn new(
         layers: Vec<Loaded<'a>>,
-        sites: Vec<Vec<Site>>,
-        places: HashMap<(Option<usize>, Name), usize>,
-        mappings: Vec<Mapping>,
+        (sites, places, mappings): (Vec<Vec<Site>>, HashMap<(Option<usize>, Name), usize>, Vec<Mapping>),
+        (sets, clipped): (Vec<ClipSet>, Vec<Option<Clipped>>),
         allowance: u64,
     ) -> Self {
         Self {
@@ -58,6 +61,8 @@ impl<'a> Composite<'a> {
             sites,
             places,
             mappings,
+            sets,
+            clipped,
             copies: HashMap::new(),
             values: Vec::new(),
             numbers: HashMap::new(),
@@ -132,7 +137,7 @@ impl<'a> Composite<'a> {
         Ok(&self.vectors[&(value.0, width)])
     }
 
-    fn held(&mut self, layer: usize, value: Value) -> Value {
+    pub(super) fn held(&mut self, layer: usize, value: Value) -> Value {
         let next = self.values.len() as u64;
         let number = *self.numbers.entry((layer, value.0)).or_insert(next);
         if number == next {
@@ -179,14 +184,21 @@ impl<'a> Composite<'a> {
 
 impl Attributes for Composite<'_> {
     fn attribute(&mut self, prim: usize, name: &str) -> Result<Track, Fault> {
+        let mut clipped = self.clipped[prim].clone();
         for site in self.sites[prim].clone() {
+            if let Some(clipped) = clipped.take_if(|clipped| !self.is_stronger(clipped, site)) {
+                let track = self.in_clips(&clipped, name)?;
+                if !track.is_empty() {
+                    return Ok(track);
+                }
+            }
             let mut track = self.own(site, name)?;
             if !track.is_empty() {
                 track.times.iter_mut().for_each(|time| *time = site.times.offset + site.times.scale * *time);
                 return Ok(track);
             }
         }
-        Ok(Track::default())
+        clipped.map_or(Ok(Track::default()), |clipped| self.in_clips(&clipped, name))
     }
 
     fn properties(&self, prim: usize) -> Vec<(String, String)> {
@@ -224,6 +236,7 @@ impl Attributes for Composite<'_> {
     fn copy(&mut self, of: usize, tops: (usize, usize)) {
         self.copies.insert(self.sites.len(), tops);
         self.sites.push(self.sites.get(of).cloned().unwrap_or_default());
+        self.clipped.push(self.clipped.get(of).cloned().flatten());
     }
 
     fn folder(&self, value: Value) -> String {

@@ -90,6 +90,13 @@ impl Parser<'_, '_> {
         if key == "variants" {
             return self.chosen(prim);
         }
+        if key == "clips" && self.scanner.solid()? == Some(b'{') {
+            let clips = self.clips()?;
+            let prim = &mut self.contents.prims[prim];
+            prim.composed = if clips.is_none() { Some("value clips") } else { prim.composed };
+            prim.clips = clips.map(Box::new);
+            return Ok(());
+        }
         let value = self.short()?;
         let prim = &mut self.contents.prims[prim];
         if key == "active" {

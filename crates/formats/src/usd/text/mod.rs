@@ -1,5 +1,6 @@
 //! Layers of text: read once for where values are, which are parsed when they are asked for.
 
+mod clips;
 mod composed;
 mod fields;
 mod parser;

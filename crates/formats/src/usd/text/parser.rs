@@ -23,7 +23,10 @@ const INSTANCING: [&str; 8] =
 /// Whether an attribute or a relationship of a prim is asked for.
 pub(super) fn is_wanted(kind: Kind, name: &str) -> bool {
     let of_kind = match kind {
-        Kind::Mesh => name == "normals" || ["primvars:", "crease"].iter().any(|start| name.starts_with(start)),
+        // What has no type says something of a prim that others define.
+        Kind::Mesh | Kind::Other => {
+            name == "normals" || ["primvars:", "crease"].iter().any(|start| name.starts_with(start))
+        }
         Kind::Subset | Kind::Shading | Kind::Skeleton | Kind::Motion => true,
         Kind::PointInstancer => INSTANCING.contains(&name),
         _ => false,
@@ -155,7 +158,7 @@ impl<'a, 'b> Parser<'a, 'b> {
         }
         let name = self.word()?;
         if let Some(&prim) = self.open.last()
-            && (matches!(self.contents.prims[prim].kind, Kind::Mesh | Kind::Motion)
+            && (matches!(self.contents.prims[prim].kind, Kind::Mesh | Kind::Motion | Kind::Other)
                 || name.starts_with("material:binding"))
         {
             let plain = name.split('.').next().unwrap_or_default().to_owned();
