@@ -468,16 +468,11 @@ fn one_of_several_meshes_is_chosen_by_path_or_name() {
     let mut same = triangle(1);
     same.name = "body";
     let place = |name, child| transform(name, &[0x10], 0, &[vec![0.0, 0.0, 0.0]], vec![child]);
-    let mut instance = triangle(1);
-    (instance.name, instance.metadata, instance.compound) = ("twin", "isInstance=1", "");
-    let source = array(".instanceSource", (TEXT, 1), 0, &[b"/coat/body".to_vec()], u8::to_le_bytes);
-    instance.properties = vec![Property { kind: 1, ..source }];
-    let (_folder, path) = saved(&archive("", &[EVEN], &[place("coat", same), place("skin", other), instance]));
+    let (_folder, path) = saved(&archive("", &[EVEN], &[place("coat", same), place("skin", other)]));
     let list = "/coat/body (3 points) and /skin/body (2 points)";
     let together = format!("holds 2 meshes, {list}, which together have 5 points, and 7 are expected; choose by paths");
     assert!(message(open_frames(&path, 7)).contains(&together));
-    let frames = open_frames(&path, 5).unwrap();
-    assert!(frames.notes()[0].contains("/twin is an instance of /coat/body, which is not read"));
+    open_frames(&path, 5).unwrap();
     let take = |prim: &str, points| {
         let selection = FrameSelection { prims: vec![prim.to_owned()], ..FrameSelection::default() };
         open_selected_frames(&path, points, &selection).map(|mut reader| all(&mut *reader))
@@ -491,8 +486,68 @@ fn one_of_several_meshes_is_chosen_by_path_or_name() {
     for prim in ["hat", "/hat/body", "/body", "ody", "/coat/body/body"] {
         assert!(message(take(prim, 2)).contains(&format!("holds no mesh {prim}, but {list}; give")), "{prim}");
     }
-    assert!(message(take("twin", 3)).contains("/twin is an instance of /coat/body, which is not read; "));
     assert!(matches!(take("/coat", 2), Err(Error::PointCount { expected: 2, found: 3, .. })));
+}
+
+/// An object that is another one once more.
+fn instance(name: &'static str, of: &str) -> Node {
+    let source = array(".instanceSource", (TEXT, 1), 0, &[of.as_bytes().to_vec()], u8::to_le_bytes);
+    let properties = vec![Property { kind: 1, ..source }];
+    Node { name, metadata: "isInstance=1", compound: "", properties, children: vec![] }
+}
+
+#[test]
+fn instances_are_parts_of_their_own() {
+    // Written by `tests/peers/make_alembic.py`.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/alembic/instances.abc");
+    let read = read_mesh(&path, &[]).unwrap();
+    assert_eq!(read.dropped, Default::default());
+    let surface = &read.model.surface;
+    let paths: Vec<&str> = surface.parts.iter().map(|part| part.path.as_str()).collect();
+    assert_eq!(paths, ["/tree/leaf", "/a/leaf_a", "/b/tree_b/leaf"]);
+    assert!(surface.materials.len() == 1 && surface.parts.iter().all(|part| part.materials == [0]));
+    let mut reader = open_frames(&path, 9).unwrap();
+    for (k, frame) in all(&mut *reader).iter().enumerate() {
+        let (z, y) = (k as f64, 20.0 + 10.0 * k as f64);
+        let firsts = [0, 1, 2].map(|part| [0, 1, 2].map(|axis| frame[9 * part + axis]));
+        // An instance of the mesh stays behind what moves the mesh, one of the transform does not.
+        assert_eq!(firsts, [[0.0, 0.0, z], [10.0, 0.0, 0.0], [0.0, y, z]], "{k}");
+    }
+    let selection = FrameSelection { prims: vec!["tree_b".to_owned()], ..FrameSelection::default() };
+    assert_eq!(open_selected_frames(&path, 3, &selection).unwrap().frames(), 2);
+}
+
+#[test]
+fn instances_of_nothing_or_of_themselves_and_too_many_are_told() {
+    let open = |nodes: &[Node]| {
+        let (_folder, path) = saved(&archive("", &[EVEN], nodes));
+        read_mesh(&path, &[]).and_then(|read| {
+            let reader = open_frames(&path, read.model.points.len())?;
+            Ok((read.model.points.len(), reader.notes().concat()))
+        })
+    };
+    let chain =
+        [triangle(1), instance("a", "/b"), instance("b", "/triangle"), instance("c", "/gone"), instance("d", "")];
+    let (points, notes) = open(&chain).unwrap();
+    assert_eq!(points, 9);
+    for what in ["/c is an instance of /gone, which is not there", "/d is an instance of nothing"] {
+        assert!(notes.contains(what), "{notes}");
+    }
+    assert!(message(open(&chain[3..])).contains("/c is an instance of /gone, which is not there, and is left out; "));
+    let inside = transform("x", &[0x10], 0, &[vec![0.0; 3]], vec![triangle(1), instance("again", "/x")]);
+    assert!(message(open(&[inside])).contains("nests deeper than 256"));
+    let (_, notes) = open(&[triangle(1), instance("a", "/b"), instance("b", "/a")]).unwrap();
+    assert!(notes.contains("/a is an instance of itself"), "{notes}");
+    // Each level shows the one before ten times.
+    let names = ["l0", "l1", "l2", "l3", "l4", "l5", "l6"];
+    let twice = |k: usize| {
+        let copies =
+            ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j"].map(|name| instance(name, &format!("/l{}", k - 1)));
+        transform(names[k], &[0x10], 0, &[vec![0.0; 3]], copies.to_vec())
+    };
+    let first = transform("l0", &[0x10], 0, &[vec![0.0; 3]], vec![triangle(1)]);
+    let levels: Vec<Node> = std::iter::once(first).chain((1..7).map(twice)).collect();
+    assert!(message(open(&levels)).contains("shows its meshes so many times"));
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! What an archive says of polygon meshes and the transforms above them.
 
+use std::collections::{HashMap, HashSet};
 use std::io::{Read, Seek};
 use std::sync::Arc;
 
 use cager_geometry::surface::Part;
 
-use super::objects::{Archive, Kind as ObjectKind};
+use super::instances::Room;
+use super::objects::{Archive, Kind as ObjectKind, Object};
 use super::ogawa::DOUBLES;
 use super::properties::{BOOL, F32, F64, I32, Kind, Property, U8, U32, find};
 use super::sampling::{Sampling, timing};
@@ -14,11 +16,9 @@ use crate::dropped::Dropped;
 use crate::error::Fault;
 use crate::scene::{
     Chain, MOST_OPERATIONS, MeshTracks, MovingScene, Operation, SceneTracks, Steps, Timeline, Track, Tree, Visibility,
-    Wanted, ancestry, check_held, choose, damaged, named, no_points, path, said, shown, shown_path, union,
+    Wanted, ancestry, check_held, choose, damaged, no_points, path, said, union,
 };
 
-/// Bytes of the path of what an instance is of.
-const LONGEST_PATH: u64 = 4096;
 /// Of what is shown or hidden as what is above it.
 const DEFERRED: i8 = -1;
 /// Frames per second where an archive does not say them.
@@ -35,17 +35,25 @@ pub(crate) fn open<'a>(
     dropped: Option<&mut Dropped>,
 ) -> Result<MovingScene<'a>, Fault> {
     let mut archive = Archive::open(Box::new(source), length)?;
-    let (objects, note) = find_meshes(&mut archive, wanted)?;
-    let mut tracks = SceneTracks { notes: note.into_iter().collect(), ..SceneTracks::default() };
+    let notes = archive.expand_instances()?;
+    let objects = find_meshes(&mut archive, wanted, &notes)?;
+    let mut tracks = SceneTracks { notes, ..SceneTracks::default() };
+    let mut room = Room::of(&archive);
     let (mut moving, mut held, several) = (Vec::new(), Vec::new(), objects.len() > 1);
-    let mut visibility = Visibility::default();
+    let (mut visibility, mut groups) = (Visibility::default(), HashSet::new());
     for &object in &objects {
         let name = path(archive.nodes(), object);
         let named = |fault: Fault| if several { fault.within(&name) } else { fault };
         archive.container.allow(4);
         let (mut mesh, positions) = read_mesh(&mut archive, object, &mut moving).map_err(named)?;
         mesh.shown = visible(&mut archive, object, &mut visibility).map_err(named)?;
-        held.push(positions);
+        if archive.objects[object].is_copy {
+            let points = archive.points(object).unwrap_or(0);
+            room.take(&mut archive, &mesh, points).map_err(named)?;
+        }
+        if groups.insert(positions.group) {
+            held.push(positions);
+        }
         tracks.meshes.push(mesh);
     }
     tracks.timeline = timeline(&mut archive, &held, &tracks.meshes, moving)?;
@@ -54,17 +62,29 @@ pub(crate) fn open<'a>(
     if let Some(dropped) = dropped {
         // What lies on faces is held, so that samples that meshes share are not free.
         archive.container.allow(8);
-        let mut materials = Materials::default();
+        let (mut materials, mut known) = (Materials::default(), HashMap::<u64, Part>::new());
         for (mesh, &object) in tracks.meshes.iter_mut().zip(&objects) {
-            match surface::read(&mut archive, object, &mut materials, dropped) {
-                Ok(part) => mesh.part = Part { path: std::mem::take(&mut mesh.part.path), ..part },
+            let Object { group, is_copy, .. } = archive.objects[object];
+            let read = match known.get(&group) {
+                Some(part) => Ok(part.clone()),
+                None => surface::read(&mut archive, object, &mut materials, dropped),
+            };
+            let Ok(part) = read else {
                 // That is no reason to refuse a mesh.
-                Err(_) => dropped.add_on_faces("what lies on faces, as it is damaged or too large"),
+                dropped.add_on_faces("what lies on faces, as it is damaged or too large");
+                continue;
+            };
+            if is_copy {
+                room.take_part(&part)?;
+                known.entry(group).or_insert_with(|| part.clone());
             }
+            mesh.part = Part { path: std::mem::take(&mut mesh.part.path), ..part };
         }
         tracks.materials = materials.list;
         archive.container.allow(4);
     }
+    // Faces of instances are read once more for each.
+    archive.container.source.allowance.0 = archive.container.source.allowance.0.saturating_add(room.taken);
     MovingScene::new(Box::new(archive.container), tracks)
 }
 
@@ -99,35 +119,15 @@ fn read_mesh(
     Ok((tracks, positions))
 }
 
-/// The meshes that are wanted, and what the user should know of others.
-fn find_meshes(archive: &mut Archive<'_>, wanted: Wanted<'_>) -> Result<(Vec<usize>, Option<String>), Fault> {
-    let of_kind = |archive: &Archive<'_>, kinds: &[ObjectKind]| -> Vec<usize> {
-        (0..archive.objects.len()).filter(|&k| kinds.contains(&archive.objects[k].kind)).collect()
-    };
-    let meshes = of_kind(archive, &[ObjectKind::Mesh, ObjectKind::Subdivision]);
-    let instances = of_kind(archive, &[ObjectKind::Instance]);
-    if let Some(&instance) = instances.first() {
-        let properties = archive.top_properties(instance)?;
-        let source = match find(&properties, ".instanceSource", Kind::Scalar) {
-            Some(told) => {
-                let bytes = told.small(&mut archive.container, LONGEST_PATH)?;
-                shown(String::from_utf8_lossy(&bytes).trim_end_matches('\0'))
-            }
-            None => "another object".to_owned(),
-        };
-        let path = shown_path(archive.nodes(), instance);
-        let what =
-            format!("{path} is an instance of {source}, which is not read; make instances real where it is exported");
-        let is_named = wanted.prims.iter().any(|prim| !named(archive.nodes(), &instances, prim).is_empty());
-        if is_named || meshes.is_empty() {
-            return Err(Fault::unsupported(format!("{what}, or export {source} alone")));
-        }
-        return Ok((choose(archive, &meshes, wanted)?, Some(what)));
+/// The meshes that are wanted.
+fn find_meshes(archive: &mut Archive<'_>, wanted: Wanted<'_>, missing: &[String]) -> Result<Vec<usize>, Fault> {
+    let is_mesh = |&k: &usize| matches!(archive.objects[k].kind, ObjectKind::Mesh | ObjectKind::Subdivision);
+    let meshes: Vec<usize> = (0..archive.objects.len()).filter(is_mesh).collect();
+    match (meshes.is_empty(), missing.first()) {
+        (false, _) => choose(archive, &meshes, wanted),
+        (true, Some(missing)) => Err(Fault::invalid(format!("{missing}; export it with what it is of"))),
+        (true, None) => Err(Fault::unsupported("holds no polygon mesh; export the mesh itself as Alembic")),
     }
-    if meshes.is_empty() {
-        return Err(Fault::unsupported("holds no polygon mesh; export the mesh itself as Alembic"));
-    }
-    Ok((choose(archive, &meshes, wanted)?, None))
 }
 
 /// When an object is shown: what is hidden hides what is below it, unless that says otherwise.

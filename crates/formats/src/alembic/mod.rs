@@ -4,6 +4,7 @@
 //! which are applied. Alembic winds faces clockwise; they are turned around on the way in and out.
 //! An archive says neither its unit nor which axis points up.
 
+mod instances;
 mod mesh;
 mod objects;
 mod ogawa;

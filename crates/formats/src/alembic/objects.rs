@@ -10,7 +10,7 @@ use crate::scene::{Fields, Node, Reader, damaged};
 
 /// Objects of an archive, and how deep they nest; programs write far fewer.
 const MOST_OBJECTS: usize = 1 << 20;
-const DEEPEST: usize = 256;
+pub(super) const DEEPEST: usize = 256;
 /// Bytes at the end of the headers of a group's objects that tell its contents apart from others.
 const HASHES: usize = 32;
 /// In place of an index of metadata that is told beside it.
@@ -49,10 +49,12 @@ pub(super) fn told<'a>(metadata: &'a [u8], key: &[u8]) -> Option<&'a [u8]> {
     metadata.split(|&b| b == b';').find_map(|entry| entry.strip_prefix(key)?.strip_prefix(b"="))
 }
 
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Object {
     pub(super) kind: Kind,
     pub(super) group: u64,
+    /// Whether it is another one once more, or within such.
+    pub(super) is_copy: bool,
 }
 
 /// An archive without the contents of its objects.
@@ -106,6 +108,12 @@ impl<'a> Archive<'a> {
     }
 }
 
+/// The fault of objects within objects, more than programs write.
+pub(super) fn too_deep() -> Fault {
+    let what = format!("nests deeper than {DEEPEST}; export the mesh alone, without what it lies below");
+    Fault::unsupported(what)
+}
+
 fn too_many() -> Fault {
     Fault::unsupported(format!("has more than {MOST_OBJECTS} objects; export the mesh alone"))
 }
@@ -123,8 +131,7 @@ fn children_of(
         return Ok(Vec::new());
     }
     if depth > DEEPEST {
-        let what = format!("nests deeper than {DEEPEST}; export the mesh alone, without what it lies below");
-        return Err(Fault::unsupported(what));
+        return Err(too_deep());
     }
     if groups.len() > MOST_OBJECTS {
         return Err(too_many());
@@ -138,7 +145,7 @@ fn children_of(
             INLINE => Kind::of(fields.sized(2)?),
             index => *kinds.get(index).ok_or_else(|| damaged("an object has metadata that are not there"))?,
         };
-        objects.push((Node { name, parent, depth }, Object { kind, group }));
+        objects.push((Node { name, parent, depth }, Object { kind, group, is_copy: false }));
     }
     objects.reverse();
     Ok(objects)

@@ -26,6 +26,11 @@ impl Steps {
         Arc::new(Self { own, above: Some(above) })
     }
 
+    /// How many changes it has, those of what is above it included.
+    pub(crate) fn len(&self) -> usize {
+        self.own.len() + self.above.as_ref().map_or(0, |above| above.len())
+    }
+
     /// Whether it is shown at a time; a value that comes within rounding of it counts.
     pub(crate) fn at(&self, time: f64) -> bool {
         const NEAR: f64 = 1e-6;
