@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cager_geometry::mesh::Model;
-use cager_geometry::surface::{Part, Subdivision, Surface};
+use cager_geometry::surface::{Part, Subdivision, Surface, Texture};
 
 /// Names that a list shows, and characters of each.
 const LISTED: usize = 4;
@@ -100,6 +100,10 @@ pub(crate) fn phrases_of(surface: &Surface, is_kept: bool) -> Vec<String> {
         phrases.push("the frames in which parts are shown".to_owned());
     }
     if is_kept {
+        let is_special = |texture: &Texture| !texture.uv_set.is_empty() || texture.component.is_some();
+        if surface.materials.iter().flat_map(|material| &material.textures).any(is_special) {
+            phrases.push("which texture coordinates and components textures have".to_owned());
+        }
         return phrases;
     }
     if parts.len() > 1 {

@@ -115,34 +115,50 @@ fn place(output: &Path, is_folder: bool) -> (PathBuf, String) {
 /// Names the pictures of a surface as files in `folder`, and takes their bytes by the names there.
 pub(crate) fn rename(surface: &mut Surface, folder: &str) -> BTreeMap<String, Arc<[u8]>> {
     let mut names: BTreeMap<String, Arc<[u8]>> = BTreeMap::new();
-    let mut renamed = BTreeMap::new();
     let textures = || surface.materials.iter().flat_map(|material| &material.textures);
-    let named: BTreeSet<&str> = textures().map(|texture| texture.path.as_str()).collect();
-    let tiles: Vec<(&str, &str)> = named.iter().filter_map(|path| path.split_once("<UDIM>")).collect();
-    let is_named = |path: &str| {
-        named.contains(path) || tiles.iter().any(|(before, after)| path.starts_with(before) && path.ends_with(after))
-    };
-    let mut pictures = surface.pictures.clone();
-    pictures.retain(|picture| is_named(&picture.path));
-    surface.pictures = Vec::new();
-    for Picture { path, bytes } in pictures {
-        let name = plain(path.rsplit(['/', '\\']).next().unwrap_or_default());
-        let (stem, extension) =
-            name.rsplit_once('.').map_or((name.as_str(), String::new()), |(stem, end)| (stem, format!(".{end}")));
-        let numbered = (1..).map(|k| if k == 1 { name.clone() } else { format!("{stem}_{k}{extension}") });
-        let free = numbered.into_iter().find(|name| names.get(name).is_none_or(|other| *other == bytes));
-        let name = free.unwrap_or_else(|| name.clone());
-        renamed.insert(path, format!("{folder}/{name}"));
-        names.insert(name, bytes);
+    let named: BTreeSet<String> = textures().map(|texture| texture.path.clone()).collect();
+    let pictures = std::mem::take(&mut surface.pictures);
+    let mut renamed = BTreeMap::new();
+    for path in named {
+        let (before, after) = path.split_once("<UDIM>").unwrap_or((&path, ""));
+        // Of a picture in tiles all, with what stands between the rest of the name.
+        let tile = |found: &Picture| {
+            let tile = found.path.strip_prefix(before)?.strip_suffix(after)?.to_owned();
+            (tile.is_empty() || path.len() > before.len()).then(|| (tile, Arc::clone(&found.bytes)))
+        };
+        let tiles: Vec<(String, Arc<[u8]>)> = pictures.iter().filter_map(tile).collect();
+        if tiles.is_empty() {
+            continue;
+        }
+        let file = before.rsplit(['/', '\\']).next().unwrap_or_default();
+        let is_tiled = path.len() > before.len();
+        let (stem, end) = match file.rsplit_once('.') {
+            Some((stem, end)) if !is_tiled => (stem, format!(".{end}")),
+            _ if is_tiled => {
+                let stem = file.trim_end_matches(['.', '_', '-']);
+                (stem, format!("{}<UDIM>{after}", &file[stem.len()..]))
+            }
+            _ => (file, String::new()),
+        };
+        let name = |k: usize, tile: &str| {
+            let number = if k == 1 { String::new() } else { format!("_{k}") };
+            let placed = |name: &str| name.replace("<UDIM>", tile);
+            plain(&placed(&format!("{stem}{number}{end}")))
+        };
+        let is_free = |k: &usize| {
+            let is_other =
+                |(tile, bytes): &(String, Arc<[u8]>)| names.get(&name(*k, tile)).is_some_and(|there| there != bytes);
+            !tiles.iter().any(is_other)
+        };
+        let k = (1..).find(is_free).unwrap_or(1);
+        let told = name(k, "0000");
+        let told = if is_tiled { told.replacen("0000", "<UDIM>", 1) } else { told };
+        renamed.insert(path.clone(), format!("{folder}/{told}"));
+        tiles.into_iter().for_each(|(tile, bytes)| drop(names.insert(name(k, &tile), bytes)));
     }
     for texture in surface.materials.iter_mut().flat_map(|material| &mut material.textures) {
         if let Some(path) = renamed.get(&texture.path) {
             texture.path.clone_from(path);
-        } else if let Some((before, after)) = texture.path.split_once("<UDIM>")
-            && let Some((_, path)) = renamed.iter().find(|(old, _)| old.starts_with(before) && old.ends_with(after))
-        {
-            let name = format!("{}<UDIM>{after}", before.rsplit('/').next().unwrap_or_default());
-            texture.path = format!("{}/{name}", path.rsplit_once('/').map_or("", |(folder, _)| folder));
         }
     }
     names
@@ -215,5 +231,35 @@ impl Beside {
             file.commit()?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cager_geometry::surface::{Channel, Material, Texture};
+
+    use super::*;
+
+    #[test]
+    fn tiles_of_one_name_in_two_folders_stay_apart() {
+        let names = ["a/skin.<UDIM>.png", "b/skin.<UDIM>.png", "b/skin.png", "a/skin.png"];
+        let textures = names.map(|path| Texture::new(Channel::BaseColor, path)).to_vec();
+        let picture = |path: &str| Picture { path: path.to_owned(), bytes: Arc::from(path.as_bytes()) };
+        let files =
+            ["a/skin.1001.png", "a/skin.1002.png", "b/skin.1001.png", "b/skin.png", "a/skin.png", "c/other.png"];
+        let mut surface = Surface {
+            materials: vec![Material { textures, ..Material::default() }],
+            pictures: files.map(picture).to_vec(),
+            ..Surface::default()
+        };
+        let found = rename(&mut surface, "out");
+        let told: Vec<&str> = surface.materials[0].textures.iter().map(|texture| texture.path.as_str()).collect();
+        assert_eq!(told, ["out/skin.<UDIM>.png", "out/skin_2.<UDIM>.png", "out/skin_2.png", "out/skin.png"]);
+        let bytes = |name: &str| String::from_utf8_lossy(&found[name]).into_owned();
+        assert_eq!((bytes("skin.1002.png"), bytes("skin_2.1001.png")), (files[1].to_owned(), files[2].to_owned()));
+        assert_eq!(
+            (bytes("skin_2.png"), bytes("skin.png"), found.len()),
+            (files[3].to_owned(), files[4].to_owned(), 5)
+        );
     }
 }

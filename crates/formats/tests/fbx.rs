@@ -71,6 +71,21 @@ fn all_meshes_of_a_scene_are_parts_with_what_lies_on_their_faces() {
 }
 
 #[test]
+fn pictures_in_the_file_are_taken_out_of_it() {
+    let video = "Video: 303, \"Video::tiles\", \"Clip\" {\nType: \"Clip\"\nRelativeFilename: \"pictures\\tiles.png\"\n\
+                 Content: ,\n\"iVBORw0KGgo=\"\n}\nTexture: 302,";
+    let text = CUBE.replacen("Texture: 302,", video, 1).replacen(
+        "C: \"OP\",302,300",
+        "C: \"OO\",303,302\nC: \"OP\",302,300",
+        1,
+    );
+    let surface = read(&text).unwrap().model.surface;
+    let [picture] = &surface.pictures[..] else { panic!("{:?}", surface.pictures) };
+    assert_eq!((picture.path.as_str(), &picture.bytes[..]), ("pictures/tiles.png", &b"\x89PNG\r\n\x1a\n"[..]));
+    assert!(read(CUBE).unwrap().model.surface.pictures.is_empty());
+}
+
+#[test]
 fn frames_are_those_of_the_animation_at_its_rate_or_another() {
     let (all, numbers, notes) = frames(CUBE, 13, &FrameSelection::default());
     assert_eq!((all.len(), numbers[0], numbers[24]), (25, 0.0, 24.0));

@@ -9,7 +9,9 @@ use cager_formats::{
     CacheFormat, FrameOptions, MorphOptions, create_frames, open_frames, open_frames_bytes, read_mesh, read_split_mesh,
 };
 use cager_geometry::mesh::{Model, Polygons};
-use cager_geometry::surface::{Channel, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface};
+use cager_geometry::surface::{
+    Channel, Component, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface, Texture,
+};
 use gltf::json::Value;
 use support::document::Built;
 use support::{all, by_corner, glb_file, polygons, read, set, texture};
@@ -306,6 +308,44 @@ fn what_is_written_is_read_again() {
     let material = |wanted: &str| back.surface.materials.iter().find(|material| material.name == wanted).unwrap();
     assert_eq!((material("gold"), material("plain")), (&surface.materials[1], &surface.materials[0]));
     assert!(flag.normals.is_empty());
+}
+
+#[test]
+fn textures_keep_their_coordinates_and_components() {
+    let (model, mut surface) = scene();
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let mut write = |textures: Vec<Texture>| {
+        surface.materials[1].textures = textures;
+        let morphs = MorphOptions { floats: true, ..MorphOptions::default() };
+        let options = FrameOptions { morphs, surface: surface.clone(), ..FrameOptions::default() };
+        let _ = fs::remove_file(&path);
+        let mut writer = create_frames(&path, model.points.len(), 1, &model.faces, &options).unwrap();
+        writer.write_frame(&model.points.iter().flatten().map(|&x| x as f32).collect::<Vec<_>>()).unwrap();
+        let notes = writer.notes().concat();
+        writer.finish().unwrap();
+        let back = read_mesh(&path, &[]).unwrap().model.surface;
+        (back.materials.into_iter().find(|material| material.name == "gold").unwrap().textures, notes)
+    };
+    let on_detail = |texture: Texture| Texture { uv_set: "detail".to_owned(), ..texture };
+    let (base, rough) = (texture(Channel::BaseColor, "a.png"), texture(Channel::Roughness, "r.png"));
+    let metal = texture(Channel::Metalness, "r.png");
+    let (back, notes) = write(vec![on_detail(base.clone()), rough.clone(), metal.clone()]);
+    // Sets have their numbers as names there.
+    let base_there = Texture { uv_set: "TEXCOORD_1".to_owned(), ..base.clone() };
+    assert_eq!(back[0], base_there);
+    assert!(back.contains(&rough) && back.contains(&metal) && !notes.contains("roughness"), "{back:?} {notes}");
+    // The flag is hidden in the only frame.
+    assert!(notes.contains("has no place for") && notes.contains("what is hidden (/rig/strip/flag)"), "{notes}");
+    let red = Texture { component: Some(Component::Red), ..rough.clone() };
+    for textures in [vec![red, metal.clone()], vec![on_detail(rough), metal]] {
+        let (back, notes) = write(textures);
+        assert!(back.is_empty() && notes.contains("not the green and the blue of one picture"), "{back:?} {notes}");
+    }
+    let json = split(&fs::read(&path).unwrap()).0;
+    // The flag is at no node that is shown.
+    let text = json["nodes"].to_string();
+    assert_eq!((json["nodes"].as_array().unwrap().len(), text.matches("children").count()), (3, 1), "{text}");
 }
 
 #[test]

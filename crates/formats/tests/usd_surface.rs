@@ -10,7 +10,7 @@ use std::sync::Arc;
 use cager_formats::{CageMesh, FrameOptions, MeshFormat, create_frames, read_mesh, read_mesh_bytes};
 use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::{
-    Channel, Crease, FaceGroup, Material, NO_MATERIAL, Part, Picture, Subdivision, Surface, Texture,
+    Channel, Component, Crease, FaceGroup, Material, NO_MATERIAL, Part, Picture, Subdivision, Surface, Texture,
 };
 use support::{by_corner, data, polygons, set, texture};
 use tempfile::tempdir;
@@ -80,9 +80,9 @@ fn surface() -> Surface {
         textures: vec![
             texture(Channel::BaseColor, "pictures/base.png"),
             texture(Channel::Opacity, "pictures/base.png"),
-            texture(Channel::Roughness, "pictures/rough.png"),
+            Texture { component: Some(Component::Blue), ..texture(Channel::Roughness, "pictures/rough.png") },
             texture(Channel::Normal, "pictures/n.png"),
-            texture(Channel::Emission, "pictures/glow.png"),
+            Texture { uv_set: "detail".to_owned(), ..texture(Channel::Emission, "pictures/glow.png") },
         ],
     };
     let glass = Material { name: "glass".to_owned(), base_color: [1.0; 3], ..Material::default() };
@@ -191,7 +191,10 @@ fn files_of_the_library_have_what_it_wrote() {
             base_color: [0.2, 0.4, 0.6],
             roughness: 0.25,
             metalness: 1.0,
-            textures: vec![texture(Channel::Opacity, "pictures/paint.png")],
+            textures: vec![Texture {
+                component: Some(Component::Alpha),
+                ..texture(Channel::Opacity, "pictures/paint.png")
+            }],
             ..Material::default()
         };
         let metal = Material { name: "metal".to_owned(), ..Material::default() };
@@ -313,9 +316,9 @@ fn the_library_of_usd_reads_what_lies_on_faces() {
         "diffuseColor (0.5, 0.25, 0.125)",
         "rgb textures/base.png True sRGB UVMap",
         "a textures/base.png True raw UVMap",
-        "r pictures/rough.png False raw UVMap",
+        "b pictures/rough.png False raw UVMap",
         "rgb pictures/n.png False raw UVMap",
-        "rgb pictures/glow.png False sRGB UVMap",
+        "rgb pictures/glow.png False sRGB detail",
         "metallic 1.0",
     ] {
         assert!(text.lines().any(|found| found == line), "{line}\n{text}");

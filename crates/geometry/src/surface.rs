@@ -154,6 +154,60 @@ pub struct Texture {
     pub channel: Channel,
     /// Its file as the source names it, with `/` between folders.
     pub path: String,
+    /// The name of its texture coordinates; empty for the first of each part.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub uv_set: String,
+    /// Which component of the picture counts, where it is not the usual one ([`Material::component`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub component: Option<Component>,
+}
+
+/// One of the numbers of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Component {
+    /// The first, also of a picture that has no other.
+    Red,
+    /// The second.
+    Green,
+    /// The third.
+    Blue,
+    /// The fourth.
+    Alpha,
+}
+
+impl Texture {
+    /// With the first texture coordinates of each part and the usual component.
+    pub fn new(channel: Channel, path: impl Into<String>) -> Self {
+        Self { channel, path: path.into(), uv_set: String::new(), component: None }
+    }
+}
+
+impl Material {
+    /// Which component of a picture counts; `None` for red, green and blue as a colour or a direction.
+    ///
+    /// Where nothing is said, opacity is the alpha of the picture of the base colour, roughness and metalness of one
+    /// picture are its green and blue, and everything else is red.
+    pub fn component(&self, texture: &Texture) -> Option<Component> {
+        let is_of = |channel| self.textures.iter().any(|other| other.channel == channel && other.path == texture.path);
+        texture.component.or(match texture.channel {
+            Channel::BaseColor | Channel::Normal | Channel::Emission => None,
+            Channel::Opacity if is_of(Channel::BaseColor) => Some(Component::Alpha),
+            Channel::Roughness if is_of(Channel::Metalness) => Some(Component::Green),
+            Channel::Metalness if is_of(Channel::Roughness) => Some(Component::Blue),
+            Channel::Opacity | Channel::Roughness | Channel::Metalness => Some(Component::Red),
+        })
+    }
+
+    /// Leaves out which component counts where that is the usual one.
+    pub fn forget_usual_components(&mut self) {
+        for k in 0..self.textures.len() {
+            let said = self.textures[k].component.take();
+            if self.component(&self.textures[k]) != said {
+                self.textures[k].component = said;
+            }
+        }
+    }
 }
 
 /// What a picture says of a material.

@@ -27,7 +27,7 @@ pub(crate) fn open_frames<'a>(
     folder: Option<&Path>,
 ) -> Result<Box<dyn FrameReader + 'a>, Error> {
     let open = || {
-        let scene = Scene::load(&read_all(source)?, folder)?;
+        let scene = Scene::load(&read_all(source)?, folder, false)?;
         let parts = selection.rest.as_ref().map_or(&[][..], |rest| &rest.surface.parts);
         let wanted = Wanted { prims: &selection.prims, points: Some(expected_points), parts };
         MeshFrames::open(scene, wanted, selection, None)
@@ -45,7 +45,7 @@ pub(crate) fn read(
 ) -> Result<(Model, usize, Units, Dropped), Error> {
     let (mut surface, mut dropped, mut values) = (Surface::default(), Dropped::default(), Vec::new());
     let open = || {
-        let scene = Scene::load(&read_all(source)?, folder)?;
+        let scene = Scene::load(&read_all(source)?, folder, true)?;
         MeshFrames::open(scene, wanted, &FrameSelection::default(), Some((&mut surface, &mut dropped)))
     };
     let mut frames = open().map_err(|failure: Fault| failure.at(path))?;
@@ -125,7 +125,7 @@ impl MeshFrames {
             info.shown.clear();
         }
         if let Some((surface, _)) = all {
-            surface.materials = materials.list;
+            (surface.materials, surface.pictures) = (materials.list, materials.pictures);
         }
         let stack = stack.map(|stack| stack.element.typed_id as usize);
         drop(first);

@@ -31,7 +31,8 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    pub(super) fn load(bytes: &[u8], folder: Option<&Path>) -> Result<Self, Fault> {
+    /// With the pictures that lie in it, where they are wanted.
+    pub(super) fn load(bytes: &[u8], folder: Option<&Path>, has_pictures: bool) -> Result<Self, Fault> {
         let limit = FIXED.saturating_add(PER_BYTE.saturating_mul(bytes.len()));
         let load = |axes: Option<CoordinateAxes>| {
             let open = |path: &str, info: &OpenFileInfo| beside(folder, path, info);
@@ -39,7 +40,7 @@ impl Scene {
                 temp_allocator: allocator(limit),
                 result_allocator: allocator(limit),
                 file_format: FileFormat::Fbx,
-                ignore_embedded: true,
+                ignore_embedded: !has_pictures,
                 skip_mesh_parts: true,
                 // What is not there is told from what is.
                 index_error_handling: IndexErrorHandling::NoIndex,

@@ -1,14 +1,17 @@
 //! The materials of faces.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use cager_geometry::surface::{Channel, Material, NO_MATERIAL, Texture};
+use cager_geometry::surface::{Channel, Material, NO_MATERIAL, Picture, Texture};
 use ufbx::{MaterialMap, Mesh, Node};
 
 /// Those of all meshes that are read.
 #[derive(Default)]
 pub(super) struct Materials {
     pub(super) list: Vec<Material>,
+    /// Those that lie in the file and are named, once each.
+    pub(super) pictures: Vec<Picture>,
     /// Places in the list by numbers in the scene.
     known: HashMap<u32, u32>,
 }
@@ -19,13 +22,14 @@ impl Materials {
     pub(super) fn of_faces(&mut self, node: &Node, mesh: &Mesh, faces: &[u32]) -> Vec<u32> {
         let own = if node.materials.is_empty() { &mesh.materials } else { &node.materials };
         let mut places: Vec<Option<u32>> = vec![None; own.len()];
+        let first = mesh.uv_sets.as_ref().first().map_or("", |set| &set.name);
         let mut material = |&face: &u32| {
             // Where all faces have the first one, some files have no list.
             let slot = mesh.face_material.as_ref().get(face as usize).map_or(0, |&slot| slot as usize);
             let Some(stored) = own.as_ref().get(slot) else { return NO_MATERIAL };
             *places[slot].get_or_insert_with(|| {
                 *self.known.entry(stored.element.typed_id).or_insert_with(|| {
-                    self.list.push(read(stored));
+                    self.list.push(read(stored, first, &mut self.pictures));
                     self.list.len() as u32 - 1
                 })
             })
@@ -35,7 +39,8 @@ impl Materials {
     }
 }
 
-fn read(stored: &ufbx::Material) -> Material {
+/// A material of a mesh whose first texture coordinates have a name; adds the pictures that lie in the file.
+fn read(stored: &ufbx::Material, first: &str, pictures: &mut Vec<Picture>) -> Material {
     let (usual, maps) = (Material::default(), &stored.pbr);
     let value = |map: &MaterialMap, usual: f32| match map.value_vec4.x as f32 {
         value if map.has_value && value.is_finite() => value.clamp(0.0, 1.0),
@@ -61,16 +66,23 @@ fn read(stored: &ufbx::Material) -> Material {
         metalness: value(&maps.metalness, usual.metalness),
         textures: textures
             .into_iter()
-            .filter_map(|(channel, map)| Some(Texture { channel, path: picture(map)? }))
+            .filter_map(|(channel, map)| {
+                let (path, found) = picture(map)?;
+                if !found.content.is_empty() && pictures.iter().all(|picture| picture.path != path) {
+                    pictures.push(Picture { path: path.clone(), bytes: Arc::from(&found.content[..]) });
+                }
+                let uv_set = if &*found.uv_set == first { String::new() } else { found.uv_set.to_string() };
+                Some(Texture { uv_set, ..Texture::new(channel, path) })
+            })
             .collect(),
     }
 }
 
-/// The file of a picture, of several layers the lowest.
-fn picture(map: &MaterialMap) -> Option<String> {
+/// The file of a picture, of several layers the lowest, and what is said of it.
+fn picture(map: &MaterialMap) -> Option<(String, &ufbx::Texture)> {
     let texture = map.texture.as_deref().filter(|_| map.texture_enabled)?;
     let texture = texture.file_textures.as_ref().first().map_or(texture, |first| &**first);
     let names = [&texture.relative_filename, &texture.filename, &texture.absolute_filename];
     let path = names.into_iter().find(|name| !name.is_empty())?;
-    Some(path.replace('\\', "/"))
+    Some((path.replace('\\', "/"), texture))
 }

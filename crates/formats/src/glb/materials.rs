@@ -1,8 +1,9 @@
 //! Materials of metallic-roughness, as far as those of other formats are like them, and the
 //! pictures that they name.
 
-use cager_geometry::surface::{Channel, Material, Texture};
+use cager_geometry::surface::{Channel, Component, Material, Texture};
 use gltf::json::Value;
+use gltf::json::mesh::Semantic;
 use percent_encoding::percent_decode_str;
 
 use super::document::items;
@@ -106,17 +107,22 @@ fn look(document: &Value, k: usize, value: &Value, room: &mut usize) -> Look {
         };
         *room = left;
         look.embedded.extend(embedded.map(|view| Embedded { path: path.clone(), view }));
-        look.material.textures.push(Texture { channel, path });
         let extension = &info["extensions"]["KHR_texture_transform"];
         let set = extension["texCoord"].as_u64().or(info["texCoord"].as_u64()).unwrap_or(0);
+        let uv_set = if set == 0 { String::new() } else { Semantic::TexCoords(set as u32).to_string() };
+        let component = match channel {
+            Channel::Opacity => Some(Component::Alpha),
+            Channel::Roughness => Some(Component::Green),
+            Channel::Metalness => Some(Component::Blue),
+            Channel::BaseColor | Channel::Normal | Channel::Emission => None,
+        };
+        look.material.textures.push(Texture { uv_set, component, ..Texture::new(channel, path) });
         transforms.push((Transform::of(extension), set));
     }
     if value["occlusionTexture"].is_object() {
         look.dropped.push("textures of occlusion");
     }
-    if transforms.iter().any(|&(_, set)| set > 0) {
-        look.dropped.push("which texture coordinates each texture has");
-    }
+    look.material.forget_usual_components();
     if let Some(&(first, _)) = transforms.first() {
         if transforms.iter().any(|&(other, _)| other != first) {
             look.dropped.push("places of textures that differ in one material (KHR_texture_transform)");

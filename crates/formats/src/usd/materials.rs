@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use cager_geometry::surface::{Channel, FaceGroup, Material, NO_MATERIAL, Part, Texture};
+use cager_geometry::surface::{Channel, Component, FaceGroup, Material, NO_MATERIAL, Part, Texture};
 
 use super::layer::{Kind, Layer};
 use super::surface::Faces;
@@ -21,6 +21,14 @@ const INPUTS: [(&str, Channel); 6] = [
     ("inputs:metallic", Channel::Metalness),
     ("inputs:normal", Channel::Normal),
     ("inputs:emissiveColor", Channel::Emission),
+];
+
+/// Outputs of a picture that are one number.
+const COMPONENTS: [(&str, Component); 4] = [
+    ("outputs:r", Component::Red),
+    ("outputs:g", Component::Green),
+    ("outputs:b", Component::Blue),
+    ("outputs:a", Component::Alpha),
 ];
 
 /// The materials of a layer that are in use.
@@ -53,9 +61,9 @@ impl Materials {
         part: &mut Part,
     ) -> Result<(), Fault> {
         let count = faces.arities.len();
-        let mut whole = NO_MATERIAL;
+        let (mut whole, first) = (NO_MATERIAL, part.uv_sets.first().map_or("", |set| &set.name).to_owned());
         for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
-            if let Some(material) = self.bound(layer, prim)? {
+            if let Some(material) = self.bound(layer, prim, &first)? {
                 whole = material;
                 break;
             }
@@ -70,7 +78,7 @@ impl Materials {
             if !matches!(elements.as_str(), "" | "face") {
                 continue;
             }
-            match self.bound(layer, subset)? {
+            match self.bound(layer, subset, &first)? {
                 Some(material) => indices.iter().filter_map(inside).for_each(|face| materials[face] = material),
                 None => part.groups.push(FaceGroup {
                     name: String::from_utf8_lossy(&layer.nodes[subset].name).into_owned(),
@@ -94,24 +102,24 @@ impl Materials {
         textures.any(|texture| tiles(&texture.path).unwrap_or(texture.path == path))
     }
 
-    /// The material that a prim itself is bound to.
-    fn bound(&mut self, layer: &mut Layer<'_>, prim: usize) -> Result<Option<u32>, Fault> {
+    /// The material that a prim itself is bound to, on a mesh whose first texture coordinates have a name.
+    fn bound(&mut self, layer: &mut Layer<'_>, prim: usize, first: &str) -> Result<Option<u32>, Fault> {
         for name in BINDINGS {
             if let Some((material, _)) = layer.source.target(prim, name)? {
-                return Ok(Some(self.number(layer, material)));
+                return Ok(Some(self.number(layer, material, first)));
             }
         }
         Ok(None)
     }
 
-    fn number(&mut self, layer: &mut Layer<'_>, prim: usize) -> u32 {
+    fn number(&mut self, layer: &mut Layer<'_>, prim: usize, first: &str) -> u32 {
         let origin = layer.source.origin(prim);
         if let Some(&number) = self.numbers.get(&origin) {
             return number;
         }
         let name = String::from_utf8_lossy(&layer.nodes[prim].name).into_owned();
         // What cannot be read has a name at least.
-        let read = read_material(layer, prim).unwrap_or_default();
+        let read = read_material(layer, prim, first).unwrap_or_default();
         self.names_alone += usize::from(read.is_none());
         let number = self.list.len() as u32;
         self.list.push(Material { name, ..read.unwrap_or_default() });
@@ -132,8 +140,8 @@ fn source(layer: &mut Layer<'_>, prim: usize, name: &str) -> Result<(usize, Stri
     Ok(at)
 }
 
-/// A material whose surface is a UsdPreviewSurface.
-fn read_material(layer: &mut Layer<'_>, prim: usize) -> Result<Option<Material>, Fault> {
+/// A material whose surface is a UsdPreviewSurface, on a mesh with these texture coordinates as the first.
+fn read_material(layer: &mut Layer<'_>, prim: usize, first: &str) -> Result<Option<Material>, Fault> {
     let (shader, output) = source(layer, prim, "outputs:surface")?;
     let is_a = |layer: &mut Layer<'_>, prim: usize, id: &str| -> Result<bool, Fault> {
         Ok(layer.tokens(prim, "info:id", 1)?.is_some_and(|told| told == [id]))
@@ -145,8 +153,8 @@ fn read_material(layer: &mut Layer<'_>, prim: usize) -> Result<Option<Material>,
     for (name, channel) in INPUTS {
         let (prim, attribute) = source(layer, shader, name)?;
         if attribute.starts_with("outputs:") && is_a(layer, prim, "UsdUVTexture")? {
-            let (prim, file) = source(layer, prim, "inputs:file")?;
-            let value = layer.first(prim, &file)?;
+            let (at, file) = source(layer, prim, "inputs:file")?;
+            let value = layer.first(at, &file)?;
             let path = value.map(|value| layer.source.tokens(value, 1)).transpose()?;
             let path = path.unwrap_or_default().concat().replace('\\', "/");
             let mut path = path.strip_prefix("./").unwrap_or(&path).to_owned();
@@ -155,7 +163,9 @@ fn read_material(layer: &mut Layer<'_>, prim: usize) -> Result<Option<Material>,
                 path = format!("{folder}/{path}");
             }
             if !path.is_empty() {
-                material.textures.push(Texture { channel, path });
+                let uv_set = uv_set(layer, prim).ok().flatten().filter(|name| name != first).unwrap_or_default();
+                let component = COMPONENTS.iter().find(|(name, _)| *name == attribute).map(|(_, component)| *component);
+                material.textures.push(Texture { uv_set, component, ..Texture::new(channel, path) });
             }
         }
         // The value of the surface itself, where a picture takes its place.
@@ -172,5 +182,21 @@ fn read_material(layer: &mut Layer<'_>, prim: usize) -> Result<Option<Material>,
             _ => {}
         }
     }
+    material.forget_usual_components();
     Ok(Some(material))
+}
+
+/// The name of the texture coordinates of a picture, where a UsdPrimvarReader says it.
+fn uv_set(layer: &mut Layer<'_>, picture: usize) -> Result<Option<String>, Fault> {
+    let mut at = source(layer, picture, "inputs:st")?;
+    // What moves them on the way does not change which they are.
+    if layer.tokens(at.0, "info:id", 1)?.is_some_and(|told| told == ["UsdTransform2d"]) {
+        at = source(layer, at.0, "inputs:in")?;
+    }
+    if at.0 == picture {
+        return Ok(None);
+    }
+    let (prim, name) = source(layer, at.0, "inputs:varname")?;
+    let told = layer.tokens(prim, &name, 1)?;
+    Ok(told.map(|told| told.concat()).filter(|name| !name.is_empty()))
 }

@@ -303,7 +303,7 @@ pub fn by_corner<const N: usize>(set: &CornerSet<N>) -> Vec<[f32; N]> {
 }
 
 pub fn texture(channel: Channel, path: &str) -> Texture {
-    Texture { channel, path: path.to_owned() }
+    Texture::new(channel, path)
 }
 
 /// Captures beside the repository, or where the environment says.

@@ -3,14 +3,14 @@
 use std::io::{BufWriter, Write};
 
 use cager_geometry::mesh::Polygons;
-use cager_geometry::surface::{Subdivision, Surface};
+use cager_geometry::surface::{Part, Subdivision, Surface};
 
 use super::super::CacheFormat;
 use super::collected::{Collected, Collection, MOST_BYTES, check_room};
 use super::output::{Announced, FrameOptions, MorphOptions, check_precision};
 use super::scene::name;
 use crate::atomic::{AtomicFile, Target, commit_together};
-use crate::dropped::groups_phrase;
+use crate::dropped::{groups_phrase, listed};
 use crate::error::{Error, Fault};
 use crate::faces::check_faces;
 use crate::glb::{MOST_FRAMES, MorphScene, Morphs, Piece, Wanted, lost_pictures};
@@ -55,7 +55,13 @@ impl MorphWriter {
             origin: change.apply(options.origin.unwrap_or_default()),
             floats,
         };
-        let lost = lost(surface, faces);
+        let mut lost = lost(surface, faces);
+        let is_hidden =
+            |part: &&Part| part.shown.as_ref().is_some_and(|shown| shown.first().is_none_or(|first| first.start > 0));
+        let hidden = surface.parts.iter().filter(is_hidden).map(|part| part.path.as_bytes());
+        if announced.frames < 2 && hidden.clone().next().is_some() {
+            lost.push(format!("what is hidden ({})", listed(hidden)));
+        }
         let is_text = CacheFormat::from_path(path) == Some(CacheFormat::Gltf);
         let data = is_text.then(|| AtomicFile::create(target.beside("bin"))).transpose()?;
         let file = AtomicFile::create(target)?;

@@ -10,7 +10,7 @@ use super::super::document::{FIRST_FRAME, FRAME_RATE};
 use super::look::Looks;
 use super::nodes::nodes;
 use super::numbers::place;
-use super::{Morphs, Scene};
+use super::{Morphs, Piece, Scene};
 
 /// Types of numbers, and what views are for, as glTF counts them.
 const SHORT: u32 = 5122;
@@ -81,11 +81,16 @@ impl Morphs<'_> {
             document["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
             document["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
         }
-        let (nodes, roots) = nodes(pieces, place(stored, self.scene).map(|x| x as f32), [stored.step; 3]);
+        let (nodes, roots) = nodes(pieces, place(stored, self.scene).map(|x| x as f32), [stored.step; 3], !is_moving);
         document["scenes"] = json!([{ "nodes": roots }]);
         document["nodes"] = nodes.into();
         document["meshes"] = meshes.into();
-        Looks::of(materials).put(&mut document);
+        let uv_set = |material: u32, name: &str| {
+            let has = |piece: &&Piece| piece.primitives.iter().any(|(found, _)| *found == material);
+            let number = |piece: &Piece| piece.uv_names.iter().position(|found| found == name);
+            pieces.iter().filter(has).find_map(number).unwrap_or(0)
+        };
+        Looks::of(materials, uv_set).put(&mut document);
         document["accessors"] = layout.accessors.into();
         document["bufferViews"] = layout.views.into();
         document["buffers"] = json!([{ "byteLength": layout.length }]);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use cager_geometry::surface::{Channel, Material};
+use cager_geometry::surface::{Channel, Component, Material, Texture};
 use percent_encoding::utf8_percent_encode;
 use serde_json::{Value, json};
 
@@ -18,9 +18,12 @@ pub(super) struct Looks {
 }
 
 impl Looks {
-    pub(super) fn of(materials: &[Material]) -> Self {
+    /// `uv_set` is the number of the texture coordinates of a name, of what has a material.
+    pub(super) fn of(materials: &[Material], uv_set: impl Fn(u32, &str) -> usize) -> Self {
         let mut looks = Self::default();
-        looks.materials = materials.iter().map(|material| looks.look(material)).collect();
+        let look = |(k, material)| looks.look(material, |name: &str| uv_set(k, name));
+        let all = (0..).zip(materials).map(look).collect();
+        looks.materials = all;
         looks
     }
 
@@ -37,7 +40,7 @@ impl Looks {
         }
     }
 
-    fn look(&mut self, material: &Material) -> Value {
+    fn look(&mut self, material: &Material, uv_set: impl Fn(&str) -> usize) -> Value {
         let [red, green, blue] = material.base_color;
         let mut pbr = json!({
             "baseColorFactor": [red, green, blue, material.opacity],
@@ -45,22 +48,23 @@ impl Looks {
             "roughnessFactor": material.roughness,
         });
         let mut look = json!({ "name": material.name, "doubleSided": true });
-        if let Some(path) = picture(material, Channel::BaseColor) {
+        let mut texture = |texture: &Texture| self.texture(&texture.path, uv_set(&texture.uv_set));
+        if let Some(found) = picture(material, Channel::BaseColor) {
             pbr["baseColorFactor"] = json!([1.0, 1.0, 1.0, material.opacity]);
-            pbr["baseColorTexture"] = self.texture(path);
+            pbr["baseColorTexture"] = texture(found);
         }
-        if let Some(path) = shared_picture(material) {
-            pbr["metallicRoughnessTexture"] = self.texture(path);
+        if let Some(found) = shared_picture(material) {
+            pbr["metallicRoughnessTexture"] = texture(found);
             pbr["roughnessFactor"] = json!(1.0);
             if picture(material, Channel::Metalness).is_some() {
                 pbr["metallicFactor"] = json!(1.0);
             }
         }
-        if let Some(path) = picture(material, Channel::Normal) {
-            look["normalTexture"] = self.texture(path);
+        if let Some(found) = picture(material, Channel::Normal) {
+            look["normalTexture"] = texture(found);
         }
-        if let Some(path) = picture(material, Channel::Emission) {
-            look["emissiveTexture"] = self.texture(path);
+        if let Some(found) = picture(material, Channel::Emission) {
+            look["emissiveTexture"] = texture(found);
             look["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
         }
         if material.opacity < 1.0 || picture(material, Channel::Opacity).is_some() {
@@ -70,44 +74,55 @@ impl Looks {
         look
     }
 
-    fn texture(&mut self, path: &str) -> Value {
+    fn texture(&mut self, path: &str, uv_set: usize) -> Value {
         let index = *self.numbers.entry(path.to_owned()).or_insert_with(|| {
             self.pictures.push(path.to_owned());
             self.pictures.len() - 1
         });
-        json!({ "index": index })
+        if uv_set == 0 { json!({ "index": index }) } else { json!({ "index": index, "texCoord": uv_set }) }
     }
 }
 
 /// Pictures that are left out: the format has roughness and metalness in one, and opacity in that
 /// of the colour.
 pub(crate) fn lost_pictures(materials: &[Material]) -> Vec<&'static str> {
-    let any = |is_lost: fn(&Material) -> bool| materials.iter().any(is_lost);
+    let any = |is_lost: &dyn Fn(&Material) -> bool| materials.iter().any(is_lost);
     let mut lost = Vec::new();
-    if any(|material| {
-        let [rough, metal] = [Channel::Roughness, Channel::Metalness].map(|channel| picture(material, channel));
-        shared_picture(material).is_none() && (rough.is_some() || metal.is_some())
+    let has = |material: &Material, channel| picture(material, channel).is_some();
+    if any(&|material| {
+        let is_there = has(material, Channel::Roughness) || has(material, Channel::Metalness);
+        is_there && shared_picture(material).is_none()
     }) {
-        lost.push("textures of roughness or metalness that are not one picture of both");
+        lost.push("textures of roughness or metalness that are not the green and the blue of one picture");
     }
-    if any(|material| {
+    if any(&|material| {
         let opacity = picture(material, Channel::Opacity);
-        opacity.is_some() && opacity != picture(material, Channel::BaseColor)
+        let base = picture(material, Channel::BaseColor);
+        opacity.is_some_and(|opacity| {
+            material.component(opacity) != Some(Component::Alpha)
+                || base.is_none_or(|base| (&base.path, &base.uv_set) != (&opacity.path, &opacity.uv_set))
+        })
     }) {
-        lost.push("textures of opacity apart from that of the colour");
+        lost.push("textures of opacity apart from the alpha of that of the colour");
     }
     lost
 }
 
-fn picture(material: &Material, channel: Channel) -> Option<&str> {
-    material.textures.iter().find(|texture| texture.channel == channel).map(|texture| texture.path.as_str())
+fn picture(material: &Material, channel: Channel) -> Option<&Texture> {
+    material.textures.iter().find(|texture| texture.channel == channel)
 }
 
-/// The picture of roughness and metalness, where it is one, or where nothing is metal.
-fn shared_picture(material: &Material) -> Option<&str> {
+/// The picture whose green is roughness and whose blue is metalness, or whose roughness is all the same
+/// in any component, where nothing is metal.
+fn shared_picture(material: &Material) -> Option<&Texture> {
     let rough = picture(material, Channel::Roughness)?;
-    match picture(material, Channel::Metalness) {
-        None => (material.metalness == 0.0).then_some(rough),
-        metal => (metal == Some(rough)).then_some(rough),
-    }
+    let is_fit = match picture(material, Channel::Metalness) {
+        None => material.metalness == 0.0 && matches!(rough.component, None | Some(Component::Green)),
+        Some(metal) => {
+            let is_one = (&metal.path, &metal.uv_set) == (&rough.path, &rough.uv_set);
+            let components = [rough, metal].map(|texture| material.component(texture));
+            is_one && components == [Some(Component::Green), Some(Component::Blue)]
+        }
+    };
+    is_fit.then_some(rough)
 }

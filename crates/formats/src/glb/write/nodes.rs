@@ -18,7 +18,8 @@ fn have_own_transforms(pieces: &[Piece]) -> bool {
 }
 
 /// A node for each mesh in their order, then those above them; and which of these are at the root.
-pub(super) fn nodes(pieces: &[Piece], place: [f32; 3], scale: [f32; 3]) -> (Vec<Value>, Vec<usize>) {
+/// A mesh that is hidden where there is but one frame is at none of them.
+pub(super) fn nodes(pieces: &[Piece], place: [f32; 3], scale: [f32; 3], is_still: bool) -> (Vec<Value>, Vec<usize>) {
     let names_left = if have_own_transforms(pieces) { 2 } else { 1 };
     let depth = |piece: &Piece| piece.path.len().saturating_sub(names_left);
     let of_mesh = |(mesh, piece): (usize, &Piece)| {
@@ -27,7 +28,11 @@ pub(super) fn nodes(pieces: &[Piece], place: [f32; 3], scale: [f32; 3]) -> (Vec<
     };
     let mut nodes: Vec<Value> = pieces.iter().enumerate().map(of_mesh).collect();
     let (mut groups, mut roots) = (HashMap::new(), Vec::new());
+    let are_shown = pieces.iter().any(|piece| !piece.is_hidden());
     for (mesh, piece) in pieces.iter().enumerate() {
+        if is_still && are_shown && piece.is_hidden() {
+            continue;
+        }
         let mut above = None;
         let mut put = |node: usize, above: Option<usize>, nodes: &mut Vec<Value>| match above {
             None => roots.push(node),

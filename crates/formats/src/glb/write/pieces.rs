@@ -22,6 +22,7 @@ pub(crate) struct Piece {
     pub(super) primitives: Vec<(u32, Vec<[u32; 3]>)>,
     /// By set and vertex, `v` downwards.
     pub(super) uv_sets: Vec<Vec<[f32; 2]>>,
+    pub(super) uv_names: Vec<String>,
     pub(super) color_sets: Vec<Vec<[f32; 4]>>,
     pub(super) normals: Option<Normals>,
     /// Frames in which it is shown, where it is not always.
@@ -54,6 +55,7 @@ impl Piece {
             vertices,
             primitives: if triangles.is_empty() { Vec::new() } else { vec![(NO_MATERIAL, triangles)] },
             uv_sets: Vec::new(),
+            uv_names: Vec::new(),
             color_sets: Vec::new(),
             normals,
             shown: None,
@@ -64,6 +66,11 @@ impl Piece {
     /// anyway.
     pub(crate) fn of(surface: &Surface, faces: &Polygons, name: &str, has_normals: bool) -> Vec<Self> {
         surface.ranges(faces).map(|(part, range)| Self::of_part(part, &range, faces, (name, has_normals))).collect()
+    }
+
+    /// Whether it is hidden in the first frame.
+    pub(super) fn is_hidden(&self) -> bool {
+        self.shown.as_ref().is_some_and(|shown| shown.first().is_none_or(|range| range.start > 0))
     }
 
     fn of_part(part: &Part, range: &PartRange, faces: &Polygons, (name, has_normals): (&str, bool)) -> Self {
@@ -90,6 +97,7 @@ impl Piece {
             vertices: vertices.iter().map(|&point| point + range.points.start as u32).collect(),
             primitives: primitives(&local, &part.materials, &of_corners),
             uv_sets: part.uv_sets.iter().map(|set| values(set, &firsts, |[u, v]| [u, 1.0 - v])).collect(),
+            uv_names: part.uv_sets.iter().map(|set| set.name.clone()).collect(),
             color_sets: part.color_sets.iter().map(|set| values(set, &firsts, |color| color)).collect(),
             normals: normals.map(|(from, of_vertices)| Normals { from, of_vertices }),
             shown: part.shown.clone(),

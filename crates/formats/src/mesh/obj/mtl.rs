@@ -52,7 +52,7 @@ pub(super) fn read(bytes: &[u8]) -> Vec<Material> {
                     && !path.is_empty()
                     && material.textures.iter().all(|texture| texture.channel != channel)
                 {
-                    material.textures.push(Texture { channel, path });
+                    material.textures.push(Texture::new(channel, path));
                 }
             }
         }

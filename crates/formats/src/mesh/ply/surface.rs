@@ -50,7 +50,7 @@ impl Coordinates {
         let faces = model.faces.len();
         let material = |path: &String| Material {
             name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(),
-            textures: vec![Texture { channel: Channel::BaseColor, path: path.replace('\\', "/") }],
+            textures: vec![Texture::new(Channel::BaseColor, path.replace('\\', "/"))],
             ..Material::default()
         };
         let materials: Vec<Material> = pictures.iter().map(material).collect();

@@ -121,8 +121,13 @@ impl Attributes for Binary<'_> {
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
         let rep = Rep(value.0);
         let text = |index: u32| String::from_utf8_lossy(self.sections.token(index)).into_owned();
-        if matches!(rep.kind(), kind::TOKEN | kind::ASSET) && rep.is_inlined() && !rep.is_array() {
-            return Ok(vec![text(u32::from_le_bytes(rep.inlined()))]);
+        if rep.is_inlined() && !rep.is_array() {
+            let index = u32::from_le_bytes(rep.inlined());
+            match rep.kind() {
+                kind::TOKEN | kind::ASSET => return Ok(vec![text(index)]),
+                kind::STRING => return Ok(vec![self.sections.string(index)]),
+                _ => {}
+            }
         }
         let (start, count) = match rep.kind() {
             kind::TOKENS => (rep.offset() + 8, self.file.source.number(rep.offset())?),

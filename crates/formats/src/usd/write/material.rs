@@ -2,7 +2,7 @@
 
 use std::io::{self, Seek, Write};
 
-use cager_geometry::surface::{Channel, Material, Surface};
+use cager_geometry::surface::{Channel, Component, Material, Part, Surface};
 
 use super::encoder::Encoder;
 use super::faces::uv_names;
@@ -30,9 +30,14 @@ pub(super) fn materials<W: Write + Seek>(
     for (k, material) in (0..).zip(&surface.materials) {
         let name = names.add(&identifier(&material.name));
         let path = format!("{root}/{GROUP}/{name}");
-        let of = surface.parts.iter().find(|part| !part.uv_sets.is_empty() && part.materials.contains(&k));
-        let uvs = of.map_or_else(|| USUAL_UVS.to_owned(), |part| uv_names(part).remove(0));
-        let children = shaders(encoder, material, &path, &uvs)?;
+        let parts = || surface.parts.iter().filter(|part| !part.uv_sets.is_empty() && part.materials.contains(&k));
+        // Of a name that no part has, the first.
+        let uvs = |name: &str| {
+            let named = |part: &Part| Some((part.uv_sets.iter().position(|set| set.name == name)?, uv_names(part)));
+            let found = parts().find_map(named).or_else(|| parts().next().map(|part| (0, uv_names(part))));
+            found.map_or_else(|| USUAL_UVS.to_owned(), |(set, mut names)| names.swap_remove(set))
+        };
+        let children = shaders(encoder, material, &path, uvs)?;
         let output = Property::new("token", "outputs:surface").from(format!("{path}/{SHADER}.outputs:surface"));
         group.children.push(Prim {
             name,
@@ -50,7 +55,7 @@ fn shaders<W: Write + Seek>(
     encoder: &mut Encoder<W>,
     material: &Material,
     path: &str,
-    uvs: &str,
+    uvs: impl Fn(&str) -> String,
 ) -> io::Result<Vec<Prim>> {
     let bytes = |numbers: &[f32]| -> Vec<u8> { numbers.iter().flat_map(|x| x.to_le_bytes()).collect() };
     let base_color = encoder.put(kind::VEC3F, &bytes(&material.base_color))?;
@@ -60,24 +65,33 @@ fn shaders<W: Write + Seek>(
         (Channel::Roughness, Property::new("float", "inputs:roughness").value(encoder.float(material.roughness))),
         (Channel::Metalness, Property::new("float", "inputs:metallic").value(encoder.float(material.metalness))),
     ];
-    let file_of = |channel| material.textures.iter().find(|t| t.channel == channel).map(|t| t.path.as_str());
+    let texture_of = |channel| material.textures.iter().find(|texture| texture.channel == channel);
     for (channel, type_name, name) in
         [(Channel::Normal, "normal3f", "inputs:normal"), (Channel::Emission, "color3f", "inputs:emissiveColor")]
     {
-        inputs.extend(file_of(channel).map(|_| (channel, Property::new(type_name, name))));
+        inputs.extend(texture_of(channel).map(|_| (channel, Property::new(type_name, name))));
     }
     let mut properties = vec![Property::fixed("info:id", "UsdPreviewSurface")];
-    let mut pictures = Vec::new();
+    // Of texture coordinates, which are told apart by their names.
+    let (mut pictures, mut readers) = (Vec::new(), Vec::<(String, String)>::new());
     for (channel, mut input) in inputs {
-        if let Some(file) = file_of(channel) {
-            let is_packed = |other| material.textures.iter().any(|t| t.channel == other && t.path == file);
-            let output = match channel {
-                Channel::BaseColor | Channel::Normal | Channel::Emission => "rgb",
-                Channel::Opacity if is_packed(Channel::BaseColor) => "a",
-                // As glTF has roughness and metalness in one picture.
-                Channel::Roughness if is_packed(Channel::Metalness) => "g",
-                Channel::Metalness if is_packed(Channel::Roughness) => "b",
-                Channel::Opacity | Channel::Roughness | Channel::Metalness => "r",
+        if let Some(texture) = texture_of(channel) {
+            let output = match material.component(texture) {
+                None => "rgb",
+                Some(Component::Red) => "r",
+                Some(Component::Green) => "g",
+                Some(Component::Blue) => "b",
+                Some(Component::Alpha) => "a",
+            };
+            let uvs = uvs(&texture.uv_set);
+            let reader = match readers.iter().position(|(known, _)| *known == uvs) {
+                Some(known) => readers[known].1.clone(),
+                None => {
+                    let reader =
+                        if readers.is_empty() { READER.to_owned() } else { format!("{READER}_{}", readers.len()) };
+                    readers.push((uvs, reader.clone()));
+                    reader
+                }
             };
             let name = format!("{channel:?}");
             let output_type = if output == "rgb" { "float3" } else { "float" };
@@ -86,11 +100,12 @@ fn shaders<W: Write + Seek>(
             let is_color = matches!(channel, Channel::BaseColor | Channel::Emission);
             let mut picture = vec![
                 Property::fixed("info:id", "UsdUVTexture"),
-                Property::new("asset", "inputs:file").value(encoder.asset(&file.replace(char::is_control, "_"))),
+                Property::new("asset", "inputs:file")
+                    .value(encoder.asset(&texture.path.replace(char::is_control, "_"))),
                 Property::new("token", "inputs:sourceColorSpace").token(if is_color { "sRGB" } else { "raw" }),
                 Property::new("token", "inputs:wrapS").token("repeat"),
                 Property::new("token", "inputs:wrapT").token("repeat"),
-                Property::new("float2", "inputs:st").from(format!("{path}/{READER}.outputs:result")),
+                Property::new("float2", "inputs:st").from(format!("{path}/{reader}.outputs:result")),
                 Property::new(output_type, output),
             ];
             if channel == Channel::Normal {
@@ -106,14 +121,14 @@ fn shaders<W: Write + Seek>(
     }
     properties.push(Property::new("token", "outputs:surface"));
     let mut all = vec![Prim { name: SHADER.to_owned(), type_name: "Shader", properties, ..Prim::default() }];
-    if !pictures.is_empty() {
-        all.append(&mut pictures);
+    all.append(&mut pictures);
+    for (uvs, name) in readers {
         let properties = vec![
             Property::fixed("info:id", "UsdPrimvarReader_float2"),
-            Property::new("string", "inputs:varname").value(encoder.string(uvs)),
+            Property::new("string", "inputs:varname").value(encoder.string(&uvs)),
             Property::new("float2", "outputs:result"),
         ];
-        all.push(Prim { name: READER.to_owned(), type_name: "Shader", properties, ..Prim::default() });
+        all.push(Prim { name, type_name: "Shader", properties, ..Prim::default() });
     }
     Ok(all)
 }
