@@ -38,14 +38,6 @@ impl Steps {
         let own = self.own.get(next.saturating_sub(1)).and_then(|&(_, said)| said);
         own.unwrap_or_else(|| self.above.as_ref().is_none_or(|above| above.at(time)))
     }
-
-    /// Whether it is hidden at all times.
-    pub(crate) fn is_never(&self) -> bool {
-        let is_hidden = |&(_, said): &(f64, Option<bool>)| said == Some(false);
-        let above = || self.above.as_ref().is_some_and(|above| above.is_never());
-        self.own.iter().all(|(_, said)| *said != Some(true))
-            && (!self.own.is_empty() && self.own.iter().all(is_hidden) || above())
-    }
 }
 
 /// When the nodes of a tree are shown: what each says is read once, however many lie below it.
@@ -108,9 +100,6 @@ mod tests {
         assert_eq!(at(&[3, 0]), [true; 5]);
         // Each is asked once.
         assert_eq!(asked, [0, 1, 2, 3]);
-        assert!(Steps::default().at(3.0) && !Steps::default().is_never());
-        let hidden = Steps::below(Arc::default(), vec![(0.0, Some(false)), (1.0, Some(false))]);
-        assert!(hidden.is_never() && Steps::below(Arc::clone(&hidden), vec![(0.0, None)]).is_never());
-        assert!(!Steps::below(hidden, vec![(0.0, Some(true))]).is_never());
+        assert!(Steps::default().at(3.0));
     }
 }

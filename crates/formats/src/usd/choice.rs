@@ -1,5 +1,6 @@
 //! Which meshes of a layer are meant, and when they are shown.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::layer::{Instance, Kind, Layer, Prim, composed};
@@ -9,11 +10,7 @@ use crate::scene::{
 };
 
 /// The meshes that are wanted, and what the user should know of others.
-pub(super) fn choose(
-    layer: &mut Layer<'_>,
-    wanted: Wanted<'_>,
-    visibility: &mut Visibility,
-) -> Result<(Vec<usize>, Vec<String>), Fault> {
+pub(super) fn choose(layer: &mut Layer<'_>, wanted: Wanted<'_>) -> Result<(Vec<usize>, Vec<String>), Fault> {
     let is_there = |&k: &usize| ancestry(&layer.nodes, k).all(|k| layer.prims[k].is_there);
     let there: Vec<usize> = (0..layer.prims.len()).filter(is_there).collect();
     let is_a = |k: usize, kind: Kind| layer.prims[k].kind == kind;
@@ -27,7 +24,7 @@ pub(super) fn choose(
     meshes.retain(is_placed);
     let mut notes = Vec::new();
     if wanted.prims.is_empty() && meshes.len() > 1 {
-        let (mut rendered, mut others) = shown(layer, &meshes, visibility)?;
+        let (mut rendered, mut others) = shown(layer, &meshes)?;
         // A part of the rest pose may be hidden in the file of a frame.
         if wanted.points.is_some_and(|points| count(layer, &rendered) != points && count(layer, &meshes) == points) {
             (rendered, others) = (meshes, Vec::new());
@@ -83,23 +80,25 @@ fn count(layer: &mut Layer<'_>, meshes: &[usize]) -> usize {
 
 /// Meshes that are rendered, where there are any, and others: cages and other helpers say that they
 /// are guides or proxies, and what is switched off is invisible.
-fn shown(
-    layer: &mut Layer<'_>,
-    meshes: &[usize],
-    visibility: &mut Visibility,
-) -> Result<(Vec<usize>, Vec<usize>), Fault> {
-    let (mut rendered, mut others) = (Vec::new(), Vec::new());
+fn shown(layer: &mut Layer<'_>, meshes: &[usize]) -> Result<(Vec<usize>, Vec<usize>), Fault> {
+    let (mut rendered, mut others, mut switched) = (Vec::new(), Vec::new(), HashMap::new());
     for &mesh in meshes {
-        let mut purpose = None;
+        let (mut purpose, mut is_hidden) = (None, false);
         for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
-            purpose = constant(layer, prim, "purpose")?;
-            // The innermost counts.
-            if purpose.is_some() {
-                break;
-            }
+            // The innermost purpose counts.
+            purpose = match purpose {
+                None => constant(layer, prim, "purpose")?,
+                known => known,
+            };
+            is_hidden |= match switched.get(&prim) {
+                Some(is_off) => *is_off,
+                None => {
+                    let is_off = constant(layer, prim, "visibility")?.as_deref() == Some("invisible");
+                    *switched.entry(prim).or_insert(is_off)
+                }
+            };
         }
-        let is_helper = matches!(purpose.as_deref(), Some("guide" | "proxy"));
-        let is_rendered = !is_helper && !visible(layer, mesh, visibility)?.is_never();
+        let is_rendered = !is_hidden && !matches!(purpose.as_deref(), Some("guide" | "proxy"));
         if is_rendered { rendered.push(mesh) } else { others.push(mesh) }
     }
     Ok(if rendered.is_empty() { (others, rendered) } else { (rendered, others) })

@@ -24,8 +24,8 @@ pub(super) fn open<'a>(
     wanted: Wanted<'_>,
     model: Option<(&mut Dropped, Vec<Picture>)>,
 ) -> Result<MovingScene<'a>, Fault> {
+    let (prims, notes) = choose(&mut layer, wanted)?;
     let mut visibility = Visibility::default();
-    let (prims, notes) = choose(&mut layer, wanted, &mut visibility)?;
     let mut tracks = SceneTracks { notes, units: units(&layer.stage), ..SceneTracks::default() };
     let mut rigs = Rigs::default();
     for &prim in &prims {
