@@ -198,6 +198,7 @@ fn scene() -> (Model, Surface) {
         ],
         color_sets: vec![set("Col", &[[0.25, 0.5, 1.0, 1.0], [0.0, 0.0, 0.0, 0.5]], &[0, 0, 0, 0, 1, 0, 0, 0])],
         normals: vec![0, 0, 0, 0, 1, 1, 1, 1],
+        tilts: None,
         subdivision: Subdivision::CatmullClark,
         creases: vec![Crease { edge: [0, 1], sharpness: 2.0 }],
         materials: vec![1, NO_MATERIAL],

@@ -2,9 +2,11 @@
 
 mod normals;
 mod parts;
+mod tilts;
 
 pub use normals::{SharedNormals, numbered, sharing};
 pub use parts::{Chosen, shown_in};
+pub use tilts::Tilts;
 
 use crate::mesh::Polygons;
 use serde::{Deserialize, Serialize};
@@ -55,6 +57,10 @@ pub struct Part {
     /// and the edge is hard where they do not. Empty where the file has no normals.
     #[serde(skip)]
     pub normals: Vec<u32>,
+    /// Where the normals of the file are others than those of the faces around, which ones these are; `None` where
+    /// none is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tilts: Option<Tilts>,
     /// How the mesh is to be subdivided.
     pub subdivision: Subdivision,
     /// Edges that a subdivision keeps sharp.
@@ -313,6 +319,11 @@ impl PartRange {
 }
 
 impl Part {
+    /// Whether its normals say more than its faces do; `corners` are those of the faces.
+    pub fn has_normals_of_its_own(&self, corners: &[u32]) -> bool {
+        self.tilts.is_some() || self.has_hard_edges(corners)
+    }
+
     /// Whether somewhere corners of one point have other normals; `corners` are those of its faces.
     pub fn has_hard_edges(&self, corners: &[u32]) -> bool {
         let mut first = HashMap::new();
@@ -341,6 +352,12 @@ impl Part {
         }
         if !self.normals.is_empty() && self.normals.len() != count {
             return Err(format!("{} normals for {count} corners", self.normals.len()));
+        }
+        if let Some(tilts) = &self.tilts
+            && (tilts.corners.len() != self.normals.len()
+                || !tilts.corners.as_flattened().iter().all(|x| x.is_finite()))
+        {
+            return Err(format!("{} tilts of {} normals", tilts.corners.len(), self.normals.len()));
         }
         if !self.materials.is_empty() && self.materials.len() != self.faces {
             return Err(format!("materials for {} of {} faces", self.materials.len(), self.faces));

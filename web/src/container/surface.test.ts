@@ -111,7 +111,7 @@ describe('what lies on faces', () => {
       numbers: Uint32Array.of(0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3),
     };
     const faces = { counts: new Uint32Array(4).fill(3), corners: Uint32Array.of(0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2) };
-    const part = { faces, uvs, normals: null, materials: new Uint32Array(4).fill(1) };
+    const part = { faces, uvs, normals: null, tilts: null, materials: new Uint32Array(4).fill(1) };
     const tiles = (isTiled: boolean) => splitMesh([part], 3, [isTiled]).ranges.map(({ tile, count }) => [tile, count]);
     expect(tiles(false)).toEqual([[1001, 12]]);
     expect(tiles(true)).toEqual([

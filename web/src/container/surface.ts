@@ -96,6 +96,7 @@ function sizeOf(part: Json, fail: () => Error): PartSize {
     uvSets: lengthOf(part.uv_sets),
     colorSets: lengthOf(part.color_sets),
     groups: lengthOf(part.groups),
+    isTilted: (part.tilts ?? null) !== null,
   };
 }
 

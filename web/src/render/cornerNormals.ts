@@ -1,11 +1,11 @@
 import { HalfFloatType, type Texture, type WebGLRenderer, type WebGLRenderTarget } from 'three';
 import type { SplitNormals } from '../codec/surface/splitVertices';
-import { fanTextures, ownerTexture } from './dataTextures';
+import { fanTextures, ownerTexture, tiltTexture } from './dataTextures';
 import { splitNormalShader } from './decodeShaders';
 import { WIDTH } from './packing';
 import { Pass, target } from './pass';
 
-/** Normals of a model with hard edges, where points have several: computed as those of points are, when they are needed. */
+/** Normals of a model with hard edges, where points have several, or with tilted ones: computed as those of points are, when they are needed. */
 export class CornerNormals {
   private readonly into: WebGLRenderTarget;
   private readonly pass: Pass;
@@ -23,7 +23,9 @@ export class CornerNormals {
     this.into = target(bands, HalfFloatType);
     this.pass = new Pass(splitNormalShader, {
       positions: { value: positions },
-      owners: { value: ownerTexture(split.points, bands) },
+      owners: { value: ownerTexture(split.points, split.next, bands) },
+      tilts: { value: tiltTexture(split.tilts, bands) },
+      areTilted: { value: split.tilts !== null },
       fanStarts: { value: fans.starts },
       fans: { value: fans.fans },
     });

@@ -5,6 +5,7 @@ import {
   RedFormat,
   RGBAFormat,
   RGBAIntegerFormat,
+  RGFormat,
   RGIntegerFormat,
   ShortType,
   SRGBColorSpace,
@@ -69,11 +70,21 @@ export function fanTextures(surface: Fans, bands: number, limit: number): { star
   return { starts: pairTexture(ranges, WIDTH, bands), fans: pairTexture(padded, FAN_WIDTH, height) };
 }
 
-/** The point of each normal, in the arrangement of {@link pointValueTexture}. */
-export function ownerTexture(points: Uint32Array, bands: number): DataTexture {
+/** The point of each normal and the point beside it, in the arrangement of {@link pointValueTexture}. */
+export function ownerTexture(points: Uint32Array, next: Uint32Array, bands: number): DataTexture {
   const data = new Uint32Array(2 * WIDTH * bands);
-  points.forEach((point, k) => (data[2 * k] = point));
+  points.forEach((point, k) => data.set([point, next[k]], 2 * k));
   return pairTexture(data, WIDTH, bands);
+}
+
+/** Two angles of each normal, in the arrangement of {@link pointValueTexture}; without any a texture of nothing. */
+export function tiltTexture(angles: Float32Array | null, bands: number): DataTexture {
+  const [width, height] = angles ? [WIDTH, bands] : [1, 1];
+  const data = new Float32Array(2 * width * height);
+  if (angles) data.set(angles);
+  const texture = new DataTexture(data, width, height, RGFormat, FloatType);
+  texture.needsUpdate = true;
+  return texture;
 }
 
 function pairTexture(data: Uint32Array<ArrayBuffer>, width: number, height: number): DataTexture {

@@ -76,7 +76,8 @@ void main() {
 }`;
 }
 
-const normalsAround = (own: string): string => `${header}
+/** @param found the normal that is written, by the mean of those around, `mean`, and what `leaning` has */
+const normalsAround = (own: string, found: string, leaning = ''): string => `${header}
 uniform sampler2D positions;
 uniform usampler2D owners;
 uniform usampler2D fanStarts;
@@ -85,7 +86,7 @@ out vec4 normal;
 vec3 place(uint point) {
   return texelFetch(positions, ivec2(point & ${WIDTH - 1}u, point >> ${WIDTH_BITS}), 0).xyz;
 }
-void main() {
+${leaning}void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec3 own = ${own};
   uvec2 range = texelFetch(fanStarts, at, 0).xy;
@@ -96,11 +97,29 @@ void main() {
     sum += cross(place(others.x) - own, place(others.y) - own);
   }
   float size = length(sum);
-  normal = vec4(size > 0.0 ? sum / size : vec3(0.0), 1.0);
+  vec3 mean = size > 0.0 ? sum / size : vec3(0.0);
+  normal = vec4(${found}, 1.0);
 }`;
 
 /** The normal of each point: the normals of the triangles around it, weighted by their areas. */
-export const normalShader = normalsAround('texelFetch(positions, at, 0).xyz');
+export const normalShader = normalsAround('texelFetch(positions, at, 0).xyz', 'mean');
 
-/** The same for normals of which a point may have several; `owners` are the points. */
-export const splitNormalShader = normalsAround('place(texelFetch(owners, at, 0).x)');
+/** The same for normals of which a point may have several, and which may be tilted; `owners` are the points and those that follow them around faces. */
+export const splitNormalShader = normalsAround(
+  'place(texelFetch(owners, at, 0).x)',
+  'tilted(mean, at, own)',
+  `
+uniform sampler2D tilts;
+uniform bool areTilted;
+vec3 tilted(vec3 mean, ivec2 at, vec3 own) {
+  vec2 angles = areTilted ? texelFetch(tilts, at, 0).xy : vec2(0.0);
+  float angle = length(angles);
+  vec3 edge = place(texelFetch(owners, at, 0).y) - own;
+  vec3 along = edge - dot(edge, mean) * mean;
+  float size = length(along);
+  if (angle == 0.0 || size == 0.0) return mean;
+  vec2 parts = sin(angle) / (angle * size) * angles;
+  return cos(angle) * mean + parts.x * along + parts.y * cross(mean, along);
+}
+`,
+);

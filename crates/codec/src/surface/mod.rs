@@ -1,14 +1,15 @@
-//! What lies on the faces of a model to bytes and back: which corners share a value, the values on a grid, labels of
-//! faces, and the order in which the source has its faces.
+//! What lies on the faces of a model to bytes and back: which corners share a value, the values on a grid, how normals
+//! are tilted, labels of faces, and the order in which the source has its faces.
 
 mod face_order;
 mod labels;
 mod sharing;
+mod tilts;
 mod values;
 
 use crate::error::{Error, Result};
 use cager_geometry::mesh::{Model, Polygons};
-use cager_geometry::surface::{CornerSet, Part, Surface, numbered};
+use cager_geometry::surface::{CornerSet, Part, Surface, Tilts, numbered};
 use values::{decode_values, encode_values};
 
 /// Half of it is the error of texture coordinates: a quarter of a texel of a picture of 8,192.
@@ -73,6 +74,7 @@ fn outline(mut surface: Surface) -> Surface {
         part.uv_sets.iter_mut().for_each(|set| (set.values, set.corners) = (Vec::new(), Vec::new()));
         part.color_sets.iter_mut().for_each(|set| (set.values, set.corners) = (Vec::new(), Vec::new()));
         (part.normals, part.materials) = (Vec::new(), Vec::new());
+        part.tilts.iter_mut().for_each(|tilts| tilts.corners = Vec::new());
         part.groups.iter_mut().for_each(|group| group.faces = Vec::new());
     }
     surface
@@ -89,6 +91,7 @@ fn encode_parts(surface: &Surface, faces: &Polygons) -> Vec<u8> {
         part.uv_sets.iter().for_each(|set| put(encode_set(set, &local, part.points, UV_STEP)));
         part.color_sets.iter().for_each(|set| put(encode_set(set, &local, part.points, COLOR_STEP)));
         put(if part.normals.is_empty() { Vec::new() } else { sharing::encode(&local, part.points, &part.normals) });
+        part.tilts.iter().for_each(|tilts| put(tilts::encode(&local, &part.normals, &tilts.corners)));
         put(labels::encode(&local, &part.materials.iter().map(|&k| k.wrapping_add(1)).collect::<Vec<_>>()));
         for group in &part.groups {
             let mut inside = vec![0; part.faces];
@@ -117,6 +120,13 @@ fn decode_parts(mut streams: Streams<'_>, outline: Surface, faces: &Polygons) ->
         let normals = streams.next(corners)?;
         if !normals.is_empty() {
             filled.normals = sharing::decode(normals, &local, part.points)?.0;
+        }
+        if filled.tilts.is_some() {
+            let tilts = streams.next(2 * corners)?;
+            if filled.normals.is_empty() {
+                return Err(Error::Damaged("normals are tilted that are not there"));
+            }
+            filled.tilts = Some(Tilts { corners: tilts::decode(tilts, &local, &filled.normals)? });
         }
         let materials = streams.next(part.faces)?;
         if !materials.is_empty() {
@@ -194,7 +204,7 @@ mod tests {
 
     const POINTS: usize = 981;
 
-    /// A part of `side` × `side` points whose texture is cut in the middle.
+    /// A part of `side` × `side` points whose texture is cut in the middle; the normals of a large one are tilted.
     fn part(side: u32, first: u32, faces: &mut Polygons) -> Part {
         let at = |i: u32, j: u32| first + i * side + j;
         let mut uvs = CornerSet { name: "UVMap".to_owned(), ..CornerSet::default() };
@@ -219,6 +229,8 @@ mod tests {
         distinct.dedup();
         uvs.corners = uvs.values.iter().map(|v| distinct.iter().position(|d| d == v).unwrap() as u32).collect();
         uvs.values = distinct;
+        let tilt = |&normal: &u32| if normal % 3 == 0 { [0.1 + normal as f32 / 9_000.0, -0.3] } else { [0.0; 2] };
+        let tilts = (side > 9).then(|| Tilts { corners: normals.iter().map(tilt).collect() });
         let groups = vec![FaceGroup { name: "rim".to_owned(), faces: vec![0, 3, 4] }];
         Part {
             path: "/root/part".to_owned(),
@@ -227,6 +239,7 @@ mod tests {
             uv_sets: vec![uvs],
             color_sets: vec![colors],
             normals,
+            tilts,
             materials,
             groups,
             ..Part::default()
@@ -267,6 +280,9 @@ mod tests {
             for (k, j) in (0..a.normals.len()).flat_map(|k| [(k, (k + 1) % a.normals.len()), (k, k / 2)]) {
                 assert_eq!(a.normals[k] == a.normals[j], b.normals[k] == b.normals[j]);
             }
+            assert_eq!(a.tilts.is_some(), b.tilts.is_some());
+            let angles = |part: &Part| part.tilts.clone().unwrap_or_default().corners.into_flattened();
+            assert!(angles(a).iter().zip(angles(b)).all(|(x, y)| (x - y).abs() < 0.0044));
         }
     }
 

@@ -62,23 +62,24 @@ pub(crate) fn open<'a>(
     if let Some(dropped) = dropped {
         // What lies on faces is held, so that samples that meshes share are not free.
         archive.container.allow(8);
-        let (mut materials, mut known) = (Materials::default(), HashMap::<u64, Part>::new());
+        let (mut materials, mut known) = (Materials::default(), HashMap::<u64, (Part, Vec<[f32; 3]>)>::new());
         for (mesh, &object) in tracks.meshes.iter_mut().zip(&objects) {
             let Object { group, is_copy, .. } = archive.objects[object];
             let read = match known.get(&group) {
-                Some(part) => Ok(part.clone()),
+                Some(read) => Ok(read.clone()),
                 None => surface::read(&mut archive, object, &mut materials, dropped),
             };
-            let Ok(part) = read else {
+            let Ok((part, normals)) = read else {
                 // That is no reason to refuse a mesh.
                 dropped.add_on_faces("what lies on faces, as it is damaged or too large");
                 continue;
             };
             if is_copy {
                 room.take_part(&part)?;
-                known.entry(group).or_insert_with(|| part.clone());
+                known.entry(group).or_insert_with(|| (part.clone(), normals.clone()));
             }
             mesh.part = Part { path: std::mem::take(&mut mesh.part.path), ..part };
+            mesh.normals = normals;
         }
         tracks.materials = materials.list;
         archive.container.allow(4);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use cager_geometry::surface::{CornerSet, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, sharing};
+use cager_geometry::surface::{CornerSet, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision};
 
 use super::mesh::array;
 use super::objects::{Archive, Kind as ObjectKind, told};
@@ -32,16 +32,17 @@ impl Materials {
     }
 }
 
-/// Reads what lies on the faces of a mesh, of all of them as they are stored; tells what is not read.
+/// Reads what lies on the faces of a mesh, of all of them as they are stored, and the normals of their corners; tells
+/// what is not read.
 pub(super) fn read(
     archive: &mut Archive<'_>,
     mesh: usize,
     materials: &mut Materials,
     dropped: &mut Dropped,
-) -> Result<Part, Fault> {
+) -> Result<(Part, Vec<[f32; 3]>), Fault> {
     let properties = archive.schema(mesh, ".geom")?;
     let topology = topology(archive, &properties)?;
-    let mut part = Part::default();
+    let (mut part, mut directions) = (Part::default(), Vec::new());
     let parameters = archive.within(&properties, ".arbGeomParams")?;
     let own = |name: &str| properties.iter().find(|found| found.name == name.as_bytes());
     if let Some(uv) = own("uv")
@@ -65,15 +66,14 @@ pub(super) fn read(
     if let Some(normals) = own("N") {
         match archive.parameter::<3>(normals, &topology)? {
             Some(CornerSet { values, corners, .. }) => {
-                let normals: Vec<_> = corners.iter().map(|&k| values[k as usize]).collect();
-                part.normals = sharing(&topology.corners, &normals);
+                directions = corners.iter().map(|&k| values[k as usize]).collect();
             }
             None => dropped.add_on_faces("normals (N)"),
         }
     }
     read_sets(archive, mesh, (&mut part, topology.arities.len()), materials)?;
     unread::add(archive, mesh, &properties, dropped)?;
-    Ok(part)
+    Ok((part, directions))
 }
 
 fn topology(archive: &mut Archive<'_>, properties: &[Property]) -> Result<Topology, Fault> {

@@ -1,7 +1,7 @@
 //! What lies on the faces of a mesh.
 
 use cager_geometry::mesh::Polygons;
-use cager_geometry::surface::{CornerSet, Crease, FaceGroup, Part, Subdivision, sharing};
+use cager_geometry::surface::{CornerSet, Crease, FaceGroup, Part, Subdivision};
 use ufbx::{Mesh, SubdivisionDisplayMode, VertexVec2, VertexVec4};
 
 use crate::colors::linear;
@@ -20,12 +20,13 @@ pub(super) struct Kept {
     /// The numbers of their corners in the file, and the point of each.
     corners: Vec<usize>,
     points: Vec<u32>,
+    turned: bool,
 }
 
 impl Kept {
     /// Those of a mesh, in the opposite order of corners where `turned`.
     pub(super) fn of(mesh: &Mesh, turned: bool) -> Result<Self, Fault> {
-        let mut kept = Self::default();
+        let mut kept = Self { turned, ..Self::default() };
         for (number, face) in (0..).zip(&mesh.faces).filter(|(_, face)| face.num_indices >= 3) {
             let (begin, first) = (face.index_begin as usize, kept.corners.len());
             kept.corners.extend(begin..begin + face.num_indices as usize);
@@ -59,17 +60,18 @@ impl Kept {
             mesh.subdivision_display_mode,
             SubdivisionDisplayMode::Smooth | SubdivisionDisplayMode::HullAndSmooth
         );
-        Part {
+        let mut part = Part {
             points: mesh.num_vertices,
             faces: self.faces.len(),
             uv_sets: sets.flatten().collect(),
             color_sets: color_sets.flatten().collect(),
-            normals: self.normals(mesh),
             subdivision: if is_smooth { Subdivision::CatmullClark } else { Subdivision::None },
             creases: creases(mesh),
             groups: self.groups(mesh),
             ..Part::default()
-        }
+        };
+        self.take_normals(mesh, &mut part);
+        part
     }
 
     fn uv_set(&self, name: &str, stored: &VertexVec2) -> Option<CornerSet<2>> {
@@ -101,14 +103,22 @@ impl Kept {
         (known > 0 && is_finite).then(|| CornerSet { name: name.to_owned(), values, corners })
     }
 
-    fn normals(&self, mesh: &Mesh) -> Vec<u32> {
+    /// Those of the points that no joint and no target moves.
+    fn take_normals(&self, mesh: &Mesh, part: &mut Part) {
         let stored = &mesh.vertex_normal;
+        // Of what a transform mirrors, faces are turned around already.
+        let side = if self.turned { -1.0 } else { 1.0 };
         let normal = |&corner: &usize| {
             let value = stored.values.as_ref().get(*stored.indices.as_ref().get(corner)? as usize)?;
-            Some([value.x as f32, value.y as f32, value.z as f32])
+            Some([side * value.x, value.y, value.z].map(|x| x as f32))
         };
         let all: Option<Vec<_>> = self.corners.iter().map(normal).collect();
-        all.filter(|_| stored.exists).map_or_else(Vec::new, |normals| sharing(&self.points, &normals))
+        let Some(normals) = all.filter(|_| stored.exists) else { return };
+        let mut faces = Polygons::new();
+        self.add_to(&mut faces, 0);
+        let place = |point: &ufbx::Vec3| [side * point.x, point.y, point.z];
+        let point = |point: u32| mesh.vertices.as_ref().get(point as usize).map_or([0.0; 3], place);
+        part.take_normals(&faces, point, &normals);
     }
 
     /// Where faces are in more than one.

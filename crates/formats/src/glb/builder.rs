@@ -72,7 +72,7 @@ pub(super) struct Placed<'a> {
 }
 
 impl Placed<'_> {
-    fn is_mirrored(&self) -> bool {
+    pub(super) fn is_mirrored(&self) -> bool {
         self.joints.as_ref().map_or_else(|| self.placement.mirrored(), Joints::mirror)
     }
 }

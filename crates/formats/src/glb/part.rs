@@ -5,12 +5,13 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::iter::repeat_n;
 
+use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::surface::{CornerSet, NO_MATERIAL, Part};
 use gltf::json::accessor::Type;
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-use super::accessor::{COLORS, NORMALS, UVS, attribute};
+use super::accessor::{COLORS, NORMALS, POSITIONS, UVS, attribute};
 use super::alike::Alike;
 use super::builder::{Builder, POINT_BYTES, Placed};
 use super::choice::called;
@@ -59,7 +60,10 @@ impl Builder<'_, '_> {
         let surface = &self.model.surface;
         let is_bare = |part: &Part| part.uv_sets.is_empty() && part.color_sets.is_empty() && part.materials.is_empty();
         let says_nothing = surface.parts.len() < 2
-            && surface.parts.iter().all(|part| is_bare(part) && !part.has_hard_edges(self.model.faces.indices()));
+            && surface
+                .parts
+                .iter()
+                .all(|part| is_bare(part) && !part.has_normals_of_its_own(self.model.faces.indices()));
         if says_nothing {
             self.model.surface = Default::default();
         }
@@ -144,6 +148,7 @@ impl Builder<'_, '_> {
                 *numbers.entry(bits(normal)).or_insert(next)
             };
             part.normals = normals.iter().map(number).collect();
+            self.add_tilts(part, placed, points, normals);
         }
         if placed.drawn.iter().any(|(primitive, ..)| primitive.material.is_some()) {
             for &(primitive, _, corners) in &placed.drawn {
@@ -151,6 +156,25 @@ impl Builder<'_, '_> {
                 part.materials.extend(repeat_n(material, corners / 3));
             }
         }
+    }
+
+    /// How normals are tilted, from the points that no joint and no target moves, as these are their normals.
+    fn add_tilts(&mut self, part: &mut Part, placed: &Placed<'_>, points: &[u32], mut normals: Vec<[f32; 3]>) {
+        let buffers = self.buffers;
+        let read = |_: &Primitive, index, most| {
+            let places: Vec<Point> = buffers.values(index, &POSITIONS, most, PLACE).ok()?;
+            Some(places.into_iter().map(|place| place.map(|x| x as f32)).collect())
+        };
+        let Some(places) = self.by_corner(placed, &Semantic::Positions, [0.0; 3], read) else { return };
+        let mut still = vec![[0.0; 3]; part.points];
+        points.iter().zip(&places).for_each(|(&point, place)| still[point as usize] = place.map(f64::from));
+        // Faces are turned around already.
+        if placed.is_mirrored() {
+            normals.iter_mut().for_each(|normal| normal[0] = -normal[0]);
+            still.iter_mut().for_each(|place| place[0] = -place[0]);
+        }
+        let faces = Polygons::of_triangles(points.as_chunks().0);
+        part.take_tilts(&faces, |point| still[point as usize], &normals);
     }
 
     /// An attribute of each corner; none where no primitive has it, or one's cannot be read.

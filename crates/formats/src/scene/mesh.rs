@@ -20,6 +20,8 @@ pub(crate) struct MeshTracks {
     /// How many corners faces have, and which.
     pub(crate) faces: [Track; 2],
     pub(crate) is_clockwise: bool,
+    /// Whether the deformer shows them as a mirror does.
+    pub(crate) is_mirrored: bool,
     /// What moves them before the transforms above do.
     pub(crate) deformer: Option<Box<dyn Deformer>>,
     pub(crate) chain: Chain,
@@ -27,6 +29,8 @@ pub(crate) struct MeshTracks {
     /// The path; where a model is read, what lies on the faces too, of all faces and their corners
     /// in the order of the file. Numbers of points and faces are not looked at.
     pub(crate) part: Part,
+    /// Of each corner in the first sample of the positions; empty where there are none.
+    pub(crate) normals: Vec<[f32; 3]>,
 }
 
 pub(super) struct MovingMesh {
@@ -63,24 +67,46 @@ impl MovingMesh {
         if points == 0 {
             return Ok(None);
         }
-        let mut turned = tracks.is_clockwise;
+        let mut mirrored = tracks.is_mirrored;
         // What is not there yet is often scaled to nothing.
         for &time in at.iter().take(MOST_REPEATED) {
             let scale = tracks.chain.matrix(source, time)?.map_or(1.0, |matrix| matrix.matrix3.determinant());
             if scale != 0.0 {
-                turned ^= scale < 0.0;
+                mirrored ^= scale < 0.0;
                 break;
             }
         }
+        let turned = tracks.is_clockwise ^ mirrored;
         let (faces, next) = (Polygons::new(), Vec::new());
         let mut mesh = Self { tracks, turned, equal: [[None; 2]; 2], points, faces, left_out: 0, next };
         let places = mesh.places(at[0]);
         let arities = mesh.arities(source, places)?;
         (mesh.faces, mesh.left_out) = mesh.read_faces(source, places)?;
         mesh.equal = [places; 2];
-        let part = std::mem::take(&mut mesh.tracks.part);
-        mesh.tracks.part = Part { points, faces: mesh.faces.len(), ..arranged(part, &arities, turned) };
+        let (part, normals) = (std::mem::take(&mut mesh.tracks.part), std::mem::take(&mut mesh.tracks.normals));
+        let (part, normals) = arranged(part, &normals, &arities, turned);
+        mesh.tracks.part = Part { points, faces: mesh.faces.len(), ..part };
+        mesh.take_normals(source, normals, mirrored);
         Ok(Some(mesh))
+    }
+
+    /// Takes the normals of the corners of its faces, which are those of its first positions before anything moves them.
+    /// What cannot be read of these is no reason to refuse a mesh.
+    fn take_normals(&mut self, source: &mut dyn Values, mut normals: Vec<[f32; 3]>, mirrored: bool) {
+        let positions = &self.tracks.positions;
+        let Some(first) = positions.values.first().copied().or(positions.default) else { return };
+        let Ok(stored) = source.points(first) else { return };
+        let mut places = vec![0.0; 3 * self.points];
+        if normals.is_empty() || stored.count != self.points || source.read(stored, &mut places).is_err() {
+            return;
+        }
+        // Faces are turned around already.
+        if mirrored {
+            normals.iter_mut().for_each(|normal| normal[0] = -normal[0]);
+            places.iter_mut().step_by(3).for_each(|x| *x = -*x);
+        }
+        let places = places.as_chunks().0;
+        self.tracks.part.take_normals(&self.faces, |point| places[point as usize], &normals);
     }
 
     pub(super) fn part(&self) -> &Part {

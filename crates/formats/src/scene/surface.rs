@@ -47,9 +47,9 @@ pub(crate) fn creases(
     Ok(creases)
 }
 
-/// A part of all faces of a file, which have so many corners each, for the faces that are kept.
-/// What is not as long as these say is dropped.
-pub(super) fn arranged(mut part: Part, arities: &[u32], turned: bool) -> Part {
+/// A part of all faces of a file, which have so many corners each, and the normals of their corners, for the faces that
+/// are kept. What is not as long as these say is dropped.
+pub(super) fn arranged(mut part: Part, normals: &[[f32; 3]], arities: &[u32], turned: bool) -> (Part, Vec<[f32; 3]>) {
     let count: usize = arities.iter().map(|&arity| arity as usize).sum();
     let is_kept = |face: usize| arities[face] >= 3;
     let (mut corners, mut first) = (Vec::with_capacity(count), 0);
@@ -64,7 +64,6 @@ pub(super) fn arranged(mut part: Part, arities: &[u32], turned: bool) -> Part {
     }
     part.uv_sets.retain_mut(|set| arrange_set(set, &corners, count));
     part.color_sets.retain_mut(|set| arrange_set(set, &corners, count));
-    part.normals = arrange(&part.normals, &corners, count);
     if part.materials.len() == arities.len() {
         let kept = part.materials.iter().enumerate().filter(|&(face, _)| is_kept(face));
         part.materials = kept.map(|(_, &material)| material).collect();
@@ -79,10 +78,10 @@ pub(super) fn arranged(mut part: Part, arities: &[u32], turned: bool) -> Part {
         group.faces.sort_unstable();
         group.faces.dedup();
     }
-    part
+    (part, arrange(normals, &corners, count))
 }
 
-fn arrange(values: &[u32], corners: &[usize], count: usize) -> Vec<u32> {
+fn arrange<T: Copy>(values: &[T], corners: &[usize], count: usize) -> Vec<T> {
     if values.len() == count { corners.iter().map(|&corner| values[corner]).collect() } else { Vec::new() }
 }
 
@@ -105,15 +104,15 @@ mod tests {
                 CornerSet { name: "a".to_owned(), values: vec![[0.0; 2]; 9], corners: (0..9).collect() },
                 CornerSet { name: "short".to_owned(), values: vec![[0.0; 2]; 9], corners: (0..8).collect() },
             ],
-            normals: (10..19).collect(),
             materials: vec![7, 8, 9],
             groups: vec![FaceGroup { name: "g".to_owned(), faces: vec![2, 1, 5, 0] }],
             ..Part::default()
         };
-        let arranged = arranged(part, &[3, 2, 4], true);
+        let normals: Vec<[f32; 3]> = (10..19).map(|k| [k as f32; 3]).collect();
+        let (arranged, normals) = arranged(part, &normals, &[3, 2, 4], true);
         assert_eq!(arranged.uv_sets.len(), 1);
         assert_eq!(arranged.uv_sets[0].corners, [2, 1, 0, 8, 7, 6, 5]);
-        assert_eq!(arranged.normals, [12, 11, 10, 18, 17, 16, 15]);
+        assert_eq!(normals, [12, 11, 10, 18, 17, 16, 15].map(|k| [k as f32; 3]));
         assert_eq!((arranged.materials, arranged.groups[0].faces.clone()), (vec![7, 9], vec![0, 1]));
     }
 

@@ -46,7 +46,7 @@ pub(super) fn open<'a>(
         let (mut materials, mut unread) = (Materials::new(&layer), Unread::default());
         for (&prim, mesh) in prims.iter().zip(&mut tracks.meshes) {
             // What cannot be read is no reason to refuse a mesh.
-            let read = surface::read(&mut layer, prim, &mut materials, &mut mesh.part).unwrap_or_default();
+            let read = surface::read(&mut layer, prim, &mut materials, mesh).unwrap_or_default();
             unread.take(&mut layer, prim, mesh, &read);
         }
         unread.tell(materials.names_alone, dropped);
@@ -60,7 +60,7 @@ fn read_mesh(layer: &mut Layer<'_>, prim: usize, rigs: &mut Rigs) -> Result<Mesh
     let mut attribute = |name| layer.attribute(prim, name);
     let positions = attribute("points")?;
     let faces = [attribute("faceVertexCounts")?, attribute("faceVertexIndices")?];
-    let mut is_clockwise = layer.tokens(prim, "orientation", 1)?.is_some_and(|told| told == ["leftHanded"]);
+    let is_clockwise = layer.tokens(prim, "orientation", 1)?.is_some_and(|told| told == ["leftHanded"]);
     // Points that move are where a skeleton has taken them.
     let still = positions.default.filter(|_| positions.times.is_empty());
     let points = still.map(|value| layer.source.points(value)).transpose()?;
@@ -69,10 +69,10 @@ fn read_mesh(layer: &mut Layer<'_>, prim: usize, rigs: &mut Rigs) -> Result<Mesh
         None => None,
     };
     let chain = transform::above(layer, bound.as_ref().map_or(prim, |bound| bound.space))?;
-    is_clockwise ^= bound.as_ref().is_some_and(|bound| bound.is_mirrored);
+    let is_mirrored = bound.as_ref().is_some_and(|bound| bound.is_mirrored);
     let deformer = bound.map(|bound| Box::new(bound.skin) as Box<dyn Deformer>);
     let part = Part { path: path(&layer.nodes, prim), ..Part::default() };
-    Ok(MeshTracks { positions, faces, is_clockwise, deformer, chain, part, ..MeshTracks::default() })
+    Ok(MeshTracks { positions, faces, is_clockwise, is_mirrored, deformer, chain, part, ..MeshTracks::default() })
 }
 
 pub(super) fn units(stage: &Stage) -> Units {

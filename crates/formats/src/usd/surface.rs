@@ -2,13 +2,13 @@
 
 use std::collections::HashSet;
 
-use cager_geometry::surface::{Crease, Part, Subdivision, sharing};
+use cager_geometry::surface::{Crease, Subdivision};
 
 use super::layer::Layer;
 use super::materials::Materials;
 use super::unread::kind;
 use crate::error::Fault;
-use crate::scene::{creases, damaged, merged, most_corners};
+use crate::scene::{MeshTracks, creases, damaged, merged, most_corners};
 
 /// Names of texture coordinates that come before others, as programs call the first ones.
 const FIRST_UVS: [&str; 4] = ["primvars:st", "primvars:UVMap", "primvars:map1", "primvars:uv"];
@@ -53,14 +53,15 @@ impl Faces {
     }
 }
 
-/// Reads what is known of a mesh into a part; gives the names of the properties that it has.
+/// Reads what is known of the faces of a mesh; gives the names of the properties that it has.
 pub(super) fn read(
     layer: &mut Layer<'_>,
     prim: usize,
     materials: &mut Materials,
-    part: &mut Part,
+    mesh: &mut MeshTracks,
 ) -> Result<HashSet<String>, Fault> {
     let faces = Faces::read(layer, prim)?;
+    let part = &mut mesh.part;
     let mut properties = layer.source.properties(prim);
     properties.sort_by_key(|(name, _)| FIRST_UVS.iter().position(|first| first == name).unwrap_or(FIRST_UVS.len()));
     let mut found = HashSet::new();
@@ -96,7 +97,9 @@ pub(super) fn read(
     if let Some(name) = normals {
         // Of a subdivision surface they say nothing.
         let is_flat = part.subdivision == Subdivision::None;
-        if !is_flat || read_normals(layer, (prim, name), &faces, part).is_ok() {
+        let read = if is_flat { read_normals(layer, (prim, name), &faces).ok() } else { Some(Vec::new()) };
+        if let Some(read) = read {
+            mesh.normals = read;
             found.extend(["primvars:normals", "normals"].map(str::to_owned));
         }
     }
@@ -146,12 +149,10 @@ fn read_colors(layer: &mut Layer<'_>, at: (usize, &str), faces: &Faces) -> Resul
     })
 }
 
-fn read_normals(layer: &mut Layer<'_>, at: (usize, &str), faces: &Faces, part: &mut Part) -> Result<(), Fault> {
+fn read_normals(layer: &mut Layer<'_>, at: (usize, &str), faces: &Faces) -> Result<Vec<[f32; 3]>, Fault> {
     let (values, corners) = read_set::<3>(layer, at, faces)?;
     layer.source.reserve(corners.len() as u64, 24)?;
-    let normals: Vec<[f32; 3]> = corners.iter().map(|&corner| values[corner as usize]).collect();
-    part.normals = sharing(&faces.corners, &normals);
-    Ok(())
+    Ok(corners.iter().map(|&corner| values[corner as usize]).collect())
 }
 
 fn read_creases(layer: &mut Layer<'_>, prim: usize, faces: &Faces) -> Result<Vec<Crease>, Fault> {

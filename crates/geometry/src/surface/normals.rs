@@ -1,5 +1,7 @@
 //! Normals of corners, computed anew where a surface was deformed.
 
+use super::tilts::{Tilts, angles, leaning};
+use super::{Part, Subdivision};
 use crate::mesh::{Point, Polygons};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
@@ -44,7 +46,7 @@ pub fn sharing(points: &[u32], normals: &[[f32; 3]]) -> Vec<u32> {
     points.iter().zip(normals).map(number).collect()
 }
 
-/// Which corners share a normal: see [`Part::normals`](super::Part::normals).
+/// Which corners share a normal, and how normals are tilted: see [`Part::normals`] and [`Part::tilts`].
 #[derive(Clone, Debug)]
 pub struct SharedNormals {
     faces: Polygons,
@@ -52,19 +54,54 @@ pub struct SharedNormals {
     pub corners: Vec<u32>,
     /// How many normals there are.
     pub count: usize,
+    /// The first corner of each.
+    firsts: Vec<usize>,
+    /// The angles of each; empty where none is tilted.
+    tilts: Vec<[f32; 2]>,
 }
 
 impl SharedNormals {
     /// Of faces and the numbers of their corners.
     pub fn new(faces: Polygons, given: &[u32]) -> Self {
         let (corners, firsts) = numbered(&faces, given);
-        Self { faces, corners, count: firsts.len() }
+        Self { faces, corners, count: firsts.len(), firsts, tilts: Vec::new() }
     }
 
-    /// The unit normals where points are, faces weighted by their angles (Thürmer and Wüthrich 1998); zero where no face
-    /// has an area.
+    /// Those of a part that has some, whose faces count its own points.
+    pub fn of(part: &Part, faces: Polygons) -> Self {
+        let shared = Self::new(faces, &part.normals);
+        let tilts = part.tilts.iter().flat_map(|tilts| shared.firsts.iter().map(|&corner| tilts.corners[corner]));
+        let tilts = tilts.collect();
+        Self { tilts, ..shared }
+    }
+
+    /// The unit normals where points are, faces weighted by their angles (Thürmer and Wüthrich 1998), and tilted from
+    /// there; zero where no face has an area.
     pub fn at(&self, point: impl Fn(u32) -> Point) -> Vec<Point> {
+        let mut found = self.upright(point);
+        for ([normal, edge], &angles) in found.iter_mut().zip(&self.tilts) {
+            *normal = leaning(*normal, *edge, angles);
+        }
+        found.into_iter().map(|[normal, _]| normal.to_array()).collect()
+    }
+
+    /// How the normals of a file, one for each corner, are tilted where points are.
+    fn tilts(&self, point: impl Fn(u32) -> Point, given: &[[f32; 3]]) -> Option<Tilts> {
         let mut sums = vec![DVec3::ZERO; self.count];
+        for (&number, &vector) in self.corners.iter().zip(given) {
+            sums[number as usize] += Vec3::from(vector).normalize_or_zero().as_dvec3();
+        }
+        let found = self.upright(point).into_iter().zip(sums);
+        let tilts: Vec<_> = found.map(|([normal, edge], sum)| angles(normal, edge, sum.normalize_or_zero())).collect();
+        let of_corner = |&number: &u32| tilts[number as usize].unwrap_or_default();
+        let is_tilted = tilts.iter().any(Option::is_some);
+        is_tilted.then(|| Tilts { corners: self.corners.iter().map(of_corner).collect() })
+    }
+
+    /// The normals of the faces around, and from the point of each the edge to the next corner of the first face that has
+    /// it.
+    fn upright(&self, point: impl Fn(u32) -> Point) -> Vec<[DVec3; 2]> {
+        let mut found = vec![[DVec3::ZERO; 2]; self.count];
         let mut begin = 0;
         for face in self.faces.iter() {
             let places: Vec<DVec3> = face.iter().map(|&p| point(p).into()).collect();
@@ -76,11 +113,31 @@ impl SharedNormals {
             for k in 0..count {
                 let [before, after] = [(k + count - 1) % count, (k + 1) % count].map(|j| places[j] - places[k]);
                 let angle = before.cross(after).length().atan2(before.dot(after));
-                sums[self.corners[begin + k] as usize] += normal * angle;
+                let number = self.corners[begin + k] as usize;
+                found[number][0] += normal * angle;
+                if self.firsts[number] == begin + k {
+                    found[number][1] = after;
+                }
             }
             begin += count;
         }
-        sums.into_iter().map(|sum| sum.normalize_or_zero().to_array()).collect()
+        found.iter_mut().for_each(|[sum, _]| *sum = sum.normalize_or_zero());
+        found
+    }
+}
+
+impl Part {
+    /// Takes the normals that a file has at the corners of its faces, where its points are at rest. Faces count its own
+    /// points. Of a subdivision surface they say nothing but which edges are hard.
+    pub fn take_normals(&mut self, faces: &Polygons, point: impl Fn(u32) -> Point, normals: &[[f32; 3]]) {
+        self.normals = sharing(faces.indices(), normals);
+        self.take_tilts(faces, point, normals);
+    }
+
+    /// The tilts alone, where it is known already which corners share a normal.
+    pub fn take_tilts(&mut self, faces: &Polygons, point: impl Fn(u32) -> Point, normals: &[[f32; 3]]) {
+        let is_flat = self.subdivision == Subdivision::None;
+        self.tilts = is_flat.then(|| SharedNormals::new(faces.clone(), &self.normals).tilts(point, normals)).flatten();
     }
 }
 
@@ -110,5 +167,51 @@ mod tests {
         let hard = SharedNormals::new(faces, &[0, 0, 0, 0, 1, 1, 1]);
         assert_eq!(hard.count, 7);
         assert_eq!(hard.at(at)[4..], [[1.0, 0.0, 0.0]; 3]);
+    }
+
+    /// A strip of two faces, bent along its middle, and points that are turned, moved and bent further.
+    fn strip() -> (Polygons, [Point; 6], [Point; 6]) {
+        let mut faces = Polygons::new();
+        faces.push(&[0, 1, 2, 3]);
+        faces.push(&[3, 2, 4, 5]);
+        let bent = |angle: f64| {
+            let [x, y] = [1.0 + angle.cos(), angle.sin()];
+            [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, 0.0], [x, y, 1.0], [x, y, 0.0]]
+        };
+        let turned = bent(0.8).map(|[x, y, z]| [3.0 * z + 7.0, 3.0 * x, 3.0 * y]);
+        (faces, bent(0.3), turned)
+    }
+
+    #[test]
+    fn tilted_normals_keep_their_angle_to_the_surface() {
+        let (faces, rest, deformed) = strip();
+        let at = |points: [Point; 6]| move |point: u32| points[point as usize];
+        // All lean towards z, which the second shape has as x.
+        let smooth = SharedNormals::new(faces.clone(), &[0; 8]);
+        let leant = |normals: Vec<Point>, toward: DVec3| -> Vec<DVec3> {
+            normals.into_iter().map(|normal| (DVec3::from(normal) + 0.4 * toward).normalize()).collect()
+        };
+        let given = leant(smooth.at(at(rest)), DVec3::Z);
+        let by_corner: Vec<[f32; 3]> =
+            smooth.corners.iter().map(|&k| (2.0 * given[k as usize]).as_vec3().to_array()).collect();
+        let mut part = Part { points: 6, faces: 2, ..Part::default() };
+        part.take_normals(&faces, at(rest), &by_corner);
+        assert_eq!(part.tilts.as_ref().map(|tilts| tilts.corners.len()), Some(8));
+        let tilted = SharedNormals::of(&part, faces.clone());
+        let close = |found: Vec<Point>, wanted: &[DVec3], least: f64| {
+            found.iter().zip(wanted).all(|(&a, &b)| DVec3::from(a).dot(b) > least)
+        };
+        assert!(close(tilted.at(at(rest)), &given, 1.0 - 1e-6));
+        let wanted = leant(smooth.at(at(deformed)), DVec3::X);
+        assert!(close(tilted.at(at(deformed)), &wanted, 5_f64.to_radians().cos()));
+        assert!(!close(smooth.at(at(deformed)), &wanted, 20_f64.to_radians().cos()));
+        // What the faces say, and what is to be subdivided, has none.
+        let plain: Vec<[f32; 3]> =
+            smooth.corners.iter().map(|&k| smooth.at(at(rest))[k as usize].map(|x| x as f32)).collect();
+        part.take_normals(&faces, at(rest), &plain);
+        assert_eq!(part.tilts, None);
+        part.subdivision = Subdivision::Loop;
+        part.take_normals(&faces, at(rest), &by_corner);
+        assert_eq!((part.tilts, part.normals.len()), (None, 8));
     }
 }

@@ -6,6 +6,7 @@ import { decodePositions } from '../positions';
 import { decodeFaceOrder } from './faceOrder';
 import { decodeLabels } from './labels';
 import { decodeSharing } from './sharing';
+import { decodeTilts } from './tilts';
 
 /** Most streams of all parts together. */
 const MAX_STREAMS = 1 << 16;
@@ -19,6 +20,8 @@ export interface PartSize {
   readonly uvSets: number;
   readonly colorSets: number;
   readonly groups: number;
+  /** Whether normals lean away from those of the faces around. */
+  readonly isTilted: boolean;
 }
 
 /** What a part has by corner and by face. Corners are those of its faces, one after another. */
@@ -29,6 +32,8 @@ export interface PartSurface {
   readonly uvs: { readonly values: Float32Array; readonly numbers: Uint32Array } | null;
   /** Corners of a point that have the same number share a normal; null where all do. */
   readonly normals: Uint32Array | null;
+  /** By these numbers two angles each, by which the normal leans away; null where none does. */
+  readonly tilts: Float32Array | null;
   /** 0 for none, else one more than the place of the face's material; null where no face has one. */
   readonly materials: Uint32Array | null;
 }
@@ -80,13 +85,16 @@ function decodePart(
   }
   for (let set = 0; set < part.colorSets; set++) streams.next(7 * corners);
   const sharing = streams.next(corners);
+  const tilted = part.isTilted ? streams.next(2 * corners) : null;
   const labels = streams.next(part.faces);
   for (let group = 0; group < part.groups; group++) streams.next(part.faces);
   const materials = labels.length === 0 ? null : decodeLabels(labels, local, part.points);
   if (materials?.some((label) => label > materialCount) === true)
     throw new CodedDataError('a face has a material that is not there');
-  const normals = sharing.length === 0 ? null : decodeSharing(sharing, local, part.points).numbers;
-  return { faces, uvs, normals, materials };
+  const normals = sharing.length === 0 ? null : decodeSharing(sharing, local, part.points);
+  if (tilted !== null && normals === null) throw new CodedDataError('normals are tilted that are not there');
+  const tilts = tilted && normals && decodeTilts(tilted, local, normals);
+  return { faces, uvs, normals: normals?.numbers ?? null, tilts, materials };
 }
 
 function decodeUvs(bytes: Uint8Array, faces: Polygons, points: number): PartSurface['uvs'] {

@@ -20,7 +20,7 @@ export interface SplitMesh {
   readonly points: Uint32Array;
   /** u and v of each vertex, v upwards. */
   readonly uvs: Float32Array;
-  /** Normal of each vertex: its place in `split`, or where there are no hard edges its point. */
+  /** Normal of each vertex: its place in `split`, or without that its point. */
   readonly normals: Uint32Array;
   readonly split: SplitNormals | null;
   /** Three vertices of each triangle. */
@@ -37,7 +37,7 @@ const NO_UV = [0, 0] as const;
 export function splitMesh(parts: readonly PartSurface[], points: number, isTiled: readonly boolean[]): SplitMesh {
   const vertices = new SplitVertices(points);
   const lists = new Map<string, Omit<TriangleRange, 'start' | 'count'> & { corners: number[] }>();
-  parts.forEach(({ faces, uvs, normals, materials }, part) => {
+  parts.forEach(({ faces, uvs, normals, tilts, materials }, part) => {
     const uvOf = (corner: number): readonly [number, number] => {
       if (uvs === null) return NO_UV;
       const at = 2 * uvs.numbers[corner];
@@ -53,7 +53,10 @@ export function splitMesh(parts: readonly PartSurface[], points: number, isTiled
       let [start, before] = [0, 0];
       for (let k = 0; k < count; k++) {
         const at = first + k;
-        const vertex = vertices.of(faces.corners[at], uvs?.numbers[at] ?? 0, normals?.[at] ?? 0, uvOf(at));
+        const number = normals?.[at] ?? 0;
+        const next = faces.corners[k + 1 < count ? at + 1 : first];
+        const tilt = { next, along: tilts?.[2 * number] ?? 0, across: tilts?.[2 * number + 1] ?? 0 };
+        const vertex = vertices.of(faces.corners[at], uvs?.numbers[at] ?? 0, number, uvOf(at), tilt);
         if (k === 0) start = vertex;
         else if (k > 1) list.corners.push(start, before, vertex);
         before = vertex;

@@ -3,10 +3,20 @@
 import { fansOf, type Fans } from '../polygons';
 import { NumbersOfPoints } from './sharing';
 
-/** Normals of points of which some have more than one, as they have at hard edges. */
+/** Normals of points of which some have more than one, as they have at hard edges, or lean away from the faces around. */
 export interface SplitNormals extends Fans {
-  /** Point of each normal. */
+  /** Point of each normal, and the next corner of the first face that has it. */
   readonly points: Uint32Array;
+  readonly next: Uint32Array;
+  /** Angles by which each leans away: along the edge to the next corner, and across. Null where none does. */
+  readonly tilts: Float32Array | null;
+}
+
+/** How a normal leans away, as a corner has it. */
+export interface Tilt {
+  readonly next: number;
+  readonly along: number;
+  readonly across: number;
 }
 
 export class SplitVertices {
@@ -18,6 +28,7 @@ export class SplitVertices {
   private readonly normals: NumbersOfPoints;
   private readonly normalPoints: number[] = [];
   private readonly normalNumbers: number[] = [];
+  private readonly tilts: Tilt[] = [];
 
   constructor(points: number) {
     this.vertices = new NumbersOfPoints(points);
@@ -28,9 +39,10 @@ export class SplitVertices {
    * The vertex of a corner. Texture coordinates and normals are told apart by their numbers, those of one point.
    *
    * @param uv the texture coordinate with that number
+   * @param tilt of the normal; that of the first corner counts
    */
-  of(point: number, uvNumber: number, normalNumber: number, uv: readonly [number, number]): number {
-    const normal = this.normal(point, normalNumber);
+  of(point: number, uvNumber: number, normalNumber: number, uv: readonly [number, number], tilt: Tilt): number {
+    const normal = this.normal(point, normalNumber, tilt);
     let vertex = this.vertices.first(point);
     while (vertex !== undefined && (this.uvNumbers[vertex] !== uvNumber || this.normalOf[vertex] !== normal))
       vertex = this.vertices.next(vertex);
@@ -45,24 +57,29 @@ export class SplitVertices {
   /** What was found, for triangles of three vertices each: point, texture coordinate and normal of each vertex. */
   finish(triangles: Uint32Array) {
     const [points, uvs] = [Uint32Array.from(this.points), Float32Array.from(this.uvs)];
-    if (new Set(this.normalPoints).size === this.normalPoints.length)
+    const tilts = Float32Array.from(this.tilts.flatMap(({ along, across }) => [along, across]));
+    const isTilted = tilts.some((angle) => angle !== 0);
+    if (!isTilted && new Set(this.normalPoints).size === this.normalPoints.length)
       return { points, uvs, normals: points, split: null };
     const normals = Uint32Array.from(this.normalOf);
     const corners = triangles.map((vertex) => points[vertex]);
     const owners = triangles.map((vertex) => normals[vertex]);
     const split: SplitNormals = {
       points: Uint32Array.from(this.normalPoints),
+      next: Uint32Array.from(this.tilts, ({ next }) => next),
+      tilts: isTilted ? tilts : null,
       ...fansOf(corners, owners, this.normalPoints.length),
     };
     return { points, uvs, normals, split };
   }
 
-  private normal(point: number, number: number): number {
+  private normal(point: number, number: number, tilt: Tilt): number {
     let normal = this.normals.first(point);
     while (normal !== undefined && this.normalNumbers[normal] !== number) normal = this.normals.next(normal);
     if (normal !== undefined) return normal;
     this.normalPoints.push(point);
     this.normalNumbers.push(number);
+    this.tilts.push(tilt);
     return this.normals.add(point);
   }
 }

@@ -73,7 +73,7 @@ impl PartWriter {
         let mut normals = None;
         if part.subdivision == Subdivision::None {
             if !part.normals.is_empty() {
-                let shared = SharedNormals::new(local.clone(), &part.normals);
+                let shared = SharedNormals::of(part, local.clone());
                 let parameter = Parameter::normals(sink, &local, &shared)?;
                 normals = Some((shared, parameter));
             }

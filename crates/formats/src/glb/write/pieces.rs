@@ -80,7 +80,7 @@ impl Piece {
             // Smooth everywhere.
             has_normals.then(|| SharedNormals::new(local.clone(), &vec![0; corners.len()]))
         } else {
-            Some(SharedNormals::new(local.clone(), &part.normals))
+            Some(SharedNormals::of(part, local.clone()))
         };
         let shared = shared.filter(|shared| shared.count > 0);
         let sets = part.uv_sets.iter().map(|set| &set.corners).chain(part.color_sets.iter().map(|set| &set.corners));

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use cager_geometry::mesh::Model;
-use cager_geometry::surface::{CornerSet, FaceGroup, Material, NO_MATERIAL, Part, Surface, sharing};
+use cager_geometry::surface::{CornerSet, FaceGroup, Material, NO_MATERIAL, Part, PartRange, Surface};
 
 use crate::text::{integer, number, words};
 
@@ -126,9 +126,11 @@ impl SurfaceLines {
             };
             part.uv_sets.extend(self.uv_set(of_part));
             if of_part.iter().all(|&[_, normal]| normal != NONE) {
-                let points = &model.faces.indices()[of_corners];
+                let points = bound[0].points..bound[1].points;
+                let own = &model.points[points.clone()];
+                let local = PartRange { points, faces: faces.clone(), corners: of_corners }.local(&model.faces);
                 let normals: Vec<_> = of_part.iter().map(|&[_, normal]| self.normals[normal as usize]).collect();
-                part.normals = sharing(points, &normals);
+                part.take_normals(&local, |point| own[point as usize], &normals);
             }
             let materials: Vec<u32> = self.faces[faces.clone()].iter().map(|&(material, _)| material).collect();
             if materials.iter().any(|&material| material > 0) {
@@ -143,7 +145,7 @@ impl SurfaceLines {
         let says_something = surface.parts.len() > 1
             || surface.parts.iter().any(|part| {
                 let is_bare = part.uv_sets.is_empty() && part.materials.is_empty() && part.groups.is_empty();
-                !is_bare || part.has_hard_edges(model.faces.indices())
+                !is_bare || part.has_normals_of_its_own(model.faces.indices())
             });
         if says_something {
             model.surface = surface;

@@ -47,7 +47,7 @@ impl ObjText {
             let local = range.local(faces);
             let name = part.path.rsplit('/').next().unwrap_or_default();
             let head = if name.is_empty() { String::new() } else { format!("o {}\n", one_line(name)) };
-            let shared = (!part.normals.is_empty()).then(|| SharedNormals::new(local.clone(), &part.normals));
+            let shared = (!part.normals.is_empty()).then(|| SharedNormals::of(part, local.clone()));
             let mut tail = Vec::new();
             let bases = [range.points.start, uvs, normals];
             write_faces(&mut tail, &local, (part, shared.as_ref()), &names, bases);

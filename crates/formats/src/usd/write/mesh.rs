@@ -79,6 +79,7 @@ impl Mesh {
     ) -> io::Result<Self> {
         let bare = Part {
             normals: if has_normals { part.normals.clone() } else { Vec::new() },
+            tilts: part.tilts.clone().filter(|_| has_normals),
             points: part.points,
             subdivision: part.subdivision,
             ..Part::default()
@@ -179,7 +180,7 @@ fn visibility<W: Write + Seek>(encoder: &mut Encoder<W>, shown: &[Range<u32>], c
 
 impl Normals {
     fn new(part: &Part, faces: &Polygons) -> Self {
-        let shared = SharedNormals::new(faces.clone(), &part.normals);
+        let shared = SharedNormals::of(part, faces.clone());
         let of_points = (!part.has_hard_edges(faces.indices())).then(|| {
             let mut of_points = vec![u32::MAX; part.points];
             for (&point, &normal) in faces.indices().iter().zip(&shared.corners) {
