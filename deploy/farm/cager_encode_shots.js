@@ -17,6 +17,14 @@ const JOB_TYPE = {
           description: "Capture, in the shot's folder" },
         { key: "cage", type: "string", default: "",
           description: "Cage, in the shot's folder; empty to have one designed for each shot" },
+        { key: "prim", type: "string", default: "",
+          description: "Meshes to take, with commas between them: paths, names, globs such as eye*; empty for all" },
+        { key: "up", type: "string", default: "",
+          description: "Axis that points up in the capture, y or z, where another one does in the rest pose" },
+        { key: "unit", type: "string", default: "",
+          description: "What one unit is, mm, cm, m, in or ft, in files that do not say it" },
+        { key: "sample_rate", type: "float", default: 0,
+          description: "Frames to take for each second of a .glb, .gltf or .fbx; 0 to take those that it has" },
         { key: "max_error", type: "float", default: 0.001,
           description: "No point of any frame is off by more than this fraction of the rest pose's diagonal" },
         { key: "output", type: "string", subtype: "dir_path", required: true,
@@ -57,8 +65,11 @@ function encodeArguments(settings, shot) {
     if (settings.cage) {
         args.push("--cage", inShot(settings.cage));
     }
-    if (settings.server) {
-        args.push("--server", settings.server);
+    for (const mesh of settings.prim.split(",").filter((mesh) => mesh.trim())) {
+        args.push("--prim", mesh.trim());
+    }
+    for (const key of ["up", "unit", "sample_rate", "server"].filter((key) => settings[key])) {
+        args.push("--" + key.replace("_", "-"), String(settings[key]));
     }
     const output = path.join(settings.output, shot);
     args.push("--max-error", String(settings.max_error), "-o", output + ".cager", "--report", output + ".json");
