@@ -7,6 +7,9 @@ use serde_json::Value;
 use std::collections::HashSet;
 use std::io::Cursor;
 
+/// The beginning of a picture.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n of one texel";
+
 /// A token and its SHA-256.
 const TOKEN: &str = "open-sesame-open-sesame-open-sesame";
 const HASH: &str = "2482b372f3c76c863606bc41264596d81f6a2bd5cfd3d5c389f1436040912d4f";
@@ -89,6 +92,43 @@ fn a_capture_in_doubles_is_sent_in_singles() {
     dir.write("frames.npy", npy_f64(&doubles));
     dir.cager(&format!("{ENCODE} --server {}", server.address())).succeeds();
     assert!(dir.read("out.cager") == rounded, "other bytes than those of the rounded capture");
+}
+
+#[test]
+fn pictures_go_through_a_service() {
+    let (dir, ..) = capture();
+    let server = Server::start(&dir);
+    let text = String::from_utf8(dir.read("rest.obj")).expect("text");
+    let (faces, points): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| line.starts_with("f "));
+    let corners = |line: &str| line.split(' ').skip(1).map(|word| format!(" {word}/1")).collect::<String>();
+    let faces: String = faces.into_iter().map(|line| format!("f{}\n", corners(line))).collect();
+    dir.write("rest.obj", format!("mtllib a.mtl\n{}\nvt 0.5 0.25\nusemtl skin\n{faces}", points.join("\n")));
+    dir.write("a.mtl", "newmtl skin\nmap_Kd maps/skin.png\nmap_Pr maps/rough.png\n");
+    ["maps/skin.png", "maps/rough.png"].iter().for_each(|name| dir.write(name, PNG));
+    dir.write("maps/rough.png", [PNG, b"another"].concat());
+    for options in ["", " --max-error 1e-3", " --unit cm", " --max-error 1e-3 --unit cm"] {
+        let line = format!("{ENCODE}{options} --textures embed");
+        dir.cager(&line).succeeds();
+        let here = dir.read("out.cager");
+        dir.cager(&format!("{line} --server {}", server.address())).succeeds();
+        let there = dir.read("out.cager");
+        let pictures = |bytes: &[u8]| {
+            ContainerReader::open(Cursor::new(bytes)).expect("a container").pictures().expect("pictures")
+        };
+        assert_eq!(pictures(&here).len(), 2, "{options}");
+        assert_eq!(pictures(&there), pictures(&here), "{options}");
+        assert!(there == here, "{options}: other bytes");
+        dir.cager("decode out.cager -o decoded.usdc --overwrite").succeeds();
+        assert_eq!(dir.read("decoded_textures/skin.png"), PNG, "{options}");
+    }
+    // A cage that the service designs from the packed rest pose.
+    let line = ENCODE.replace(" --cage cage.obj", "") + " --cage-vertices 60 --textures embed";
+    dir.cager(&format!("{line} --server {}", server.address())).succeeds();
+    dir.cager("decode out.cager -o designed.usdc").succeeds();
+    assert_eq!(dir.read("designed_textures/skin.png"), PNG);
+    // Pictures that are not asked for are not sent.
+    dir.cager(&format!("{ENCODE} --server {}", server.address())).succeeds();
+    assert!(!dir.cager("inspect out.cager").succeeds().stdout.contains("pict"));
 }
 
 #[test]
