@@ -130,7 +130,8 @@ class Capture:
         -1 for none, None without) and shown (ranges of frames, None for all)."""
     @property
     def materials(self) -> list[dict[str, Any]]:
-        """The materials that parts count: name, base_color, opacity, roughness, metalness and textures by channel."""
+        """The materials that parts count: name, base_color, opacity, roughness, metalness, and by channel textures and
+        texture_sequences, the picture of each frame where not all have the same."""
     @property
     def frame_rate(self) -> float | None:
         """Frames per second, where known."""

@@ -331,7 +331,7 @@ impl Capture {
         self.surface.as_ref().map_or(Ok(Vec::new()), |surface| parts::parts(py, surface))
     }
 
-    /// The materials that parts count: name, base_color, opacity, roughness, metalness and textures.
+    /// The materials that parts count: name, base_color, opacity, roughness, metalness, textures and texture_sequences.
     #[getter]
     fn materials<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyDict>>, Fault> {
         self.surface.as_ref().map_or(Ok(Vec::new()), |(surface, _)| parts::materials(py, surface))

@@ -158,6 +158,18 @@ fn read_whole(path: &Path, prims: &[String]) -> Result<ReadModel, cager_formats:
     Ok(read)
 }
 
+/// As [`read_whole`], of a model whose pictures no option of the command asks for.
+fn read_without_pictures(path: &Path) -> Result<ReadModel, cager_formats::Error> {
+    let mut read = read_whole(path, &[])?;
+    if !std::mem::take(&mut read.model.surface.pictures).is_empty() {
+        warn(&[format!(
+            "{}: the pictures in it are left out; cager encode --textures embed takes pictures in",
+            path.display()
+        )]);
+    }
+    Ok(read)
+}
+
 /// What of a mesh an output loses that has no colours; of what lies on the faces its format says what it loses.
 fn dropped(path: &Path, read: &ReadModel) -> Option<String> {
     read.dropped_with_colors().sentence(path, false)

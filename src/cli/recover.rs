@@ -7,7 +7,7 @@ use super::recover_args::{Align, JointsKind, RecoverArgs};
 use super::recover_stretch::{Beside, Done, Stretching};
 use super::rig::{read_manifold, read_rig};
 use super::stretches::{Stretch, StretchList, cut, numbered};
-use super::{counted, read_whole, recover_remote, tell, warn};
+use super::{counted, read_without_pictures, recover_remote, tell, warn};
 use anyhow::{Result, bail};
 use cager_capture::origin::{move_to, own_origin};
 use cager_formats::{
@@ -122,7 +122,7 @@ fn refuse_several(args: &RecoverArgs) -> Result<()> {
 
 /// A template, checked, its origin, and what its positions mean where it is not brought to those of the frames.
 fn template(args: &RecoverArgs, path: &Path) -> Result<(Model, Option<Point>, Units)> {
-    let ReadModel { model: mut template, units: said, dropped, .. } = read_whole(path, &[])?;
+    let ReadModel { model: mut template, units: said, dropped, .. } = read_without_pictures(path)?;
     if template.faces.is_empty() {
         bail!("{}: has no faces, and a template is a mesh; give one with faces", path.display());
     }

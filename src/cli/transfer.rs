@@ -9,7 +9,7 @@ use super::encode_summary::write_report;
 use super::motion_args::TransferMotionArgs;
 use super::outputs::{Outputs, folder_of};
 use super::transfer_source::MotionSource;
-use super::{counted, grouped, human_bytes, progress, read_whole, tell, transfer_remote, warn};
+use super::{counted, grouped, human_bytes, progress, read_without_pictures, tell, transfer_remote, warn};
 use anyhow::{Context, Error, Result};
 use cager_cages::DesignOptions;
 use cager_capture::design::FRAMES;
@@ -35,7 +35,7 @@ pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let method = args.method()?;
     let (align, matrix) = args.alignment()?;
     let align = words::align(align, matrix).unwrap_or(AlignBy::Surfaces);
-    let ReadModel { model: mut target, units: said, dropped, .. } = read_whole(&args.target, &[])?;
+    let ReadModel { model: mut target, units: said, dropped, .. } = read_without_pictures(&args.target)?;
     let units = said.or(args.coding.units());
     let origin = own_origin(&target.points);
     move_to(origin, &mut target.points);

@@ -25,6 +25,9 @@ pub fn check_frames(
     let frames = opened.and_then(|mut reader| {
         warnings.extend(reader.notes());
         files.shown = reader.shown();
+        if rest.surface.picture_names().next().is_some() {
+            files.pictures = reader.pictures();
+        }
         sample_frames(reader.as_mut(), mismatch::FRAMES, false)
     });
     let frames = frames.map_err(|error| explained(error, (path, rest)))?;

@@ -260,7 +260,7 @@ impl<'a> Chosen<'a> {
         if self.what.has_own_frames() {
             surface.take_frames(&self.wanted);
         } else {
-            surface.parts.iter_mut().for_each(|part| part.shown = None);
+            surface.forget_frames();
         }
         if self.what.parts.is_empty() {
             self.options.surface = surface;

@@ -163,8 +163,8 @@ fn rewritten(
     let (mut rest, cage) = (container.rest().map_err(fail)?, container.cage().map_err(fail)?);
     rest.colors = container.colors().map_err(fail)?;
     if let Some((mut surface, faces)) = container.surface().map_err(fail)? {
-        // Of these frames nothing says when parts are shown.
-        surface.parts.iter_mut().for_each(|part| part.shown = None);
+        // Of these frames nothing says when parts are shown, and in which pictures.
+        surface.forget_frames();
         surface.pictures = container.pictures().map_err(fail)?;
         (rest.faces, rest.surface) = (faces, surface);
     }

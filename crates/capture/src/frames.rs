@@ -5,7 +5,7 @@ use crate::belonging::{Belonging, Pass};
 use crate::origin::{move_to, own_origin};
 use crate::timing::Timing;
 use cager_cages::diagnosis::weld;
-use cager_formats::{Error, FrameReader, FrameSelection, missing_frames, open_selected_frames};
+use cager_formats::{Error, FrameReader, FrameSelection, PictureSequence, missing_frames, open_selected_frames};
 use cager_geometry::mesh::Model;
 use cager_geometry::units::{Change, Units, Up};
 use std::ops::Range;
@@ -37,6 +37,9 @@ pub struct CaptureFiles {
     /// Frames in which each part is shown, once the frames were compared with the rest pose: see
     /// [`FrameReader::shown`].
     pub shown: Vec<Option<Vec<Range<u32>>>>,
+    /// Pictures of materials that are not the same in all frames, likewise: see
+    /// [`FrameReader::pictures`].
+    pub pictures: Vec<PictureSequence>,
     /// What is subtracted from all positions, where the rest pose lies far away.
     pub origin: Option<[f64; 3]>,
     /// What every frame is compared with as it is read, if anything.
@@ -204,6 +207,10 @@ impl FrameReader for Adapted {
 
     fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
         self.inner.shown()
+    }
+
+    fn pictures(&self) -> Vec<PictureSequence> {
+        self.inner.pictures()
     }
 
     fn read_next(&mut self, out: &mut Vec<f64>) -> Result<bool, Error> {

@@ -7,10 +7,11 @@ use crate::encode::EncodeError;
 use crate::frames::CaptureFiles;
 use cager_cages::{DesignOptions, Goal, design};
 use cager_core::cage::Cage;
-use cager_formats::{Dropped, ReadModel, read_mesh, read_split_mesh, take_pictures};
+use cager_formats::{Dropped, PictureSequence, ReadModel, read_mesh, read_split_mesh, take_pictures};
 use cager_geometry::mesh::Model;
+use cager_geometry::surface::Surface;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, absolute};
 use std::sync::Arc;
 
 /// A rest pose, its cage, and frames that are read from files.
@@ -115,6 +116,25 @@ fn as_in_frames(rest: ReadModel, path: &Path, files: &CaptureFiles) -> Result<Re
     Ok(if stored != points && !has(points) && has(stored) { split } else { rest })
 }
 
+/// Gives the materials of a rest pose the pictures of frames, named from the folder of its file: by the names of
+/// materials, or where there is one alone.
+fn take_sequences(surface: &mut Surface, found: &[PictureSequence], path: &Path) {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let here = |path: &str| {
+        let [path, folder] = [Path::new(path), folder].map(|path| absolute(path).unwrap_or_else(|_| path.to_owned()));
+        path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/")
+    };
+    let of_one = found.first().filter(|first| found.iter().all(|other| other.material == first.material));
+    let of_one = of_one.map(|first| first.material.as_str()).filter(|_| surface.materials.len() == 1);
+    for material in &mut surface.materials {
+        let name = of_one.unwrap_or(&material.name);
+        for texture in &mut material.textures {
+            let sequence = found.iter().find(|found| found.material == name && found.channel == texture.channel);
+            texture.set_frames(sequence.map_or_else(Vec::new, |found| found.paths.iter().map(|p| here(p)).collect()));
+        }
+    }
+}
+
 impl OpenOptions {
     /// As [`Capture::open`].
     ///
@@ -183,12 +203,6 @@ impl OpenOptions {
         let read = read_mesh(path, &files.selection.prims)?;
         let ReadModel { model: mut rest, units, note, dropped } = as_in_frames(read, path, &files)?;
         warnings.extend(note);
-        if pictures {
-            warnings.extend(take_pictures(&mut rest.surface, path));
-        } else if !std::mem::take(&mut rest.surface.pictures).is_empty() {
-            warnings
-                .push(format!("{}: the pictures in it are left out; --textures embed takes them in", path.display()));
-        }
         (files.points, files.rest_units) = (rest.points.len(), units);
         if weld {
             let had_surface = !rest.surface.is_empty();
@@ -211,6 +225,13 @@ impl OpenOptions {
         check_frames(&mut files, (path, &rest), allow_mismatch, warnings)?;
         for (part, shown) in rest.surface.parts.iter_mut().zip(std::mem::take(&mut files.shown)) {
             part.shown = shown;
+        }
+        take_sequences(&mut rest.surface, &std::mem::take(&mut files.pictures), path);
+        if pictures {
+            warnings.extend(take_pictures(&mut rest.surface, path));
+        } else if !std::mem::take(&mut rest.surface.pictures).is_empty() {
+            warnings
+                .push(format!("{}: the pictures in it are left out; --textures embed takes them in", path.display()));
         }
         if let (Some(path), Some(cage)) = (cage_path, &cage) {
             check_cage((path, cage.mesh()), &rest, allow_mismatch, warnings)?;

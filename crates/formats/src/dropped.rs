@@ -127,6 +127,11 @@ pub(crate) fn groups_phrase(surface: &Surface) -> Option<String> {
     (count > 0).then(|| format!("{} ({})", counted(count, "group"), listed(groups)))
 }
 
+/// Of formats with one picture for all frames.
+pub(crate) fn sequences_phrase(surface: &Surface) -> Option<String> {
+    surface.has_sequences().then(|| "the pictures of frames after the first".to_owned())
+}
+
 /// Phrases as one: `a, b and c`.
 pub(crate) fn joined(phrases: &[String]) -> Option<String> {
     let (last, others) = phrases.split_last()?;

@@ -33,9 +33,9 @@ pub use dropped::Dropped;
 pub use error::{Action, Error};
 pub use frames::{
     CacheFormat, CageMesh, FrameOptions, FrameRange, FrameReader, FrameSelection, FrameWriter, MeshSequence,
-    MorphOptions, RATES, create_frames, frame_files, frame_numbers, frames_path, is_numbered_in_vain, mesh_sequence,
-    missing_frames, names_beside_others, open_frames, open_frames_bytes, open_frames_in, open_raw_frames,
-    open_selected_frames,
+    MorphOptions, PictureSequence, RATES, create_frames, frame_files, frame_numbers, frames_path, is_numbered_in_vain,
+    mesh_sequence, missing_frames, names_beside_others, open_frames, open_frames_bytes, open_frames_in,
+    open_raw_frames, open_selected_frames,
 };
 pub use listing::{FORMATS, Listed};
 pub use matrix::{read_matrix, read_matrix_bytes};

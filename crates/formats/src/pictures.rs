@@ -1,13 +1,13 @@
 //! The pictures that materials name: read from beside a model, and put beside an output.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use cager_geometry::surface::{Picture, Surface};
+use cager_geometry::surface::{MOST_PICTURES, Picture, Surface, TILES, tile};
 
 use crate::atomic::{AtomicFile, Target};
 use crate::error::{Error, Fault};
@@ -21,11 +21,17 @@ pub fn take_pictures(surface: &mut Surface, model: &Path) -> Vec<String> {
     let folder = model.parent().unwrap_or(Path::new(""));
     let mut known: BTreeSet<String> = surface.pictures.iter().map(|picture| picture.path.clone()).collect();
     let (mut warnings, mut total) = (Vec::new(), 0);
-    for texture in surface.materials.iter().flat_map(|material| &material.textures) {
-        if !known.insert(texture.path.clone()) {
+    let names: Vec<String> = surface.picture_names().map(str::to_owned).collect();
+    for name in names {
+        if !known.insert(name.clone()) {
             continue;
         }
-        for (path, file) in files(&texture.path, folder) {
+        for (path, file) in files(&name, folder) {
+            if surface.pictures.len() == MOST_PICTURES {
+                let what = format!("more than {MOST_PICTURES} pictures are not taken in, such as {}", file.display());
+                warnings.push(format!("{}: {what}", model.display()));
+                return warnings;
+            }
             match read(&file, MOST_BYTES - total) {
                 Ok(bytes) => {
                     total += bytes.len() as u64;
@@ -83,7 +89,7 @@ const SIGNATURES: [(usize, &[u8]); 15] = [
 /// The files of a texture: one, or all tiles of one whose name has `<UDIM>`.
 fn files(path: &str, folder: &Path) -> Vec<(String, PathBuf)> {
     let one = || vec![(path.to_owned(), folder.join(path))];
-    let Some((before, after)) = path.split_once("<UDIM>") else { return one() };
+    let Some((before, after)) = path.split_once(TILES) else { return one() };
     let tile = |number: u32| format!("{before}{number}{after}");
     let there = (1001..2000).map(tile).map(|path| (path.clone(), folder.join(path)));
     let there: Vec<_> = there.filter(|(_, file)| file.exists()).collect();
@@ -112,75 +118,114 @@ fn place(output: &Path, is_folder: bool) -> (PathBuf, String) {
     }
 }
 
-/// Names the pictures of a surface as files in `folder`, and takes their bytes by the names there.
+/// Names the pictures of a surface as files in `folder`, equal ones as one, and takes their bytes by the names there.
 pub(crate) fn rename(surface: &mut Surface, folder: &str) -> BTreeMap<String, Arc<[u8]>> {
-    let mut names: BTreeMap<String, Arc<[u8]>> = BTreeMap::new();
-    let textures = || surface.materials.iter().flat_map(|material| &material.textures);
-    let named: BTreeSet<String> = textures().map(|texture| texture.path.clone()).collect();
     let pictures = std::mem::take(&mut surface.pictures);
-    let mut renamed = BTreeMap::new();
-    for path in named {
-        let (before, after) = path.split_once("<UDIM>").unwrap_or((&path, ""));
-        // Of a picture in tiles all, with what stands between the rest of the name.
-        let tile = |found: &Picture| {
-            let tile = found.path.strip_prefix(before)?.strip_suffix(after)?.to_owned();
-            (tile.is_empty() || path.len() > before.len()).then(|| (tile, Arc::clone(&found.bytes)))
-        };
-        let tiles: Vec<(String, Arc<[u8]>)> = pictures.iter().filter_map(tile).collect();
-        if tiles.is_empty() {
+    let bytes: BTreeMap<&str, &Arc<[u8]>> = pictures.iter().map(|found| (found.path.as_str(), &found.bytes)).collect();
+    let (mut files, mut renamed) = (Files::default(), BTreeMap::new());
+    for path in surface.picture_names() {
+        if renamed.contains_key(path) {
             continue;
         }
-        let file = before.rsplit(['/', '\\']).next().unwrap_or_default();
-        let is_tiled = path.len() > before.len();
-        let (stem, end) = match file.rsplit_once('.') {
-            Some((stem, end)) if !is_tiled => (stem, format!(".{end}")),
-            _ if is_tiled => {
-                let stem = file.trim_end_matches(['.', '_', '-']);
-                (stem, format!("{}<UDIM>{after}", &file[stem.len()..]))
+        let name = match bytes.get(path) {
+            Some(bytes) => Some(files.add(path, bytes)),
+            None if path.contains(TILES) => {
+                let is_tile = |found: &&Picture| tile(path, &found.path).is_some();
+                files.add_tiles(path, &pictures.iter().filter(is_tile).collect::<Vec<_>>())
             }
-            _ => (file, String::new()),
+            None => None,
         };
-        let name = |k: usize, tile: &str| {
-            let number = if k == 1 { String::new() } else { format!("_{k}") };
-            let placed = |name: &str| name.replace("<UDIM>", tile);
-            plain(&placed(&format!("{stem}{number}{end}")))
-        };
-        let is_free = |k: &usize| {
-            let is_other =
-                |(tile, bytes): &(String, Arc<[u8]>)| names.get(&name(*k, tile)).is_some_and(|there| there != bytes);
-            !tiles.iter().any(is_other)
-        };
-        let k = (1..).find(is_free).unwrap_or(1);
-        let told = name(k, "0000");
-        let told = if is_tiled { told.replacen("0000", "<UDIM>", 1) } else { told };
-        renamed.insert(path.clone(), format!("{folder}/{told}"));
-        tiles.into_iter().for_each(|(tile, bytes)| drop(names.insert(name(k, &tile), bytes)));
+        renamed.extend(name.map(|name| (path.to_owned(), format!("{folder}/{name}"))));
     }
     for texture in surface.materials.iter_mut().flat_map(|material| &mut material.textures) {
-        if let Some(path) = renamed.get(&texture.path) {
-            texture.path.clone_from(path);
+        for path in std::iter::once(&mut texture.path).chain(&mut texture.frames) {
+            if let Some(name) = renamed.get(path) {
+                path.clone_from(name);
+            }
         }
     }
-    names
+    files.files
+}
+
+/// Files in one folder, by their names.
+#[derive(Default)]
+struct Files {
+    files: BTreeMap<String, Arc<[u8]>>,
+    /// Names by where the bytes lie, so that those of many names are looked at once.
+    by_place: HashMap<Place, String>,
+    by_bytes: HashMap<Arc<[u8]>, String>,
+    /// Names of tiles by their numbers and where their bytes lie.
+    by_tiles: HashMap<Vec<(String, Place)>, String>,
+}
+
+/// Where bytes lie, and how many they are.
+type Place = (usize, usize);
+
+fn place_of(bytes: &Arc<[u8]>) -> Place {
+    (bytes.as_ptr().addr(), bytes.len())
+}
+
+impl Files {
+    /// The name of the file with these bytes; of a new one that of `path`, unless another one has it.
+    fn add(&mut self, path: &str, bytes: &Arc<[u8]>) -> String {
+        let place = place_of(bytes);
+        if let Some(name) = self.by_place.get(&place).or_else(|| self.by_bytes.get(bytes)) {
+            return name.clone();
+        }
+        let name = plain(path.rsplit(['/', '\\']).next().unwrap_or_default());
+        let (stem, extension) =
+            name.rsplit_once('.').map_or((name.as_str(), String::new()), |(stem, end)| (stem, format!(".{end}")));
+        let numbered = (1..).map(|k| if k == 1 { name.clone() } else { format!("{stem}_{k}{extension}") });
+        let name = numbered.into_iter().find(|name| !self.files.contains_key(name)).unwrap_or_default();
+        self.files.insert(name.clone(), Arc::clone(bytes));
+        self.by_bytes.insert(Arc::clone(bytes), name.clone());
+        self.by_place.insert(place, name.clone());
+        name
+    }
+
+    /// The name of these tiles of `path`, whose numbers are in the names of their files; none where they are too many.
+    fn add_tiles(&mut self, path: &str, tiles: &[&Picture]) -> Option<String> {
+        let is_fit = !tiles.is_empty() && self.files.len() + tiles.len() <= MOST_PICTURES;
+        let (before, after) = path.split_once(TILES).filter(|_| is_fit)?;
+        let of_tile = |found: &Picture| tile(path, &found.path).unwrap_or_default().to_owned();
+        let places = tiles.iter().map(|found| (of_tile(found), place_of(&found.bytes))).collect::<Vec<_>>();
+        if let Some(name) = self.by_tiles.get(&places) {
+            return Some(name.clone());
+        }
+        let before = harmless(before.rsplit(['/', '\\']).next().unwrap_or_default().trim_start_matches('.'));
+        let after = harmless(after);
+        let numbered = |number: u32| if number == 1 { before.clone() } else { format!("{number}_{before}") };
+        let name = |number, of_tile: &str| format!("{}{of_tile}{after}", numbered(number));
+        let is_free = |number: &u32| places.iter().all(|(tile, _)| !self.files.contains_key(&name(*number, tile)));
+        let number = (1..).find(is_free)?;
+        let bytes = tiles.iter().map(|found| Arc::clone(&found.bytes));
+        self.files.extend(places.iter().map(|(tile, _)| name(number, tile)).zip(bytes));
+        self.by_tiles.insert(places, name(number, TILES));
+        Some(name(number, TILES))
+    }
 }
 
 /// A name that any file system has, and that hides nothing.
 fn plain(name: &str) -> String {
-    const LONGEST: usize = 60;
-    let is_odd = |c: char| {
-        c.is_control()
-            || "<>:\"|?*%".contains(c)
-            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
-    let name: String = name.trim_start_matches('.').chars().map(|c| if is_odd(c) { '_' } else { c }).collect();
-    let (stem, end) = name.rsplit_once('.').unwrap_or((&name, ""));
-    let stem: String = stem.chars().take(LONGEST).collect();
-    let end: String = end.chars().take(8).collect();
+    let name = name.trim_start_matches('.');
+    let (stem, end) = name.rsplit_once('.').unwrap_or((name, ""));
+    let (stem, end) = (harmless(stem), harmless(end).chars().take(8).collect::<String>());
     match (stem.is_empty(), end.is_empty()) {
         (true, true) => "picture".to_owned(),
         (_, true) => stem,
         _ => format!("{stem}.{end}"),
     }
+}
+
+/// The beginning of a text, with `_` for what names of files should not have.
+fn harmless(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let is_odd = |c: char| {
+        c.is_control()
+            || "<>:\"|?*%/\\".contains(c)
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    text.chars().map(|c| if is_odd(c) { '_' } else { c }).take(LONGEST).collect()
 }
 
 /// Files to be written beside an output.
@@ -236,30 +281,40 @@ impl Beside {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use cager_geometry::surface::{Channel, Material, Texture};
 
-    use super::*;
-
-    #[test]
-    fn tiles_of_one_name_in_two_folders_stay_apart() {
-        let names = ["a/skin.<UDIM>.png", "b/skin.<UDIM>.png", "b/skin.png", "a/skin.png"];
-        let textures = names.map(|path| Texture::new(Channel::BaseColor, path)).to_vec();
-        let picture = |path: &str| Picture { path: path.to_owned(), bytes: Arc::from(path.as_bytes()) };
-        let files =
-            ["a/skin.1001.png", "a/skin.1002.png", "b/skin.1001.png", "b/skin.png", "a/skin.png", "c/other.png"];
+    /// The names that textures of these names get, and the files.
+    fn renamed(names: &[&str], pictures: &[(&str, &[u8])]) -> (Vec<String>, Vec<(String, Vec<u8>)>) {
+        let textures = names.iter().map(|&name| Texture::new(Channel::BaseColor, name)).collect();
+        let picture = |&(path, bytes): &(&str, &[u8])| Picture { path: path.to_owned(), bytes: Arc::from(bytes) };
         let mut surface = Surface {
             materials: vec![Material { textures, ..Material::default() }],
-            pictures: files.map(picture).to_vec(),
+            pictures: pictures.iter().map(picture).collect(),
             ..Surface::default()
         };
-        let found = rename(&mut surface, "out");
-        let told: Vec<&str> = surface.materials[0].textures.iter().map(|texture| texture.path.as_str()).collect();
-        assert_eq!(told, ["out/skin.<UDIM>.png", "out/skin_2.<UDIM>.png", "out/skin_2.png", "out/skin.png"]);
-        let bytes = |name: &str| String::from_utf8_lossy(&found[name]).into_owned();
-        assert_eq!((bytes("skin.1002.png"), bytes("skin_2.1001.png")), (files[1].to_owned(), files[2].to_owned()));
-        assert_eq!(
-            (bytes("skin_2.png"), bytes("skin.png"), found.len()),
-            (files[3].to_owned(), files[4].to_owned(), 5)
-        );
+        let files = rename(&mut surface, "t").into_iter().map(|(name, bytes)| (name, bytes.to_vec())).collect();
+        (surface.picture_names().map(str::to_owned).collect(), files)
+    }
+
+    #[test]
+    fn equal_pictures_are_one_file_and_others_of_a_name_are_numbered() {
+        let given: [(&str, &[u8]); 5] =
+            [("a/x.png", b"1"), ("b/y.png", b"1"), ("c/x.png", b"2"), ("d/../x.png", b"3"), ("unnamed.png", b"4")];
+        let names = ["a/x.png", "b/y.png", "c/x.png", "d/../x.png", "missing.png"];
+        let (names, files) = renamed(&names, &given);
+        assert_eq!(names, ["t/x.png", "t/x.png", "t/x_2.png", "t/x_3.png", "missing.png"]);
+        let named = |name: &str, bytes: &[u8]| (name.to_owned(), bytes.to_vec());
+        assert_eq!(files, [named("x.png", b"1"), named("x_2.png", b"2"), named("x_3.png", b"3")]);
+    }
+
+    #[test]
+    fn tiles_keep_their_numbers_even_where_they_are_equal() {
+        let given: [(&str, &[u8]); 4] =
+            [("a/s.1001.png", b"1"), ("a/s.1002.png", b"1"), ("b/s.1001.png", b"2"), ("c/s.1001.png", b"2")];
+        let (names, files) = renamed(&["a/s.<UDIM>.png", "b/s.<UDIM>.png"], &given);
+        assert_eq!(names, ["t/s.<UDIM>.png", "t/2_s.<UDIM>.png"]);
+        let files: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(files, ["2_s.1001.png", "s.1001.png", "s.1002.png"]);
     }
 }

@@ -10,6 +10,7 @@ use cager_formats::{
     read_mesh, read_mesh_bytes, read_model_bytes,
 };
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::{Channel, Texture};
 use support::{all, data, message, numbers, polygons};
 
 const NAME: &str = "a.usda";
@@ -271,4 +272,33 @@ fn texts_of_the_library_hold_what_its_binary_files_do() {
         let between = |k: usize| binary[k - 1].iter().zip(&binary[(k + 1).min(10)]).map(|(a, b)| a + 0.5 * (b - a));
         assert!(every == 1 || (1..11).step_by(2).all(|k| between(k).eq(text[k].iter().copied())), "{name}");
     }
+}
+
+#[test]
+fn pictures_of_frames_are_those_that_hold_at_their_times() {
+    let points = "[(0, 0, 0), (1, 0, 0), (0, 1, 0)]";
+    let samples: Vec<String> = (1..5).map(|time| format!("{time}: {points}")).collect();
+    let moving =
+        format!("point3f[] points.timeSamples = {{ {} }}\nrel material:binding = </looks/skin>", samples.join(", "));
+    let looks = |file: &str| {
+        format!(
+            r#"def Scope "looks" {{ def Material "skin" {{
+                token outputs:surface.connect = </looks/skin/s.outputs:surface>
+                def Shader "s" {{
+                    uniform token info:id = "UsdPreviewSurface"
+                    color3f inputs:diffuseColor.connect = </looks/skin/t.outputs:rgb>
+                    token outputs:surface
+                }}
+                def Shader "t" {{ uniform token info:id = "UsdUVTexture"; asset {file}; float3 outputs:rgb }}
+            }} }}"#
+        )
+    };
+    let text = mesh(&moving) + &looks("inputs:file.timeSamples = { 1: @a.1.png@, 3: @./b/c.png@ }");
+    let found = open(&text, 3).expect("frames").pictures();
+    assert_eq!((found.len(), found[0].material.as_str(), found[0].channel), (1, "skin", Channel::BaseColor));
+    assert_eq!(found[0].paths, ["a.1.png", "a.1.png", "b/c.png", "b/c.png"]);
+    let rest = read_mesh_bytes(MeshFormat::Usda, Path::new(NAME), text.as_bytes()).expect("a mesh").model;
+    assert_eq!(rest.surface.materials[0].textures, [Texture::new(Channel::BaseColor, "a.1.png")]);
+    let text = mesh(&moving) + &looks("inputs:file = @a.1.png@");
+    assert_eq!(open(&text, 3).expect("frames").pictures(), []);
 }

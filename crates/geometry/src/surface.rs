@@ -2,10 +2,12 @@
 
 mod normals;
 mod parts;
+mod pictures;
 mod tilts;
 
 pub use normals::{SharedNormals, numbered, sharing};
 pub use parts::{Chosen, shown_in};
+pub use pictures::{MOST_PICTURES, TILES, tile};
 pub use tilts::Tilts;
 
 use crate::mesh::Polygons;
@@ -158,8 +160,11 @@ impl Default for Material {
 pub struct Texture {
     /// What it is for.
     pub channel: Channel,
-    /// Its file as the source names it, with `/` between folders.
+    /// Its file as the source names it, with `/` between folders; of a sequence the first one.
     pub path: String,
+    /// The file in each frame, where not all frames have the same; the last one stays.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub frames: Vec<String>,
     /// The name of its texture coordinates; empty for the first of each part.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub uv_set: String,
@@ -183,9 +188,22 @@ pub enum Component {
 }
 
 impl Texture {
-    /// With the first texture coordinates of each part and the usual component.
+    /// One picture for all frames, with the first texture coordinates of each part and the usual component.
     pub fn new(channel: Channel, path: impl Into<String>) -> Self {
-        Self { channel, path: path.into(), uv_set: String::new(), component: None }
+        Self { channel, path: path.into(), frames: Vec::new(), uv_set: String::new(), component: None }
+    }
+
+    /// Has these pictures, one in each frame; of none it stays as it is.
+    pub fn set_frames(&mut self, frames: Vec<String>) {
+        let Some(first) = frames.first() else { return };
+        self.path.clone_from(first);
+        let is_one = frames.iter().all(|path| path == first);
+        self.frames = if is_one { Vec::new() } else { frames };
+    }
+
+    /// The picture of a frame, counted from 0.
+    pub fn at(&self, frame: usize) -> &str {
+        self.frames.get(frame).or(self.frames.last()).unwrap_or(&self.path)
     }
 }
 
@@ -217,7 +235,7 @@ impl Material {
 }
 
 /// What a picture says of a material.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// Base colour, in sRGB.

@@ -3,14 +3,11 @@
 use super::reader::ContainerReader;
 use super::writer::ContainerWriter;
 use super::{Error, tag};
-use cager_geometry::surface::Picture;
+use cager_geometry::surface::{MOST_PICTURES, Picture};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::io::{Read, Seek, Write};
 use std::sync::Arc;
-
-/// Pictures of a model at the most.
-const MOST: usize = 1 << 12;
 
 /// Which bytes a picture has.
 #[derive(Deserialize, Serialize)]
@@ -30,8 +27,8 @@ impl<W: Write> ContainerWriter<W> {
         if pictures.is_empty() {
             return Ok(());
         }
-        if pictures.len() > MOST {
-            return Err(Error::TooLarge(format!("{} pictures, where {MOST} are the most", pictures.len())));
+        if pictures.len() > MOST_PICTURES {
+            return Err(Error::TooLarge(format!("{} pictures, where {MOST_PICTURES} are the most", pictures.len())));
         }
         let (mut places, mut all) = (HashMap::new(), Vec::new());
         let listed: Vec<Listed> = pictures
@@ -60,7 +57,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| corrupt("is cut"))?;
         let listed: Vec<Listed> =
             serde_json::from_slice(list).map_err(|e| corrupt(&format!("cannot be read ({e})")))?;
-        if listed.len() > MOST {
+        if listed.len() > MOST_PICTURES {
             return Err(corrupt("is longer than any program writes"));
         }
         let mut known: HashMap<(u64, u64), Arc<[u8]>> = HashMap::new();

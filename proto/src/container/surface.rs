@@ -8,6 +8,11 @@ use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::Surface;
 use std::io::{Read, Seek, Write};
 
+/// Texts of a thing that is named, its keys among them, rather too many.
+const KEYS: u64 = 32;
+/// Names of pictures by frame, unless the file has bytes for more; they take 50 bytes of memory each.
+const MOST_PICTURE_NAMES: u64 = 1 << 20;
+
 impl<W: Write> ContainerWriter<W> {
     pub(super) fn write_surface(&mut self, coded: &CodedSurface) -> Result<(), Error> {
         let names = serde_json::to_vec(&coded.outline).map_err(|e| Error::Invalid(e.to_string()))?;
@@ -27,7 +32,10 @@ impl<R: Read + Seek> ContainerReader<R> {
             rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| corrupt("is cut"))?;
         // Before any is made: parts have points, faces have materials, creases and groups.
         let things = self.header.points.saturating_add(self.header.rest_corners).saturating_mul(8);
-        if names.iter().filter(|&&b| b == b'{').count() as u64 > things.saturating_add(1 << 16) {
+        let count = |mark: u8| names.iter().filter(|&&b| b == mark).count() as u64;
+        // Texts are those within these, and names of pictures by frame.
+        let texts = KEYS.saturating_mul(count(b'{')).saturating_add(MOST_PICTURE_NAMES).saturating_add(self.file_bytes);
+        if count(b'{') > things.saturating_add(1 << 16) || count(b'"') / 2 > texts {
             return Err(corrupt("names more than lies on them"));
         }
         let outline = serde_json::from_slice(names).map_err(|e| corrupt(&format!("cannot be read ({e})")))?;

@@ -35,7 +35,7 @@ pub(super) fn parts<'py>(
 
 pub(super) fn materials<'py>(py: Python<'py>, surface: &Surface) -> Result<Vec<Bound<'py, PyDict>>, Fault> {
     let told = |material: &Material| {
-        let (dict, textures) = (PyDict::new(py), PyDict::new(py));
+        let (dict, textures, sequences) = (PyDict::new(py), PyDict::new(py), PyDict::new(py));
         dict.set_item("name", &material.name)?;
         dict.set_item("base_color", material.base_color)?;
         dict.set_item("opacity", material.opacity)?;
@@ -43,8 +43,12 @@ pub(super) fn materials<'py>(py: Python<'py>, surface: &Surface) -> Result<Vec<B
         dict.set_item("metalness", material.metalness)?;
         for texture in &material.textures {
             textures.set_item(texture.channel.name(), &texture.path)?;
+            if !texture.frames.is_empty() {
+                sequences.set_item(texture.channel.name(), &texture.frames)?;
+            }
         }
         dict.set_item("textures", textures)?;
+        dict.set_item("texture_sequences", sequences)?;
         Ok(dict)
     };
     surface.materials.iter().map(told).collect()

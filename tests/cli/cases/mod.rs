@@ -13,6 +13,7 @@ mod numpy;
 mod one_file_each;
 mod origin;
 mod parts;
+mod pictures;
 mod pointers;
 mod surface;
 mod turns;

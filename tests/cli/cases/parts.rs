@@ -78,6 +78,10 @@ fn parts_come_back_alone_by_name_or_glob() {
     let hat = model(&dir, "hat.usdc");
     assert_eq!((hat.points.len(), hat.surface.parts.len(), hat.surface.parts[0].path.as_str()), (8, 1, "/hat/hat"));
     assert_eq!(hat.surface.parts[0].uv_sets[0].corners.len(), 24);
+    // With what it has alone.
+    let names: Vec<&str> = hat.surface.materials.iter().map(|material| material.name.as_str()).collect();
+    assert_eq!((names, hat.surface.materials[0].base_color), (vec!["felt"], [0.1, 0.2, 0.3]));
+    assert!(dir.path("hat_textures/felt.png").exists() && !dir.path("hat_textures/skin.png").exists());
     dir.cager("decode cast.cager --part *y -o body.npy").succeeds();
     let mut reader = open_frames(dir.path("body.npy"), 8).expect("the points of the body");
     let mut frame = Vec::new();
@@ -124,18 +128,18 @@ fn pictures_that_were_taken_in_are_put_beside_what_is_decoded() {
     let pictures = sections.iter().find(|section| section["tag"] == "pict").expect("pictures");
     let stored = pictures["bytes"].as_u64().expect("bytes");
     assert!(stored < 2 * PICTURE.len() as u64 + 200, "equal pictures are there once: {stored}");
-    for (output, file) in [
-        ("out/cast.usdc", "out/cast_textures/skin.png"),
-        ("out/cast.gltf", "out/cast_textures/felt.png"),
-        ("folder/", "folder_textures/skin.png"),
-    ] {
+    for (output, folder) in
+        [("out/cast.usdc", "out/cast_textures"), ("out/cast.gltf", "out/cast_textures"), ("folder/", "folder_textures")]
+    {
         dir.write("out/there.txt", "");
         dir.cager(&format!("decode cast.cager -o {output} --overwrite")).succeeds();
-        assert_eq!(dir.read(file), PICTURE, "{output}");
+        assert_eq!(dir.read(&format!("{folder}/skin.png")), PICTURE, "{output}");
+        // Both materials have the one file.
+        assert_eq!(std::fs::read_dir(dir.path(folder)).expect("a folder").count(), 1, "{output}");
     }
     let there = model(&dir, "out/cast.usdc").surface;
     let path = &there.materials.iter().find(|material| material.name == "felt").expect("felt").textures[0].path;
-    assert_eq!(path.trim_start_matches("./"), "cast_textures/felt.png");
+    assert_eq!(path.trim_start_matches("./"), "cast_textures/skin.png");
     // Another file of that name stays, and so does what is decoded.
     dir.write("new_textures/skin.png", "mine");
     let refused = dir.cager("decode cast.cager -o new.usdc").run();
@@ -212,4 +216,21 @@ fn files_that_are_no_pictures_are_not_taken_in() {
         said.contains("skin.png that its materials name is not taken in (it is no picture that is known)"),
         "{said}"
     );
+}
+
+#[test]
+fn pictures_that_nobody_asks_for_are_left_out_of_motions_that_are_made() {
+    let dir = encoded();
+    dir.cager("decode cast.cager -o cast.usdz").succeeds();
+    (0..3).for_each(|k| dir.write(&format!("whole/f.{k}.obj"), boxes(0.1 * f64::from(k), true)));
+    let lines = [
+        "transfer --source cast.cager --target cast.usdz --align none -o made.cager",
+        "recover --template cast.usdz --frames whole -o made.cager",
+    ];
+    for line in lines {
+        let said = dir.cager(&format!("{line} --overwrite")).succeeds();
+        assert!(said.stderr.contains("cast.usdz: the pictures in it are left out"), "{line}: {}", said.stderr);
+        let inside = dir.cager("inspect made.cager").succeeds().stdout;
+        assert!(inside.contains("surf") && !inside.contains("pict"), "{line}: {inside}");
+    }
 }

@@ -17,7 +17,8 @@ fn of_repository(path: &str) -> PathBuf {
 /// Runs the script of a task of a template with a program that writes down its arguments, and gives its exit status and
 /// what it said. Of the arguments `captures`, `out` and `program` are places in the folder.
 fn task(dir: &Dir, template: &str, arguments: &[&str]) -> (i32, String) {
-    let template = fs::read_to_string(of_repository(&format!("deploy/farm/{template}.openjd.yaml"))).expect("the template");
+    let template =
+        fs::read_to_string(of_repository(&format!("deploy/farm/{template}.openjd.yaml"))).expect("the template");
     let (_, script) = template.split_once("          data: |\n").expect("a script");
     let program = dir.path("program");
     fs::write(&program, PROGRAM).expect("written");
@@ -28,8 +29,12 @@ fn task(dir: &Dir, template: &str, arguments: &[&str]) -> (i32, String) {
     });
     // In a folder with files that a glob would find.
     dir.write("here/eyeball", "");
-    let done =
-        Command::new("sh").args(["-c", script, "sh"]).args(placed).current_dir(dir.path("here")).output().expect("sh runs");
+    let done = Command::new("sh")
+        .args(["-c", script, "sh"])
+        .args(placed)
+        .current_dir(dir.path("here"))
+        .output()
+        .expect("sh runs");
     let said = [done.stdout, done.stderr].concat();
     (done.status.code().unwrap_or(-1), String::from_utf8_lossy(&said).into_owned())
 }
@@ -92,7 +97,10 @@ fn shots_are_decoded_to_files_and_folders() {
         [("usdc", "sh010.usdc"), ("obj", "sh010/"), ("ply", "sh010/*.ply"), ("vat", "sh010.vat/"), ("npy", "sh010.npy")]
     {
         let (_, said) = decoded(format, "", "", "replace");
-        assert!(said.contains(&format!("decode\nin/seq/sh010.cager\n-o\n{}/seq/{output}\n", dir.path("out").display())), "{said}");
+        assert!(
+            said.contains(&format!("decode\nin/seq/sh010.cager\n-o\n{}/seq/{output}\n", dir.path("out").display())),
+            "{said}"
+        );
     }
     let (status, said) = decoded("usdc", "eye*, left hand", "../hero.usdc", "replace");
     let words = format!(

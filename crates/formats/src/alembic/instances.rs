@@ -126,11 +126,11 @@ impl Room {
     }
 
     /// Takes that of what lies on the faces of a mesh.
-    pub(super) fn take_part(&mut self, part: &Part) -> Result<(), Fault> {
+    pub(super) fn take_part(&mut self, part: &Part, normals: usize) -> Result<(), Fault> {
         let sets = part.uv_sets.iter().map(|set| 8 * set.values.len() + 4 * set.corners.len());
         let colors = part.color_sets.iter().map(|set| 16 * set.values.len() + 4 * set.corners.len());
         let groups = part.groups.iter().map(|group| 4 * group.faces.len());
-        let others = 4 * (part.normals.len() + part.materials.len()) + 12 * part.creases.len();
+        let others = 4 * part.materials.len() + 12 * (normals + part.creases.len());
         self.bytes((sets.chain(colors).chain(groups).sum::<usize>() + others) as u64)
     }
 

@@ -75,7 +75,7 @@ pub(crate) fn open<'a>(
                 continue;
             };
             if is_copy {
-                room.take_part(&part)?;
+                room.take_part(&part, normals.len())?;
                 known.entry(group).or_insert_with(|| (part.clone(), normals.clone()));
             }
             mesh.part = Part { path: std::mem::take(&mut mesh.part.path), ..part };

@@ -16,6 +16,7 @@ mod numbered;
 mod numbers;
 mod packed;
 mod pc2;
+mod pictures;
 mod pieces;
 mod python;
 mod range;
@@ -33,12 +34,14 @@ use std::ops::Range;
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
+use cager_geometry::surface::Channel;
 use cager_geometry::units::Units;
 
 use crate::error::Error;
 
 pub(crate) use block::read_values;
 pub use numbers::missing_frames;
+pub(crate) use pictures::named_in;
 pub use range::FrameRange;
 pub use selection::FrameSelection;
 pub use source::{
@@ -54,6 +57,17 @@ pub use write::{
 
 /// Frames per second that files hold: beyond, times are infinite, or frames no longer apart.
 pub const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+
+/// What a material has of a channel in each frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PictureSequence {
+    /// The name of the material.
+    pub material: String,
+    /// What the pictures are for.
+    pub channel: Channel,
+    /// One for each frame.
+    pub paths: Vec<String>,
+}
 
 /// Positions of one capture, frame by frame; memory does not grow with the number of frames.
 pub trait FrameReader: Send {
@@ -91,6 +105,12 @@ pub trait FrameReader: Send {
     /// Frames in which each part of the mesh is shown, counted from 0; `None` for a part that always
     /// is, and nothing where no part is ever hidden, or the source does not say.
     fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
+        Vec::new()
+    }
+
+    /// Pictures of materials that are not the same in all frames; nothing where the source does not
+    /// say. Names of files in a folder begin with that.
+    fn pictures(&self) -> Vec<PictureSequence> {
         Vec::new()
     }
 

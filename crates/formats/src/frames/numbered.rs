@@ -60,6 +60,23 @@ impl NumberedNames {
         format!("{}.mtl", if name.is_empty() { "materials" } else { name })
     }
 
+    /// The name of a file of materials for one number alone.
+    pub(super) fn own_library(&self, number: f64) -> String {
+        let name = self.name(number);
+        format!("{}.mtl", name.strip_suffix(self.extension()).unwrap_or(&name))
+    }
+
+    /// Whether a name is one of these.
+    pub(super) fn is_own_library(&self, name: &str) -> bool {
+        let stem = name.strip_suffix(".mtl");
+        stem.is_some_and(|stem| self.number(&format!("{stem}{}", self.extension())).is_some())
+    }
+
+    /// With its dot.
+    fn extension(&self) -> &str {
+        &self.after[self.after.rfind('.').unwrap_or(0)..]
+    }
+
     /// The glob pattern of such names, and of others with something else in place of the number.
     pub(super) fn glob(&self) -> String {
         format!("{}*{}", glob::Pattern::escape(&self.before), glob::Pattern::escape(&self.after))

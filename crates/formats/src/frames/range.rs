@@ -9,7 +9,7 @@ use cager_geometry::mesh::Polygons;
 use cager_geometry::surface::shown_in;
 use cager_geometry::units::Units;
 
-use super::FrameReader;
+use super::{FrameReader, PictureSequence};
 use crate::error::{Error, Fault};
 
 /// Frames `first` to `last`, both included, every `step`-th of them, counted from 0 in the order of
@@ -232,6 +232,15 @@ impl FrameReader for RangeReader {
         let taken =
             |shown: Vec<Range<u32>>| shown_in(frames().map(|frame| shown.iter().any(|range| range.contains(&frame))));
         self.reader.shown().into_iter().map(|shown| shown.and_then(taken)).collect()
+    }
+
+    fn pictures(&self) -> Vec<PictureSequence> {
+        let mut found = self.reader.pictures();
+        for PictureSequence { paths, .. } in &mut found {
+            let taken = (0..self.range.count()).filter_map(|place| paths.get(self.range.frame(place)));
+            *paths = taken.cloned().collect();
+        }
+        found
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {

@@ -11,7 +11,7 @@ use cager_geometry::units::Units;
 use super::merged::Merged;
 use super::names::Sequence;
 use super::vanished::Parts;
-use super::{FrameReader, FrameSelection, cut, npz, single};
+use super::{FrameReader, FrameSelection, PictureSequence, cut, npz, pictures, single};
 use crate::error::{Error, Fault};
 use crate::mesh::{FrameFaces, MeshFormat, read_frame_file};
 
@@ -201,6 +201,10 @@ impl FrameReader for SequenceReader {
             shown.get(part).is_none_or(|ranges| ranges.as_ref().is_none_or(|ranges| !ranges.is_empty()))
         };
         (0..parts.count()).map(|part| shown_in(of_files.iter().map(|shown| is_shown(shown, part)))).collect()
+    }
+
+    fn pictures(&self) -> Vec<PictureSequence> {
+        pictures::of_files(&self.sequence.files)
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {

@@ -107,7 +107,8 @@ impl MeshFrames {
         let notes = clip.as_ref().and_then(|clip| clip.note.clone()).into_iter().collect();
         let shown_at = |node: &Option<usize>| clip.as_ref().zip(*node).and_then(|(clip, node)| clip.shown(node, &at));
         let shown = nodes.iter().map(shown_at).collect();
-        let info = MeshInfo { points, frames: at.len(), times, faces: rest.faces, units: Units::METRES, notes, shown };
+        let (frames, faces, units) = (at.len(), rest.faces, Units::METRES);
+        let info = MeshInfo { points, frames, times, faces, units, notes, shown, ..MeshInfo::default() };
         Ok(Self { buffers, chosen, kept, stored, clip, at, info })
     }
 }

@@ -29,7 +29,7 @@ use crate::usd;
 
 pub use format::MeshFormat;
 pub(crate) use format::extensions;
-pub(crate) use obj::{ObjText, materials_text, write_obj_faces};
+pub(crate) use obj::{ObjText, libraries_of, materials_of, materials_text, write_obj_faces};
 use parsed::Parsed;
 pub use write::{model_bytes, obj_bytes, write_model};
 pub(crate) use write::{write_off, write_ply, write_stl};

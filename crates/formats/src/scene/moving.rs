@@ -10,6 +10,7 @@ use super::mesh::{MeshTracks, MovingMesh};
 use super::reader::{Animation, MeshInfo, open};
 use super::track::{Timeline, Values};
 use crate::error::{Error, Fault};
+use crate::frames::PictureSequence;
 
 /// What a parser finds of a scene.
 #[derive(Default)]
@@ -24,6 +25,8 @@ pub(crate) struct SceneTracks {
     pub(crate) materials: Vec<Material>,
     /// Those that lie in the file itself.
     pub(crate) pictures: Vec<Picture>,
+    /// Those of materials by frame, where frames are read.
+    pub(crate) sequences: Vec<PictureSequence>,
 }
 
 pub(crate) struct MovingScene<'a> {
@@ -42,7 +45,7 @@ pub(crate) fn no_points() -> Fault {
 
 impl<'a> MovingScene<'a> {
     pub(crate) fn new(mut source: Box<dyn Values + 'a>, tracks: SceneTracks) -> Result<Self, Fault> {
-        let SceneTracks { meshes: found, timeline, units, mut notes, materials, pictures } = tracks;
+        let SceneTracks { meshes: found, timeline, units, mut notes, materials, pictures, sequences } = tracks;
         let (mut meshes, mut faces, mut points) = (Vec::new(), Polygons::new(), 0);
         let several = found.len() > 1;
         for tracks in found {
@@ -69,7 +72,8 @@ impl<'a> MovingScene<'a> {
             return Err(no_points());
         }
         let shown = meshes.iter().map(|mesh| shown_in(timeline.at.iter().map(|&time| mesh.is_shown(time)))).collect();
-        let info = MeshInfo { points, frames: timeline.at.len(), times: timeline.times, faces, units, notes, shown };
+        let (frames, times) = (timeline.at.len(), timeline.times);
+        let info = MeshInfo { points, frames, times, faces, units, notes, shown, pictures: sequences };
         Ok(Self { source, meshes, at: timeline.at, materials, pictures, info })
     }
 

@@ -7,7 +7,7 @@ use cager_geometry::mesh::Polygons;
 use cager_geometry::units::Units;
 
 use crate::error::{Error, Fault};
-use crate::frames::{FrameReader, Times};
+use crate::frames::{FrameReader, PictureSequence, Times, named_in};
 
 /// What all frames of a mesh have in common.
 #[derive(Default)]
@@ -21,6 +21,8 @@ pub(crate) struct MeshInfo {
     pub(crate) notes: Vec<String>,
     /// Frames in which each part is shown; `None` where it always is.
     pub(crate) shown: Vec<Option<Vec<Range<u32>>>>,
+    /// Named from the folder of the file.
+    pub(crate) pictures: Vec<PictureSequence>,
 }
 
 pub(crate) trait Animation: Send {
@@ -83,6 +85,13 @@ impl<A: Animation> FrameReader for Reader<A> {
 
     fn shown(&self) -> Vec<Option<Vec<Range<u32>>>> {
         self.mesh.info().shown.clone()
+    }
+
+    fn pictures(&self) -> Vec<PictureSequence> {
+        let mut found = self.mesh.info().pictures.clone();
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        found.iter_mut().flat_map(|sequence| &mut sequence.paths).for_each(|path| *path = named_in(folder, path));
+        found
     }
 
     fn mesh(&self) -> Option<(&Path, &Polygons)> {

@@ -7,7 +7,8 @@ use cager_geometry::surface::{Channel, Component, FaceGroup, Material, NO_MATERI
 use super::layer::{Kind, Layer};
 use super::surface::Faces;
 use crate::error::Fault;
-use crate::scene::ancestry;
+use crate::frames::PictureSequence;
+use crate::scene::{Track, Value, ancestry};
 
 /// Relationships to a material; what is for previews before what is for rendering alone.
 const BINDINGS: [&str; 3] = ["material:binding", "material:binding:preview", "material:binding:full"];
@@ -36,12 +37,40 @@ pub(super) struct Materials {
     pub(super) list: Vec<Material>,
     /// Those that are kept by name alone.
     pub(super) names_alone: usize,
+    /// Times of the frames whose pictures are read; none of a model.
+    times: Vec<f64>,
     numbers: HashMap<(usize, usize), u32>,
     /// The subsets of each mesh.
     subsets: HashMap<usize, Vec<usize>>,
 }
 
 impl Materials {
+    /// The pictures of frames at these times, where a material has other ones in some of them.
+    pub(super) fn sequences(layer: &mut Layer<'_>, times: &[f64]) -> Result<Vec<PictureSequence>, Fault> {
+        let kinds = layer.prims.iter().enumerate().filter(|(_, prim)| prim.kind == Kind::Shading && prim.is_there);
+        let shading: Vec<usize> = kinds.map(|(k, _)| k).collect();
+        let mut is_moving = false;
+        for &prim in &shading {
+            is_moving |= layer.attribute(prim, "inputs:file")?.values.len() > 1;
+        }
+        let mut sequences = Vec::new();
+        let mut materials = Self { times: times.to_vec(), ..Self::new(layer) };
+        for &prim in shading.iter().filter(|_| is_moving) {
+            if layer.source.target(prim, "outputs:surface")?.is_some() {
+                materials.number(layer, prim);
+            }
+        }
+        for Material { name, textures, .. } in materials.list {
+            let moving = textures.into_iter().filter(|texture| !texture.frames.is_empty());
+            sequences.extend(moving.map(|Texture { channel, frames, .. }| PictureSequence {
+                material: name.clone(),
+                channel,
+                paths: frames,
+            }));
+        }
+        Ok(sequences)
+    }
+
     pub(super) fn new(layer: &Layer<'_>) -> Self {
         let mut subsets: HashMap<usize, Vec<usize>> = HashMap::new();
         for (k, _) in layer.prims.iter().enumerate().filter(|(_, prim)| prim.kind == Kind::Subset && prim.is_there) {
@@ -49,7 +78,7 @@ impl Materials {
                 subsets.entry(mesh).or_default().push(k);
             }
         }
-        Self { list: Vec::new(), names_alone: 0, numbers: HashMap::new(), subsets }
+        Self { list: Vec::new(), names_alone: 0, times: Vec::new(), numbers: HashMap::new(), subsets }
     }
 
     /// The materials and the groups of the faces of a mesh.
@@ -119,7 +148,7 @@ impl Materials {
         }
         let name = String::from_utf8_lossy(&layer.nodes[prim].name).into_owned();
         // What cannot be read has a name at least.
-        let read = read_material(layer, prim, first).unwrap_or_default();
+        let read = read_material(layer, prim, first, &self.times).unwrap_or_default();
         self.names_alone += usize::from(read.is_none());
         let number = self.list.len() as u32;
         self.list.push(Material { name, ..read.unwrap_or_default() });
@@ -140,8 +169,40 @@ fn source(layer: &mut Layer<'_>, prim: usize, name: &str) -> Result<(usize, Stri
     Ok(at)
 }
 
-/// A material whose surface is a UsdPreviewSurface, on a mesh with these texture coordinates as the first.
-fn read_material(layer: &mut Layer<'_>, prim: usize, first: &str) -> Result<Option<Material>, Fault> {
+/// The name of a file, as seen from the folder of the first layer.
+fn asset_path(layer: &mut Layer<'_>, value: Value) -> Result<String, Fault> {
+    let path = layer.source.tokens(value, 1)?.concat().replace('\\', "/");
+    let path = path.strip_prefix("./").unwrap_or(&path).to_owned();
+    let folder = layer.source.folder(value);
+    let is_relative = !folder.is_empty() && !path.is_empty() && !path.starts_with('/') && !path.contains(':');
+    Ok(if is_relative { format!("{folder}/{path}") } else { path })
+}
+
+/// The files that a track names at these times; between two times it names that of the first.
+fn frame_paths(layer: &mut Layer<'_>, track: &Track, times: &[f64]) -> Result<Vec<String>, Fault> {
+    let mut paths: Vec<String> = Vec::with_capacity(times.len());
+    let mut last = None;
+    for &time in times {
+        let Some((value, ..)) = track.at(time) else { break };
+        let path = match paths.last().filter(|_| last == Some(value.0)) {
+            Some(path) => path.clone(),
+            None => asset_path(layer, value)?,
+        };
+        layer.source.reserve(path.len() as u64 + 24, 1)?;
+        last = Some(value.0);
+        paths.push(path);
+    }
+    Ok(paths)
+}
+
+/// A material whose surface is a UsdPreviewSurface, on a mesh with these texture coordinates as the first, with the
+/// pictures of frames at these times.
+fn read_material(
+    layer: &mut Layer<'_>,
+    prim: usize,
+    first: &str,
+    times: &[f64],
+) -> Result<Option<Material>, Fault> {
     let (shader, output) = source(layer, prim, "outputs:surface")?;
     let is_a = |layer: &mut Layer<'_>, prim: usize, id: &str| -> Result<bool, Fault> {
         Ok(layer.tokens(prim, "info:id", 1)?.is_some_and(|told| told == [id]))
@@ -154,18 +215,19 @@ fn read_material(layer: &mut Layer<'_>, prim: usize, first: &str) -> Result<Opti
         let (prim, attribute) = source(layer, shader, name)?;
         if attribute.starts_with("outputs:") && is_a(layer, prim, "UsdUVTexture")? {
             let (at, file) = source(layer, prim, "inputs:file")?;
-            let value = layer.first(at, &file)?;
-            let path = value.map(|value| layer.source.tokens(value, 1)).transpose()?;
-            let path = path.unwrap_or_default().concat().replace('\\', "/");
-            let mut path = path.strip_prefix("./").unwrap_or(&path).to_owned();
-            let folder = value.map_or_else(String::new, |value| layer.source.folder(value));
-            if !folder.is_empty() && !path.is_empty() && !path.starts_with('/') && !path.contains(':') {
-                path = format!("{folder}/{path}");
-            }
+            let track = layer.attribute(at, &file)?;
+            let path = match track.values.first().or(track.default.as_ref()) {
+                Some(&value) => asset_path(layer, value)?,
+                None => String::new(),
+            };
             if !path.is_empty() {
                 let uv_set = uv_set(layer, prim).ok().flatten().filter(|name| name != first).unwrap_or_default();
                 let component = COMPONENTS.iter().find(|(name, _)| *name == attribute).map(|(_, component)| *component);
-                material.textures.push(Texture { uv_set, component, ..Texture::new(channel, path) });
+                let mut texture = Texture { uv_set, component, ..Texture::new(channel, path) };
+                if track.values.len() > 1 {
+                    texture.set_frames(frame_paths(layer, &track, times)?);
+                }
+                material.textures.push(texture);
             }
         }
         // The value of the surface itself, where a picture takes its place.

@@ -52,6 +52,9 @@ pub(super) fn open<'a>(
         unread.tell(materials.names_alone, dropped);
         pictures.retain(|picture| materials.names(&picture.path));
         (tracks.materials, tracks.pictures) = (materials.list, pictures);
+    } else {
+        // What cannot be read is no reason to refuse a capture.
+        tracks.sequences = Materials::sequences(&mut layer, &tracks.timeline.at).unwrap_or_default();
     }
     MovingScene::new(layer.source, tracks)
 }

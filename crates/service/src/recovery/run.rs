@@ -94,6 +94,8 @@ impl Service {
             ValidOptions::of(&meta.options, meta.parts.rig.is_some())?;
         let RecoveryParts { template, cage, rig, manifold } = self.store.recovery_parts(meta).map_err(damaged)?;
         let (mut model, said) = read_part_with_units("template", &template.name, &template.bytes)?;
+        // Nothing asks for them, as on the command line.
+        model.surface.pictures.clear();
         move_to(meta.origin, &mut model.points);
         let unusable = |detail: String| ApiError::new(problem::INVALID_GEOMETRY, detail);
         let known = match rig.zip(manifold) {

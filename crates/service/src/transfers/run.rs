@@ -61,6 +61,8 @@ impl Service {
         let valid = ValidOptions::of(&meta.options, meta.parts.contains_key("cage"))?;
         let file = part("target")?.ok_or_else(|| ApiError::internal(&"a transfer has no target"))?;
         let (mut target, units) = read_part_with_units("target", &file.name, &file.bytes)?;
+        // Nothing asks for them, as on the command line.
+        target.surface.pictures.clear();
         move_to(meta.origin, &mut target.points);
         let is_fitted = valid.method == MethodChoice::Fitted;
         let cage = part("cage")?.map(|file| cage_of(&file, meta.origin.filter(|_| !is_fitted))).transpose()?;

@@ -55,7 +55,7 @@ impl FrameMesh {
             MeshFormat::Obj if !surface.is_empty() => {
                 let has_materials = !surface.materials.is_empty();
                 of_materials =
-                    has_materials.then(|| (library.to_owned(), materials_text(&surface.materials).into_bytes()));
+                    has_materials.then(|| (library.to_owned(), materials_text(&surface.materials, 0).into_bytes()));
                 text = Some(ObjText::new(faces, surface, has_materials.then_some(library)));
             }
             MeshFormat::Ply => {
@@ -75,6 +75,13 @@ impl FrameMesh {
         let surface = if format == MeshFormat::Ply { surface.clone() } else { Surface::default() };
         let model = Model { faces: faces.clone(), surface, ..Model::default() };
         Ok(Self { format, model, faces: lines, text, library: of_materials, origin: options.origin })
+    }
+
+    /// Names another file of materials in the frames that are written next.
+    pub(super) fn name_library(&mut self, library: &str) {
+        if let Some(text) = &mut self.text {
+            text.name_library(library);
+        }
     }
 
     /// What of a surface has no place.

@@ -20,6 +20,7 @@ use super::CacheFormat;
 use super::numbered::NumberedNames;
 use super::times::nominal;
 use crate::atomic::Target;
+use crate::dropped::sequences_phrase;
 use crate::error::{Error, Fault};
 use crate::mesh::MeshFormat;
 use crate::pictures::Beside;
@@ -106,13 +107,25 @@ pub fn create_frames(
         );
         return Err(Fault::unsupported(what).at(path));
     }
-    let mut surface = options.surface.clone();
+    let (mut surface, mut lost) = (options.surface.clone(), None);
+    if !keeps_sequences(given) {
+        lost = sequences_phrase(&surface).filter(|_| names_pictures(target));
+        surface.keep_first_pictures();
+    }
     let beside =
         (names_pictures(target) && options.onto.is_none()).then(|| Beside::of(&mut surface, target, is_folder(path)));
     beside.as_ref().map_or(Ok(()), Beside::check)?;
-    let options = &FrameOptions { surface, ..options.clone() };
-    let output = begin(&all, target, faces, options)?;
-    Ok(FrameWriter::new(all, output, &options.surface, beside))
+    let output = begin(&all, target, faces, &FrameOptions { surface, ..options.clone() })?;
+    Ok(FrameWriter::new(all, output, (&options.surface, lost), beside))
+}
+
+/// Whether an output has a place for other pictures in other frames.
+fn keeps_sequences(path: &Path) -> bool {
+    let ends_in = |other: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(other));
+    match CacheFormat::from_path(path) {
+        Some(format) => matches!(format, CacheFormat::Usdc | CacheFormat::Usdz | CacheFormat::Usd),
+        None => !ends_in("ply") && !ends_in("vat"),
+    }
 }
 
 /// Whether the files of an output name pictures, and do not hold them.

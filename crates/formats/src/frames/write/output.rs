@@ -24,10 +24,10 @@ impl FrameWriter {
     pub(super) fn new(
         announced: Announced,
         output: Box<dyn Output>,
-        surface: &Surface,
+        (surface, also): (&Surface, Option<String>),
         pictures: Option<Beside>,
     ) -> Self {
-        let lost = lost(output.as_ref(), surface);
+        let lost = lost(output.as_ref(), surface, also);
         Self { announced, output, lost, pictures }
     }
 
@@ -85,9 +85,9 @@ impl FrameWriter {
     }
 }
 
-/// What a format has no place for, in words.
-fn lost(output: &dyn Output, surface: &Surface) -> Option<String> {
-    let all = joined(&output.lost(surface))?;
+/// What a format has no place for, in words; `also` is lost too.
+fn lost(output: &dyn Output, surface: &Surface, also: Option<String>) -> Option<String> {
+    let all = joined(&output.lost(surface).into_iter().chain(also).collect::<Vec<_>>())?;
     let way = if output.keeps_surface() { "" } else { "; write .obj files for them" };
     Some(format!("has no place for {all} of the model{way}"))
 }

@@ -5,20 +5,22 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use cager_geometry::mesh::Polygons;
-use cager_geometry::surface::Surface;
+use cager_geometry::surface::{Material, Surface};
 
 use super::super::numbered::NumberedNames;
 use super::mesh::FrameMesh;
 use super::output::{Announced, FrameOptions, Output};
 use crate::atomic::{AtomicDir, AtomicGroup, Target};
 use crate::error::Error;
-use crate::mesh::MeshFormat;
+use crate::mesh::{MeshFormat, materials_text};
 
 pub(super) struct SequenceWriter {
     place: Place,
     mesh: FrameMesh,
     names: NumberedNames,
     options: FrameOptions,
+    /// Materials with other pictures in other frames, each of which has a file of them.
+    moving: Option<Vec<Material>>,
 }
 
 /// Where the files go.
@@ -37,6 +39,12 @@ impl Place {
         }
         .map_err(|cause| Error::write(path, cause))
     }
+
+    /// Writes a file of this name and text into the folder at `path`.
+    fn write_file(&mut self, name: &str, text: &[u8], path: &Path) -> Result<(), Error> {
+        let path = path.join(name);
+        self.create_file(name, &path)?.write_all(text).map_err(|cause| Error::write(&path, cause))
+    }
 }
 
 impl SequenceWriter {
@@ -49,28 +57,45 @@ impl SequenceWriter {
     ) -> Result<Self, Error> {
         let format = if names.extension_is("ply") { MeshFormat::Ply } else { MeshFormat::Obj };
         let library = names.library();
-        let mesh = FrameMesh::new(format, announced, faces, options, &library)?;
-        let is_frame = |name: &str| names.number(name).is_some() || mesh.library.is_some() && name == library;
+        let mut mesh = FrameMesh::new(format, announced, faces, options, &library)?;
+        let moving =
+            (mesh.library.is_some() && options.surface.has_sequences()).then(|| options.surface.materials.clone());
+        let one = mesh.library.take_if(|_| moving.is_none());
+        let is_frame = |name: &str| {
+            names.number(name).is_some()
+                || one.is_some() && name == library
+                || moving.is_some() && names.is_own_library(name)
+        };
         let path = &announced.path;
         let mut place = if shares_folder(target.path()) {
-            let frames = (0..announced.frames).map(|frame| names.name(options.number(frame)));
-            let new = frames.chain(mesh.library.is_some().then(|| library.clone())).collect();
+            let numbers = || (0..announced.frames).map(|frame| options.number(frame));
+            let libraries = numbers().filter(|_| moving.is_some()).map(|number| names.own_library(number));
+            let frames = numbers().map(|number| names.name(number)).chain(libraries);
+            let new = frames.chain(one.is_some().then(|| library.clone())).collect();
             Place::Shared(AtomicGroup::create(path, target.replaces(), &new, is_frame)?)
         } else {
             Place::Own(AtomicDir::create(path, |name| target.replaces() && is_frame(name))?)
         };
-        if let Some((name, text)) = &mesh.library {
-            let path = path.join(name);
-            let mut file = place.create_file(name, &path)?;
-            file.write_all(text).map_err(|cause| Error::write(&path, cause))?;
+        if let Some((name, text)) = &one {
+            place.write_file(name, text, path)?;
         }
-        Ok(Self { place, mesh, names, options: options.clone() })
+        Ok(Self { place, mesh, names, options: options.clone(), moving })
     }
 }
 
 impl Output for SequenceWriter {
     fn write(&mut self, announced: &Announced, positions: &[f32]) -> Result<(), Error> {
-        let name = self.names.name(self.options.number(announced.written));
+        let number = self.options.number(announced.written);
+        if let Some(materials) = &self.moving {
+            let library = self.names.own_library(number);
+            self.place.write_file(
+                &library,
+                materials_text(materials, announced.written).as_bytes(),
+                &announced.path,
+            )?;
+            self.mesh.name_library(&library);
+        }
+        let name = self.names.name(number);
         let path = announced.path.join(&name);
         let mut file = BufWriter::with_capacity(1 << 16, self.place.create_file(&name, &path)?);
         self.mesh.write(&mut file, positions, &path)?;
@@ -87,6 +112,7 @@ impl Output for SequenceWriter {
         announced.points = points;
         announced.check(&self.options).map_err(|fault| fault.at(&announced.path))?;
         self.mesh = FrameMesh::new(self.mesh.format, announced, faces, options, &self.names.library())?;
+        self.moving = None;
         Ok(())
     }
 

@@ -4,14 +4,18 @@ mod mtl;
 mod surface;
 mod write;
 
-use std::path::Path;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use cager_geometry::mesh::Model;
+use cager_geometry::surface::Material;
 
 pub(crate) use mtl::materials_text;
-use surface::SurfaceLines;
+use surface::{SurfaceLines, name_of_library};
 pub(crate) use write::{ObjText, write_obj_faces};
 
+use super::MeshFormat;
 use super::parsed::Parsed;
 use super::unread::Unread;
 use crate::colors::{Colors, Scale};
@@ -21,6 +25,8 @@ use crate::text::{self, Lines, damaged, integer, point, quoted, words};
 
 /// Bytes of a file of materials.
 const LARGEST_LIBRARY: u64 = 64 << 20;
+/// Bytes before the first point in which files of materials are looked for.
+const LONGEST_HEAD: u64 = 64 << 10;
 
 pub(super) fn read(bytes: &[u8], contents: Contents) -> Result<Parsed, Fault> {
     let parsed = scan(bytes, contents, None)?;
@@ -131,13 +137,32 @@ fn corner(word: &[u8], before: usize, points: Option<usize>, line: usize) -> Res
     Ok(u32::try_from(from_zero).unwrap_or(u32::MAX))
 }
 
+/// The files of materials that an OBJ file names before its first point; none of other files.
+pub(crate) fn libraries_of(path: &Path) -> Vec<PathBuf> {
+    let (mut head, is_obj) = (Vec::new(), MeshFormat::guess(path) == Some(MeshFormat::Obj));
+    let read = |file: File| file.take(LONGEST_HEAD).read_to_end(&mut head).ok();
+    if !is_obj || File::open(path).ok().and_then(read).is_none() {
+        return Vec::new();
+    }
+    let lines = Lines::new(&head).take_while(|line| !line.starts_with(b"v "));
+    let names = lines.filter_map(|line| line.strip_prefix(b"mtllib "));
+    names.map(|name| library(path, &name_of_library(name.trim_ascii()))).collect()
+}
+
+fn library(path: &Path, name: &str) -> PathBuf {
+    path.with_file_name("").join(name)
+}
+
+/// The materials of a file; none of one that cannot be read.
+pub(crate) fn materials_of(library: &Path) -> Vec<Material> {
+    let is_small = library.metadata().is_ok_and(|found| found.is_file() && found.len() <= LARGEST_LIBRARY);
+    is_small.then(|| std::fs::read(library).ok()).flatten().map_or_else(Vec::new, |bytes| mtl::read(&bytes))
+}
+
 /// Fills in the materials of a model from the files beside it that it names; what cannot be read is left as it is.
 pub(super) fn read_materials(parsed: &mut Parsed, path: &Path) {
-    for library in &parsed.libraries {
-        let file = path.with_file_name("").join(library);
-        let is_small = file.metadata().is_ok_and(|found| found.is_file() && found.len() <= LARGEST_LIBRARY);
-        let Some(bytes) = is_small.then(|| std::fs::read(&file).ok()).flatten() else { continue };
-        for found in mtl::read(&bytes) {
+    for name in &parsed.libraries {
+        for found in materials_of(&library(path, name)) {
             if let Some(material) = parsed.model.surface.materials.iter_mut().find(|m| m.name == found.name) {
                 *material = found;
             }

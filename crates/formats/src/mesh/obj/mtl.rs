@@ -79,8 +79,8 @@ fn file_of(line: &[u8]) -> String {
     String::from_utf8_lossy(rest).replace('\\', "/")
 }
 
-/// Materials as a file.
-pub(crate) fn materials_text(materials: &[Material]) -> String {
+/// Materials as a file, with the pictures of a frame.
+pub(crate) fn materials_text(materials: &[Material], frame: usize) -> String {
     let mut text = String::new();
     for (material, name) in materials.iter().zip(names(materials)) {
         let [red, green, blue] = material.base_color;
@@ -91,7 +91,7 @@ pub(crate) fn materials_text(materials: &[Material]) -> String {
         );
         for texture in &material.textures {
             let name = MAPS.iter().find(|(_, channel)| *channel == texture.channel).map_or("map_Kd", |(name, _)| name);
-            text += &format!("{name} {}\n", one_line(&texture.path));
+            text += &format!("{name} {}\n", one_line(texture.at(frame)));
         }
         text.push('\n');
     }
@@ -126,6 +126,6 @@ mod tests {
         let paths: Vec<(Channel, &str)> = gold.textures.iter().map(|t| (t.channel, t.path.as_str())).collect();
         assert_eq!(paths, [(Channel::BaseColor, "../tex/gold base.png"), (Channel::Normal, "n.png")]);
         assert_eq!((read_back[1].roughness, read_back[1].opacity), (0.5, 0.75));
-        assert_eq!(read(materials_text(&read_back).as_bytes()), read_back);
+        assert_eq!(read(materials_text(&read_back, 0).as_bytes()), read_back);
     }
 }

@@ -58,6 +58,11 @@ struct Object {
     faces: usize,
 }
 
+/// What a `mtllib` line names.
+pub(super) fn name_of_library(rest: &[u8]) -> String {
+    String::from_utf8_lossy(rest).replace('\\', "/")
+}
+
 impl SurfaceLines {
     /// Takes a line by its first word; `false` where it is none of these.
     pub(super) fn take(&mut self, keyword: &[u8], rest: &[u8], points: usize) -> bool {
@@ -76,7 +81,7 @@ impl SurfaceLines {
                 let name = String::from_utf8_lossy(rest).replace('/', "_");
                 self.objects.push(Object { name, points, faces: self.faces.len() });
             }
-            b"mtllib" => self.libraries.push(String::from_utf8_lossy(rest).replace('\\', "/")),
+            b"mtllib" => self.libraries.push(name_of_library(rest)),
             _ => return false,
         }
         true

@@ -37,10 +37,7 @@ struct PartText {
 impl ObjText {
     /// Of faces with what lies on them; `library` is the file of the materials.
     pub(crate) fn new(faces: &Polygons, surface: &Surface, library: Option<&str>) -> Self {
-        let mut head = Vec::new();
-        if let Some(library) = library {
-            head.extend(format!("mtllib {}\n", one_line(library)).into_bytes());
-        }
+        let head = library.map_or_else(Vec::new, library_line);
         let names = names(&surface.materials);
         let (mut uvs, mut normals) = (0, 0);
         let parts = surface.ranges(faces).map(|(part, range)| {
@@ -57,6 +54,11 @@ impl ObjText {
         });
         let parts = parts.collect();
         Self { head, parts }
+    }
+
+    /// Names another file of the materials.
+    pub(crate) fn name_library(&mut self, library: &str) {
+        self.head = library_line(library);
     }
 
     /// Writes a frame; `vertex` writes the line of a point, and `point` is where it is.
@@ -79,6 +81,10 @@ impl ObjText {
         }
         Ok(())
     }
+}
+
+fn library_line(library: &str) -> Vec<u8> {
+    format!("mtllib {}\n", one_line(library)).into_bytes()
 }
 
 /// The `vt`, `g`, `usemtl` and `f` lines of a part.

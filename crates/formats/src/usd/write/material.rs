@@ -2,7 +2,7 @@
 
 use std::io::{self, Seek, Write};
 
-use cager_geometry::surface::{Channel, Component, Material, Part, Surface};
+use cager_geometry::surface::{Channel, Component, Material, Part, Surface, Texture};
 
 use super::encoder::Encoder;
 use super::faces::uv_names;
@@ -19,11 +19,12 @@ const SHADER: &str = "surface";
 /// Texture coordinates that have no name.
 pub(super) const USUAL_UVS: &str = "st";
 
-/// The materials below a root of this path, and the path of each.
+/// The materials below a root of this path, and the path of each; frames are at these time codes.
 pub(super) fn materials<W: Write + Seek>(
     encoder: &mut Encoder<W>,
     surface: &Surface,
     root: &str,
+    codes: &[f64],
 ) -> io::Result<(Prim, Vec<String>)> {
     let mut group = Prim { name: GROUP.to_owned(), type_name: "Scope", ..Prim::default() };
     let (mut names, mut paths) = (Names::default(), Vec::new());
@@ -37,7 +38,7 @@ pub(super) fn materials<W: Write + Seek>(
             let found = parts().find_map(named).or_else(|| parts().next().map(|part| (0, uv_names(part))));
             found.map_or_else(|| USUAL_UVS.to_owned(), |(set, mut names)| names.swap_remove(set))
         };
-        let children = shaders(encoder, material, &path, uvs)?;
+        let children = shaders(encoder, material, (&path, uvs), codes)?;
         let output = Property::new("token", "outputs:surface").from(format!("{path}/{SHADER}.outputs:surface"));
         group.children.push(Prim {
             name,
@@ -54,8 +55,8 @@ pub(super) fn materials<W: Write + Seek>(
 fn shaders<W: Write + Seek>(
     encoder: &mut Encoder<W>,
     material: &Material,
-    path: &str,
-    uvs: impl Fn(&str) -> String,
+    (path, uvs): (&str, impl Fn(&str) -> String),
+    codes: &[f64],
 ) -> io::Result<Vec<Prim>> {
     let bytes = |numbers: &[f32]| -> Vec<u8> { numbers.iter().flat_map(|x| x.to_le_bytes()).collect() };
     let base_color = encoder.put(kind::VEC3F, &bytes(&material.base_color))?;
@@ -100,8 +101,7 @@ fn shaders<W: Write + Seek>(
             let is_color = matches!(channel, Channel::BaseColor | Channel::Emission);
             let mut picture = vec![
                 Property::fixed("info:id", "UsdUVTexture"),
-                Property::new("asset", "inputs:file")
-                    .value(encoder.asset(&texture.path.replace(char::is_control, "_"))),
+                files(encoder, texture, codes)?,
                 Property::new("token", "inputs:sourceColorSpace").token(if is_color { "sRGB" } else { "raw" }),
                 Property::new("token", "inputs:wrapS").token("repeat"),
                 Property::new("token", "inputs:wrapT").token("repeat"),
@@ -131,4 +131,23 @@ fn shaders<W: Write + Seek>(
         all.push(Prim { name, type_name: "Shader", properties, ..Prim::default() });
     }
     Ok(all)
+}
+
+/// The file of a picture, of a sequence that of each time code where it becomes another one.
+fn files<W: Write + Seek>(encoder: &mut Encoder<W>, texture: &Texture, codes: &[f64]) -> io::Result<Property> {
+    let property = Property::new("asset", "inputs:file").value(encoder.asset(&one_line(&texture.path)));
+    if texture.frames.is_empty() {
+        return Ok(property);
+    }
+    let is_new = |&k: &usize| k == 0 || texture.at(k) != texture.at(k - 1);
+    let (times, names): (Vec<f64>, Vec<&str>) =
+        (0..codes.len()).filter(is_new).map(|k| (codes[k], texture.at(k))).unzip();
+    let times = encoder.times(&times)?;
+    let values: Vec<u64> = names.into_iter().map(|name| encoder.asset(&one_line(name))).collect();
+    Ok(property.samples(encoder.samples(times, &values)?))
+}
+
+/// A path as tables of names have it.
+fn one_line(path: &str) -> String {
+    path.chars().map(|c| if c.is_control() { '_' } else { c }).collect()
 }

@@ -79,7 +79,8 @@ impl<W: Write + Seek> MeshWriter<W> {
         let mut tree = Tree::new(paths.chain(surface.is_empty().then_some("")), &scene.name);
         let (mut meshes, mut materials, mut bindings) = (Vec::new(), None, Vec::new());
         if !surface.materials.is_empty() {
-            let (group, paths) = material::materials(&mut encoder, surface, &format!("/{}", tree.nodes[0].name))?;
+            let root = format!("/{}", tree.nodes[0].name);
+            let (group, paths) = material::materials(&mut encoder, surface, &root, &scene.codes)?;
             (materials, bindings) = (Some(group), paths);
         }
         for (part, range) in surface.ranges(faces) {
