@@ -26,7 +26,7 @@ fn coded() -> (Vec<u8>, Vec<Vec<f32>>) {
     let (basis, _) = CageBasis::of(&MeanValue, &checked, &rest.mesh.points, None, None).unwrap().unwrap();
     let hierarchy = Hierarchy::new(&rest.mesh.faces, rest.mesh.points.len());
     let meshes = ((&rest.mesh, Some(&rest)), (&mesh, Some(&cage)));
-    let mut writer = ContainerWriter::with_meshes(Vec::new(), &header(4), meshes.0, meshes.1).unwrap();
+    let mut writer = ContainerWriter::with_meshes(Vec::new(), &header(4), meshes.0, meshes.1, &[]).unwrap();
     let cages: Vec<Vec<f32>> = (0..FRAMES).map(|k| frame(k, 4)).collect();
     let mut decoded = Vec::new();
     for group in cages.chunks(4) {

@@ -44,7 +44,7 @@ fn small_file_of_large_sections() -> Vec<u8> {
     residual.extend(64_u32.to_le_bytes());
     residual.extend([0; 64]);
     let mut writer =
-        ContainerWriter::with_meshes(Vec::new(), &header(4), (&rest.mesh, Some(&rest)), (&cage, None)).unwrap();
+        ContainerWriter::with_meshes(Vec::new(), &header(4), (&rest.mesh, Some(&rest)), (&cage, None), &[]).unwrap();
     for _ in 0..2 {
         writer.write_group(&cages, Some(&residual), &[(0.5, 1.5); FRAMES]).unwrap();
     }

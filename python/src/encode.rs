@@ -197,8 +197,8 @@ pub(crate) fn design_options(
         let work = move |caller: Caller<()>| {
             let before_step = |_| caller.tell(TRYING, 0.0);
             let context = PrepareContext { before_step: &before_step, ..PrepareContext::default() };
-            let sizes =
-                CageSizes { goal, rest: &rest, system, frames: &samples, total, memory: Memory::half_of_free() };
+            let (components, memory) = (None, Memory::half_of_free());
+            let sizes = CageSizes { goal, rest: &rest, components, system, frames: &samples, total, memory };
             sizes.best(|cage: &Cage, rest| {
                 let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
                 Solver::prepare_with(system, cage, &rest.points, options, &context)

@@ -14,6 +14,7 @@ use super::service::ServiceCommand;
 use super::transfer_args::{EditArgs, TransferArgs};
 use cager_cages::Style;
 use cager_capture::decode::Layer;
+use cager_capture::design::PerPart;
 use cager_capture::memory::Memory;
 use cager_capture::sizes::bytes;
 use cager_compare::report_page::Up;
@@ -181,6 +182,10 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "N", conflicts_with_all = ["cage", "mean_error"],
           value_parser = clap::value_parser!(u32).range(4..=1_500))]
     pub(crate) cage_vertices: Option<u32>,
+
+    /// Whether the designed cage has components that carry a part of the model each.
+    #[arg(long, value_parser = names::per_part(), value_name = "HOW", default_value = "auto", conflicts_with = "cage")]
+    pub(crate) per_part: PerPart,
 
     /// What the designed cage is for [default: free with mean value coordinates, editable with others].
     #[arg(long, value_parser = names::style(), value_name = "STYLE", conflicts_with = "cage")]

@@ -145,7 +145,7 @@ fn designed(
     warn_of_departures(&files);
     let mesh = start.as_ref().map(|(_, model)| TriMesh::from(model));
     let start_mesh = start.as_ref().zip(mesh.as_ref()).map(|((path, _), mesh)| (path.as_path(), mesh));
-    let found = design::design((&args.rest[0], rest), (frames_path, &frames), start_mesh, &options)?;
+    let found = design::design((&args.rest[0], rest), (frames_path, &frames), start_mesh, None, &options)?;
     let report = design_report(&found, &options, frames.len());
     warnings.extend(found.warnings);
     // An artist's cage keeps its quads.

@@ -2,8 +2,8 @@
 
 use super::progress;
 use anyhow::{Result, bail};
-use cager_cages::{Design, DesignError, DesignOptions, Goal, Progress};
-use cager_capture::design::default_vertices;
+use cager_cages::{Components, Design, DesignError, DesignOptions, Goal, Progress};
+use cager_capture::design::{default_vertices, design_components};
 use cager_core::cage::CageError;
 use cager_geometry::mesh::{Model, TriMesh};
 use std::ops::ControlFlow;
@@ -27,6 +27,7 @@ pub(super) fn design(
     rest: (&Path, &Model),
     frames: (&Path, &[Vec<f64>]),
     start: Option<(&Path, &TriMesh)>,
+    components: Option<&Components>,
     options: &DesignOptions,
 ) -> Result<Design> {
     const PARTS: u64 = 1000;
@@ -39,7 +40,10 @@ pub(super) fn design(
         ControlFlow::Continue(())
     };
     let start_mesh = start.map(|(_, mesh)| mesh);
-    let result = cager_cages::design(rest.1, frames.1, start_mesh, options, &mut watch);
+    let result = match start_mesh {
+        Some(_) => cager_cages::design(rest.1, frames.1, start_mesh, options, &mut watch),
+        None => design_components(components, rest.1, frames.1, options, &mut watch),
+    };
     bar.finish_and_clear();
     result.map_err(|error| {
         let path = match &error {

@@ -11,7 +11,7 @@ use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum
 use super::{design, encode_remote, grouped, human_bytes, progress, tell, warn, warning};
 use anyhow::{Context, Result};
 use cager_capture::coding::Goal;
-use cager_capture::design::{read_frames, report as design_report};
+use cager_capture::design::{components, read_frames, report as design_report};
 use cager_capture::encode::{ChooseSpectrum, Encode, EncodeError, EncodeProgress, sample_frames};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::memory::{Memory, free_bytes};
@@ -131,16 +131,23 @@ struct Designed {
 
 /// A cage from the capture itself.
 fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Cage, Designed)> {
-    let options = sized_design(args, files, rest)?;
     let frames = read_frames(files).map_err(|error| name_files(error, args))?;
-    let design = design::design((&args.rest, rest), (&args.frames, &frames), None, &options)?;
+    design_options(args, rest.points.len())?;
+    let vertices = args.design.cage_vertices.map(|vertices| vertices as usize);
+    let components = components(args.design.per_part, args.solver.coordinates, rest, &frames, vertices);
+    let components = components.as_ref();
+    let options = sized_design(args, files, rest, components)?;
+    let design = design::design((&args.rest, rest), (&args.frames, &frames), None, components, &options)?;
     warn(&design.warnings);
     if design.missed {
         tell("what the cage leaves is coded beside it, so that the mean error holds\n")?;
     }
     let designed =
         Designed { report: design_report(&design, &options, frames.len()), seconds: 0.0, missed: design.missed };
-    let cage = Cage::new(design.cage).with_context(|| args.rest.display().to_string())?;
+    let cage = design.into_cage().with_context(|| args.rest.display().to_string())?;
+    if let Some(components) = components {
+        tell(&format!("the cage has {} components, which carry some of the parts each\n", components.len()))?;
+    }
     Ok((cage, designed))
 }
 

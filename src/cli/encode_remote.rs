@@ -9,6 +9,7 @@ use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemotePr
 use anyhow::{Context, Result, anyhow, bail};
 use cager_cages::DesignOptions;
 use cager_capture::coding::Goal;
+use cager_capture::design::PerPart;
 use cager_capture::encode::Encoded;
 use cager_capture::frames::CaptureFiles;
 use cager_client::messages::SessionOptions;
@@ -37,6 +38,15 @@ pub(super) fn run(
 ) -> Result<()> {
     if cage.is_none() {
         design_options(args, rest.points.len())?;
+    }
+    if args.design.per_part == PerPart::Yes {
+        bail!("--per-part: a service makes one cage for all parts; encode here for a component for each part");
+    }
+    if let (Some(path), Some(false)) = (&args.cage, cage.map(|cage| cage.carriers().is_empty())) {
+        bail!(
+            "{}: its cage has components that carry a part of the model each, which a service does not know; encode here",
+            path.display()
+        );
     }
     let units = files.open()?.units();
     let is_placed = files.origin.is_some() || units != Units::UNKNOWN;
@@ -94,7 +104,7 @@ pub(super) fn run(
         Some(_) => DesignOptions::default(),
         // A session has its cage.
         None if args.session.is_some() => DesignOptions::default(),
-        None => sized_design(args, files, rest)?,
+        None => sized_design(args, files, rest, None)?,
     };
     let size_seconds = clock_size.elapsed().as_secs_f64();
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);

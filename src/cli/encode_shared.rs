@@ -8,9 +8,9 @@ use super::outputs::Outputs;
 use super::solver_options::{check_inversion, inversion_choices, with_input_name};
 use super::{design, progress, tell, warn};
 use anyhow::{Result, bail};
-use cager_cages::DesignOptions;
+use cager_cages::{Components, DesignOptions};
 use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, InversionChoices};
-use cager_capture::design::{most_vertices, usual_options};
+use cager_capture::design::{PerPart, most_vertices, usual_options};
 use cager_capture::encode::{self, Encoded, sample_frames};
 use cager_capture::frames::CaptureFiles;
 use cager_capture::memory::{Memory, free_bytes};
@@ -69,6 +69,11 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
             "--mean-error: is measured with mean value coordinates; give --cage-vertices, or leave --coordinates out"
         );
     }
+    if args.design.per_part == PerPart::Yes && !mean_value {
+        bail!(
+            "--per-part: components carry parts with mean value coordinates alone; leave --coordinates out, or --per-part"
+        );
+    }
     let points = most_vertices(args.solver.coordinates, points);
     let usual = usual_options(args.solver.coordinates);
     Ok(DesignOptions {
@@ -81,9 +86,14 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
 }
 
 /// How a cage is designed, of as many vertices as suit what the file is to meet.
-pub(super) fn sized_design(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<DesignOptions> {
+pub(super) fn sized_design(
+    args: &EncodeArgs,
+    files: &CaptureFiles,
+    rest: &Model,
+    components: Option<&Components>,
+) -> Result<DesignOptions> {
     let mut options = design_options(args, rest.points.len())?;
-    if let Some(vertices) = best_cage_size(args, files, rest)? {
+    if let Some(vertices) = best_cage_size(args, files, rest, components)? {
         tell(&format!(
             "cages of several sizes were tried on the first frames: {vertices} vertices suit what is asked for\n"
         ))?;
@@ -94,7 +104,12 @@ pub(super) fn sized_design(args: &EncodeArgs, files: &CaptureFiles, rest: &Model
 
 /// How many vertices a designed cage should have for a bound or a size, where neither they nor an
 /// error of the cage are given.
-fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<Option<usize>> {
+fn best_cage_size(
+    args: &EncodeArgs,
+    files: &CaptureFiles,
+    rest: &Model,
+    components: Option<&Components>,
+) -> Result<Option<usize>> {
     let mut reader = files.open()?;
     let total = reader.frames();
     let goal = goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, total)?;
@@ -103,7 +118,7 @@ fn best_cage_size(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Resu
     let memory = args.memory.unwrap_or_else(Memory::half_of_free);
     let system = args.solver.coordinates;
     check_inversion(&args.solver)?;
-    let sizes = CageSizes { goal, rest, system, frames: &frames, total, memory };
+    let sizes = CageSizes { goal, rest, components, system, frames: &frames, total, memory };
     let bar = progress::steps();
     bar.set_message("trying cages of several sizes");
     let best = sizes.best(|cage, rest| {

@@ -10,7 +10,7 @@ use cager_formats::missing_frames;
 use cager_geometry::surface::{Part, PartRange};
 use cager_proto::report::Report;
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -40,6 +40,8 @@ struct Inspected {
     #[serde(flatten)]
     report: Report,
     parts: Vec<PartOf>,
+    /// None where the whole cage carries every part.
+    components: Vec<Component>,
     layers: Vec<Layer>,
     sections: Vec<Section>,
 }
@@ -57,6 +59,15 @@ struct PartOf {
     materials: Vec<String>,
     /// Frames in which it is shown, from and to below, counted from 0; null where it always is.
     shown: Option<Vec<[u32; 2]>>,
+}
+
+/// A component of the cage, and the parts that it carries.
+#[derive(Serialize)]
+struct Component {
+    first_vertex: u32,
+    vertices: u32,
+    /// By their paths.
+    parts: Vec<String>,
 }
 
 /// A layer of edits.
@@ -81,7 +92,8 @@ impl Inspected {
         let report = container.report().map_err(fail)?;
         let layers = layers(&mut container).map_err(fail)?;
         let parts = parts(&mut container).map_err(fail)?;
-        Ok(Self { report, parts, layers, sections: sections(&container) })
+        let components = components(&mut container, &parts).map_err(fail)?;
+        Ok(Self { report, parts, components, layers, sections: sections(&container) })
     }
 
     fn tell(&self, path: &Path) -> Result<()> {
@@ -90,7 +102,7 @@ impl Inspected {
     }
 
     fn as_text(&self, name: &str) -> Result<String> {
-        let Self { report, parts, layers, sections } = self;
+        let Self { report, parts, components, layers, sections } = self;
         let mut out = String::new();
         writeln!(out, "{name}: {}, every checksum matches", human_bytes(report.bytes.output))?;
         let (frames, points) = (counted(report.frames, "frame"), counted(report.points, "point"));
@@ -109,6 +121,10 @@ impl Inspected {
         }
         let (vertices, faces) = (grouped(report.cage_vertices), grouped(report.cage_faces));
         writeln!(out, "  cage      {vertices} vertices, {faces} faces")?;
+        for Component { first_vertex, vertices, parts } in components {
+            let parts: Vec<String> = parts.iter().map(|path| plain(path)).collect();
+            writeln!(out, "            {vertices} vertices from {first_vertex} carry {}", parts.join(" "))?;
+        }
         // How many are read is known where not every point is.
         let read = match report.handle_indices.len() {
             count if count > 0 && report.handles != "all" => format!(" ({count})"),
@@ -181,6 +197,19 @@ fn parts(container: &mut Container) -> Result<Vec<PartOf>, cager_proto::containe
         shown: part.shown.as_ref().map(|shown| shown.iter().map(|range| [range.start, range.end]).collect()),
     };
     Ok(surface.ranges(&faces).map(of).collect())
+}
+
+/// In the order of their vertices, with the parts that they carry.
+fn components(container: &mut Container, parts: &[PartOf]) -> Result<Vec<Component>, cager_proto::container::Error> {
+    let mut components: BTreeMap<u32, Component> = BTreeMap::new();
+    for carrier in container.carriers()? {
+        let (first_vertex, vertices) = (carrier.vertices.start, carrier.vertices.end - carrier.vertices.start);
+        let new = Component { first_vertex, vertices, parts: Vec::new() };
+        let component = components.entry(first_vertex).or_insert(new);
+        let is_carried = |part: &&PartOf| carrier.points.contains(&(part.first_point as u32)) && part.points > 0;
+        component.parts.extend(parts.iter().filter(is_carried).map(|part| part.path.clone()));
+    }
+    Ok(components.into_values().collect())
 }
 
 /// All of them; frames by their numbers.

@@ -1,7 +1,7 @@
 //! Values of options that are named as the library names them, each with its help.
 
 use cager_cages::Style;
-use cager_capture::design::style_by_name;
+use cager_capture::design::{PerPart, style_by_name};
 use cager_core::coordinates;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::Handles;
@@ -62,11 +62,16 @@ const STYLES: &Names = &[
     ("editable", "For editing by hand: closed, free of self-intersection, enclosing, smooth"),
 ];
 
+const PER_PART: &Names = &[
+    ("auto", "Parts that move together share one, where components follow the motion better than one cage for all"),
+    ("yes", "One for each part"),
+    ("no", "One cage for all parts"),
+];
+
 pub(super) fn coordinates() -> impl TypedValueParser<Value = &'static dyn CoordinateSystem> {
     named(COORDINATES, coordinates::by_name)
 }
 
-/// Handles without a count of their own.
 /// A time above 0, also in parts of a second.
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|seconds| *seconds > 0.0);
@@ -74,6 +79,7 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     time.ok_or_else(|| "give seconds above 0, such as 30".to_owned())
 }
 
+/// Handles without a count of their own.
 pub(super) fn handles() -> impl TypedValueParser<Value = Handles> {
     named(HANDLES, |name| Handles::by_name(name, None))
 }
@@ -84,6 +90,15 @@ pub(super) fn regularizer() -> impl TypedValueParser<Value = Regularizer> {
 
 pub(super) fn style() -> impl TypedValueParser<Value = Style> {
     named(STYLES, style_by_name)
+}
+
+pub(super) fn per_part() -> impl TypedValueParser<Value = PerPart> {
+    named(PER_PART, |name| match name {
+        "auto" => Some(PerPart::Auto),
+        "yes" => Some(PerPart::Yes),
+        "no" => Some(PerPart::No),
+        _ => None,
+    })
 }
 
 fn named<T: Clone + Send + Sync + 'static>(

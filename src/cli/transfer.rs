@@ -162,7 +162,7 @@ fn write(
     let Transferred { mut frames, report, warnings } = moved;
     let samples = sample_frames(&mut frames, FRAMES, false)?;
     frames.rewind()?;
-    let design = design((&args.target, target), (&args.target, &samples), None, options)?;
+    let design = design((&args.target, target), (&args.target, &samples), None, None, options)?;
     warn(&design.warnings);
     let cage = Cage::new(design.cage).with_context(|| args.target.display().to_string())?;
     let encoding = Encoding {

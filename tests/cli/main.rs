@@ -7,6 +7,7 @@ mod cages_out;
 mod cases;
 mod coding;
 mod compare;
+mod components;
 mod decode;
 mod defaults;
 mod demo;

@@ -16,6 +16,18 @@ export interface TriangleMesh {
   readonly triangles: Uint32Array;
 }
 
+/** Consecutive points of a model, from those of the carrier before, and the vertices of the component of its cage that carries them. */
+export interface Carrier {
+  readonly points: number;
+  readonly firstVertex: number;
+  readonly vertices: number;
+}
+
+/** A cage: a closed mesh, each of whose components may carry some of the points of the model alone (`COMP` in docs/FORMAT.md). */
+export interface Cage extends TriangleMesh {
+  readonly carriers?: readonly Carrier[];
+}
+
 /** Everything that does not change from frame to frame. */
 export interface StaticPart {
   readonly system: CoordinateSystem;
@@ -32,7 +44,7 @@ export interface StaticPart {
   readonly corners: Uint32Array;
   /** Red, green and blue of each point of the model, in sRGB, where the file has them (`rcol` in docs/FORMAT.md). */
   readonly colors?: Uint8Array;
-  readonly cage: TriangleMesh;
+  readonly cage: Cage;
   /** Rows of three numbers of one frame: what the coordinate system's columns multiply. */
   readonly rowsPerFrame: number;
   /** Frames per second, if the file or session says. */

@@ -1,6 +1,7 @@
 //! Cages: generated around a model, checked, repaired, and designed from its motion. No files.
 
 mod bounding_shape;
+mod components;
 mod design;
 pub mod diagnosis;
 mod enclose;
@@ -8,6 +9,7 @@ mod enclose_apart;
 mod thinned;
 
 pub use bounding_shape::{BoundingShape, bounding_shape};
+pub use components::Components;
 pub use design::{
     Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Parts, Progress, Stage, Style, Unseen, design,
 };

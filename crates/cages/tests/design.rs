@@ -2,7 +2,7 @@
 
 mod common;
 
-use cager_cages::{Design, DesignError, DesignOptions, Goal, Parts, Style, design, enclose};
+use cager_cages::{Components, Design, DesignError, DesignOptions, Goal, Parts, Style, design, enclose};
 use cager_core::cage::Cage;
 use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_geometry::mesh::{Model, TriMesh};
@@ -323,4 +323,56 @@ fn of_a_large_model_all_points_stay_inside_a_cage_for_editing_spikes_among_them(
     assert!(verdict.is_valid(1), "{verdict:?}");
     let (first, last) = (&found.stages[0], found.stages.last().unwrap());
     assert!(last.validation_error < first.validation_error / 1.6, "{first:?} {last:?}");
+}
+
+/// The arm, and a copy of it beside it that moves away along x, or with it.
+fn two_arms(leaves: bool) -> (Capture, [std::ops::Range<usize>; 2]) {
+    let mut both = capture_of(16, 10, 0.0);
+    let count = both.rest.points.len();
+    let aside = |p: [f64; 3], x: f64| [p[0] + 0.4 + x, p[1], p[2]];
+    let second: Vec<[f64; 3]> = both.rest.points.iter().map(|&p| aside(p, 0.0)).collect();
+    both.rest.points.extend(second);
+    let faces: Vec<Vec<u32>> =
+        both.rest.faces.iter().map(|face| face.iter().map(|v| v + count as u32).collect()).collect();
+    faces.iter().for_each(|face| both.rest.faces.push(face));
+    for (t, frame) in both.frames.iter_mut().enumerate() {
+        let x = if leaves { 0.2 * t as f64 } else { 0.0 };
+        let moved: Vec<[f64; 3]> = frame.as_chunks().0.iter().map(|&p| aside(p, x)).collect();
+        frame.extend(moved.as_flattened());
+    }
+    (both, [0..count, count..2 * count])
+}
+
+#[test]
+fn parts_that_move_apart_get_components_that_follow_them_better() {
+    let (Capture { rest, frames }, parts) = two_arms(true);
+    let components = Components::by_motion(&rest, &frames, &parts, 60).expect("components");
+    assert_eq!(components.len(), 2);
+    let options = DesignOptions { goal: Goal::Vertices(60), ..DesignOptions::default() };
+    let go_on = &mut |_: cager_cages::Progress<'_>| ControlFlow::Continue(());
+    let found = components.design(&rest, &frames, &options, go_on).unwrap();
+    let one = design(&rest, &frames, None, &options, go_on).unwrap();
+    let error = |design: &Design| design.stages.last().unwrap().validation_error;
+    assert!(error(&found) < 0.5 * error(&one), "{} {}", error(&found), error(&one));
+    let cage = found.into_cage().unwrap();
+    assert!(cage.vertices().len() <= 60 && cage.carries(rest.points.len()));
+    let carried: Vec<_> = cage.carriers().iter().map(|carrier| carrier.points.clone()).collect();
+    let half = parts[1].start as u32;
+    assert_eq!(carried, [0..half, half..2 * half]);
+    // The same again, whatever the threads.
+    let again = components.design(&rest, &frames, &options, go_on).unwrap().into_cage().unwrap();
+    assert_eq!(again.mesh(), cage.mesh());
+}
+
+#[test]
+fn parts_that_move_together_share_one_cage_unless_each_is_to_have_its_own() {
+    let (Capture { rest, frames }, parts) = two_arms(false);
+    assert!(Components::by_motion(&rest, &frames, &parts, 60).is_none());
+    assert!(Components::by_motion(&rest, &frames, &parts[..1], 60).is_none());
+    assert!(Components::by_motion(&rest, &[], &parts, 60).is_none());
+    let each = Components::of_each(&rest, &frames, &parts);
+    assert_eq!((each.len(), each.least_vertices()), (2, 16));
+    let error = each.enclose(15).expect_err("too few").to_string();
+    assert!(error.contains("ask for at least 16"), "{error}");
+    assert_eq!(each.enclose(16).unwrap().carriers().len(), 2);
 }

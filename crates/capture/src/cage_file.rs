@@ -29,10 +29,19 @@ pub fn read_cage(
     move_to(origin, &mut model.points);
     let mesh = TriMesh::from(&model);
     let polygon_of = model.faces.polygon_of_triangle();
-    Cage::new(if flip { mesh.flipped() } else { mesh }).map_err(|cause| EncodeError::Cage {
+    let carriers = match is_container(path) {
+        true => decode::open(path)?.carriers().map_err(|cause| DecodeError::container(path, cause))?,
+        false => Vec::new(),
+    };
+    let cage = Cage::new(if flip { mesh.flipped() } else { mesh }).and_then(|cage| cage.with_carriers(carriers));
+    cage.map_err(|cause| EncodeError::Cage {
         path: path.to_owned(),
         cause: cause.renumbered(|triangle| polygon_of[triangle] as usize),
     })
+}
+
+fn is_container(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("cager"))
 }
 
 /// The mesh of a cage in the units of its model, with vertices merged that seams split.
@@ -47,7 +56,8 @@ pub fn read_welded_cage(path: &Path, units: Units, warnings: &mut Vec<String>) -
         let path = path.display();
         warnings.push(format!("{path}: the cage is {change}, as its unit and axes are not those of its model"));
     }
-    if let Some(welded) = weld(&model) {
+    // What encoding wrote has no doubled vertices, but components may touch.
+    if let Some(welded) = weld(&model).filter(|_| !is_container(path)) {
         let (path, merged) = (path.display(), welded.merged);
         warnings.push(format!("{path}: merged {merged} vertices with others in the same place, as seams split them"));
         model = welded.model;
@@ -60,7 +70,7 @@ pub fn read_welded_cage(path: &Path, units: Units, warnings: &mut Vec<String>) -
 /// # Errors
 /// A file that cannot be read.
 pub fn read_cage_mesh(path: &Path, warnings: &mut Vec<String>) -> Result<(Model, Units), EncodeError> {
-    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("cager")) {
+    if !is_container(path) {
         let read = read_mesh(path, &[])?;
         warnings.extend(read.note);
         return Ok((read.model, read.units));

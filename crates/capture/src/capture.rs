@@ -95,7 +95,8 @@ impl<W: Write> CaptureWriter<W> {
     ) -> Result<Self, container::Error> {
         let (rest, cage) = coded.unzip();
         let meshes = ((encoding.rest, rest), (encoding.cage.mesh(), cage));
-        let mut writer = ContainerWriter::with_meshes(out, &header(encoding), meshes.0, meshes.1)?;
+        let mut writer =
+            ContainerWriter::with_meshes(out, &header(encoding), meshes.0, meshes.1, encoding.cage.carriers())?;
         if let Some(plan) = &encoding.solver.preparation().plan {
             writer.add_elements(plan.as_bytes())?;
         }

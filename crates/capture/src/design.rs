@@ -2,9 +2,11 @@
 
 use crate::encode::{EncodeError, sample_frames};
 use crate::frames::CaptureFiles;
-use cager_cages::{Design, DesignOptions, Parts, Style};
+use cager_cages::{Components, Design, DesignError, DesignOptions, Parts, Progress, Style, design};
 use cager_core::coordinates::{CoordinateSystem, Green, MeanValue};
+use cager_geometry::mesh::Model;
 use cager_proto::report::{DesignReport, StageReport};
+use std::ops::{ControlFlow, Range};
 
 /// Most frames that a design looks at: to design by, to choose by, and stretches to judge by.
 pub const FRAMES: usize = 160;
@@ -32,6 +34,58 @@ pub fn most_vertices(system: &dyn CoordinateSystem, points: usize) -> usize {
 /// Those of the reader, also where it ends before the frames it announced.
 pub fn read_frames(files: &CaptureFiles) -> Result<Vec<Vec<f64>>, EncodeError> {
     sample_frames(files.open()?.as_mut(), FRAMES, false)
+}
+
+/// Whether a cage has a component for each part of a model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PerPart {
+    /// Parts that move together share one, where these follow the motion better than one cage.
+    #[default]
+    Auto,
+    /// One for each part.
+    Yes,
+    /// One cage for all parts.
+    No,
+}
+
+/// The components of a cage of so many vertices, a usual number without it, for the parts of a model
+/// as they move in these frames; `None` where that is one cage for all.
+pub fn components(
+    per_part: PerPart,
+    system: &dyn CoordinateSystem,
+    rest: &Model,
+    frames: &[Vec<f64>],
+    vertices: Option<usize>,
+) -> Option<Components> {
+    let parts: Vec<Range<usize>> = rest.surface.ranges(&rest.faces).map(|(_, range)| range.points).collect();
+    if parts.len() < 2 || frames.is_empty() || system.name() != MeanValue.name() {
+        return None;
+    }
+    match per_part {
+        PerPart::Auto => {
+            let vertices = vertices.unwrap_or_else(|| default_vertices(rest.points.len()));
+            Components::by_motion(rest, frames, &parts, vertices)
+        }
+        PerPart::Yes => Some(Components::of_each(rest, frames, &parts)),
+        PerPart::No => None,
+    }
+}
+
+/// A cage of these components, or, without any, one for all points.
+///
+/// # Errors
+/// See [`DesignError`].
+pub fn design_components(
+    components: Option<&Components>,
+    rest: &Model,
+    frames: &[Vec<f64>],
+    options: &DesignOptions,
+    watch: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+) -> Result<Design, DesignError> {
+    match components {
+        Some(components) => components.design(rest, frames, options, watch),
+        None => design(rest, frames, None, options, watch),
+    }
 }
 
 /// What is worth telling of a design from so many frames.

@@ -172,7 +172,9 @@ fn rewritten(
     // The residual belongs to the cages as they were; without it the errors are others.
     let loses = container.has_residual();
     let file = BufWriter::with_capacity(1 << 20, AtomicFile::create(output)?);
-    let mut writer = ContainerWriter::new(file, container.header(), &rest, &cage).map_err(refused)?;
+    let carriers = container.carriers().map_err(fail)?;
+    let writer = ContainerWriter::with_meshes(file, container.header(), (&rest, None), (&cage, None), &carriers);
+    let mut writer = writer.map_err(refused)?;
     if let Some(elements) = container.elements().map_err(fail)? {
         writer.add_elements(&elements).map_err(refused)?;
     }

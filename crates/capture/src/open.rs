@@ -2,11 +2,12 @@
 
 use crate::cage_file::read_cage;
 use crate::checks::{check_cage, check_frames};
-use crate::design::{default_vertices, read_frames};
+use crate::design::{PerPart, components, default_vertices, design_components, read_frames};
 use crate::encode::EncodeError;
 use crate::frames::CaptureFiles;
-use cager_cages::{DesignOptions, Goal, design};
+use cager_cages::{DesignOptions, Goal};
 use cager_core::cage::Cage;
+use cager_core::coordinates::MeanValue;
 use cager_formats::{Dropped, PictureSequence, ReadModel, read_mesh, read_split_mesh, take_pictures};
 use cager_geometry::mesh::Model;
 use cager_geometry::surface::Surface;
@@ -178,9 +179,11 @@ impl OpenOptions {
                 let goal = Goal::Vertices(vertices.unwrap_or_else(|| default_vertices(rest.points.len())));
                 let options = DesignOptions { goal, ..DesignOptions::default() };
                 let on = &mut |_: cager_cages::Progress<'_>| ControlFlow::Continue(());
-                let designed = design(&rest, &read_frames(&files)?, None, &options, on)?;
-                warnings.extend(designed.warnings);
-                Cage::new(designed.cage).map_err(|cause| EncodeError::Cage { path: path.to_owned(), cause })?
+                let frames = read_frames(&files)?;
+                let components = components(PerPart::Auto, &MeanValue, &rest, &frames, vertices);
+                let mut designed = design_components(components.as_ref(), &rest, &frames, &options, on)?;
+                warnings.append(&mut designed.warnings);
+                designed.into_cage().map_err(|cause| EncodeError::Cage { path: path.to_owned(), cause })?
             }
         };
         Ok(Capture { rest, cage, files, warnings })

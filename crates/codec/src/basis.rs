@@ -67,7 +67,8 @@ impl CageBasis {
         let sample: Vec<Point> = points.iter().step_by(every).copied().collect();
         let is_own = system.pointwise().is_some() || record.is_some_and(|record| record.rounding.is_none());
         let system: &dyn CoordinateSystem = if is_own { system } else { &MeanValue };
-        let found = system.coordinates(cage, &sample, plan.filter(|_| is_own))?;
+        let sampled_cage = cage.of_points((0..points.len() as u32).step_by(every));
+        let found = system.coordinates(&sampled_cage, &sample, plan.filter(|_| is_own))?;
         // Of normals that follow from the vertices no rows are stored.
         let values = system.values(cage);
         let rows = values.unknowns();

@@ -2,7 +2,10 @@
 
 mod common;
 
-use cager_core::cage::{Cage, CageError};
+use cager_core::cage::{Cage, CageError, Carrier};
+use cager_core::coordinates::{CoordinateSystem as _, Harmonic, MeanValue};
+use cager_core::decode::Decoder;
+use cager_core::inversion::{Solver, SolverOptions};
 use cager_geometry::mesh::{Point, TriMesh};
 use cager_geometry::spatial::Nesting;
 use common::octahedron;
@@ -177,4 +180,79 @@ fn coordinates_whose_products_overflow_are_refused() {
         Cage::new(mesh)
     };
     assert!(of_size(1.0).is_ok() && of_size(1e110).is_err());
+}
+
+/// Two octahedra, one moved along x by so much, of which the first carries points 0 to 3 and 6, the second the others.
+fn two_components(apart: f64) -> (TriMesh, Vec<Carrier>) {
+    let mut mesh = octahedron();
+    let count = mesh.vertices.len() as u32;
+    mesh.vertices.extend(octahedron().vertices.iter().map(|p| [p[0] + apart, p[1], p[2]]));
+    mesh.triangles.extend(octahedron().triangles.iter().map(|t| t.map(|v| v + count)));
+    let carrier = |points, second: bool| Carrier { points, vertices: if second { count..2 * count } else { 0..count } };
+    (mesh, vec![carrier(0..3, false), carrier(3..6, true), carrier(6..7, false)])
+}
+
+#[test]
+fn points_have_the_coordinates_of_the_component_that_carries_them_alone() {
+    // The components cut each other.
+    let (mesh, carriers) = two_components(0.3);
+    let cage = Cage::new(mesh).unwrap().with_carriers(carriers).unwrap();
+    let single = Cage::new(octahedron()).unwrap();
+    let points: Vec<Point> = (0..7).map(|k| [0.05 * f64::from(k), 0.02, 0.1 - 0.03 * f64::from(k)]).collect();
+    let phi = MeanValue.coordinates(&cage, &points, None).unwrap().phi;
+    let half = single.vertices().len();
+    for (point, p) in points.iter().enumerate() {
+        let (first, shift) = if (3..6).contains(&point) { (half, 0.3) } else { (0, 0.0) };
+        let own = MeanValue.coordinates(&single, &[[p[0] - shift, p[1], p[2]]], None).unwrap().phi;
+        for j in 0..half {
+            assert!((phi[(point, first + j)] - own[(0, j)]).abs() < 1e-12, "{point}");
+            assert_eq!(phi[(point, half - first + j)], 0.0, "{point}");
+        }
+    }
+    // Rows that are computed when they are wanted are the same.
+    let pointwise = MeanValue.pointwise().unwrap();
+    let frame: Vec<f32> = cage.vertices().as_flattened().iter().map(|&x| x as f32).collect();
+    let decoded = |decoder: Decoder| {
+        let mut out = vec![Vec::new()];
+        decoder.decode(&[&frame], &mut out);
+        out
+    };
+    let kept = Decoder::with_stored_coordinates(pointwise, &cage, &points, 2 * half);
+    let again = Decoder::with_recomputed_coordinates(pointwise, &cage, &points, 2 * half);
+    assert_eq!(decoded(kept.of_points(&[5, 0, 6, 3])), decoded(again.of_points(&[5, 0, 6, 3])));
+    let (kept, again) = (decoded(kept), decoded(again));
+    assert_eq!(kept, again);
+    let off = kept[0].iter().zip(points.as_flattened()).map(|(&a, b)| (f64::from(a) - b).abs()).fold(0.0, f64::max);
+    assert!(off < 1e-6, "{off}");
+}
+
+#[test]
+fn components_that_do_not_fit_cage_model_or_coordinates_are_refused() {
+    let (mesh, carriers) = two_components(5.0);
+    let refused = |change: &dyn Fn(&mut Vec<Carrier>)| {
+        let mut carriers = carriers.clone();
+        change(&mut carriers);
+        Cage::new(mesh.clone()).unwrap().with_carriers(carriers).expect_err("no components").to_string()
+    };
+    assert!(refused(&|c| c[1].points = 4..6).contains("point 3 is next"));
+    assert!(refused(&|c| c[1].points = 3..3).contains("3..3"));
+    assert!(refused(&|c| c[1].vertices = 6..11).contains("vertex 11 is in no component"));
+    assert!(
+        refused(&|c| c[1].vertices = 5..12).contains("vertices 0..6")
+            || refused(&|c| c[1].vertices = 5..12).contains("5..12")
+    );
+    assert!(refused(&|c| c[1].vertices = 6..u32::MAX).contains("vertex 6 is next"));
+    assert!(refused(&|c| c.truncate(1)).contains("vertex 6 is in no component"));
+    let shifted = |c: &mut Vec<Carrier>| {
+        for carrier in c {
+            carrier.vertices = if carrier.vertices.start == 0 { 0..5 } else { 5..12 };
+        }
+    };
+    assert!(refused(&shifted).contains("corners in two components"));
+    let cage = Cage::new(mesh.clone()).unwrap().with_carriers(carriers).unwrap();
+    let points: Vec<Point> = (0..40).map(|k| [0.01 * f64::from(k), 0.1 * f64::from(k % 3), 0.02]).collect();
+    let check =
+        |system| Solver::check(system, &cage, &points, SolverOptions::default(), u64::MAX).unwrap_err().to_string();
+    assert!(check(&MeanValue).contains("carry 7 points, the model has 40"), "{}", check(&MeanValue));
+    assert!(check(&Harmonic).contains("use mean value coordinates"), "{}", check(&Harmonic));
 }

@@ -126,6 +126,7 @@ fn coded(header: &Header, rest: &Model, cage: &TriMesh) -> Vec<u8> {
         header,
         (&coded_rest.mesh, Some(&coded_rest)),
         (&mesh, Some(&coded_cage)),
+        &[],
     )
     .expect("a header");
     writer.write_group(&cages, Some(&residual), &[(0.5, 1.5); 5]).expect("a group");

@@ -87,7 +87,7 @@ impl<R: Read + Seek> ContainerReader<R> {
         }
         let corrupt = |what: String| Error::corrupt(offset, what);
         let points = self.rest()?.points;
-        let cage = Cage::new(self.cage()?).map_err(|e| corrupt(e.to_string()))?;
+        let cage = self.checked_cage()?;
         let rows = system.values(&cage).unknowns();
         if rows != header.rows_per_frame as usize || rows > MAX_ROWS {
             return Err(corrupt(format!("a frame has {} rows", header.rows_per_frame)));

@@ -103,6 +103,7 @@ impl<R: Read + Seek> ContainerReader<R> {
             tag::REST_COLORS,
             tag::SURFACE,
             tag::PICTURES,
+            tag::COMPONENTS,
             tag::ELEMENTS,
             tag::NUMBERS,
             tag::REPORT,
@@ -130,7 +131,7 @@ impl<R: Read + Seek> ContainerReader<R> {
                 tag::FRAMES => ((u64::from(s.count) * u64::from(h.rows_per_frame)).saturating_mul(12), &[4]),
                 tag::ERRORS => (8 * self.frames as u64, &[4]),
                 tag::NUMBERS => (8 * self.frames as u64, &[8]),
-                tag::EDIT => (s.raw_bytes, &[4]),
+                tag::EDIT | tag::COMPONENTS => (s.raw_bytes, &[4]),
                 tag::SURFACE | tag::PICTURES | tag::ELEMENTS | tag::RESIDUAL => (s.raw_bytes, &[1]),
                 _ => (s.raw_bytes, if s.width > 0 { std::slice::from_ref(&s.width) } else { &[] }),
             };

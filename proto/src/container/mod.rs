@@ -4,6 +4,7 @@
 
 mod codec;
 mod coded;
+mod components;
 mod contents;
 mod edits;
 mod error;
@@ -125,6 +126,7 @@ pub(crate) mod tag {
         PICTURES = b"pict";
         CAGE_VERTICES = b"CVTX";
         CAGE_FACES = b"CTRI";
+        COMPONENTS = b"COMP";
         ELEMENTS = b"ELEM";
         FRAMES = b"FRAM";
         ERRORS = b"ERRS";

@@ -158,6 +158,9 @@ impl<R: Read + Seek> ContainerReader<R> {
     /// Reads and checks everything; of unknown sections, the checksum.
     pub fn verify(&mut self) -> Result<(), Error> {
         self.cage()?;
+        if !self.carriers()?.is_empty() {
+            self.checked_cage()?;
+        }
         self.layers()?;
         self.colors()?;
         self.surface()?;

@@ -120,7 +120,7 @@ impl SectionHeader {
 fn layout(tag: [u8; 4]) -> (u8, u8) {
     match tag {
         tag::REST_FACES | tag::CAGE_FACES | tag::FRAMES => (DIFFERENCE, 4),
-        tag::ERRORS | tag::EDIT => (PLANES, 4),
+        tag::ERRORS | tag::EDIT | tag::COMPONENTS => (PLANES, 4),
         tag::REST_COLORS | tag::SURFACE | tag::ELEMENTS | tag::REPORT => (PLANES, 1),
         tag::REST_POINTS | tag::CAGE_VERTICES => (PLANES, 4),
         tag::NUMBERS => (PLANES, 8),

@@ -7,6 +7,7 @@ use crate::le::f32_bytes;
 use crate::report::Report;
 use crate::wire;
 use cager_codec::{CodedMesh, CodedSurface, encode_errors};
+use cager_core::cage::Carrier;
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use cager_geometry::units::Units;
 use std::io::Write;
@@ -41,15 +42,17 @@ impl<W: Write> ContainerWriter<W> {
     /// # Errors
     /// An output that refuses; meshes that readers would refuse.
     pub fn new(out: W, header: &Header, rest: &Model, cage: &TriMesh) -> Result<Self, Error> {
-        Self::with_meshes(out, header, (rest, None), (cage, None))
+        Self::with_meshes(out, header, (rest, None), (cage, None), &[])
     }
 
-    /// The same with meshes as bytes, where given; `rest` and `cage` are what these decode to.
+    /// The same with meshes as bytes, where given; `rest` and `cage` are what these decode to. The
+    /// carriers say which component of the cage carries which points, none that all of it does.
     pub fn with_meshes(
         out: W,
         header: &Header,
         (rest, coded_rest): (&Model, Option<&CodedMesh>),
         (cage, coded_cage): (&TriMesh, Option<&CodedMesh>),
+        carriers: &[Carrier],
     ) -> Result<Self, Error> {
         // Readers refuse what expands too far; such meshes are stored as others are.
         let fits = |coded: &&CodedMesh| {
@@ -89,6 +92,8 @@ impl<W: Write> ContainerWriter<W> {
             writer.write_surface(&surface)?;
             writer.write_pictures(&surface.outline.pictures)?;
         }
+        // Before the cage, which is complete then for who reads the file as it comes.
+        writer.write_carriers(carriers)?;
         writer.positions(tag::CAGE_VERTICES, &cage.vertices, coded_cage)?;
         writer.faces(tag::CAGE_FACES, cage.triangles.as_flattened(), coded_cage)?;
         Ok(writer)

@@ -56,6 +56,7 @@ impl SlowDesigns {
             outcome?;
             Ok(Design {
                 cage,
+                carriers: Vec::new(),
                 stages: Vec::new(),
                 unseen: None,
                 timed_out: false,

@@ -101,6 +101,9 @@ export class Layout {
     const elements = this.byTag.get('ELEM');
     if (elements !== undefined && head.system !== 'harmonic')
       throw damaged(elements.offset, `coordinates ${head.system} have no boundary elements`);
+    const components = this.byTag.get('COMP');
+    if (components !== undefined && head.system !== 'mvc')
+      throw damaged(components.offset, `coordinates ${head.system} of a cage by component`);
   }
 
   chunkOf(frame: number): Chunk | undefined {
@@ -157,6 +160,7 @@ function expectedSize(fields: SectionFields, head: Head, frames: number): [reado
       return [[1], 3 * head.points];
     // What else it is to be is checked when it is decoded.
     case 'EDIT':
+    case 'COMP':
       return [[4], fields.rawBytes];
     case 'CTRI':
       return [[4], 12 * head.cageFaces];

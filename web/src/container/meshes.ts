@@ -1,6 +1,6 @@
 /** Model and cage from their sections. */
 
-import type { StaticPart, TriangleMesh, UpAxis } from '../capture';
+import type { Carrier, StaticPart, TriangleMesh, UpAxis } from '../capture';
 import type { Codec } from '../codec/client';
 import { CodedDataError } from '../codec/error';
 import { NO_POLYGONS, type Polygons } from '../codec/polygons';
@@ -10,7 +10,7 @@ import type { Head } from './head';
 import { CODEC, type Entry } from './section';
 
 /** Sections before the frames that model and cage are made of. */
-export const STATIC_TAGS: readonly string[] = ['ORIG', 'RPTS', 'RFAC', 'CVTX', 'CTRI', 'ELEM'];
+export const STATIC_TAGS: readonly string[] = ['ORIG', 'RPTS', 'RFAC', 'COMP', 'CVTX', 'CTRI', 'ELEM'];
 
 /** Sections of model and cage without which they can be shown: where one is damaged, it is left out. */
 export const OPTIONAL_TAGS: readonly string[] = ['unit', 'rcol'];
@@ -35,6 +35,7 @@ export async function decodeStatic(
   const polygons = await decodeModelFaces(head, sections.get('RFAC'), codec);
   const rest = await decodePoints(sections.get('RPTS')!, polygons, head.points, codec);
   const elements = sections.get('ELEM');
+  const components = sections.get('COMP');
   const origin = sections.get('ORIG');
   const [unit, colors] = OPTIONAL_TAGS.map((tag) => sections.get(tag));
   const up = unit && decodeUp(unit);
@@ -43,7 +44,10 @@ export async function decodeStatic(
     rest,
     cornerCounts: polygons.counts,
     corners: polygons.corners,
-    cage: await decodeCage(head, sections.get('CTRI')!, sections.get('CVTX')!, codec),
+    cage: {
+      ...(await decodeCage(head, sections.get('CTRI')!, sections.get('CVTX')!, codec)),
+      ...(components && { carriers: decodeCarriers(head, components) }),
+    },
     rowsPerFrame: head.rowsPerFrame,
     frameRate: head.frameRate,
     report: null,
@@ -93,6 +97,20 @@ async function decodeCage(head: Head, faces: Section, vertices: Section, codec: 
   if (polygons.counts.some((count) => count !== 3))
     throw damaged(entry.offset, 'the cage has faces that are no triangles');
   return { positions: await decodePoints(vertices, polygons, cageVertices, codec), triangles: polygons.corners };
+}
+
+/** Which component of the cage carries which points. That no face is cut is seen when their coordinates are computed. */
+function decodeCarriers(head: Head, { entry, payload }: Section): Carrier[] {
+  const words = new Uint32Array(decodePayload(entry, payload).slice().buffer);
+  const carriers: Carrier[] = [];
+  for (let k = 0; k + 2 < words.length; k += 3)
+    carriers.push({ points: words[k], firstVertex: words[k + 1], vertices: words[k + 2] });
+  const carried = carriers.reduce((sum, { points }) => sum + points, 0);
+  const isWrong = ({ points, firstVertex, vertices }: Carrier) =>
+    points === 0 || vertices === 0 || firstVertex + vertices > head.cageVertices;
+  if (words.length % 3 !== 0 || carried !== head.points || carriers.some(isWrong))
+    throw damaged(entry.offset, 'the components of the cage do not carry the points of the model');
+  return carriers;
 }
 
 /** Positions, x y z each; coded ones are predicted along these faces. */

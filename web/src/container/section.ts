@@ -107,7 +107,7 @@ function startsWith(bytes: Uint8Array, start: readonly number[]): boolean {
 }
 
 export const KNOWN_TAGS: ReadonlySet<string> = new Set(
-  'HEAD ORIG unit RPTS RFAC rcol surf pict CVTX CTRI ELEM FRAM resi ERRS fnum summ EDIT TOC_'.split(' '),
+  'HEAD ORIG unit RPTS RFAC rcol surf pict COMP CVTX CTRI ELEM FRAM resi ERRS fnum summ EDIT TOC_'.split(' '),
 );
 
 /** Whether a reader that does not know the section must refuse the file. */

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { CoordinateSystem, TriangleMesh } from '../capture';
-import { columnsOf, computeCoordinates } from './compute';
+import { columnsOf, computeCoordinates, rowsOf } from './compute';
 import golden from './golden.json';
 import { TiedNormals } from './tiedNormals';
 import { diagonalOf } from './topology';
@@ -48,6 +48,40 @@ describe.each(['mvc', 'green'] as const)('%s coordinates', (system) => {
         for (let j = 0; j < columns; j++) sum += phi[i * columns + j] * values[3 * j + axis];
         expect(Math.abs(sum - points[3 * i + axis]) / diagonal, `point ${i}`).toBeLessThan(1e-9);
       }
+    }
+  });
+});
+
+describe('coordinates of a cage of two components', () => {
+  const half = cage.positions.length / 3;
+  const both = {
+    positions: Float64Array.from([...cage.positions, ...cage.positions]),
+    triangles: Uint32Array.from([...cage.triangles, ...cage.triangles.map((vertex) => vertex + half)]),
+  };
+  const carrier = (points: number, firstVertex: number) => ({ points, firstVertex, vertices: half });
+  const rows = points.length / 3;
+  const carriers = [carrier(3, half), carrier(2, 0), carrier(rows - 5, half)];
+
+  it('are those in the component that carries the point, and zero elsewhere', () => {
+    const single = computeCoordinates('mvc', cage, points);
+    const phi = computeCoordinates('mvc', { ...both, carriers }, points);
+    for (let i = 0; i < rows; i++) {
+      const first = i === 3 || i === 4 ? 0 : half;
+      const row = phi.subarray(2 * half * i, 2 * half * (i + 1));
+      expect(row.subarray(first, first + half)).toEqual(single.subarray(half * i, half * (i + 1)));
+      expect(row.subarray(half - first, 2 * half - first).every((value) => value === 0)).toBe(true);
+    }
+  });
+
+  it('are the same for points from any place on, in any order', () => {
+    const phi = computeCoordinates('mvc', { ...both, carriers }, points);
+    const from = computeCoordinates('mvc', { ...both, carriers }, points.subarray(12), 4);
+    expect(from).toEqual(phi.subarray(8 * half));
+    const fill = rowsOf('mvc', { ...both, carriers });
+    const row = new Float64Array(2 * half);
+    for (const i of [4, 0, rows - 1]) {
+      fill(i, points[3 * i], points[3 * i + 1], points[3 * i + 2], row, 0);
+      expect(row).toEqual(phi.subarray(2 * half * i, 2 * half * (i + 1)));
     }
   });
 });

@@ -44,7 +44,7 @@ export async function computePhi(
   const pointsOf = (index: number) => rest.slice(3 * index * slice, 3 * (index + 1) * slice);
   if (typeof Worker === 'undefined') {
     for (let k = 0; k < slices; k++) {
-      const rows = computeCoordinates(system, cage, pointsOf(k));
+      const rows = computeCoordinates(system, cage, pointsOf(k), k * slice);
       phi.set(rows, k * slice * columns);
       await onRows?.(rows);
     }
@@ -59,7 +59,7 @@ export async function computePhi(
       let [sent, done, reported] = [0, 0, performance.now()];
       const sendNext = (worker: Worker) => {
         if (sent >= slices) return;
-        send(worker, { kind: 'points', slice: sent, points: pointsOf(sent) });
+        send(worker, { kind: 'points', slice: sent, first: sent * slice, points: pointsOf(sent) });
         sent++;
       };
       /** Rows that came before those in front of them. */

@@ -1,10 +1,9 @@
 import '../workerStarted';
-import { columnsOf, rowsOf } from './compute';
+import { columnsOf, rowsOf, type RowOfPoint } from './compute';
 import { sentence } from '../text';
-import type { RowOf } from './meanValue';
 import type { FromWorker, ToWorker } from './messages';
 
-let fill: RowOf | null = null;
+let fill: RowOfPoint | null = null;
 let row = new Float64Array(0);
 let isExact = false;
 
@@ -15,7 +14,7 @@ self.addEventListener('message', ({ data }: MessageEvent<ToWorker>) => {
       row = new Float64Array(columnsOf(data.system, data.cage));
       isExact = data.isExact;
     } else if (fill) {
-      const rows = computeRows(fill, data.points);
+      const rows = computeRows(fill, data.first, data.points);
       answer({ kind: 'rows', slice: data.slice, rows }, [rows.buffer]);
     }
   } catch (error) {
@@ -23,11 +22,15 @@ self.addEventListener('message', ({ data }: MessageEvent<ToWorker>) => {
   }
 });
 
-function computeRows(fillRow: RowOf, points: Float64Array): Float32Array<ArrayBuffer> | Float64Array<ArrayBuffer> {
+function computeRows(
+  fillRow: RowOfPoint,
+  first: number,
+  points: Float64Array,
+): Float32Array<ArrayBuffer> | Float64Array<ArrayBuffer> {
   const count = points.length / 3;
   const rows = new (isExact ? Float64Array : Float32Array)(count * row.length);
   for (let i = 0; i < count; i++) {
-    fillRow(points[3 * i], points[3 * i + 1], points[3 * i + 2], row, 0);
+    fillRow(first + i, points[3 * i], points[3 * i + 1], points[3 * i + 2], row, 0);
     rows.set(row, i * row.length);
   }
   return rows;

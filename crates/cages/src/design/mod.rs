@@ -17,7 +17,7 @@ use self::contact::{Distances, Obstacles};
 pub use self::options::{Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Progress, Stage, Style, Unseen};
 pub use self::parts::Parts;
 use self::run::{Best, Defects, Run};
-use self::samples::Samples;
+pub(crate) use self::samples::Samples;
 use self::symmetry::Symmetry;
 use crate::enclose::enclose_watched;
 use crate::thinned::Thinned;
@@ -126,7 +126,7 @@ fn obstacles(rest: &Model, outside: &[u32], style: Style, symmetry: Option<Symme
     Obstacles::new(inside, distances, symmetry)
 }
 
-fn check(rest: &Model, frames: &[Vec<f64>]) -> Result<(), DesignError> {
+pub(crate) fn check(rest: &Model, frames: &[Vec<f64>]) -> Result<(), DesignError> {
     if frames.is_empty() {
         return Err(DesignError::NoFrames);
     }

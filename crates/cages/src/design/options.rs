@@ -1,7 +1,7 @@
 //! What a design is asked for, tells on its way, and gives.
 
 use crate::EncloseError;
-use cager_core::cage::CageError;
+use cager_core::cage::{Cage, CageError, Carrier};
 use cager_geometry::mesh::TriMesh;
 use std::ops::Range;
 use std::time::Duration;
@@ -105,6 +105,8 @@ pub struct Unseen {
 pub struct Design {
     /// The cage.
     pub cage: TriMesh,
+    /// Which component of it carries which points; empty where the whole cage carries all.
+    pub carriers: Vec<Carrier>,
     /// What each stage brought, in order. The last holds the final errors.
     pub stages: Vec<Stage>,
     /// How it does where nothing of it was chosen by; `None` of too few frames to hold some back.
@@ -115,6 +117,16 @@ pub struct Design {
     pub missed: bool,
     /// What a user should know.
     pub warnings: Vec<String>,
+}
+
+impl Design {
+    /// The cage with its components.
+    ///
+    /// # Errors
+    /// See [`CageError`].
+    pub fn into_cage(self) -> Result<Cage, CageError> {
+        Cage::new(self.cage)?.with_carriers(self.carriers)
+    }
 }
 
 /// Why no cage can be designed.

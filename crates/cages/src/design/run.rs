@@ -119,7 +119,15 @@ impl Run<'_> {
             let error = self.samples.unseen_error(&cage);
             unseen = error.map(|error| Unseen { error, stretches: self.frames.1.unseen.clone() });
         }
-        Design { cage: mesh, stages: self.stages, unseen, timed_out, missed: self.missed, warnings }
+        Design {
+            cage: mesh,
+            carriers: Vec::new(),
+            stages: self.stages,
+            unseen,
+            timed_out,
+            missed: self.missed,
+            warnings,
+        }
     }
 
     fn descend(&mut self, descent: &mut Descent<'_>, warnings: &mut Vec<String>) -> ControlFlow<()> {

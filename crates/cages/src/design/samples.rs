@@ -24,7 +24,7 @@ const RIDGE: f64 = 1e-6;
 const LARGE: usize = 1_000;
 
 /// Points and their motion.
-pub(super) struct Samples {
+pub(crate) struct Samples {
     /// Rest positions, n.
     points: Vec<Point>,
     /// Training motion, n × c, over the diagonal: each frame less its best affine image of the rest
@@ -40,7 +40,7 @@ pub(super) struct Samples {
     /// Their motion in frames that neither sees, and how many these are.
     unseen: Option<(Mat<f32>, usize)>,
     /// Diagonal of the rest pose.
-    pub(super) diagonal: f64,
+    pub(crate) diagonal: f64,
 }
 
 /// Points of one step.
@@ -52,9 +52,9 @@ pub(super) struct Batch {
 
 /// Least-squares errors of a cage, over the diagonal; infinite where it has none.
 #[derive(Clone, Debug)]
-pub(super) struct Evaluation {
+pub(crate) struct Evaluation {
     pub(super) training_error: f64,
-    pub(super) validation_error: f64,
+    pub(crate) validation_error: f64,
     /// `ΦᵀΦ` of the points; `None` for large cages, whose condition number would take too long.
     gram: Option<Mat<f64>>,
 }
@@ -75,7 +75,7 @@ impl Evaluation {
 
 impl Samples {
     /// Of frames with these parts.
-    pub(super) fn new(rest: &Model, frames: &[Vec<f64>], parts: &Parts, random: &mut fastrand::Rng) -> Self {
+    pub(crate) fn new(rest: &Model, frames: &[Vec<f64>], parts: &Parts, random: &mut fastrand::Rng) -> Self {
         let of = |part: &[usize]| -> Vec<&[f64]> { part.iter().map(|&frame| frames[frame].as_slice()).collect() };
         let (designed, choosing) = (of(&parts.designed), of(&parts.choosing));
         let unseen = of(&parts.unseen.iter().cloned().flatten().collect::<Vec<_>>());
@@ -106,6 +106,12 @@ impl Samples {
         }
     }
 
+    /// Root mean square of what the judged points move in the frames that are designed from, beyond
+    /// affine images of the rest pose and over the diagonal.
+    pub(crate) fn motion(&self) -> f64 {
+        root_mean_square(self.judged_motion.as_ref(), 0..self.chosen_from, self.judged_frames[0])
+    }
+
     /// Random points and their motion.
     pub(super) fn batch(&self, points: usize, random: &mut fastrand::Rng) -> Batch {
         let mut rows = random.choose_multiple(0..self.points.len(), points);
@@ -115,7 +121,7 @@ impl Samples {
     }
 
     /// Root mean square errors of a cage.
-    pub(super) fn evaluate(&self, cage: &Cage) -> Evaluation {
+    pub(crate) fn evaluate(&self, cage: &Cage) -> Evaluation {
         let (gram, residual) = self.residual(cage, &self.judged_motion);
         let kept = (gram.nrows() <= LARGE).then_some(gram);
         let error = |columns: Range<usize>, frames: usize| {

@@ -6,7 +6,7 @@ use super::group::GroupCoder;
 use super::meshes::RestMeshes;
 use super::model::GroupDecoder;
 use crate::memory::Memory;
-use cager_cages::{EncloseOptions, enclose};
+use cager_cages::{Components, EncloseOptions, enclose};
 use cager_core::cage::Cage;
 use cager_core::coordinates::CoordinateSystem;
 use cager_core::inversion::{BATCH, PrepareError, Rows, Solver};
@@ -25,6 +25,8 @@ pub struct CageSizes<'a> {
     pub goal: Goal,
     /// The rest pose.
     pub rest: &'a Model,
+    /// The components of its cage, where it is not one for all points.
+    pub components: Option<&'a Components>,
     /// Coordinate system.
     pub system: &'a dyn CoordinateSystem,
     /// The first frames of the capture, at most [`FRAMES`].
@@ -62,8 +64,11 @@ impl CageSizes<'_> {
 
     /// Bytes of the whole file, or the mean error in its size.
     fn cost(&self, vertices: usize, prepare: &impl Fn(&Cage, &Model) -> Result<Solver, PrepareError>) -> Option<f64> {
-        let cage = enclose(self.rest, &EncloseOptions { vertices, ..EncloseOptions::default() }).ok()?;
-        let cage = Cage::new(cage).ok()?;
+        let around = || enclose(self.rest, &EncloseOptions { vertices, ..EncloseOptions::default() }).ok();
+        let cage = match self.components {
+            Some(components) => components.enclose(vertices).ok()?,
+            None => Cage::new(around()?).ok()?,
+        };
         let meshes = RestMeshes::new(self.goal, self.rest, &cage, self.system)?;
         let rest = &meshes.rest.mesh;
         let solver = prepare(&meshes.checked, rest).ok()?;

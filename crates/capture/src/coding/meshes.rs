@@ -72,6 +72,7 @@ fn coded_cage(
     let checked = |coded: CodedMesh| {
         let triangles = coded.mesh.faces.triangulated();
         let checked = Cage::new(TriMesh { vertices: coded.mesh.points.clone(), triangles }).ok()?;
+        let checked = checked.with_carriers(cage.carriers().to_vec()).ok()?;
         system.check(&checked, rest).ok()?;
         Some((coded, checked))
     };

@@ -54,7 +54,12 @@ pub(super) fn bind(
         }));
     }
     let mesh = container.cage().map_err(fail)?;
-    let cage = Cage::new(mesh).map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
+    let carriers = container.carriers().map_err(fail)?;
+    if let (Some((model, _)), false) = (other, carriers.is_empty()) {
+        return Err(DecodeError::ByComponent { path: path.to_owned(), model: model.to_owned() });
+    }
+    let cage = Cage::new(mesh).and_then(|cage| cage.with_carriers(carriers));
+    let cage = cage.map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
     let values = system.values(&cage);
     if values.unknowns() != header.rows_per_frame as usize {
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));

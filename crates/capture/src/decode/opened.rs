@@ -48,6 +48,14 @@ pub enum DecodeError {
         /// What it needs.
         what: String,
     },
+    /// Another model cannot be moved by a cage whose components carry parts of the capture's own.
+    #[error("{}: the components of its cage carry a part of its own model each, so that nothing says which of them moves {}; encode the capture with one cage (--per-part no) to move other models by it", .path.display(), .model.display())]
+    ByComponent {
+        /// The container.
+        path: PathBuf,
+        /// The other model.
+        model: PathBuf,
+    },
     /// A part that was asked for is not there.
     #[error("{}: {what}", .path.display())]
     Parts {

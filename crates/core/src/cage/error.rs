@@ -35,6 +35,8 @@ pub enum CageError {
     InwardPart { vertex: u32 },
     #[error("cage vertex {vertex} belongs to no face, so nothing would place it; delete loose vertices")]
     LooseVertex { vertex: usize },
+    #[error("the components of the cage do not fit the points that they carry: {what}")]
+    Carriers { what: String },
 }
 
 impl CageError {

@@ -1,8 +1,11 @@
 //! A validated cage: a closed, outward-oriented triangle mesh with its edges.
 
+mod carriers;
 mod defects;
 mod error;
 
+pub use carriers::Carrier;
+pub(crate) use carriers::Component;
 pub use defects::{Defects, Edge, Face};
 pub use error::CageError;
 
@@ -16,6 +19,7 @@ pub struct Cage {
     edges: Vec<Edge>,
     faces: Vec<Face>,
     diagonal: f64,
+    carriers: Vec<Carrier>,
 }
 
 impl Cage {
@@ -27,7 +31,7 @@ impl Cage {
         let Examination { defects, edges, faces } = Examination::of(&mesh);
         match defects.first(&mesh) {
             Some(error) => Err(error),
-            None => Ok(Self { diagonal: diagonal(&mesh.vertices), mesh, edges, faces }),
+            None => Ok(Self { diagonal: diagonal(&mesh.vertices), mesh, edges, faces, carriers: Vec::new() }),
         }
     }
 

@@ -10,6 +10,16 @@ pub enum CoordinatesError {
     /// A plan of boundary elements that is not one of this cage.
     #[error("the boundary elements of {system} coordinates do not fit the cage: {reason}; get the file again")]
     BadPlan { system: &'static str, reason: &'static str },
+    /// Only mean value coordinates are computed by component.
+    #[error(
+        "{system} coordinates are not for a cage of components that carry a part of the model each; use mean value coordinates (mvc), or one cage for all parts"
+    )]
+    ByComponent { system: &'static str },
+    /// Another model than the components of the cage are for.
+    #[error(
+        "the components of the cage carry {carried} points, the model has {points}; give the cage of a take of this model"
+    )]
+    Carried { carried: u32, points: usize },
 }
 
 fn counted(points: &[u32]) -> String {

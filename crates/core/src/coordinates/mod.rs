@@ -176,6 +176,8 @@ pub(crate) fn for_each_chunk(
 ) {
     let size = (CHUNK_BYTES / (12 * columns)).max(1).next_multiple_of(BLOCK_ROWS);
     for (part, points) in points.chunks(size).enumerate() {
-        work(part * size, &pointwise(cage, points));
+        let first = part * size;
+        let cage = cage.of_points(first as u32..(first + points.len()) as u32);
+        work(first, &pointwise(&cage, points));
     }
 }

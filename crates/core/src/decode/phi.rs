@@ -82,7 +82,8 @@ impl Phi {
             Self::Stored(phi) => linalg::rows_of((**phi).as_ref(), rows),
             Self::Recomputed(computed) => {
                 let points: Vec<Point> = rows.iter().map(|&i| computed.points[i as usize]).collect();
-                let mut phi = to_padded_single((computed.pointwise)(&computed.cage, &points).phi.as_ref());
+                let cage = computed.cage.of_points(rows.iter().copied());
+                let mut phi = to_padded_single((computed.pointwise)(&cage, &points).phi.as_ref());
                 let at = rows.iter().enumerate();
                 let bound = &computed.bound;
                 put(&mut phi, bound, at.filter_map(|(row, i)| Some((row, bound.places.binary_search(i).ok()?))));

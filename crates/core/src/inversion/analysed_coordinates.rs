@@ -1,6 +1,8 @@
 //! Coordinates for an analysis: of all points of a model, or of a sample of a very large one.
 
-use super::checks::{check, coordinates_bytes, outside, reject_far_points, reject_missed, reproduction_error};
+use super::checks::{
+    check, coordinates_bytes, outside, reject_carriers, reject_far_points, reject_missed, reproduction_error,
+};
 use super::{Handles, PreparationReport, PrepareContext, PrepareError, SolverOptions, Step};
 use crate::cage::Cage;
 use crate::coordinates::{CageValues, CoordinateSystem, MeanValue, PointwiseCoordinates, for_each_chunk};
@@ -46,6 +48,7 @@ impl AnalysedCoordinates {
         let (m, columns) = (values.unknowns(), values.columns());
         check(points, m, options, context.memory)?;
         reject_far_points(cage, points)?;
+        reject_carriers(system, cage, points.len())?;
         context.begin(Step::Coordinates)?;
         let copies = if handles.is_none() { 3 } else { 2 };
         let check_memory = |rows: usize| {
@@ -142,10 +145,11 @@ fn of_sample(
     let decoder = decoder.with_dependent_normals(values.dependent_normals);
     rest.truncate(unknowns);
     let sampled: Vec<Point> = sample.iter().map(|&i| points[i as usize]).collect();
+    let sampled_cage = cage.of_points(sample.iter().copied());
     let start = if decoder.dependent_normals().is_some() {
-        MeanValue.coordinates(cage, &sampled, None)?
+        MeanValue.coordinates(&sampled_cage, &sampled, None)?
     } else {
-        pointwise(cage, &sampled)
+        pointwise(&sampled_cage, &sampled)
     };
     Ok(AnalysedCoordinates {
         phi: start.phi,

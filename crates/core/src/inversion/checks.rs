@@ -2,6 +2,7 @@
 
 use super::{Handles, PrepareError, SolverOptions};
 use crate::cage::Cage;
+use crate::coordinates::{CoordinateSystem, CoordinatesError, MeanValue};
 use cager_geometry::linalg::tall_product;
 use cager_geometry::mesh::{Point, diagonal};
 use cager_geometry::spatial::Surface;
@@ -30,6 +31,20 @@ pub fn reject_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareErr
         }
     }
     Ok(())
+}
+
+/// Rejects a cage whose components are for another model or not for this system.
+pub(super) fn reject_carriers(
+    system: &dyn CoordinateSystem,
+    cage: &Cage,
+    points: usize,
+) -> Result<(), CoordinatesError> {
+    match cage.carriers().last() {
+        None => Ok(()),
+        Some(_) if system.name() != MeanValue.name() => Err(CoordinatesError::ByComponent { system: system.name() }),
+        Some(_) if cage.carries(points) => Ok(()),
+        Some(last) => Err(CoordinatesError::Carried { carried: last.points.end, points }),
+    }
 }
 
 /// Rejects a point whose coordinates are dominated by rounding.

@@ -1,7 +1,7 @@
 //! Preparation of a solver: coordinates, handles, spectrum and operator.
 
 use super::AnalysedCoordinates;
-use super::checks::{check, reject_far_points};
+use super::checks::{check, reject_carriers, reject_far_points};
 use super::{PrepareContext, PrepareError, Solver, SolverOptions, Step, least_squares};
 use crate::cage::Cage;
 use crate::coordinates::CoordinateSystem;
@@ -19,6 +19,7 @@ impl Solver {
     ) -> Result<(), PrepareError> {
         check(points, system.values(cage).unknowns(), options, memory)?;
         reject_far_points(cage, points)?;
+        reject_carriers(system, cage, points.len())?;
         Ok(system.check(cage, points)?)
     }
 

@@ -57,7 +57,7 @@ impl Materials {
         let mut materials = Self { times: times.to_vec(), ..Self::new(layer) };
         for &prim in shading.iter().filter(|_| is_moving) {
             if layer.source.target(prim, "outputs:surface")?.is_some() {
-                materials.number(layer, prim);
+                materials.number(layer, prim, "");
             }
         }
         for Material { name, textures, .. } in materials.list {
@@ -197,12 +197,7 @@ fn frame_paths(layer: &mut Layer<'_>, track: &Track, times: &[f64]) -> Result<Ve
 
 /// A material whose surface is a UsdPreviewSurface, on a mesh with these texture coordinates as the first, with the
 /// pictures of frames at these times.
-fn read_material(
-    layer: &mut Layer<'_>,
-    prim: usize,
-    first: &str,
-    times: &[f64],
-) -> Result<Option<Material>, Fault> {
+fn read_material(layer: &mut Layer<'_>, prim: usize, first: &str, times: &[f64]) -> Result<Option<Material>, Fault> {
     let (shader, output) = source(layer, prim, "outputs:surface")?;
     let is_a = |layer: &mut Layer<'_>, prim: usize, id: &str| -> Result<bool, Fault> {
         Ok(layer.tokens(prim, "info:id", 1)?.is_some_and(|told| told == [id]))

@@ -12,8 +12,9 @@ mod gradient;
 mod integral;
 
 use super::{CageValues, CoordinateSystem, Coordinates, PointwiseCoordinates, pointwise_coordinates};
-use crate::cage::{Cage, Edge, Face};
+use crate::cage::{Cage, Component, Edge, Face};
 use crate::simd::{LANES, Lanes, angle, cross, dot, gather, multiversion, store};
+use cager_geometry::linalg::zeros;
 use cager_geometry::mesh::Point;
 use cager_geometry::vector;
 use faer::MatMut;
@@ -47,7 +48,28 @@ impl CoordinateSystem for MeanValue {
     }
 }
 
+/// In each component of the cage those of the points that it carries.
 fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
+    let components = cage.components();
+    if components.is_empty() {
+        return component_coordinates(cage, points);
+    }
+    assert!(cage.carries(points.len()), "the points that the components of the cage carry");
+    let (mut phi, mut outside) = (zeros(points.len(), cage.vertices().len()), Vec::new());
+    for Component { cage, vertices, points: carried } in components {
+        let rows: Vec<u32> = carried.into_iter().flatten().collect();
+        let own: Vec<Point> = rows.iter().map(|&row| points[row as usize]).collect();
+        let found = component_coordinates(&cage, &own);
+        for (column, values) in (vertices.start as usize..).zip(found.phi.col_iter()) {
+            rows.iter().zip(values.iter()).for_each(|(&row, &value)| phi[(row as usize, column)] = value);
+        }
+        outside.extend(found.outside.iter().map(|&place| rows[place as usize]));
+    }
+    outside.sort_unstable();
+    Coordinates { phi, outside, refinement: None, plan: None }
+}
+
+fn component_coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
     pointwise_coordinates(
         points.len(),
         cage.vertices().len(),
