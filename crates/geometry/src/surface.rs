@@ -5,7 +5,7 @@ mod parts;
 mod pictures;
 mod tilts;
 
-pub use normals::{SharedNormals, numbered, sharing};
+pub use normals::{SharedNormals, Weights, numbered, sharing};
 pub use parts::{Chosen, shown_in};
 pub use pictures::{MOST_PICTURES, TILES, tile};
 pub use tilts::Tilts;
@@ -63,6 +63,9 @@ pub struct Part {
     /// none is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tilts: Option<Tilts>,
+    /// How much each of the faces around counts for a normal.
+    #[serde(skip_serializing_if = "Weights::is_usual")]
+    pub weights: Weights,
     /// How the mesh is to be subdivided.
     pub subdivision: Subdivision,
     /// Edges that a subdivision keeps sharp.

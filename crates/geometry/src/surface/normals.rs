@@ -4,7 +4,28 @@ use super::tilts::{Tilts, angles, leaning};
 use super::{Part, Subdivision};
 use crate::mesh::{Point, Polygons};
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+
+/// How much a face counts for the normals of its corners: programs differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Weights {
+    /// By its angle at the corner (Thürmer and Wüthrich 1998).
+    #[default]
+    Angle,
+    /// By its area.
+    Area,
+    /// As much as any other.
+    Equal,
+}
+
+impl Weights {
+    /// Whether files need not say it.
+    pub fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
+}
 
 /// Corners of a point that have the same of these numbers as one: a new number for each corner, counted from 0 as they
 /// come, and the first corner of each.
@@ -58,13 +79,14 @@ pub struct SharedNormals {
     firsts: Vec<usize>,
     /// The angles of each; empty where none is tilted.
     tilts: Vec<[f32; 2]>,
+    weights: Weights,
 }
 
 impl SharedNormals {
     /// Of faces and the numbers of their corners.
     pub fn new(faces: Polygons, given: &[u32]) -> Self {
         let (corners, firsts) = numbered(&faces, given);
-        Self { faces, corners, count: firsts.len(), firsts, tilts: Vec::new() }
+        Self { faces, corners, count: firsts.len(), firsts, tilts: Vec::new(), weights: Weights::default() }
     }
 
     /// Those of a part that has some, whose faces count its own points.
@@ -72,35 +94,47 @@ impl SharedNormals {
         let shared = Self::new(faces, &part.normals);
         let tilts = part.tilts.iter().flat_map(|tilts| shared.firsts.iter().map(|&corner| tilts.corners[corner]));
         let tilts = tilts.collect();
-        Self { tilts, ..shared }
+        Self { tilts, weights: part.weights, ..shared }
     }
 
-    /// The unit normals where points are, faces weighted by their angles (Thürmer and Wüthrich 1998), and tilted from
-    /// there; zero where no face has an area.
+    /// The unit normals where points are, of the faces around as these count, and tilted from there; zero where no face
+    /// has an area.
     pub fn at(&self, point: impl Fn(u32) -> Point) -> Vec<Point> {
-        let mut found = self.upright(point);
+        let mut found = self.upright(point, self.weights);
         for ([normal, edge], &angles) in found.iter_mut().zip(&self.tilts) {
             *normal = leaning(*normal, *edge, angles);
         }
         found.into_iter().map(|[normal, _]| normal.to_array()).collect()
     }
 
-    /// How the normals of a file, one for each corner, are tilted where points are.
-    fn tilts(&self, point: impl Fn(u32) -> Point, given: &[[f32; 3]]) -> Option<Tilts> {
+    /// How the faces around count for the normals of a file, one for each corner, where points are, so that the fewest
+    /// are tilted, and how these are.
+    fn tilts(&self, point: impl Fn(u32) -> Point, given: &[[f32; 3]]) -> (Weights, Option<Tilts>) {
         let mut sums = vec![DVec3::ZERO; self.count];
         for (&number, &vector) in self.corners.iter().zip(given) {
             sums[number as usize] += Vec3::from(vector).normalize_or_zero().as_dvec3();
         }
-        let found = self.upright(point).into_iter().zip(sums);
-        let tilts: Vec<_> = found.map(|([normal, edge], sum)| angles(normal, edge, sum.normalize_or_zero())).collect();
+        let mut fewest: (usize, Weights, Vec<_>) = (usize::MAX, Weights::default(), Vec::new());
+        for weights in [Weights::Angle, Weights::Area, Weights::Equal] {
+            let found = self.upright(&point, weights).into_iter().zip(&sums);
+            let tilts: Vec<_> =
+                found.map(|([normal, edge], sum)| angles(normal, edge, sum.normalize_or_zero())).collect();
+            let count = tilts.iter().flatten().count();
+            if count < fewest.0 {
+                fewest = (count, weights, tilts);
+            }
+            if count == 0 {
+                break;
+            }
+        }
+        let (count, weights, tilts) = fewest;
         let of_corner = |&number: &u32| tilts[number as usize].unwrap_or_default();
-        let is_tilted = tilts.iter().any(Option::is_some);
-        is_tilted.then(|| Tilts { corners: self.corners.iter().map(of_corner).collect() })
+        (weights, (count > 0).then(|| Tilts { corners: self.corners.iter().map(of_corner).collect() }))
     }
 
     /// The normals of the faces around, and from the point of each the edge to the next corner of the first face that has
     /// it.
-    fn upright(&self, point: impl Fn(u32) -> Point) -> Vec<[DVec3; 2]> {
+    fn upright(&self, point: impl Fn(u32) -> Point, weights: Weights) -> Vec<[DVec3; 2]> {
         let mut found = vec![[DVec3::ZERO; 2]; self.count];
         let mut begin = 0;
         for face in self.faces.iter() {
@@ -109,12 +143,16 @@ impl SharedNormals {
             // Newell's normal, of polygons that are not flat too.
             let center = places.iter().sum::<DVec3>() / count as f64;
             let area = |k: usize| (places[k] - center).cross(places[(k + 1) % count] - center);
-            let normal = (0..count).map(area).sum::<DVec3>().normalize_or_zero();
+            let area = (0..count).map(area).sum::<DVec3>();
+            let normal = area.normalize_or_zero();
             for k in 0..count {
                 let [before, after] = [(k + count - 1) % count, (k + 1) % count].map(|j| places[j] - places[k]);
-                let angle = before.cross(after).length().atan2(before.dot(after));
                 let number = self.corners[begin + k] as usize;
-                found[number][0] += normal * angle;
+                found[number][0] += match weights {
+                    Weights::Angle => normal * before.cross(after).length().atan2(before.dot(after)),
+                    Weights::Area => area,
+                    Weights::Equal => normal,
+                };
                 if self.firsts[number] == begin + k {
                     found[number][1] = after;
                 }
@@ -134,10 +172,11 @@ impl Part {
         self.take_tilts(faces, point, normals);
     }
 
-    /// The tilts alone, where it is known already which corners share a normal.
+    /// The tilts and weights alone, where it is known already which corners share a normal.
     pub fn take_tilts(&mut self, faces: &Polygons, point: impl Fn(u32) -> Point, normals: &[[f32; 3]]) {
-        let is_flat = self.subdivision == Subdivision::None;
-        self.tilts = is_flat.then(|| SharedNormals::new(faces.clone(), &self.normals).tilts(point, normals)).flatten();
+        if self.subdivision == Subdivision::None {
+            (self.weights, self.tilts) = SharedNormals::new(faces.clone(), &self.normals).tilts(point, normals);
+        }
     }
 }
 

@@ -80,6 +80,7 @@ impl Mesh {
         let bare = Part {
             normals: if has_normals { part.normals.clone() } else { Vec::new() },
             tilts: part.tilts.clone().filter(|_| has_normals),
+            weights: part.weights,
             points: part.points,
             subdivision: part.subdivision,
             ..Part::default()
