@@ -10,7 +10,7 @@ use cager_formats::{
 };
 use cager_geometry::mesh::{Model, Polygons};
 use cager_geometry::surface::{
-    Channel, Component, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface, Texture,
+    Channel, Component, Crease, FaceGroup, Material, NO_MATERIAL, Part, Subdivision, Surface, Texture, Weights,
 };
 use gltf::json::Value;
 use support::document::Built;
@@ -199,6 +199,7 @@ fn scene() -> (Model, Surface) {
         color_sets: vec![set("Col", &[[0.25, 0.5, 1.0, 1.0], [0.0, 0.0, 0.0, 0.5]], &[0, 0, 0, 0, 1, 0, 0, 0])],
         normals: vec![0, 0, 0, 0, 1, 1, 1, 1],
         tilts: None,
+        weights: Weights::default(),
         subdivision: Subdivision::CatmullClark,
         creases: vec![Crease { edge: [0, 1], sharpness: 2.0 }],
         materials: vec![1, NO_MATERIAL],
