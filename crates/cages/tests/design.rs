@@ -325,8 +325,8 @@ fn of_a_large_model_all_points_stay_inside_a_cage_for_editing_spikes_among_them(
     assert!(last.validation_error < first.validation_error / 1.6, "{first:?} {last:?}");
 }
 
-/// The arm, and a copy of it beside it that moves away along x, or with it.
-fn two_arms(leaves: bool) -> (Capture, [std::ops::Range<usize>; 2]) {
+/// The arm, and a copy of it beside it that moves away along x.
+fn two_arms() -> (Capture, [std::ops::Range<usize>; 2]) {
     let mut both = capture_of(16, 10, 0.0);
     let count = both.rest.points.len();
     let aside = |p: [f64; 3], x: f64| [p[0] + 0.4 + x, p[1], p[2]];
@@ -336,8 +336,7 @@ fn two_arms(leaves: bool) -> (Capture, [std::ops::Range<usize>; 2]) {
         both.rest.faces.iter().map(|face| face.iter().map(|v| v + count as u32).collect()).collect();
     faces.iter().for_each(|face| both.rest.faces.push(face));
     for (t, frame) in both.frames.iter_mut().enumerate() {
-        let x = if leaves { 0.2 * t as f64 } else { 0.0 };
-        let moved: Vec<[f64; 3]> = frame.as_chunks().0.iter().map(|&p| aside(p, x)).collect();
+        let moved: Vec<[f64; 3]> = frame.as_chunks().0.iter().map(|&p| aside(p, 0.2 * t as f64)).collect();
         frame.extend(moved.as_flattened());
     }
     (both, [0..count, count..2 * count])
@@ -345,7 +344,7 @@ fn two_arms(leaves: bool) -> (Capture, [std::ops::Range<usize>; 2]) {
 
 #[test]
 fn parts_that_move_apart_get_components_that_follow_them_better() {
-    let (Capture { rest, frames }, parts) = two_arms(true);
+    let (Capture { rest, frames }, parts) = two_arms();
     let components = Components::by_motion(&rest, &frames, &parts, 60).expect("components");
     assert_eq!(components.len(), 2);
     let options = DesignOptions { goal: Goal::Vertices(60), ..DesignOptions::default() };
@@ -366,10 +365,13 @@ fn parts_that_move_apart_get_components_that_follow_them_better() {
 
 #[test]
 fn parts_that_move_together_share_one_cage_unless_each_is_to_have_its_own() {
-    let (Capture { rest, frames }, parts) = two_arms(false);
-    assert!(Components::by_motion(&rest, &frames, &parts, 60).is_none());
-    assert!(Components::by_motion(&rest, &frames, &parts[..1], 60).is_none());
-    assert!(Components::by_motion(&rest, &[], &parts, 60).is_none());
+    let Capture { rest, frames } = capture_of(16, 10, 0.0);
+    let count = rest.points.len();
+    let halves = [0..count / 2, count / 2..count];
+    assert!(Components::by_motion(&rest, &frames, &halves, 60).is_none());
+    assert!(Components::by_motion(&rest, &frames, &[0..count], 60).is_none());
+    assert!(Components::by_motion(&rest, &[], &halves, 60).is_none());
+    let (Capture { rest, frames }, parts) = two_arms();
     let each = Components::of_each(&rest, &frames, &parts);
     assert_eq!((each.len(), each.least_vertices()), (2, 16));
     let error = each.enclose(15).expect_err("too few").to_string();

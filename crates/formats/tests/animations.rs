@@ -574,7 +574,7 @@ fn a_shot_from_1001_plays_at_once_and_keeps_its_numbers() {
 #[test]
 fn a_shot_from_frame_1_keeps_its_times() {
     let options = FrameOptions { numbers: vec![1.0, 2.0, 3.0], fps: 25.0, ..FrameOptions::default() };
-    let (_folder, path, notes) = written("a.glb", &waves(3), &strip(), &options);
+    let (_folder, path, notes) = written("a.gltf", &waves(3), &strip(), &options);
     assert!(!notes.iter().any(|note| note.contains("is at 0 s")), "{notes:?}");
     let times = [0.04, 0.12].map(|seconds: f32| Some(f64::from(seconds)));
     let root = Root::from_slice(&fs::read(&path).unwrap()).unwrap();

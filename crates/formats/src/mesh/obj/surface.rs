@@ -135,7 +135,8 @@ impl SurfaceLines {
                 let own = &model.points[points.clone()];
                 let local = PartRange { points, faces: faces.clone(), corners: of_corners }.local(&model.faces);
                 let normals: Vec<_> = of_part.iter().map(|&[_, normal]| self.normals[normal as usize]).collect();
-                part.take_normals(&local, |point| own[point as usize], &normals);
+                // Faces that reach into another object are refused below.
+                part.take_normals(&local, |point| own.get(point as usize).copied().unwrap_or_default(), &normals);
             }
             let materials: Vec<u32> = self.faces[faces.clone()].iter().map(|&(material, _)| material).collect();
             if materials.iter().any(|&material| material > 0) {
