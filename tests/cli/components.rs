@@ -81,13 +81,13 @@ fn parts_that_move_apart_get_components_and_every_command_takes_the_file() {
     assert!(dir.read("parts.npy") == dir.read("back.npy"));
 
     let said = dir.cager("inspect out.cager").succeeds().stdout;
-    assert!(said.contains(" carry rock\n") && said.contains(" carry bird\n") && said.contains("COMP"), "{said}");
+    assert!(said.contains(" carry /rock\n") && said.contains(" carry /bird\n") && said.contains("COMP"), "{said}");
     dir.cager("inspect --json out.cager").succeeds();
     // Its cage serves another take, edits and a picture of cages.
     let again = "encode --rest rest.obj --frames frames.npy --cage out.cager --max-error 0.001 -o again.cager";
     dir.cager(again).succeeds();
     let said = dir.cager("inspect again.cager").succeeds().stdout;
-    assert!(said.contains(" carry rock\n"), "{said}");
+    assert!(said.contains(" carry /rock\n"), "{said}");
     dir.cager("decode again.cager -o again.npy").succeeds();
     holds("again.npy");
     dir.cager("decode out.cager --cages -o cages.npy").succeeds();

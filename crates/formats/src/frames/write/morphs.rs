@@ -39,7 +39,7 @@ impl MorphWriter {
         let diagonal = diagonal.map(|diagonal| change.scale * diagonal).filter(|&diagonal| diagonal > 0.0);
         let wanted = Wanted { targets, max_error, is_guarantee, diagonal };
         check(announced, faces, &wanted).map_err(|fault| fault.at(path))?;
-        let (times, note) = times(announced.frames, options).map_err(|fault| fault.at(path))?;
+        let (times, note, at_zero) = times(announced.frames, options).map_err(|fault| fault.at(path))?;
         let (name, surface) = (name(path), &options.surface);
         let pieces = if surface.is_empty() {
             vec![Piece::bare(&name, announced.points, faces, normals)]
@@ -51,7 +51,7 @@ impl MorphWriter {
             pieces,
             materials: surface.materials.clone(),
             times,
-            numbering: [options.number(0), options.fps],
+            numbering: [at_zero, options.fps],
             origin: change.apply(options.origin.unwrap_or_default()),
             floats,
         };
@@ -139,13 +139,14 @@ fn check(announced: &Announced, faces: &Polygons, wanted: &Wanted) -> Result<(),
 /// The latest time of a first frame that is kept, in seconds: shots often begin with frame 1.
 const LATEST_BEGIN: f64 = 1.0;
 
-/// The seconds of frames, in single precision, and what is to be said of them: programs play from
-/// 0 s, and would stand still until a late first key, so such frames begin at 0.
-fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<String>), Fault> {
-    if frames < 2 {
-        return Ok((Vec::new(), None));
-    }
+/// The seconds of frames, in single precision, what is to be said of them, and the number of the
+/// frame at 0 s: programs play from there, and would stand still until a late first key, so such
+/// frames begin at 0.
+fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<String>, f64), Fault> {
     let first = options.number(0);
+    if frames < 2 {
+        return Ok((Vec::new(), None, first));
+    }
     let is_kept = (0.0..=LATEST_BEGIN).contains(&(first / options.fps));
     let begin = if is_kept { 0.0 } else { first };
     let seconds: Vec<f32> = (0..frames).map(|k| ((options.number(k) - begin) / options.fps) as f32).collect();
@@ -155,5 +156,5 @@ fn times(frames: usize, options: &FrameOptions) -> Result<(Vec<f32>, Option<Stri
         ));
     }
     let note = || format!("frame {first} is at 0 s, where programs begin to play; its number is kept in extras");
-    Ok((seconds, (!is_kept).then(note)))
+    Ok((seconds, (!is_kept).then(note), begin))
 }
