@@ -3,6 +3,8 @@
 mod faults;
 mod ledger;
 mod posts;
+mod relay;
+mod several;
 mod workers;
 
 use crate::capture::Reference;

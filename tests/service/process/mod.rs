@@ -8,6 +8,7 @@ mod page;
 mod problems;
 mod provider;
 mod restart;
+mod shards;
 mod stop;
 mod store;
 mod traces;

@@ -109,4 +109,10 @@ pub enum ConfigError {
         /// What is not.
         missing: &'static str,
     },
+    /// Something that several processes cannot share.
+    #[error("{why}")]
+    Shards {
+        /// What, and what would be possible.
+        why: String,
+    },
 }

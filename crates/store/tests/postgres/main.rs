@@ -8,6 +8,7 @@ mod claim;
 mod copying;
 mod damage;
 mod figures;
+mod members;
 mod opening;
 mod sharing;
 mod support;

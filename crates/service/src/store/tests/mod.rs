@@ -15,6 +15,7 @@ use tempfile::TempDir;
 
 mod cage_jobs;
 mod faults;
+mod import;
 mod prepared;
 mod recoveries;
 mod sessions;
