@@ -17,10 +17,13 @@ const LAYER: u32 = 48;
 /// Of values that are elements of lists.
 const IS_ELEMENT: u64 = 1 << 63;
 
+/// Prims by the prim above them and their names.
+type Places = HashMap<(Option<usize>, Name), usize>;
+
 pub(super) struct Composite<'a> {
     pub(super) layers: Vec<Loaded<'a>>,
     sites: Vec<Vec<Site>>,
-    places: HashMap<(Option<usize>, Name), usize>,
+    places: Places,
     mappings: Vec<Mapping>,
     /// Sequences of files with values, and which prims have some there.
     pub(super) sets: Vec<ClipSet>,
@@ -52,7 +55,7 @@ fn given<T: Clone>(list: &[T], most: u64, allowance: &mut Allowance) -> Result<V
 impl<'a> Composite<'a> {
     pub(super) fn new(
         layers: Vec<Loaded<'a>>,
-        (sites, places, mappings): (Vec<Vec<Site>>, HashMap<(Option<usize>, Name), usize>, Vec<Mapping>),
+        (sites, places, mappings): (Vec<Vec<Site>>, Places, Vec<Mapping>),
         (sets, clipped): (Vec<ClipSet>, Vec<Option<Clipped>>),
         allowance: u64,
     ) -> Self {
