@@ -4,6 +4,9 @@ use cager_geometry::mesh::{Point, Polygons};
 use cager_geometry::surface::{Part, SharedNormals, Weights};
 use glam::DVec3;
 
+/// How much a face counts by its area and its angle at a point.
+type Weight = fn(f64, f64) -> f64;
+
 /// A pyramid whose sides have other areas and other angles at its top.
 fn pyramid() -> (Polygons, [Point; 5]) {
     let mut faces = Polygons::new();
@@ -30,7 +33,7 @@ fn weighted(faces: &Polygons, points: &[Point; 5], weight: impl Fn(f64, f64) -> 
 #[test]
 fn normals_of_any_usual_weights_are_none_of_their_own() {
     let (faces, points) = pyramid();
-    let ways: [(Weights, fn(f64, f64) -> f64); 3] =
+    let ways: [(Weights, Weight); 3] =
         [(Weights::Angle, |_, angle| angle), (Weights::Area, |area, _| area), (Weights::Equal, |_, _| 1.0)];
     for (weights, weight) in ways {
         let given = weighted(&faces, &points, weight);
