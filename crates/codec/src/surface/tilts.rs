@@ -99,7 +99,7 @@ mod tests {
         for _ in 0..200 {
             let bytes: Vec<u8> = (0..4 * random.usize(..60)).map(|_| random.u8(..)).collect();
             match decode(&bytes, &faces, &corners) {
-                Ok(angles) => assert!(angles.as_flattened().iter().all(|x| x.abs() < 3.1416)),
+                Ok(angles) => assert!(angles.as_flattened().iter().all(|x| x.abs() < 3.15)),
                 Err(_) => failed += 1,
             }
         }
