@@ -145,9 +145,8 @@ $(FARM): Makefile
 
 buckets: $(SEAWEEDFS) ## the service with its files in S3; installs SeaweedFS, and needs PostgreSQL
 	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test blobs
-	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- process::bucket process::shards
-	CAGER_TEST_PROCESSES=2 CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test reliability -- soak::several neighbours::responses --test-threads 1
-	tests/database/stories.sh $(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- --test-threads 4 --skip process::bucket --skip process::shards --skip process::database --skip process::overload
+	CAGER_SEAWEEDFS=$(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- process::bucket
+	tests/database/stories.sh $(abspath $(SEAWEEDFS)) $(CARGO) test --workspace --locked --test service -- --test-threads 4 --skip process::bucket --skip process::database --skip process::overload
 
 $(SEAWEEDFS): Makefile
 	$(PYTHON) -m venv $(S3)
@@ -187,10 +186,10 @@ lint-deploy: $(LINT)/bin/python ## Dockerfile, manifests, alerts and dashboard a
 	$(LINT)/bin/hadolint Dockerfile
 	$(LINT)/bin/yamllint --strict -d '{extends: default, rules: {line-length: {max: 140}, document-start: disable}}' deploy
 	$(LINT)/bin/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
-	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml deploy/kubernetes-standby/*.yaml deploy/kubernetes-bucket/*.yaml deploy/kubernetes-shards/*.yaml))
+	$(LINT)/bin/kubernetes-validate --strict $(filter-out %/kustomization.yaml %/servicemonitor.yaml,$(wildcard deploy/kubernetes/*.yaml deploy/kubernetes-standby/*.yaml deploy/kubernetes-bucket/*.yaml))
 	$(LINT)/bin/python deploy/check_queries.py
 	@if command -v kubectl >/dev/null; then \
-		for folder in deploy/kubernetes deploy/kubernetes-standby deploy/kubernetes-bucket deploy/kubernetes-shards; do \
+		for folder in deploy/kubernetes deploy/kubernetes-standby deploy/kubernetes-bucket; do \
 			kubectl kustomize $$folder >$(LINT)/together.yaml && \
 			$(LINT)/bin/kubernetes-validate --strict $(LINT)/together.yaml || exit 1; \
 		done; \

@@ -85,7 +85,6 @@ short! {
     range "range" 60_000;
     tokens "tokens" 30_000;
     config "config" 30_000;
-    log "log" 3_000;
     solver "solver" 15_000;
     small_files "small-files" 6_000;
 }

@@ -3,6 +3,9 @@
 
 use super::{FaultyDisk, Op, Verdict, stopped};
 use cager_store::{Catalog, CatalogError, Change, FrameEntry, Key, NewFrame, NewRecord, Record, SqliteCatalog};
+use futures_executor::block_on;
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{AssertSqlSafe, ConnectOptions as _};
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
@@ -127,6 +130,8 @@ impl FaultyDisk {
     pub fn sql(&self, statement: &str) {
         let state = self.state();
         let file = state.catalog.as_ref().expect("a catalogue").folder.path().join("catalog.db");
-        rusqlite::Connection::open(file).and_then(|file| file.execute_batch(statement)).expect(statement);
+        let options = SqliteConnectOptions::new().filename(file);
+        let statements = sqlx::raw_sql(AssertSqlSafe(statement.to_owned()));
+        block_on(async { statements.execute(&mut options.connect().await?).await }).expect(statement);
     }
 }

@@ -8,7 +8,7 @@ use cager_client::messages::{FrameResult, Problem, Session};
 use cager_client::{Client, ClientOptions};
 use cager_service::config::ServeConfig;
 use cager_service::http::listen::serve;
-use cager_service::http::{Operated, admin, router, seen, seen_by_operators, spare};
+use cager_service::http::{admin, router, seen, seen_by_operators, spare};
 use cager_service::service::{Service, StartError};
 use cager_service::store::{Disk, StoreError};
 use std::collections::BTreeMap;
@@ -127,7 +127,7 @@ impl Inside {
     pub(crate) async fn counted_bytes(&self) -> u64 {
         let service = self.running().service.upgrade().expect("it runs");
         let request = http::Request::get("/admin/tenants").header("host", "localhost").body(axum::body::Body::empty());
-        let routes = admin(Operated::one(&service), seen_by_operators(service), true);
+        let routes = admin(Arc::clone(&service), seen_by_operators(service), true);
         let answer = routes.oneshot(request.expect("a request")).await.expect("an answer");
         let body = axum::body::to_bytes(answer.into_body(), 1 << 20).await.expect("a body");
         let tenants: Vec<serde_json::Value> = serde_json::from_slice(&body).expect("tenants");

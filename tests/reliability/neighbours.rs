@@ -1,10 +1,8 @@
 //! One tenant does its worst; the other goes on as if nothing were.
 //!
-//! `CAGER_ATTACK_SECONDS` makes the attacks longer than the few seconds that tests have time for. With `CAGER_TEST_PROCESSES=2` each of the two tenants is served
-//! by a process of its own, and one of these processes is asked for everything.
+//! `CAGER_ATTACK_SECONDS` makes the attacks longer than the few seconds that tests have time for.
 
 use crate::capture::Reference;
-use crate::database::Database;
 use crate::overload::{LOUD, QUIET, Times, tokens, watch_health};
 use crate::process::{HANG, Server, Setup};
 use crate::wire::Wire;
@@ -29,8 +27,6 @@ pub(crate) struct House {
     before: f64,
     /// The quiet tenant's times before anything happens.
     undisturbed: String,
-    /// The process that serves the loud tenant, where that is another one.
-    other: Option<Server>,
     _folder: tempfile::TempDir,
 }
 
@@ -47,16 +43,7 @@ impl House {
         let file = folder.path().join("tokens.toml");
         std::fs::write(&file, tokens()).expect("tokens");
         setup.tokens = Some(file);
-        let is_one_of_two = std::env::var("CAGER_TEST_PROCESSES").as_deref() == Ok("2");
-        let other = if is_one_of_two { Some(beside(&mut setup, folder.path()).await) } else { None };
         let server = setup.start().await;
-        if let Some(database) = setup.database.as_ref().filter(|_| is_one_of_two) {
-            let clock = Instant::now();
-            while database.sql("SELECT count(DISTINCT holder) FROM shards") != "2" {
-                assert!(clock.elapsed() < HANG, "the tenants are not shared out");
-                sleep(Duration::from_millis(20)).await;
-            }
-        }
         let make = async |token: &str| {
             let client = server.client().with_token(token);
             let session = client.create(&reference.session("house", None)).await.expect("a session");
@@ -65,24 +52,15 @@ impl House {
         let (loud, quiet) = (make(LOUD).await, make(QUIET).await);
         let http = crate::inside::http().http1_only().build().expect("a client");
         let undisturbed = String::new();
-        let mut house = Self { server, reference, loud, quiet, http, before: 0.0, undisturbed, other, _folder: folder };
+        let mut house = Self { server, reference, loud, quiet, http, before: 0.0, undisturbed, _folder: folder };
         house.begin();
         house
     }
 
     /// Measures memory from here on.
     fn begin(&mut self) {
-        self.processes().for_each(Server::forget_peak);
-        self.before = self.memory();
-    }
-
-    fn processes(&self) -> impl Iterator<Item = &Server> {
-        [&self.server].into_iter().chain(&self.other)
-    }
-
-    /// That of all processes, in MiB.
-    fn memory(&self) -> f64 {
-        self.processes().map(Server::rss).sum()
+        self.server.forget_peak();
+        self.before = self.server.rss();
     }
 
     /// As [`Self::new`], where the quiet tenant's times are known.
@@ -139,7 +117,7 @@ impl House {
         while clock.elapsed() < attack_time() {
             rounds.0.extend(self.rounds(Duration::from_millis(250)).await.0);
         }
-        let highest: f64 = self.processes().map(Server::peak).sum();
+        let highest = self.server.peak();
         stop.store(true, Ordering::Relaxed);
         let mut health = tokio::task::spawn_blocking(|| health.join()).await.expect("a thread").expect("health");
         let undisturbed = &self.undisturbed;
@@ -151,17 +129,6 @@ impl House {
         assert!(rounds.at(0.99) < Duration::from_secs(1), "the quiet tenant: {}", rounds.show());
         assert!(highest < before + most_mib, "memory grew from {before:.0} to {highest:.0} MiB");
     }
-}
-
-/// Another process beside the one that `setup` starts, on a database that both share.
-async fn beside(setup: &mut Setup, folder: &std::path::Path) -> Server {
-    setup.database = setup.database.take().or_else(Database::with_bucket);
-    assert!(setup.database.is_some(), "PostgreSQL and SeaweedFS");
-    setup.settings.push("shards=2".to_owned());
-    let other = Setup { data: folder.join("other"), ..setup.clone() };
-    // Operators ask the one that works for the loud tenant.
-    setup.settings.retain(|setting| !setting.starts_with("admin_listen="));
-    other.start().await
 }
 
 /// A client of HTTP/2 that gives each response a window of so many bytes.
@@ -234,7 +201,7 @@ async fn responses_that_nobody_reads_stay_within_their_memory() {
     sleep(Duration::from_secs(4)).await;
     let again = h2(1 << 16).get(&url).bearer_auth(LOUD).send().await.expect("an answer");
     assert_eq!(again.status(), 200);
-    let after = house.memory();
+    let after = house.server.rss();
     assert!(after < house.before + 60.0, "memory stays at {after:.0} MiB");
 }
 
@@ -255,7 +222,7 @@ async fn decodings_that_nobody_reads_stay_within_their_disk() {
         let _ = timeout(Duration::from_millis(500), wire.send(&body)).await;
         wires.push(wire);
     }
-    let spooled = || house.processes().map(Server::unnamed_files).sum::<f64>();
+    let spooled = || house.server.unnamed_files();
     let clock = Instant::now();
     while spooled() == 0.0 {
         assert!(clock.elapsed() < HANG, "nothing is stored");
@@ -399,8 +366,7 @@ async fn operators_are_answered_when_every_connection_is_taken() {
     let loud = tenants.as_array().expect("a list").iter().find(|tenant| tenant["tenant"] == "loud").expect("loud");
     assert_eq!((&loud["sessions"], loud["streams"].as_u64() > Some(0)), (&1.into(), true), "{tenants}");
     let all: serde_json::Value = house.http.get(at("/admin/sessions")).send().await.unwrap().json().await.unwrap();
-    let served = if house.other.is_some() { 1 } else { 2 };
-    assert_eq!(all["sessions"].as_array().map(Vec::len), Some(served), "{all}");
+    assert_eq!(all["sessions"].as_array().map(Vec::len), Some(2), "{all}");
     // Not for pages of elsewhere.
     let planted = house.http.post(at("/admin/drain")).header("origin", "https://evil.example").send().await.unwrap();
     assert_eq!(planted.status(), 403);

@@ -19,7 +19,6 @@ use settings::SettingKind;
 use crate::admission::Budget;
 use crate::auth::{OidcSettings, TenantLimits};
 use crate::http::listen::{Limits, Tls};
-use crate::store::Shard;
 use crate::telemetry::LogFormat;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -76,10 +75,6 @@ settings! {
     blobs: Option<String> = None, SettingKind::Text;
     /// Bytes of the bucket's files kept in the data folder.
     blobs_kept_bytes: u64 = 64 * GIB, SettingKind::Bytes { least: 0, most: 1 << 50 };
-    /// Parts into which the tenants of a database are divided, so that several processes serve them at once; 1 for one process at a time. Needs `catalog`.
-    shards: u32 = 1, SettingKind::Number { least: 1, most: cager_store::MAX_SHARDS as u64 };
-    /// Address at which the other processes reach this one, `http://10.0.0.5:8080`; by default the one it listens on.
-    advertise: Option<String> = None, SettingKind::Url;
     /// File of access tokens; without one everyone on this machine is tenant `local`.
     tokens: Option<PathBuf> = None, SettingKind::File;
     /// Address of an OpenID Connect provider whose tokens are taken as well.
@@ -258,9 +253,6 @@ impl ServeConfig {
             }
         }
         self.check_stored()?;
-        if self.shards > 1 {
-            self.check_processes()?;
-        }
         if self.oidc_keys.is_some() && self.oidc_issuer.is_none() {
             return Err(ConfigError::Half { given: "oidc_keys", missing: "oidc_issuer" });
         }
@@ -272,48 +264,7 @@ impl ServeConfig {
         if self.blobs.is_some() && self.catalog.is_none() {
             return Err(ConfigError::Half { given: "blobs", missing: "catalog" });
         }
-        if self.shards == 1 {
-            return Ok(());
-        }
-        if self.catalog.is_none() {
-            let why = "shards is set but catalog is not: name the database that the processes share by --catalog";
-            return Err(ConfigError::Shards { why: why.to_owned() });
-        }
-        let path = |url: &String| url.trim_end_matches('/').splitn(4, '/').nth(3).is_some_and(|path| !path.is_empty());
-        match self.blobs.as_ref().filter(|url| !path(url)) {
-            Some(url) => Err(ConfigError::Shards {
-                why: format!(
-                    "blobs: {url} names a bucket without a path, and each shard needs one of its own: write {}/cager",
-                    url.trim_end_matches('/')
-                ),
-            }),
-            None => Ok(()),
-        }
-    }
-
-    /// Refuses what several processes cannot share.
-    fn check_processes(&self) -> Result<(), ConfigError> {
-        if self.is_guarded() {
-            return Ok(());
-        }
-        let why = "shards is set but tokens is not: without tokens there is one tenant, and nothing to divide";
-        Err(ConfigError::Shards { why: why.to_owned() })
-    }
-
-    /// As it is for one of its shards: the first one is where all was before it was divided. What is kept is shared out among them.
-    pub fn of_shard(&self, shard: Shard) -> Self {
-        let of = u64::from(shard.of);
-        let mut config = Self {
-            prepared_disk_bytes: self.prepared_disk_bytes / of,
-            blobs_kept_bytes: self.blobs_kept_bytes / of,
-            ..self.clone()
-        };
-        if shard.number > 0 {
-            config.data = self.data.join(format!("shard-{}", shard.number));
-            let beside = |url: &String| format!("{}-shard-{}", url.trim_end_matches('/'), shard.number);
-            config.blobs = self.blobs.as_ref().map(beside);
-        }
-        config
+        Ok(())
     }
 
     /// Whether requests need tokens.

@@ -23,7 +23,6 @@ pub mod serve;
 pub mod service;
 mod session;
 mod shape_spaces;
-mod shards;
 pub mod store;
 mod sync;
 mod tasks;

@@ -1,4 +1,4 @@
-//! What the services of one process share: who may ask, threads, memory, and the places of tenants.
+//! What a process has for its service: who may ask, threads, memory, and the places of tenants.
 
 use crate::admission::{Budget, Permit};
 use crate::audit::Audit;
@@ -38,7 +38,7 @@ const UPLOAD_PIECE: u64 = 64 << 10;
 /// Sessions written as files of other programs at a time.
 const MAX_CONCURRENT_EXPORTS: u64 = 2;
 
-/// Shared by the services of all shards that this process has, and by one alone otherwise.
+/// What is there before the data folder is opened, and while it is waited for.
 pub struct Resources {
     pub(crate) access: Access,
     pub(crate) audit: Audit,
@@ -231,8 +231,7 @@ impl Resources {
     pub(crate) fn tenants_in_use(&self) -> BTreeSet<String> {
         let budgets = [&self.requests, &self.streams, &self.completing, &self.frame_memory, &self.upload_memory];
         let more = [&self.parse_slots, &self.queued_frames, &self.coding, &self.download_memory, &self.spool_space];
-        // What passes through without a token is nobody's.
-        budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).filter(|name| !name.is_empty()).collect()
+        budgets.into_iter().chain(more).flat_map(|budget| budget.tenants()).collect()
     }
 
     /// Shared resources that a tenant uses.

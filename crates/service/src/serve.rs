@@ -4,14 +4,12 @@ use crate::cage_job::local_designer;
 use crate::config::ServeConfig;
 use crate::descriptors;
 use crate::http::listen::{Limits, serve, tls_config};
-use crate::http::{Operated, admin, router, seen, seen_by_operators, spare, without_pages};
+use crate::http::{admin, router, seen, seen_by_operators, spare, without_pages};
 use crate::resources::Resources;
 use crate::service::{Service, StartError};
-use crate::shards;
-use crate::store::{LocalDisk, Shard, StoreError};
+use crate::store::{LocalDisk, StoreError};
 use crate::telemetry;
 use anyhow::{Context, Result, bail};
-use axum::Router;
 use std::io::Write;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -62,15 +60,11 @@ pub(crate) async fn run_until(
     telemetry::metrics::recorder();
     tokio::spawn(telemetry::metrics::keep(stop.clone()));
     let tls = config.tls().map(|tls| tls_config(&tls)).transpose()?;
-    if config.shards > 1 {
-        return serve_shards(config, tls, stop, listening).await;
-    }
     // What waits for a database that another process has listens to nobody, so that nobody is sent here.
     let Some(service) = start(config.clone(), &stop).await? else { return Ok(()) };
     let listener = listen(&config).await?;
     let drained = CancellationToken::new();
-    let seen_by_them = seen_by_operators(Arc::clone(&service));
-    listen_for_operators(&config, Operated::one(&service), seen_by_them, drained.clone()).await?;
+    listen_for_operators(&config, &service, drained.clone()).await?;
     listening(told(&listener, tls.is_some())?);
     let spare = spare(seen(Arc::clone(&service)));
     serve(listener, router(Arc::clone(&service)), spare, config.limits(), tls, stop).await?;
@@ -79,54 +73,6 @@ pub(crate) async fn run_until(
     if service.is_taken_over() {
         bail!("another process has taken over the database, and goes on with all sessions");
     }
-    tracing::info!("stopped");
-    Ok(())
-}
-
-/// Serves some of the shards of a database, beside other processes.
-async fn serve_shards(
-    config: ServeConfig,
-    tls: Option<Arc<rustls::ServerConfig>>,
-    stop: CancellationToken,
-    listening: impl FnOnce(SocketAddr),
-) -> Result<()> {
-    let listener = listen(&config).await?;
-    let address = match &config.advertise {
-        Some(address) => address.trim_end_matches('/').to_owned(),
-        None => {
-            let own = listener.local_addr()?;
-            if own.ip().is_unspecified() {
-                bail!(
-                    "{own}: other processes cannot be told to ask there; say by --advertise where they reach this one"
-                );
-            }
-            if own.ip().is_loopback() {
-                tracing::warn!(
-                    "only processes on this machine can ask this one at {own}: --advertise gives another address"
-                );
-            }
-            format!("{}://{own}", if tls.is_some() { "https" } else { "http" })
-        }
-    };
-    // Shards are given up while requests are still taken, which then go to the processes that get them.
-    let closing = CancellationToken::new();
-    let shards = shards::start(config.clone(), address, stop.clone()).await?;
-    let drained = CancellationToken::new();
-    let seen = shards::seen_by_operators(Arc::clone(&shards));
-    listen_for_operators(&config, shards.operated(), seen, drained.clone()).await?;
-    listening(told(&listener, tls.is_some())?);
-    let leaving = tokio::spawn({
-        let (shards, closing) = (Arc::clone(&shards), closing.clone());
-        async move {
-            stop.cancelled().await;
-            shards.leave().await;
-            closing.cancel();
-        }
-    });
-    let spare = spare(shards::seen(Arc::clone(&shards)));
-    serve(listener, shards::answered(shards), spare, config.limits(), tls, closing).await?;
-    drained.cancel();
-    leaving.await?;
     tracing::info!("stopped");
     Ok(())
 }
@@ -145,12 +91,7 @@ fn told(listener: &TcpListener, is_tls: bool) -> Result<SocketAddr> {
 }
 
 /// Serves operators until `drained`, where the settings say so.
-async fn listen_for_operators(
-    config: &ServeConfig,
-    operated: Operated,
-    seen: Router,
-    drained: CancellationToken,
-) -> Result<()> {
+async fn listen_for_operators(config: &ServeConfig, service: &Arc<Service>, drained: CancellationToken) -> Result<()> {
     let Some(address) = config.admin_listen else { return Ok(()) };
     let listener = TcpListener::bind(address).await.with_context(|| {
         format!("{address}: cannot be listened on for operators; is it in use? give another --admin-listen")
@@ -159,8 +100,9 @@ async fn listen_for_operators(
     tracing::info!(%address, "listening for operators");
     let limits = Limits { max_connections: OPERATORS, max_per_address: OPERATORS, ..config.limits() };
     let open_to_all = address.ip().is_loopback();
+    let seen = seen_by_operators(Arc::clone(service));
     let seen = if open_to_all { without_pages(seen) } else { seen };
-    let routes = admin(operated, seen.clone(), open_to_all);
+    let routes = admin(Arc::clone(service), seen.clone(), open_to_all);
     tokio::spawn(serve(listener, routes, spare(seen), limits, None, drained));
     Ok(())
 }
@@ -172,7 +114,7 @@ async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Option<A
     let mut is_told = false;
     loop {
         let (config, resources, own) = (config.clone(), Arc::clone(&resources), stop.clone());
-        let opening = move || Service::of_shard(resources, config, Arc::new(LocalDisk), Shard::WHOLE, own);
+        let opening = move || Service::open(resources, config, Arc::new(LocalDisk), own);
         let what = match tokio::task::spawn_blocking(opening).await? {
             Err(StartError::Store(StoreError::InUse { what })) => what,
             // Who waits does so through restarts of the database too.

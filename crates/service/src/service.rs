@@ -11,7 +11,7 @@ use crate::resources::Resources;
 pub use crate::resources::StartError;
 use crate::session::registry::Registry;
 use crate::shape_spaces::ShapeSpaces;
-use crate::store::{ContentKey, Disk, Opened, Shard, Shared, Store, StoreError};
+use crate::store::{ContentKey, Disk, Opened, Shared, Store, StoreError};
 use crate::tasks::blocking;
 use crate::transfers::Transfer;
 use crate::webhooks::Webhooks;
@@ -23,7 +23,7 @@ use tokio_util::sync::CancellationToken;
 /// How often it is looked whether another process has the database.
 const TAKEN_OVER_CHECK: std::time::Duration = std::time::Duration::from_millis(200);
 
-/// State shared by all request handlers. What it shares with the services of other shards is seen as if it were its own.
+/// State shared by all request handlers.
 pub struct Service {
     pub(crate) config: ServeConfig,
     resources: Arc<Resources>,
@@ -50,11 +50,6 @@ impl Deref for Service {
 }
 
 impl Service {
-    /// What it shares with other services of this process.
-    pub(crate) fn resources(&self) -> Arc<Resources> {
-        Arc::clone(&self.resources)
-    }
-
     /// Opens the data folder and resumes its sessions and jobs. Call within a tokio runtime.
     ///
     /// # Errors
@@ -76,18 +71,17 @@ impl Service {
     ) -> Result<Arc<Self>, StartError> {
         let resources = Resources::new(&config, designer)?;
         tokio::spawn(resources.access.clone().watch(stop.clone()));
-        Self::of_shard(resources, config, disk, Shard::WHOLE, stop)
+        Self::open(resources, config, disk, stop)
     }
 
-    /// The service of one shard: `config` says where its files and its catalogue are, `stop` stops it alone.
+    /// As [`Self::start`], where threads and budgets are there already: it may be tried again.
     ///
     /// # Errors
     /// See [`StartError`].
-    pub(crate) fn of_shard(
+    pub(crate) fn open(
         resources: Arc<Resources>,
         config: ServeConfig,
         disk: Arc<dyn Disk>,
-        shard: Shard,
         stop: CancellationToken,
     ) -> Result<Arc<Self>, StartError> {
         let opened = Store::open(
@@ -97,7 +91,6 @@ impl Service {
                 catalog: config.catalog.as_deref(),
                 blobs: config.blobs.as_deref(),
                 kept_bytes: config.blobs_kept_bytes,
-                shard,
             },
         )?;
         for damaged in &opened.quarantined {
@@ -217,11 +210,6 @@ impl Service {
     /// Whether another process has taken its database over.
     pub(crate) fn is_taken_over(&self) -> bool {
         self.store.is_taken_over()
-    }
-
-    /// Lets another process take its database over, after it was stopped.
-    pub(crate) fn release(&self) {
-        self.store.release();
     }
 
     /// Cancelled when the service stops.

@@ -17,11 +17,11 @@ pub fn copy(from: &dyn Catalog, to: &dyn Catalog) -> Result<usize, CatalogError>
     for record in from.records()? {
         let key = Key { kind: record.kind, id: &record.id };
         match to.record(key)? {
-            Some(there) if there.phase != Phase::Importing => continue,
+            Some(there) if there.phase != Phase::Creating => continue,
             Some(_) => to.remove(key)?,
             None => {}
         }
-        let new = NewRecord { key, created_ms: record.created_ms, phase: Phase::Importing, meta: &record.meta };
+        let new = NewRecord { key, created_ms: record.created_ms, phase: Phase::Creating, meta: &record.meta };
         to.create(new)?;
         let damage = match record.kind {
             Kind::Session => copy_frames(from, to, &record.id)?,

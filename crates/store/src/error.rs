@@ -1,8 +1,5 @@
 //! Errors of the catalogue, one variant per reaction of the caller.
 
-/// SQLite's `SQLITE_IOERR_SHMSIZE`: a full disk has no room for the index of the log.
-const NO_ROOM_FOR_INDEX: i32 = 10 | 19 << 8;
-
 /// Why something could not be stored or read back.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CatalogError {
@@ -40,21 +37,4 @@ pub enum CatalogError {
     /// Anything else.
     #[error("{0}")]
     Failed(String),
-}
-
-impl From<rusqlite::Error> for CatalogError {
-    fn from(error: rusqlite::Error) -> Self {
-        use rusqlite::Error::{FromSqlConversionFailure, IntegralValueOutOfRange, InvalidColumnType};
-        use rusqlite::ErrorCode::{DatabaseCorrupt, DiskFull, NotADatabase};
-        // No value that was written is one that cannot be read.
-        if matches!(error, FromSqlConversionFailure(..) | IntegralValueOutOfRange(..) | InvalidColumnType(..)) {
-            return Self::Damaged(error.to_string());
-        }
-        match error.sqlite_error_code() {
-            Some(DiskFull) => Self::Full,
-            Some(DatabaseCorrupt | NotADatabase) => Self::Corrupt(error.to_string()),
-            _ if error.sqlite_error().is_some_and(|error| error.extended_code == NO_ROOM_FOR_INDEX) => Self::Full,
-            _ => Self::Failed(error.to_string()),
-        }
-    }
 }

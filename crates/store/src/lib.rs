@@ -8,15 +8,20 @@ mod blobs;
 mod checksums;
 mod chunks;
 mod copy;
+mod engine;
 mod error;
+mod link;
+mod migrations;
 mod numbers;
 mod postgres;
+mod rows;
 mod sqlite;
+mod trouble;
 
 pub use blobs::{Blobs, BlobsError, Listed};
 pub use copy::copy;
 pub use error::CatalogError;
-pub use postgres::{MAX_SHARDS, Members, Membership, PostgresCatalog};
+pub use postgres::PostgresCatalog;
 pub use sqlite::SqliteCatalog;
 
 use std::fmt::Debug;
@@ -54,8 +59,6 @@ impl Kind {
 pub enum Phase {
     /// Its files are not all there yet; without more it is removed at the next start.
     Creating,
-    /// It is being taken over from a folder of an earlier version, which is complete without it.
-    Importing,
     /// It is there.
     Open,
     /// Its deletion has begun, and is finished at the next start at the latest.
@@ -78,7 +81,7 @@ pub struct NewRecord<'a> {
     pub key: Key<'a>,
     /// Creation time, milliseconds since 1970.
     pub created_ms: u64,
-    /// [`Phase::Creating`], [`Phase::Importing`] or [`Phase::Open`].
+    /// [`Phase::Creating`] or [`Phase::Open`].
     pub phase: Phase,
     /// Its description.
     pub meta: &'a [u8],
@@ -201,7 +204,7 @@ pub trait Catalog: Debug + Send + Sync {
     /// Changes a record in several ways at once. Whether there is one.
     fn change(&self, key: Key<'_>, changes: &[Change]) -> Result<bool, CatalogError>;
 
-    /// Removes a record with its frames, unless there is none. May be stopped in between, so its phase is [`Phase::Deleted`] or [`Phase::Importing`] before.
+    /// Removes a record with its frames, unless there is none. May be stopped in between, so its phase is [`Phase::Deleted`] or [`Phase::Creating`] before.
     fn remove(&self, key: Key<'_>) -> Result<(), CatalogError>;
 
     /// Stores frames of a session, replacing those that are there. Gives their entries, in the same order.

@@ -19,14 +19,13 @@ pub(crate) fn kind(number: u8) -> Option<Kind> {
 pub(crate) fn phase_number(phase: Phase) -> u8 {
     match phase {
         Phase::Creating => 0x11,
-        Phase::Importing => 0x22,
         Phase::Open => 0x44,
         Phase::Deleted => 0x78,
     }
 }
 
 pub(crate) fn phase(number: u8) -> Option<Phase> {
-    let phases = [Phase::Creating, Phase::Importing, Phase::Open, Phase::Deleted];
+    let phases = [Phase::Creating, Phase::Open, Phase::Deleted];
     phases.into_iter().find(|phase| phase_number(*phase) == number)
 }
 

@@ -43,7 +43,6 @@ pub const TARGETS: &[Target] = &[
     bodies::RANGE,
     settings::TOKENS,
     settings::CONFIG,
-    store::LOG,
     store::SOLVER,
     store::SMALL_FILES,
 ];

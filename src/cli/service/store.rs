@@ -4,7 +4,7 @@ use crate::cli::{print, tell};
 use anyhow::{Context as _, Result, bail};
 use cager_formats::{AtomicFile, Target};
 use cager_service::config::{ServeConfig, ServeFlags};
-use cager_service::store::{Completion, Kind, LocalDisk, Opened, PostgresCatalog, Shard, Shared, Store, Verified};
+use cager_service::store::{Completion, Kind, LocalDisk, Opened, Shared, Store, Verified};
 use clap::{Args, Subcommand};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -32,14 +32,6 @@ pub(crate) struct StoreArgs {
     /// The service's bucket, where it has one.
     #[arg(long, global = true, value_name = "URL")]
     blobs: Option<String>,
-
-    /// Into how many shards the service's database is divided, where it is.
-    #[arg(long, global = true, value_name = "N")]
-    shards: Option<u32>,
-
-    /// Only this one of them, from 0; otherwise all.
-    #[arg(long, global = true, value_name = "K")]
-    shard: Option<u32>,
 
     /// The service's file of settings, TOML.
     #[arg(long, global = true, value_name = "FILE")]
@@ -69,54 +61,21 @@ pub(super) fn run(args: &StoreArgs) -> Result<()> {
     let opened = open(args)?;
     match &args.command {
         StoreCommand::Usage => usage(&opened),
-        StoreCommand::Verify => verify(&opened, args.shard),
+        StoreCommand::Verify => verify(&opened),
         StoreCommand::Export { output, sessions } => export(&opened, output, sessions),
     }
 }
 
-/// Opens all that is stored: each shard, where there are several and none is named.
-fn open(args: &StoreArgs) -> Result<Vec<Opened>> {
+/// Opens what is stored.
+fn open(args: &StoreArgs) -> Result<Opened> {
     let flags = ServeFlags {
         data: args.data.clone(),
         catalog: args.catalog.clone(),
         blobs: args.blobs.clone(),
-        shards: args.shards,
         config: args.config.clone(),
         ..ServeFlags::default()
     };
     let config = ServeConfig::load_stored(args.config.as_deref(), std::env::vars(), &flags)?;
-    match args.shard {
-        Some(number) if number >= config.shards => {
-            bail!("--shard {number}: the last one has the number {}", config.shards - 1)
-        }
-        Some(number) => Ok(vec![open_shard(&config, Shard { number, of: config.shards })?]),
-        None => {
-            if let Some(url) = config.catalog.as_deref().filter(|_| config.shards > 1) {
-                let there = PostgresCatalog::divided(url)?;
-                // What is in the others would pass for whole.
-                if there != config.shards {
-                    bail!("--shards {}: the database is divided into {there}; give that number", config.shards);
-                }
-            }
-            let open = |number| {
-                let opened = open_shard(&config, Shard { number, of: config.shards });
-                opened.with_context(|| {
-                    format!(
-                        "shard {number} of {} cannot be opened; --shard K looks at another one alone",
-                        config.shards
-                    )
-                })
-            };
-            match config.shards {
-                1 => Ok(vec![open_shard(&config, Shard::WHOLE)?]),
-                shards => (0..shards).map(open).collect(),
-            }
-        }
-    }
-}
-
-fn open_shard(config: &ServeConfig, shard: Shard) -> Result<Opened> {
-    let config = config.of_shard(shard);
     // In a bucket is all that there is.
     if config.blobs.is_none() {
         check_folder(&config.data)?;
@@ -125,7 +84,6 @@ fn open_shard(config: &ServeConfig, shard: Shard) -> Result<Opened> {
         catalog: config.catalog.as_deref(),
         blobs: config.blobs.as_deref(),
         kept_bytes: config.blobs_kept_bytes,
-        shard,
     };
     Ok(Store::open(&config.data, Arc::new(LocalDisk), shared)?)
 }
@@ -159,26 +117,24 @@ struct Use {
     bytes: u64,
 }
 
-fn usage(all: &[Opened]) -> Result<()> {
+fn usage(opened: &Opened) -> Result<()> {
     let mut tenants = BTreeMap::<&str, Use>::new();
-    for opened in all {
-        let store = &opened.store;
-        for (kind, id, tenant) in objects(opened) {
-            let of = tenants.entry(tenant).or_default();
-            match kind {
-                Kind::Session => of.sessions += 1,
-                _ => of.jobs += 1,
-            }
-            of.bytes += store.bytes(kind, id)?;
+    let store = &opened.store;
+    for (kind, id, tenant) in objects(opened) {
+        let of = tenants.entry(tenant).or_default();
+        match kind {
+            Kind::Session => of.sessions += 1,
+            _ => of.jobs += 1,
         }
-        let mut keys = BTreeSet::new();
-        for session in &opened.sessions {
-            let of = tenants.entry(&session.tenant).or_default();
-            of.bytes += store.frame_bytes(&session.id)?;
-            // Sessions with the same model share it.
-            if keys.insert(session.key) {
-                of.bytes += store.content_bytes(&session.key)?;
-            }
+        of.bytes += store.bytes(kind, id)?;
+    }
+    let mut keys = BTreeSet::new();
+    for session in &opened.sessions {
+        let of = tenants.entry(&session.tenant).or_default();
+        of.bytes += store.frame_bytes(&session.id)?;
+        // Sessions with the same model share it.
+        if keys.insert(session.key) {
+            of.bytes += store.content_bytes(&session.key)?;
         }
     }
     let mut text = format!("{:<24} {:>9} {:>9} {:>16}\n", "tenant", "sessions", "jobs", "bytes");
@@ -191,51 +147,44 @@ fn usage(all: &[Opened]) -> Result<()> {
     print(&text)
 }
 
-fn verify(all: &[Opened], only: Option<u32>) -> Result<()> {
+fn verify(opened: &Opened) -> Result<()> {
     let (mut bytes, mut damaged, mut objects_read, mut models) = (0, 0, 0, 0);
     let mut note = |what: &str, id: &str, tenant: &str, found: Verified| -> Result<()> {
         bytes += found.bytes;
         damaged += usize::from(!found.damage.is_empty());
         found.damage.iter().try_for_each(|why| print(&format!("{what} {id} of {tenant}: {why}\n")))
     };
-    for opened in all {
-        let store = &opened.store;
-        for (kind, id, tenant) in objects(opened) {
-            objects_read += 1;
-            note(kind.name(), id, tenant, store.verify(kind, id)?)?;
-        }
-        let mut keys = BTreeSet::new();
-        for session in opened.sessions.iter().filter(|session| keys.insert(session.key)) {
-            models += 1;
-            note("model of the session", &session.id, &session.tenant, store.verify_content(&session.key))?;
-        }
+    let store = &opened.store;
+    for (kind, id, tenant) in objects(opened) {
+        objects_read += 1;
+        note(kind.name(), id, tenant, store.verify(kind, id)?)?;
     }
-    for aside in all.iter().flat_map(|opened| &opened.quarantined) {
+    let mut keys = BTreeSet::new();
+    for session in opened.sessions.iter().filter(|session| keys.insert(session.key)) {
+        models += 1;
+        note("model of the session", &session.id, &session.tenant, store.verify_content(&session.key))?;
+    }
+    for aside in &opened.quarantined {
         damaged += 1;
         print(&format!("{}: {}; it is in {}\n", aside.name, aside.why, aside.path.display()))?;
     }
-    let of_shards = if all.len() > 1 { format!(" in {} shards", all.len()) } else { String::new() };
-    tell(&format!("read {bytes} bytes of {objects_read} sessions and jobs and {models} models{of_shards}\n"))?;
+    tell(&format!("read {bytes} bytes of {objects_read} sessions and jobs and {models} models\n"))?;
     if damaged > 0 {
         bail!(
             "{damaged} of them are damaged; complete the sessions again whose containers are, restore the others from \
              a backup, or delete them"
         );
     }
-    match only {
-        Some(shard) => print(&format!("nothing is damaged in shard {shard}; the others were not looked at\n")),
-        None => print("nothing is damaged\n"),
-    }
+    print("nothing is damaged\n")
 }
 
-fn export(all: &[Opened], output: &Path, wanted: &[String]) -> Result<()> {
-    let sessions = || all.iter().flat_map(|opened| opened.sessions.iter().map(|session| (&opened.store, session)));
-    if let Some(unknown) = wanted.iter().find(|id| sessions().all(|(_, session)| session.id != **id)) {
+fn export(Opened { store, sessions, .. }: &Opened, output: &Path, wanted: &[String]) -> Result<()> {
+    if let Some(unknown) = wanted.iter().find(|id| sessions.iter().all(|session| session.id != **id)) {
         bail!("there is no session {unknown}");
     }
     fs::create_dir_all(output).with_context(|| format!("{}: cannot be made", output.display()))?;
     let (mut written, mut there, mut running, mut left) = (0, 0, 0, 0);
-    for (store, session) in sessions().filter(|(_, session)| wanted.is_empty() || wanted.contains(&session.id)) {
+    for session in sessions.iter().filter(|session| wanted.is_empty() || wanted.contains(&session.id)) {
         let mark = match store.completion(&session.id) {
             Ok(None) => {
                 running += 1;

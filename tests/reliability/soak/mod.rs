@@ -3,8 +3,6 @@
 mod faults;
 mod ledger;
 mod posts;
-mod relay;
-mod several;
 mod workers;
 
 use crate::capture::Reference;

@@ -8,7 +8,6 @@ mod page;
 mod problems;
 mod provider;
 mod restart;
-mod shards;
 mod stop;
 mod store;
 mod traces;

@@ -18,6 +18,8 @@ pub(crate) use inside::{Inside, SlowDesigns};
 pub(crate) use raw::{Raw, chunked};
 
 use sha2::{Digest as _, Sha256};
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{AssertSqlSafe, ConnectOptions as _};
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
@@ -43,9 +45,6 @@ pub(crate) struct TestApp {
     database: Option<Database>,
     api: Api,
 }
-
-/// Names the program of an earlier version.
-const OLDER: &str = "CAGER_TEST_OLDER";
 
 /// A service that does not answer yet.
 pub(crate) struct Waiting {
@@ -135,13 +134,6 @@ impl TestApp {
         Waiting::spawn(Arc::new(folder()), flags, environment, self.database.clone(), self.api.token.clone())
     }
 
-    /// As [`Self::elsewhere`], of the program as it is now.
-    pub(crate) fn upgraded(&self) -> Waiting {
-        let environment = self.environment.iter().filter(|(name, _)| name != OLDER).cloned().collect();
-        let (flags, token) = (self.flags.clone(), self.api.token.clone());
-        Waiting::spawn(Arc::new(folder()), flags, environment, self.database.clone(), token)
-    }
-
     /// Another one, on the same folder with the same settings.
     pub(crate) fn beside(&self) -> Waiting {
         let (place, flags, environment) = (Arc::clone(&self.place), self.flags.clone(), self.environment.clone());
@@ -171,28 +163,13 @@ impl TestApp {
 
     /// As [`Self::guarded_with`], with its catalogue in a database where one is given.
     pub(crate) fn guarded_on(database: Option<Database>, tokens: &[(&str, &str, &str)], settings: &[&str]) -> Self {
-        Self::guarded_by(Vec::new(), database, tokens, settings)
-    }
-
-    /// As [`Self::guarded_on`], by an earlier version of the program, where `CAGER_TEST_OLDER` says which.
-    pub(crate) fn older_on(database: &Database, tokens: &[(&str, &str, &str)], settings: &[&str]) -> Self {
-        let older = std::env::var(OLDER).into_iter().map(|program| (OLDER.to_owned(), program)).collect();
-        Self::guarded_by(older, Some(database.clone()), tokens, settings)
-    }
-
-    fn guarded_by(
-        environment: Vec<(String, String)>,
-        database: Option<Database>,
-        tokens: &[(&str, &str, &str)],
-        settings: &[&str],
-    ) -> Self {
         let place = folder();
         let file = place.path().join("tokens.toml");
         write_tokens(&file, tokens);
         let settings = settings.iter().flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]);
         let flags = ["--tokens".to_owned(), file.display().to_string()].into_iter().chain(settings).collect();
         let token = tokens.first().map(|(_, token, _)| (*token).to_owned());
-        Waiting::spawn(Arc::new(place), flags, environment, database, token).ready()
+        Waiting::spawn(Arc::new(place), flags, Vec::new(), database, token).ready()
     }
 
     fn launch(
@@ -243,8 +220,9 @@ impl TestApp {
         match &self.database {
             Some(database) => database.sql(sql),
             None => {
-                let file = rusqlite::Connection::open(self.data().join("catalog.db")).expect("a catalogue");
-                file.query_row(sql, [], |row| row.get(0)).expect(sql)
+                let options = SqliteConnectOptions::new().filename(self.data().join("catalog.db"));
+                let query = sqlx::query_scalar(AssertSqlSafe(sql.to_owned()));
+                futures_executor::block_on(async { query.fetch_one(&mut options.connect().await?).await }).expect(sql)
             }
         }
     }
@@ -351,15 +329,13 @@ impl Waiting {
         token: Option<String>,
     ) -> Self {
         let log = std::fs::OpenOptions::new().create(true).append(true).open(place.path().join("log"));
-        let older = environment.iter().find(|(name, _)| name == OLDER);
-        let mut process = older
-            .map_or_else(service, |(_, program)| service_of(program))
+        let mut process = service()
             .args(["--listen", "127.0.0.1:0", "--data"])
             .arg(place.path().join("data"))
             .args(database.iter().flat_map(Database::flags))
             .args(&flags)
             .envs(database.iter().flat_map(Database::environment))
-            .envs(environment.iter().filter(|(name, _)| name != OLDER).map(|(name, value)| (name, value)))
+            .envs(environment.iter().map(|(name, value)| (name, value)))
             .stdout(Stdio::piped())
             .stderr(log.expect("a log"))
             .spawn()
@@ -400,11 +376,7 @@ impl Drop for TestApp {
 
 /// `cager serve` without settings from the environment of the tests.
 pub(crate) fn service() -> Command {
-    service_of(env!("CARGO_BIN_EXE_cager"))
-}
-
-fn service_of(program: &str) -> Command {
-    let mut command = Command::new(program);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cager"));
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CAGER_") || name.starts_with("OTEL_")) {
         command.env_remove(name);
     }

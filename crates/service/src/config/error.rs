@@ -109,10 +109,4 @@ pub enum ConfigError {
         /// What is not.
         missing: &'static str,
     },
-    /// Something that several processes cannot share.
-    #[error("{why}")]
-    Shards {
-        /// What, and what would be possible.
-        why: String,
-    },
 }

@@ -31,14 +31,6 @@ pub struct ServeFlags {
     #[arg(long, value_name = "URL")]
     pub blobs: Option<String>,
 
-    /// Divide the tenants of the database into so many parts, so that several processes serve them at once [default: 1, one process at a time]. Needs --catalog.
-    #[arg(long, value_name = "N")]
-    pub shards: Option<u32>,
-
-    /// Address at which the other processes reach this one [default: the one it listens on].
-    #[arg(long, value_name = "URL")]
-    pub advertise: Option<String>,
-
     /// File of settings, TOML.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -93,8 +85,6 @@ impl ServeFlags {
             ("data", path(&self.data)),
             ("catalog", self.catalog.clone()),
             ("blobs", self.blobs.clone()),
-            ("shards", self.shards.map(|shards| shards.to_string())),
-            ("advertise", self.advertise.clone()),
             ("tokens", path(&self.tokens)),
             ("tls_certificate", path(&self.tls_certificate)),
             ("tls_key", path(&self.tls_key)),

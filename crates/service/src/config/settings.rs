@@ -13,8 +13,6 @@ pub(super) enum SettingKind {
     Text,
     /// Address of a database, in which a password may be.
     Secret,
-    /// Address of a service, without a path.
-    Url,
     Format,
     Filter,
     /// A list of names of hosts.
@@ -79,11 +77,6 @@ impl SettingKind {
                 let is_database = |text: &&str| text.starts_with("postgres://") || text.starts_with("postgresql://");
                 let why = "write the address of a database, such as postgres://USER:PASSWORD@HOST:5432/DATABASE";
                 let text = text.map(str::trim).filter(is_database);
-                text.map(|text| Value::String(text.to_owned())).ok_or_else(|| why.to_owned())
-            }
-            Self::Url => {
-                let why = "write an address such as http://10.0.0.5:8080 or http://[fd00::5]:8080";
-                let text = text.map(str::trim).filter(|text| is_service(text));
                 text.map(|text| Value::String(text.to_owned())).ok_or_else(|| why.to_owned())
             }
             Self::Format => match text {
@@ -155,12 +148,6 @@ fn items(value: &Value) -> Result<Vec<String>, String> {
     };
     let items = items.ok_or_else(|| "write a list of texts, or one text with commas between them".to_owned())?;
     Ok(items.iter().map(|item| item.trim().to_owned()).filter(|item| !item.is_empty()).collect())
-}
-
-/// Whether other processes can ask a service there.
-fn is_service(text: &str) -> bool {
-    let url = reqwest::Url::parse(text).ok();
-    url.is_some_and(|url| matches!(url.scheme(), "http" | "https") && url.has_host() && url.path() == "/")
 }
 
 /// Whether a request can be for this host, at one port or any.

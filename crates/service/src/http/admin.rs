@@ -11,7 +11,7 @@ use super::router::finished;
 use super::sessions::{PAGE, PageQuery, page_of};
 use crate::auth::Scope;
 use crate::problem::{self, ApiError};
-use crate::resources::{ResourceUse, Resources};
+use crate::resources::ResourceUse;
 use crate::service::Service;
 use crate::tasks::blocking;
 use axum::extract::{Path, Request, State};
@@ -25,44 +25,21 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio_util::sync::CancellationToken;
-
-/// What operators see and do something to: this process.
-#[derive(Clone)]
-pub struct Operated {
-    pub(crate) resources: Arc<Resources>,
-    /// Its services: one, or one for each of its shards.
-    pub(crate) services: Arc<dyn Fn() -> Vec<Arc<Service>> + Send + Sync>,
-    /// Stops it.
-    pub(crate) stop: CancellationToken,
-}
-
-impl Operated {
-    /// A process with one service.
-    pub fn one(service: &Arc<Service>) -> Self {
-        let services = vec![Arc::clone(service)];
-        Self {
-            resources: service.resources(),
-            services: Arc::new(move || services.clone()),
-            stop: service.stopping().clone(),
-        }
-    }
-}
 
 /// The router, with health and metrics as `seen` has them; with `open_to_all` no token is needed.
-pub fn admin(operated: Operated, seen: Router, open_to_all: bool) -> Router {
+pub fn admin(service: Arc<Service>, seen: Router, open_to_all: bool) -> Router {
     let routes = Router::new()
         .route("/admin/tenants", get(tenants))
         .route("/admin/sessions", get(sessions))
         .route("/admin/sessions/{id}", delete(delete_session))
         .route("/admin/drain", post(drain))
         .route("/admin/evict", post(evict));
-    let routes = routes.route_layer(from_fn_with_state(operated.resources.audit.clone(), audited));
+    let routes = routes.route_layer(from_fn_with_state(service.audit.clone(), audited));
     let routes = match open_to_all {
         true => routes.route_layer(from_fn(refuse_web_pages)),
-        false => routes.route_layer(from_fn_with_state(operated.clone(), require_admin)),
+        false => routes.route_layer(from_fn_with_state(Arc::clone(&service), require_admin)),
     };
-    let routes = seen.merge(routes.with_state(operated));
+    let routes = seen.merge(routes.with_state(service));
     let routes = routes.fallback(|| async { ApiError::new(problem::NOT_FOUND, "see the documentation for operators") });
     finished(routes)
 }
@@ -84,13 +61,13 @@ async fn refuse_web_pages(request: Request, next: Next) -> Result<Response, ApiE
 
 /// Refuses requests without a token of the scope `admin`, and all requests of a service without tokens.
 async fn require_admin(
-    State(Operated { resources, .. }): State<Operated>,
+    State(service): State<Arc<Service>>,
     mut request: Request,
     next: Next,
 ) -> Result<Response, ApiError> {
-    let grant = granted(&resources, request.headers()).await?;
-    if !resources.access.is_guarded() || grant.scope < Scope::Admin {
-        resources.rejected("scope");
+    let grant = granted(&service, request.headers()).await?;
+    if !service.access.is_guarded() || grant.scope < Scope::Admin {
+        service.rejected("scope");
         let detail = "operating the service from another machine needs a token whose scope is admin";
         return Err(ApiError::new(problem::FORBIDDEN, detail));
     }
@@ -111,15 +88,12 @@ struct TenantUse {
     holds: ResourceUse,
 }
 
-async fn tenants(State(operated): State<Operated>) -> Json<Vec<TenantUse>> {
-    let in_use = operated.resources.tenants_in_use();
+async fn tenants(State(service): State<Arc<Service>>) -> Json<Vec<TenantUse>> {
+    let in_use = service.tenants_in_use();
     let mut tenants: BTreeMap<String, (usize, u64)> = in_use.into_iter().map(|tenant| (tenant, (0, 0))).collect();
-    let services = (operated.services)();
-    let usage = services.iter().flat_map(|service| service.usage());
-    tenants.extend(usage.map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
-    let preparing = |tenant: &str| services.iter().map(|service| service.solvers.in_flight_of(tenant)).sum();
+    tenants.extend(service.usage().into_iter().map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
     let tenant = |(tenant, (sessions, stored_bytes)): (String, (usize, u64))| {
-        let holds = operated.resources.holds(&tenant, preparing(&tenant));
+        let holds = service.holds(&tenant, service.solvers.in_flight_of(&tenant));
         TenantUse { tenant, sessions, stored_bytes, holds }
     };
     Json(tenants.into_iter().map(tenant).collect())
@@ -139,11 +113,8 @@ struct AllSessions {
 }
 
 /// Sessions of all tenants, newest first, a hundred at a time.
-async fn sessions(State(operated): State<Operated>, Query(query): Query<PageQuery>) -> JsonResult<AllSessions> {
-    let (services, after) = ((operated.services)(), query.after()?);
-    let pages = services.iter().flat_map(|service| service.registry.page(None, after, PAGE + 1));
-    let mut found: Vec<_> = pages.collect();
-    found.sort_by(|a, b| b.meta.id.cmp(&a.meta.id));
+async fn sessions(State(service): State<Arc<Service>>, Query(query): Query<PageQuery>) -> JsonResult<AllSessions> {
+    let found = service.registry.page(None, query.after()?, PAGE + 1);
     let (page, next) = page_of(found, |session| session.meta.id.clone());
     let mut sessions = Vec::with_capacity(page.len());
     for session in page {
@@ -154,20 +125,18 @@ async fn sessions(State(operated): State<Operated>, Query(query): Query<PageQuer
     Ok(Json(AllSessions { sessions, next }))
 }
 
-async fn delete_session(State(operated): State<Operated>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    let services = (operated.services)();
-    let found = services.iter().find_map(|service| Some((service, service.registry.find_any(&id)?)));
+async fn delete_session(State(service): State<Arc<Service>>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
     let missing = || ApiError::new(problem::NOT_FOUND, "there is no session with this id");
-    let (service, session) = found.ok_or_else(missing)?;
+    let session = service.registry.find_any(&id).ok_or_else(missing)?;
     tracing::info!(session = %id, tenant = %session.meta.tenant, "deleted by the operator");
     service.delete(&session).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
 /// Stops the process like a signal: running requests may finish within the drain time.
-async fn drain(State(operated): State<Operated>) -> StatusCode {
+async fn drain(State(service): State<Arc<Service>>) -> StatusCode {
     tracing::info!("stopping, as the operator asked");
-    operated.stop.cancel();
+    service.stopping().cancel();
     StatusCode::ACCEPTED
 }
 
@@ -180,9 +149,8 @@ struct Evicted {
 }
 
 /// Drops cached solvers from memory, and frames of sessions that nobody uses at the moment. What is in use stays, and all can be loaded again.
-async fn evict(State(operated): State<Operated>) -> JsonResult<Evicted> {
-    let services = (operated.services)();
-    let bytes = services.iter().map(|service| service.solvers.evict()).sum();
-    let unload = move || services.iter().map(|service| service.registry.unload(Duration::ZERO)).sum();
-    Ok(Json(Evicted { bytes, sessions: blocking(unload).await? }))
+async fn evict(State(service): State<Arc<Service>>) -> JsonResult<Evicted> {
+    let bytes = service.solvers.evict();
+    let sessions = blocking(move || service.registry.unload(Duration::ZERO)).await?;
+    Ok(Json(Evicted { bytes, sessions }))
 }

@@ -61,7 +61,7 @@ pub(crate) async fn authenticate(
 }
 
 /// Whether a request changes nothing: decoding does not, although it is a POST.
-pub(crate) fn only_reads(request: &axum::extract::Request) -> bool {
+pub(super) fn only_reads(request: &axum::extract::Request) -> bool {
     request.method().is_safe() || request.uri().path().ends_with("/decode")
 }
 

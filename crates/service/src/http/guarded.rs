@@ -5,7 +5,6 @@ use crate::auth::Grant;
 use axum::body::Body;
 use bytes::Bytes;
 use http_body::{Frame, SizeHint};
-use std::any::Any;
 use std::pin::Pin;
 use std::task::{Context, Poll};
 
@@ -17,12 +16,7 @@ struct GuardedBody {
     /// Ends the body with an error when it completes.
     over: Option<Pin<Box<dyn Future<Output = ()> + Send>>>,
     /// Released with it.
-    _kept: Option<Box<dyn Any + Send>>,
-}
-
-/// Fails the body when `over` completes, and keeps something until it is sent.
-pub(crate) fn until(body: Body, over: impl Future<Output = ()> + Send + 'static, kept: impl Send + 'static) -> Body {
-    Body::new(GuardedBody { body, over: Some(Box::pin(over)), _kept: Some(Box::new(kept)) })
+    _kept: Option<Permit>,
 }
 
 /// Fails the body when its token is revoked or expires.
@@ -37,13 +31,13 @@ pub(super) fn revocable(body: Body, grant: &Grant) -> Body {
             None => revoked.cancelled().await,
         }
     };
-    until(body, over, ())
+    Body::new(GuardedBody { body, over: Some(Box::pin(over)), _kept: None })
 }
 
 /// Keeps a request's permit until the body is sent, if the body is large and in memory; streams have permits of their own.
 pub(super) fn with_permit(body: Body, place: Permit) -> Body {
     match http_body::Body::size_hint(&body).exact() {
-        Some(bytes) if bytes > SMALL => Body::new(GuardedBody { body, over: None, _kept: Some(Box::new(place)) }),
+        Some(bytes) if bytes > SMALL => Body::new(GuardedBody { body, over: None, _kept: Some(place) }),
         _ => body,
     }
 }
@@ -55,9 +49,7 @@ impl http_body::Body for GuardedBody {
     fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
         if self.over.as_mut().is_some_and(|over| over.as_mut().poll(cx).is_ready()) {
             self.over = Some(Box::pin(std::future::ready(())));
-            return Poll::Ready(Some(Err(axum::Error::new(
-                "it was ended: the token was revoked or has expired, or another process goes on",
-            ))));
+            return Poll::Ready(Some(Err(axum::Error::new("it was ended: the token was revoked or has expired"))));
         }
         Pin::new(&mut self.body).poll_frame(cx)
     }

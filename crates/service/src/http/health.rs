@@ -4,7 +4,6 @@ use super::extract::granted;
 use super::listen::ConnectionHandle;
 use crate::auth::Scope;
 use crate::problem::{self, ApiError};
-use crate::resources::Resources;
 use crate::service::Service;
 use crate::telemetry;
 use axum::extract::State;
@@ -25,9 +24,9 @@ pub(crate) struct Health {
     uptime_s: f64,
 }
 
-/// Health of a process that runs.
-pub(crate) fn health(resources: &Resources) -> Json<Health> {
-    let uptime_s = resources.started.elapsed().as_secs_f64();
+/// Health of a service that runs.
+fn health(service: &Service) -> Json<Health> {
+    let uptime_s = service.started.elapsed().as_secs_f64();
     Json(Health { status: "ok", version: env!("CARGO_PKG_VERSION"), uptime_s })
 }
 
@@ -55,36 +54,23 @@ pub(crate) async fn metrics(
     connection: Option<Extension<ConnectionHandle>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    may_see_metrics(&service, connection.map(|Extension(connection)| connection), &headers).await?;
-    Ok(rendered_metrics(&service, std::slice::from_ref(&service)))
-}
-
-/// Whether a client of the public listener may see metrics.
-///
-/// # Errors
-/// 401 and 403.
-pub(crate) async fn may_see_metrics(
-    resources: &Resources,
-    connection: Option<ConnectionHandle>,
-    headers: &HeaderMap,
-) -> Result<(), ApiError> {
-    if resources.access.is_guarded() {
-        let grant = granted(resources, headers).await?;
-        if let Some(connection) = connection {
+    if service.access.is_guarded() {
+        let grant = granted(&service, &headers).await?;
+        if let Some(Extension(connection)) = connection {
             connection.caller_is_known();
         }
         if grant.scope < Scope::Admin {
-            resources.rejected("scope");
+            service.rejected("scope");
             let detail = "metrics name tenants: use a token whose scope is admin, or the operators' listener";
             return Err(ApiError::new(problem::FORBIDDEN, detail));
         }
     }
-    Ok(())
+    Ok(rendered_metrics(&service))
 }
 
-/// Metrics of a process with these services.
-pub(crate) fn rendered_metrics(resources: &Resources, services: &[Arc<Service>]) -> Response {
-    telemetry::metrics::observe(resources, services);
+/// Metrics, as text.
+pub(super) fn rendered_metrics(service: &Service) -> Response {
+    telemetry::metrics::observe(service);
     let text = telemetry::metrics::recorder().render();
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response()
 }

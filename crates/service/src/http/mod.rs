@@ -45,9 +45,5 @@ mod spooled;
 mod transfers;
 mod waiting;
 
-pub use admin::{Operated, admin, without_pages};
-pub(crate) use extract::only_reads;
-pub(crate) use guarded::until;
-pub(crate) use health::{health, may_see_metrics, rendered_metrics};
-pub(crate) use router::finished;
+pub use admin::{admin, without_pages};
 pub use router::{document, router, seen, seen_by_operators, spare};

@@ -148,7 +148,7 @@ pub fn router(service: Arc<Service>) -> Router {
 }
 
 /// Adds the middleware common to all routes: request ids, logging, problem details and content codings.
-pub(crate) fn finished(routes: Router) -> Router {
+pub(super) fn finished(routes: Router) -> Router {
     routes
         .layer(CatchPanicLayer::custom(|panic: Box<dyn std::any::Any + Send>| {
             let text = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
@@ -170,9 +170,7 @@ pub fn seen(service: Arc<Service>) -> Router {
 
 /// Health and metrics of a service, for operators.
 pub fn seen_by_operators(service: Arc<Service>) -> Router {
-    let metrics = |State(service): State<Arc<Service>>| async move {
-        health::rendered_metrics(&service, std::slice::from_ref(&service))
-    };
+    let metrics = |State(service): State<Arc<Service>>| async move { health::rendered_metrics(&service) };
     Router::from(probes()).route("/metrics", get(metrics)).with_state(service)
 }
 

@@ -2,8 +2,8 @@
 
 use super::database::{LIMIT, NUMBER};
 use super::files::Files;
-use super::import::is_without_records;
 use super::mirrored::{FOLDERS, MirroredDisk};
+use super::records::has_objects;
 use super::{CATALOG, StoreError};
 use cager_store::Blobs;
 use std::ffi::OsString;
@@ -45,7 +45,7 @@ pub(super) fn open(files: &Files, url: &str, taken: i64, kept_bytes: u64) -> Res
         send_all(files, &blobs)?;
     } else {
         let there = number(files, &blobs)?;
-        let is_used = || Ok(files.exists(&root.join(CATALOG))? || is_without_records(files)?);
+        let is_used = || Ok(files.exists(&root.join(CATALOG))? || has_objects(files)?);
         if own.as_ref().is_some_and(|own| *own != there) || (!is_known && (own.is_some() || is_used()?)) {
             return Err(elsewhere(
                 "they do not belong together; name the right ones by --data and --blobs, or a folder that is new",

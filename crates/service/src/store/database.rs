@@ -2,8 +2,8 @@
 //! its sessions for lost, and one that lacks the database their files for left-overs.
 
 use super::files::Files;
-use super::import::is_without_records;
-use super::{CATALOG, Shard, StoreError, of_catalog};
+use super::records::has_objects;
+use super::{CATALOG, StoreError, of_catalog};
 use cager_store::{Catalog, CatalogError, PostgresCatalog};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,23 +23,15 @@ pub(super) struct Database {
     pub(super) taken: i64,
 }
 
-/// Opens the catalogue in the database at `url`, or that of one of its shards, for this process alone.
-pub(super) fn open(url: &str, shard: Shard) -> Result<Database, StoreError> {
-    let opened = match shard {
-        Shard::WHOLE => PostgresCatalog::open(url),
-        Shard { number, of } => PostgresCatalog::open_shard(url, number, of),
-    };
-    let catalog = opened.map_err(|error| of_catalog(Path::new("the database"), "reach", error))?;
+/// Opens the catalogue in the database at `url` for this process alone.
+pub(super) fn open(url: &str) -> Result<Database, StoreError> {
+    let catalog = PostgresCatalog::open(url);
+    let catalog = catalog.map_err(|error| of_catalog(Path::new("the database"), "reach", error))?;
     let name = PathBuf::from(catalog.name());
     let failed = |error| match error {
         CatalogError::InUse(what) => StoreError::InUse { what },
         error => of_catalog(&name, "reach", error),
     };
-    let divided = catalog.shards().map_err(failed)?;
-    if shard == Shard::WHOLE && divided > 1 {
-        let what = format!("{} is divided into shards: start the service with --shards {divided}", name.display());
-        return Err(StoreError::Elsewhere { what });
-    }
     let taken = catalog.claim().map_err(failed)?;
     Ok(Database { catalog: Arc::new(catalog), name, taken })
 }
@@ -79,7 +71,7 @@ fn match_folder(files: &Files, catalog: &PostgresCatalog, name: &Path) -> Result
     let number = files.read(&path, LIMIT)?.map(|bytes| String::from_utf8_lossy(&bytes).trim().to_owned());
     let number = match (number, &known) {
         // Another database may have what is known of it.
-        (Some(_), None) if !files.exists(&files.root.join(CATALOG))? && is_without_records(files)? => {
+        (Some(_), None) if !files.exists(&files.root.join(CATALOG))? && has_objects(files)? => {
             let what = format!(
                 "{} is empty, and the data folder {} has sessions: name the database and the schema that know of them, or restore it",
                 name.display(),

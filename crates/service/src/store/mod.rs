@@ -47,7 +47,6 @@ mod fenced;
 mod files;
 mod frames;
 mod groups;
-mod import;
 mod jobs;
 mod meta;
 mod mirrored;
@@ -133,28 +132,6 @@ pub struct Shared<'a> {
     pub blobs: Option<&'a str>,
     /// Bytes of the bucket's files that may be in the folder too.
     pub kept_bytes: u64,
-    /// Which part of the database it is.
-    pub shard: Shard,
-}
-
-/// One of the parts into which processes divide a database.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// Which, from 0.
-    pub number: u32,
-    /// How many there are.
-    pub of: u32,
-}
-
-impl Shard {
-    /// All of a database that is not divided.
-    pub const WHOLE: Self = Self { number: 0, of: 1 };
-}
-
-impl Default for Shard {
-    fn default() -> Self {
-        Self::WHOLE
-    }
 }
 
 /// Name of the catalogue's file.
@@ -189,16 +166,13 @@ pub struct Quarantined {
 }
 
 impl Store {
-    /// Whether a service has its data in this folder, of whatever version. Changes nothing.
+    /// Whether a service has its data in this folder. Changes nothing.
     pub fn is_in(root: &Path) -> bool {
-        let is_there = |name: &str| root.join(name).exists();
-        [CATALOG, database::NUMBER, bucket::MARKER].into_iter().any(is_there)
-            // Of versions before the catalogue.
-            || ["sessions", "contents", "prepared"].into_iter().all(is_there)
+        [CATALOG, database::NUMBER, bucket::MARKER].into_iter().any(|name| root.join(name).exists())
     }
 
     /// Opens the folder `root` for this process alone, creating it if it is missing, with what is elsewhere where that is given. Finishes interrupted deletions, removes temporary
-    /// files, takes over what an earlier version stored, and moves objects with damaged metadata to `quarantine/`.
+    /// files, and moves objects with damaged metadata to `quarantine/`.
     ///
     /// # Errors
     /// [`StoreError::Locked`] or [`StoreError::InUse`] if another process uses it; [`StoreError::Elsewhere`] where database and folder do not belong
@@ -252,13 +226,12 @@ impl Store {
             }),
         };
         let records = store.catalog().records().map_err(|e| store.failed("open", e))?;
-        if records.is_empty() && import::is_without_records(store.files())? {
+        if records.is_empty() && records::has_objects(store.files())? {
             let what = "it is empty, and there are sessions or jobs in the folder".to_owned();
             return Err(StoreError::CatalogDamaged { path: store.catalog_path().to_owned(), what });
         }
         let mut quarantined = Vec::new();
-        let (records, left) = store.take_over(records, &mut quarantined)?;
-        store.match_folders(&records, &left, &mut quarantined)?;
+        store.match_folders(&records, &mut quarantined)?;
         let records = store.tidy_records(records);
         let sessions = store.metas(&records, &mut quarantined);
         let cage_jobs = store.metas(&records, &mut quarantined);
@@ -364,7 +337,7 @@ fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(
         make_folder(&*files.disk, folder)?;
     }
     let Some(url) = shared.catalog else { return Ok((files, None)) };
-    let database = database::open(url, shared.shard)?;
+    let database = database::open(url)?;
     // What is only here is sent nowhere before it is known to belong to the database.
     if shared.blobs.is_some() && bucket::is_own(&files)? {
         database.check_folder(&files)?;
@@ -379,7 +352,7 @@ fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(
 /// Opens the catalogue in the folder itself. Gives its path too.
 fn own_catalog(files: &Files) -> Result<Named, StoreError> {
     let path = files.root.join(CATALOG);
-    if !files.exists(&path)? && import::is_without_records(files)? {
+    if !files.exists(&path)? && records::has_objects(files)? {
         let what = "it is missing, and there are sessions or jobs in the folder".to_owned();
         return Err(StoreError::CatalogDamaged { path, what });
     }

@@ -11,9 +11,6 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Folders that could not be read at the start, and are left where they are.
-pub(super) type Left = HashSet<(Kind, String)>;
-
 /// What a session or job is; fixed at its creation.
 pub(crate) trait RecordMeta: Serialize + DeserializeOwned {
     const KIND: Kind;
@@ -32,6 +29,17 @@ pub(super) fn all(kind: Kind, files: &Files) -> &Path {
         Kind::Recovery => &files.recoveries,
         Kind::Transfer => &files.transfers,
     }
+}
+
+/// Whether there are objects that only a catalogue can tell of.
+pub(super) fn has_objects(files: &Files) -> Result<bool, StoreError> {
+    for kind in Kind::ALL {
+        // Empty folders too: those of sessions that run are.
+        if files.list(all(kind, files))?.iter().any(|entry| entry.is_dir) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// What the outcome of an object is called where it is stored.
@@ -193,7 +201,7 @@ impl Store {
     /// Finishes at the start what an earlier process did not live to: removes what was being created or deleted. Gives the records that are there.
     pub(super) fn tidy_records(&self, records: Vec<Record>) -> Vec<Record> {
         let (open, others): (Vec<_>, Vec<_>) = records.into_iter().partition(|record| record.phase == Phase::Open);
-        for record in others.iter().filter(|record| record.phase != Phase::Importing) {
+        for record in &others {
             if let Err(error) = self.delete(record.kind, &record.id) {
                 tracing::warn!(%error, id = record.id, "what was being created or deleted takes space until a later start");
             }
@@ -218,12 +226,11 @@ impl Store {
         read.collect()
     }
 
-    /// Compares the folders with the records at the start. Those without a record, but for what is `left`, are moved to quarantine, or removed where they
+    /// Compares the folders with the records at the start. Those without a record are moved to quarantine, or removed where they
     /// are empty; those that a backup has left out because they were empty are made.
     pub(super) fn match_folders(
         &self,
         records: &[Record],
-        left: &Left,
         quarantined: &mut Vec<Quarantined>,
     ) -> Result<(), StoreError> {
         let files = self.files();
@@ -232,8 +239,7 @@ impl Store {
                 records.iter().filter(|record| record.kind == kind).map(|record| &record.id[..]).collect();
             let mut strangers = Vec::new();
             for entry in files.list(all(kind, files))? {
-                let name = entry.name.to_string_lossy().into_owned();
-                if !missing.remove(&name[..]) && !left.contains(&(kind, name)) {
+                if !missing.remove(&*entry.name.to_string_lossy()) {
                     strangers.push(all(kind, files).join(&entry.name));
                 }
             }

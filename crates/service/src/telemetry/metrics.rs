@@ -1,12 +1,11 @@
 //! Metrics for operators, in Prometheus' format. `docs/OPERATIONS.md` lists them.
 
-use crate::resources::Resources;
 use crate::service::Service;
 use crate::sync::lock;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use metrics_process::Collector;
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
@@ -49,36 +48,32 @@ pub async fn keep(stop: CancellationToken) {
     }
 }
 
-/// Sets the gauges that are computed on demand, of all services of this process.
-pub(crate) fn observe(resources: &Resources, services: &[Arc<Service>]) {
+/// Sets the gauges that are computed on demand.
+pub(crate) fn observe(service: &Service) {
     Collector::default().collect();
-    let sum = |of: &dyn Fn(&Service) -> usize| services.iter().map(|service| of(service)).sum::<usize>() as f64;
-    metrics::gauge!("cager_queue_frames").set(resources.engine.waiting() as f64);
-    metrics::gauge!("cager_streams").set(resources.open_streams() as f64);
-    metrics::gauge!("cager_preparing").set(sum(&|service| service.solvers.in_flight()));
-    metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(lock(&resources.kept_solvers).bytes() as f64);
-    metrics::gauge!("cager_designing").set(sum(&|service| service.cage_jobs.unfinished()));
-    metrics::gauge!("cager_recovering").set(sum(&|service| service.recoveries.unfinished()));
-    let kept = resources.recovering.used() + resources.recoveries_kept.used();
+    metrics::gauge!("cager_queue_frames").set(service.engine.waiting() as f64);
+    metrics::gauge!("cager_streams").set(service.open_streams() as f64);
+    metrics::gauge!("cager_preparing").set(service.solvers.in_flight() as f64);
+    metrics::gauge!("cager_cache_bytes", "cache" => "solvers").set(lock(&service.kept_solvers).bytes() as f64);
+    metrics::gauge!("cager_designing").set(service.cage_jobs.unfinished() as f64);
+    metrics::gauge!("cager_recovering").set(service.recoveries.unfinished() as f64);
+    let kept = service.recovering.used() + service.recoveries_kept.used();
     metrics::gauge!("cager_recoveries_in_memory").set(kept as f64);
-    metrics::gauge!("cager_transferring").set(sum(&|service| service.transfers.unfinished()));
-    metrics::gauge!("cager_shapespaces").set(sum(&|service| service.shape_spaces.count()));
-    metrics::gauge!("cager_memory_bytes", "use" => "shapespaces").set(resources.shape_memory.used() as f64);
-    metrics::gauge!("cager_memory_bytes", "use" => "designs").set(resources.designs.bytes() as f64);
-    metrics::gauge!("cager_memory_bytes", "use" => "frames").set(resources.frame_memory.used() as f64);
-    metrics::gauge!("cager_memory_bytes", "use" => "downloads").set(resources.download_memory.used() as f64);
-    metrics::gauge!("cager_disk_bytes", "use" => "spool").set(resources.spool_space.used() as f64);
-    metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(resources.upload_memory.used() as f64);
-    if let Some(service) = services.first() {
-        metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
-    }
-    metrics::gauge!("cager_uptime_seconds").set(resources.started.elapsed().as_secs_f64());
+    metrics::gauge!("cager_transferring").set(service.transfers.unfinished() as f64);
+    metrics::gauge!("cager_shapespaces").set(service.shape_spaces.count() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "shapespaces").set(service.shape_memory.used() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "designs").set(service.designs.bytes() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "frames").set(service.frame_memory.used() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "downloads").set(service.download_memory.used() as f64);
+    metrics::gauge!("cager_disk_bytes", "use" => "spool").set(service.spool_space.used() as f64);
+    metrics::gauge!("cager_memory_bytes", "use" => "uploads").set(service.upload_memory.used() as f64);
+    metrics::gauge!("cager_disk_free_bytes").set(service.store.free_bytes() as f64);
+    metrics::gauge!("cager_uptime_seconds").set(service.started.elapsed().as_secs_f64());
     // A tenant without sessions is reported as 0, not with its last value.
     static SEEN: Mutex<BTreeMap<String, (usize, u64)>> = Mutex::new(BTreeMap::new());
     let mut seen = lock(&SEEN);
     seen.values_mut().for_each(|usage| *usage = (0, 0));
-    let usage = services.iter().flat_map(|service| service.usage());
-    seen.extend(usage.map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
+    seen.extend(service.usage().into_iter().map(|(tenant, sessions, bytes)| (tenant, (sessions, bytes))));
     for (tenant, (sessions, bytes)) in &*seen {
         metrics::gauge!("cager_sessions", "tenant" => tenant.clone()).set(*sessions as f64);
         metrics::gauge!("cager_stored_bytes", "tenant" => tenant.clone()).set(*bytes as f64);
@@ -107,8 +102,6 @@ fn describe() {
     describe_gauge!("cager_disk_bytes", Unit::Bytes, "Disk space of cages waiting to be decoded");
     describe_counter!("cager_body_timeouts_total", "Request bodies that stopped arriving");
     describe_gauge!("cager_connections", "Open connections");
-    describe_counter!("cager_forwarded_total", "Requests sent on to the process that has the tenant's shard");
-    describe_gauge!("cager_shards", "Shards of this process");
     describe_counter!(
         "cager_cache_total",
         "Requests for solvers, by result: memory, disk, joined (already being prepared) or miss"

@@ -7,7 +7,7 @@ use metrics::counter;
 use std::collections::BTreeSet;
 
 /// Why requests are turned away.
-pub(crate) const REJECTIONS: [&str; 25] = [
+pub(crate) const REJECTIONS: [&str; 20] = [
     "unauthorized",
     "origin",
     "scope",
@@ -28,11 +28,6 @@ pub(crate) const REJECTIONS: [&str; 25] = [
     "tenant_sessions",
     "tenant_streams",
     "tenant_bytes",
-    "no_holder",
-    "lost",
-    "moved",
-    "stopping",
-    "database",
 ];
 
 /// Begins to count.
@@ -41,7 +36,6 @@ pub(super) fn begin() {
     counter!("cager_body_timeouts_total").increment(0);
     counter!("cager_cache_evictions_total").increment(0);
     counter!("cager_connections_total").increment(0);
-    counter!("cager_forwarded_total").increment(0);
     counter!("cager_log_bytes_total").increment(0);
     counter!("cager_quarantined_total").increment(0);
     counter!("cager_sessions_expired_total").increment(0);

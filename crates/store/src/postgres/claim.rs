@@ -1,12 +1,13 @@
 //! One process has the database for itself: a lock that ends with its connection, and a number that the next process raises, so that the one before
 //! changes nothing any more even where it does not know of it.
 
-use super::link::{Fence, Link};
 use super::place::Place;
-use super::rows::only;
 use super::schema::{hash, schema};
-use super::trouble::Trouble;
+use super::transaction::{Fence, read, write};
 use crate::CatalogError;
+use crate::link::{Link, Value};
+use crate::trouble::Trouble;
+use sqlx::AssertSqlSafe;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -14,7 +15,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Distinguishes the lock of the process that has the database, and that of changes, from those that others take.
-pub(super) const OWNER: i32 = 0x6361_6766;
+const OWNER: i32 = 0x6361_6766;
 const CHANGES: i32 = 0x6361_6767;
 /// How often the connection with the lock is looked at.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -33,20 +34,20 @@ pub(super) struct Claim {
 impl Claim {
     pub(super) fn take(place: &Place) -> Result<(Self, Fence), CatalogError> {
         let name = place.name.clone();
-        let link = Link::connect(&place.of_owner())?;
-        let schema = link.read(LIMIT, &async |link: &Link| schema(link).await).map_err(|e| e.explain(&name))?;
-        let hash = hash(&schema);
-        if !try_lock(&link, hash).map_err(|e| e.explain(&name))? {
-            return Err(in_use(&link, hash, &name));
+        let explain = |trouble: Trouble| trouble.explain(&name);
+        let mut link = place.of_owner().connect().map_err(explain)?;
+        let hash = hash(&read(&mut link, LIMIT, schema).map_err(explain)?);
+        if !try_lock(&mut link, hash).map_err(explain)? {
+            return Err(in_use(&mut link, hash, &name));
         }
-        let taken = link.write(TAKING, None, &async |link: &Link| {
+        let taken: Result<i64, Trouble> = write(&mut link, TAKING, None, |link| {
             // Until the changes that earlier owners have begun are made or given up.
-            link.query("SELECT pg_advisory_xact_lock($1, $2)", &[&CHANGES, &hash]).await?;
-            only::<i64>(&link.query("UPDATE catalogue SET taken = taken + 1 RETURNING taken", &[]).await?)
+            link.batch(AssertSqlSafe(format!("SELECT pg_advisory_xact_lock({CHANGES}, {hash})")))?;
+            link.only("UPDATE catalogue SET taken = taken + 1 RETURNING taken", &[])
         });
         let taken = taken.map_err(|trouble| match trouble.is_slow() {
             true => CatalogError::InUse(format!("{name} is still being changed by its last owner")),
-            false => trouble.explain(&name),
+            false => explain(trouble),
         })?;
         let begin =
             format!("BEGIN; SELECT pg_advisory_xact_lock_shared({CHANGES}, {hash}); SELECT taken FROM catalogue");
@@ -87,35 +88,32 @@ impl Drop for Claim {
 
 /// Sees that the lock is held, by another connection where the one before has ended. Whether nobody else has had it.
 fn keep(kept: &mut Option<Link>, place: &Place, hash: i32, taken: i64) -> Result<bool, CatalogError> {
-    let asked = |link: &Link| {
-        let now = link.read(LIMIT, &async |link: &Link| only(&link.query("SELECT taken FROM catalogue", &[]).await?));
-        now.map(|now: i64| now == taken).map_err(|trouble| trouble.explain(&place.name))
-    };
+    let is_own =
+        |link: &mut Link| read(link, LIMIT, |link| Ok(link.only::<i64>("SELECT taken FROM catalogue", &[])? == taken));
     if let Some(link) = kept {
-        match asked(link) {
+        match is_own(link) {
             Ok(is_own) => return Ok(is_own),
             Err(_) => *kept = None,
         }
     }
-    let link = Link::connect(place)?;
-    let is_own = asked(&link)?;
+    let explain = |trouble: Trouble| trouble.explain(&place.name);
+    let mut link = place.connect().map_err(explain)?;
+    let is_own = is_own(&mut link).map_err(explain)?;
     // What is not ours any more is not locked. Otherwise the server may yet have to notice that the connection before has ended.
-    if is_own && try_lock(&link, hash).map_err(|trouble| trouble.explain(&place.name))? {
+    if is_own && try_lock(&mut link, hash).map_err(explain)? {
         *kept = Some(link);
     }
     Ok(is_own)
 }
 
-fn try_lock(link: &Link, hash: i32) -> Result<bool, Trouble> {
-    link.read(LIMIT, &async |link: &Link| {
-        only(&link.query("SELECT pg_try_advisory_lock($1, $2)", &[&OWNER, &hash]).await?)
-    })
+fn try_lock(link: &mut Link, hash: i32) -> Result<bool, Trouble> {
+    read(link, LIMIT, |link| link.only(AssertSqlSafe(format!("SELECT pg_try_advisory_lock({OWNER}, {hash})")), &[]))
 }
 
-fn in_use(link: &Link, hash: i32, name: &str) -> CatalogError {
+fn in_use(link: &mut Link, hash: i32, name: &str) -> CatalogError {
     let sql = "SELECT application_name || coalesce(' from ' || host(client_addr), '') FROM pg_locks JOIN pg_stat_activity USING (pid) WHERE locktype = 'advisory' AND classid::bigint = $1 AND objid::bigint = $2 AND granted AND database = (SELECT oid FROM pg_database WHERE datname = current_database()) LIMIT 1";
-    let (class, object) = (i64::from(OWNER as u32), i64::from(hash as u32));
-    let found = link.read(LIMIT, &async |link: &Link| only::<String>(&link.query(sql, &[&class, &object]).await?));
+    let values = [OWNER, hash].map(|number| Value::Integer((number as u32).into()));
+    let found: Result<String, Trouble> = read(link, LIMIT, |link| link.only(sql, &values));
     let who = found.map_or_else(|_| "another process".to_owned(), |who| format!("`{who}`"));
     CatalogError::InUse(format!("{name} is used by {who}; stop that, or name another schema in the address"))
 }

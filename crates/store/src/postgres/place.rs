@@ -1,12 +1,15 @@
 //! Where the database is, as its URL says, and how it is connected to.
 
-use super::tls;
 use crate::CatalogError;
+use crate::link::Link;
+use crate::trouble::Trouble;
+use reqwest::Url;
+use rustls::pki_types::CertificateDer;
+use rustls::pki_types::pem::PemObject as _;
+use sqlx::ConnectOptions as _;
+use sqlx::postgres::{PgConnectOptions, PgSslMode};
 use std::sync::Once;
 use std::time::Duration;
-use tokio_postgres::Config;
-use tokio_postgres::config::{Host, SslMode};
-use tokio_postgres_rustls::MakeRustlsConnect;
 
 /// How long connecting may take, unless the URL says otherwise.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -20,106 +23,148 @@ static TOLD: Once = Once::new();
 
 /// A database, and how to connect to it.
 pub(super) struct Place {
-    pub(super) config: Config,
-    /// `None`: without encryption.
-    pub(super) tls: Option<MakeRustlsConnect>,
+    /// Its servers, of which the first one is taken that is there.
+    servers: Vec<PgConnectOptions>,
+    /// It must take writes.
+    writes: bool,
     /// How long connecting may take.
-    pub(super) connect: Duration,
+    connect: Duration,
     /// Names it in messages, without the password.
     pub(super) name: String,
 }
 
 impl Place {
     pub(super) fn parse(url: &str) -> Result<Self, CatalogError> {
-        let refused = |why: &str| {
+        Self::parsed(url).map_err(|why| {
             CatalogError::Failed(format!(
                 "the address of the database cannot be used: {why}; it looks like postgres://USER:PASSWORD@HOST:5432/DATABASE, with special characters percent-encoded"
             ))
+        })
+    }
+
+    fn parsed(url: &str) -> Result<Self, String> {
+        let Some((scheme @ ("postgres" | "postgresql"), rest)) = url.split_once("://") else {
+            return Err("it does not begin with postgres://".to_owned());
         };
-        if !["postgres://", "postgresql://"].iter().any(|scheme| url.starts_with(scheme)) {
-            return Err(refused("it does not begin with postgres://"));
+        let (authority, rest) = rest.split_at(rest.find(['/', '?']).unwrap_or(rest.len()));
+        let (user, hosts) = authority.rsplit_once('@').unwrap_or(("", authority));
+        if user.contains('@') {
+            return Err("there is an @ in its user or password, which is written %40".to_owned());
         }
-        let (base, query) = url.split_once('?').unwrap_or((url, ""));
-        let (mut mode, mut roots, mut kept) = ("prefer", None, Vec::new());
-        for option in query.split('&').filter(|option| !option.is_empty()) {
-            match option.split_once('=') {
-                Some(("sslmode", value)) => mode = value,
-                Some(("sslrootcert", value)) => roots = Some(value.replace("%2F", "/").replace("%2f", "/")),
-                _ => kept.push(option),
+        let urls = hosts.split(',').map(|host| match user {
+            "" => Url::parse(&format!("{scheme}://{host}{rest}")),
+            user => Url::parse(&format!("{scheme}://{user}@{host}{rest}")),
+        });
+        let urls: Vec<Url> = urls.collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+        let (mut mode, mut roots, mut writes, mut connect) = ("prefer".to_owned(), None, false, CONNECT);
+        let (mut own, mut kept) = (String::new(), Vec::new());
+        for (key, value) in urls[0].query_pairs() {
+            match &*key {
+                "sslmode" => mode = value.into_owned(),
+                "sslrootcert" => roots = Some(value.into_owned()),
+                "options" => own = value.into_owned(),
+                "target_session_attrs" if value == "any" => {}
+                "target_session_attrs" if value == "read-write" => writes = true,
+                "connect_timeout" => {
+                    let seconds = value.parse().map_err(|_| "connect_timeout is a number of seconds".to_owned())?;
+                    connect = Duration::from_secs(seconds);
+                }
+                "application_name" | "host" | "port" | "user" | "password" | "dbname" => kept.push((key, value)),
+                _ => return Err(format!("it has no option {key}={value}")),
             }
         }
-        let parsed = format!("{base}?{}", kept.join("&")).parse::<Config>();
-        let mut config = parsed.map_err(|error| refused(&super::trouble::chain(&error)))?;
-        if config.get_hosts().is_empty() && config.get_hostaddrs().is_empty() {
-            return Err(refused("it names no host"));
+        if hosts.is_empty() && kept.iter().all(|(key, _)| key != "host") {
+            return Err("it names no host".to_owned());
         }
-        let tls = match mode {
-            "disable" | "allow" | "prefer" => None,
-            "require" | "verify-ca" | "verify-full" => Some(tls::connector(roots.as_deref()).map_err(|e| refused(&e))?),
-            _ => return Err(refused("sslmode is disable, prefer, require, verify-ca or verify-full")),
+        let is_encrypted = match &*mode {
+            "disable" | "allow" | "prefer" => false,
+            "require" | "verify-ca" | "verify-full" => true,
+            _ => return Err("sslmode is disable, prefer, require, verify-ca or verify-full".to_owned()),
         };
-        config.ssl_mode(if tls.is_some() { SslMode::Require } else { SslMode::Disable });
-        let options = [DEFAULTS, config.get_options().unwrap_or_default(), ALWAYS].join(" ");
-        config.options(options);
-        if config.get_application_name().is_none() {
-            config.application_name("cager");
-        }
-        let connect = config.get_connect_timeout().copied().unwrap_or(CONNECT);
-        config.connect_timeout(connect);
-        let name = name(&config);
-        if config.get_hosts().iter().any(|host| matches!(host, Host::Tcp(name) if name.contains('@'))) {
-            return Err(refused("there is an @ in its user or password, which is written %40"));
-        }
-        if tls.is_none() && config.get_hosts().iter().any(is_elsewhere) {
+        roots.iter().filter(|_| is_encrypted).try_for_each(|path| check_certificates(path))?;
+        let options = [DEFAULTS, &own, ALWAYS].join(" ");
+        let server = |url: &Url| {
+            let mut url = url.clone();
+            url.query_pairs_mut().clear().extend_pairs(&kept).append_pair("options", &options);
+            let server: PgConnectOptions = url.as_str().parse().map_err(|error: sqlx::Error| error.to_string())?;
+            let server = match server.get_application_name() {
+                None => server.application_name("cager"),
+                Some(_) => server,
+            };
+            // Certificates are always checked.
+            let server = match (is_encrypted, &roots) {
+                (false, _) => server.ssl_mode(PgSslMode::Disable),
+                (true, None) => server.ssl_mode(PgSslMode::VerifyFull),
+                (true, Some(roots)) => server.ssl_mode(PgSslMode::VerifyFull).ssl_root_cert(roots),
+            };
+            Ok(server.disable_statement_logging())
+        };
+        let servers: Vec<PgConnectOptions> = urls.iter().map(server).collect::<Result<_, String>>()?;
+        let name = name(&servers);
+        if !is_encrypted && servers.iter().any(is_elsewhere) {
             TOLD.call_once(|| {
                 tracing::warn!(
                     "the connection to {name} is not encrypted: `sslmode=require` in its address encrypts it"
                 );
             });
         }
-        Ok(Self { config, tls, connect, name })
-    }
-
-    /// As it is, in another schema.
-    pub(super) fn of_schema(mut self, schema: &str) -> Self {
-        let options = format!("{} -csearch_path={schema}", self.config.get_options().unwrap_or_default());
-        self.config.options(options);
-        self.name = format!("{}, schema {schema}", self.name);
-        self
+        Ok(Self { servers, writes, connect, name })
     }
 
     /// As it is, for the connection that says who has the database.
     pub(super) fn of_owner(&self) -> Self {
-        let mut config = self.config.clone();
         let system = rustix::system::uname();
         let host = system.nodename().to_string_lossy();
-        config.application_name(format!("cager {} on {host}", std::process::id()));
+        let name = format!("cager {} on {host}", std::process::id());
         // It may wait for the changes of an owner that is gone.
-        let options = format!("{} -cstatement_timeout=40s", config.get_options().unwrap_or_default());
-        config.options(options);
-        Self { config, tls: self.tls.clone(), connect: self.connect, name: self.name.clone() }
+        let server =
+            |server: &PgConnectOptions| server.clone().application_name(&name).options([("statement_timeout", "40s")]);
+        Self { servers: self.servers.iter().map(server).collect(), name: self.name.clone(), ..*self }
+    }
+
+    /// Connects to the first of the servers that is there and, where that is asked for, takes writes.
+    pub(super) fn connect(&self) -> Result<Link, Trouble> {
+        let connect = |server: &PgConnectOptions| {
+            let mut link = Link::to_postgres(server, self.connect)?;
+            link.limit(self.connect);
+            let is_wrong = self.writes && link.only("SELECT current_setting('transaction_read_only') = 'on'", &[])?;
+            match is_wrong {
+                true => Err(CatalogError::Failed(format!("{} takes no writes", self.name)).into()),
+                false => Ok(link),
+            }
+        };
+        let mut outcome = connect(&self.servers[0]);
+        for server in &self.servers[1..] {
+            if outcome.is_err() {
+                outcome = connect(server);
+            }
+        }
+        outcome
     }
 }
 
-fn name(config: &Config) -> String {
-    let of_port = |index: usize| config.get_ports().get(index).or(config.get_ports().first()).copied().unwrap_or(5432);
-    let host = |(index, host): (usize, &Host)| match host {
-        Host::Tcp(host) => format!("{host}:{}", of_port(index)),
-        Host::Unix(folder) => format!("{} port {}", folder.display(), of_port(index)),
+/// Sees that there are certificates in a file.
+fn check_certificates(path: &str) -> Result<(), String> {
+    let unreadable = |error: &dyn std::fmt::Display| format!("sslrootcert {path}: {error}");
+    let mut found = CertificateDer::pem_file_iter(path).map_err(|error| unreadable(&error))?.peekable();
+    if found.peek().is_none() {
+        return Err(unreadable(&"it has no certificates in PEM"));
+    }
+    found.try_for_each(|certificate| certificate.map(drop)).map_err(|error| unreadable(&error))
+}
+
+fn name(servers: &[PgConnectOptions]) -> String {
+    let place = |server: &PgConnectOptions| match server.get_socket() {
+        Some(folder) => format!("{} port {}", folder.display(), server.get_port()),
+        None => format!("{}:{}", server.get_host(), server.get_port()),
     };
-    let mut hosts: Vec<_> = config.get_hosts().iter().enumerate().map(host).collect();
-    if hosts.is_empty() {
-        hosts =
-            config.get_hostaddrs().iter().enumerate().map(|(index, ip)| format!("{ip}:{}", of_port(index))).collect();
-    }
-    let database = config.get_dbname().or(config.get_user()).unwrap_or("of the user");
-    format!("PostgreSQL at {}, database {database}", hosts.join(" or "))
+    let places: Vec<String> = servers.iter().map(place).collect();
+    let database = servers[0].get_database().unwrap_or_else(|| servers[0].get_username());
+    format!("PostgreSQL at {}, database {database}", places.join(" or "))
 }
 
-fn is_elsewhere(host: &Host) -> bool {
-    match host {
-        Host::Unix(_) => false,
-        Host::Tcp(name) if name == "localhost" => false,
-        Host::Tcp(name) => !name.parse::<std::net::IpAddr>().is_ok_and(|address| address.is_loopback()),
-    }
+fn is_elsewhere(server: &PgConnectOptions) -> bool {
+    let host = server.get_host().trim_matches(['[', ']']);
+    let is_here = host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|address| address.is_loopback());
+    server.get_socket().is_none() && !is_here
 }

@@ -1,12 +1,15 @@
 //! The connections of one process to a database.
 
-use super::link::{Fence, Link};
 use super::place::Place;
-use super::trouble::Trouble;
+use super::transaction::{self, Fence};
 use crate::CatalogError;
+use crate::link::Link;
+use crate::trouble::Trouble;
 use std::sync::{Condvar, Mutex, MutexGuard, Once, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
+/// Most connections at once, and so most calls.
+const CONNECTIONS: usize = 8;
 /// How much longer than the database a call waits, for the way there and back.
 const WAY: Duration = Duration::from_secs(2);
 /// How often a connection is asked for again where the server gave none.
@@ -14,8 +17,6 @@ const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 
 pub(super) struct Pool {
     place: Place,
-    /// Most connections at once, and so most calls.
-    connections: usize,
     /// How long a statement may take.
     limit: Duration,
     /// Set once this process has it for itself.
@@ -39,11 +40,10 @@ struct Links {
 
 impl Pool {
     /// Begins with a connection. `limit` is how long the database lets statements take.
-    pub(super) fn new(place: Place, link: Link, limit: Duration, connections: usize) -> Self {
+    pub(super) fn new(place: Place, link: Link, limit: Duration) -> Self {
         let links = Links { idle: vec![link], ..Links::default() };
         Self {
             place,
-            connections,
             limit: limit.saturating_add(WAY),
             fence: OnceLock::new(),
             links: Mutex::new(links),
@@ -71,21 +71,21 @@ impl Pool {
         let _ = self.fence.set(fence);
     }
 
-    pub(super) fn read<T>(&self, work: &impl AsyncFn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
-        self.twice(|link| link.read(self.limit, work))
+    pub(super) fn read<T>(&self, mut work: impl FnMut(&mut Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
+        self.twice(|link| transaction::read(link, self.limit, &mut work))
     }
 
     /// Does `work` in a transaction.
-    pub(super) fn write<T>(&self, work: &impl AsyncFn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
-        self.twice(|link| link.write(self.limit, self.fence.get(), work))
+    pub(super) fn write<T>(&self, work: impl Fn(&mut Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
+        self.twice(|link| transaction::write(link, self.limit, self.fence.get(), &work))
     }
 
     /// Calls once, and once more by a new connection where nothing was changed and that may help.
-    fn twice<T>(&self, call: impl Fn(&Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
-        let outcome = match self.once(false, &call)? {
+    fn twice<T>(&self, mut call: impl FnMut(&mut Link) -> Result<T, Trouble>) -> Result<T, CatalogError> {
+        let outcome = match self.once(false, &mut call)? {
             Err(trouble) if trouble.is_passing() => {
                 tracing::debug!(?trouble, "a call of the database is tried again");
-                self.once(true, &call)?
+                self.once(true, &mut call)?
             }
             outcome => outcome,
         };
@@ -95,11 +95,11 @@ impl Pool {
     fn once<T>(
         &self,
         is_new: bool,
-        call: impl Fn(&Link) -> Result<T, Trouble>,
+        call: impl FnOnce(&mut Link) -> Result<T, Trouble>,
     ) -> Result<Result<T, Trouble>, CatalogError> {
         let place = self.wait_for_place()?;
-        let (link, used) = self.link(is_new)?;
-        let outcome = call(&link);
+        let (mut link, used) = self.link(is_new)?;
+        let outcome = call(&mut link);
         if outcome.as_ref().is_err_and(Trouble::is_broken) {
             // Not while others wait for the lock.
             let idle = std::mem::take(&mut self.links().idle);
@@ -114,12 +114,11 @@ impl Pool {
     }
 
     fn wait_for_place(&self) -> Result<Taken<'_>, CatalogError> {
-        let is_full = |links: &mut Links| links.taken >= self.connections;
+        let is_full = |links: &mut Links| links.taken >= CONNECTIONS;
         let waited = self.freed.wait_timeout_while(self.links(), self.limit, is_full);
         let (mut links, waited) = waited.unwrap_or_else(PoisonError::into_inner);
         if waited.timed_out() {
-            let said =
-                format!("{} is too slow: {} connections are busy, and others wait", self.name(), self.connections);
+            let said = format!("{} is too slow: {} connections are busy, and others wait", self.name(), CONNECTIONS);
             return Err(CatalogError::Failed(said));
         }
         links.taken += 1;
@@ -134,7 +133,7 @@ impl Pool {
             (if is_new { None } else { links.idle.pop() }, links.closed)
         };
         let used = Used(self);
-        let made = kept.map_or_else(|| Link::try_connect(&self.place), Ok);
+        let made = kept.map_or_else(|| self.place.connect(), Ok);
         match made {
             Err(trouble) if trouble.is_full() => {
                 drop(used);
@@ -154,7 +153,7 @@ impl Pool {
             tracing::warn!(
                 "{} gives this user fewer than {} connections, so that calls wait for each other: raise its max_connections or the user's limit",
                 self.name(),
-                self.connections
+                CONNECTIONS
             );
         });
         let began = Instant::now();
@@ -171,7 +170,7 @@ impl Pool {
             closed = links.closed;
             drop(links);
             let used = Used(self);
-            match kept.map_or_else(|| Link::try_connect(&self.place), Ok) {
+            match kept.map_or_else(|| self.place.connect(), Ok) {
                 Err(now) if now.is_full() => trouble = now,
                 made => return made.map(|link| (link, used)).map_err(|trouble| trouble.explain(self.name())),
             }

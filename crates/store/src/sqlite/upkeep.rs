@@ -1,8 +1,9 @@
 //! What the file needs from time to time: its log written back, room given back to the disk, and a reserve for deletions on a full one.
 
-use super::Writer;
+use super::{Writer, explain};
 use crate::CatalogError;
-use rusqlite::Connection;
+use crate::link::Link;
+use sqlx::AssertSqlSafe;
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::os::unix::fs::OpenOptionsExt as _;
@@ -18,9 +19,9 @@ const PAUSE: Duration = Duration::from_secs(2);
 /// Length of the log from which on writing waits until it is written back.
 const LONG_LOG: u64 = 256 << 20;
 /// Pages that are given back at once.
-const FREED_PAGES: u32 = 1024;
+const FREED_PAGES: i64 = 1024;
 /// So many unused pages are given back also while others write.
-const MANY_UNUSED_PAGES: u32 = 16 * FREED_PAGES;
+const MANY_UNUSED_PAGES: i64 = 16 * FREED_PAGES;
 /// How often they are in a round on a full disk, or where they are many.
 const STEPS: u32 = 64;
 /// Bytes that are kept free for deletions; on a disk that has less, at least the second number.
@@ -40,12 +41,12 @@ pub(super) struct Upkeep {
 }
 
 impl Upkeep {
-    pub(super) fn start(path: &Path, connection: Connection, writer: Weak<Writer>) -> Result<Self, CatalogError> {
+    pub(super) fn start(path: &Path, link: Link, writer: Weak<Writer>) -> Result<Self, CatalogError> {
         let written = Arc::new(AtomicBool::new(true));
         let (reserve, log) = (beside(path, "reserve"), beside(path, "-wal"));
         let (stop, stopped) = channel::<()>();
-        let rounds = Rounds {
-            connection,
+        let mut rounds = Rounds {
+            link,
             writer,
             log,
             reserve: reserve.clone(),
@@ -102,7 +103,7 @@ pub(super) fn give_reserve(path: &Path) -> bool {
 }
 
 struct Rounds {
-    connection: Connection,
+    link: Link,
     writer: Weak<Writer>,
     log: PathBuf,
     reserve: PathBuf,
@@ -112,11 +113,11 @@ struct Rounds {
 }
 
 impl Rounds {
-    fn once(&self) -> Result<(), CatalogError> {
+    fn once(&mut self) -> Result<(), CatalogError> {
         if self.written.swap(false, Relaxed) {
-            self.connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))?;
+            self.checkpoint("PRAGMA wal_checkpoint(PASSIVE)")?;
             // Deletions on a busy service give their room back as well.
-            let unused: u32 = self.connection.pragma_query_value(None, "freelist_count", |row| row.get(0))?;
+            let unused = self.unused_pages()?;
             if unused > MANY_UNUSED_PAGES {
                 for _ in 0..STEPS {
                     self.free_pages()?;
@@ -125,7 +126,7 @@ impl Rounds {
             }
             if fs::metadata(&self.log).is_ok_and(|log| log.len() > LONG_LOG) {
                 // Those who read or write meanwhile wait, or it is tried again.
-                self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
+                self.checkpoint("PRAGMA wal_checkpoint(TRUNCATE)")?;
             }
             return Ok(());
         }
@@ -136,27 +137,30 @@ impl Rounds {
         Ok(())
     }
 
+    fn checkpoint(&mut self, sql: &'static str) -> Result<(), CatalogError> {
+        self.link.execute(sql, &[]).map(drop).map_err(explain)
+    }
+
+    fn unused_pages(&mut self) -> Result<i64, CatalogError> {
+        self.link.only("PRAGMA freelist_count", &[]).map_err(explain)
+    }
+
     /// Gives all that it can back to a full disk, for the reserve.
-    fn make_room(&self) -> Result<(), CatalogError> {
+    fn make_room(&mut self) -> Result<(), CatalogError> {
         let freed = (0..STEPS).try_for_each(|_| self.free_pages().map(|_| ()));
-        self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
+        self.checkpoint("PRAGMA wal_checkpoint(TRUNCATE)")?;
         self.keep_reserve();
         freed
     }
 
     /// Gives some unused pages back. Whether there were any.
-    fn free_pages(&self) -> Result<bool, CatalogError> {
-        let free: u32 = self.connection.pragma_query_value(None, "freelist_count", |row| row.get(0))?;
+    fn free_pages(&mut self) -> Result<bool, CatalogError> {
+        let free = self.unused_pages()?;
         if free > 0
             && let Some(writer) = self.writer.upgrade()
         {
-            let freed = move |connection: &Connection| {
-                let mut statement = connection.prepare(&format!("PRAGMA incremental_vacuum({FREED_PAGES})"))?;
-                let mut rows = statement.query([])?;
-                while rows.next()?.is_some() {}
-                Ok(())
-            };
-            writer.run(freed)?;
+            let sql = AssertSqlSafe(format!("PRAGMA incremental_vacuum({FREED_PAGES})"));
+            writer.run(|link| link.execute(sql, &[]).map(drop))?;
         }
         Ok(free > 0)
     }

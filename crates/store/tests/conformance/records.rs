@@ -8,7 +8,7 @@ pub(crate) fn a_record_is_read_back_as_it_was_created(catalog: &dyn Catalog) {
     for (number, kind) in Kind::ALL.into_iter().enumerate() {
         let key = Key { kind, id: "it's \"é\" % _" };
         assert_eq!(catalog.record(key), Ok(None));
-        let phase = [Phase::Creating, Phase::Importing, Phase::Open][number % 3];
+        let phase = [Phase::Creating, Phase::Open][number % 2];
         let created_ms = 1_700_000_000_000 + number as u64;
         catalog.create(NewRecord { key, created_ms, phase, meta: &meta[number..] }).expect("created");
         let expected = Record {
@@ -64,7 +64,7 @@ pub(crate) fn changes_are_made_together(catalog: &dyn Catalog) {
     catalog.create(NewRecord { key: job, created_ms: 1, phase: Phase::Open, meta: b"job" }).expect("created");
     let untouched = [catalog.record(session("b")), catalog.record(job)];
     let changes = [
-        Change::Phase(Phase::Importing),
+        Change::Phase(Phase::Creating),
         Change::Outcome(b"outcome".to_vec()),
         Change::Completion(vec![0, 255]),
         Change::Announcement(Vec::new()),
@@ -78,7 +78,7 @@ pub(crate) fn changes_are_made_together(catalog: &dyn Catalog) {
         kind: Kind::Session,
         id: "a".to_owned(),
         created_ms: 1,
-        phase: Phase::Importing,
+        phase: Phase::Creating,
         meta: b"{}".to_vec(),
         outcome: Some(b"outcome".to_vec()),
         completion: Some(vec![0, 255]),
@@ -109,7 +109,7 @@ pub(crate) fn a_missing_record_is_not_changed(catalog: &dyn Catalog) {
 
 pub(crate) fn every_phase_is_kept(catalog: &dyn Catalog) {
     open(catalog, "a");
-    for phase in [Phase::Creating, Phase::Importing, Phase::Open, Phase::Deleted] {
+    for phase in [Phase::Creating, Phase::Open, Phase::Deleted] {
         assert_eq!(catalog.change(session("a"), &[Change::Phase(phase)]), Ok(true));
         assert_eq!(catalog.record(session("a")).expect("read").map(|record| record.phase), Some(phase));
     }

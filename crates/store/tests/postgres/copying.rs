@@ -29,7 +29,7 @@ fn a_copy_has_everything_and_goes_on_where_it_was_stopped() {
     from.change(job, &said).expect("changed");
     let to = server.open();
     // Stopped in the middle of one.
-    to.create(NewRecord { key: session("a"), created_ms: 1, phase: Phase::Importing, meta: b"half" }).expect("created");
+    to.create(NewRecord { key: session("a"), created_ms: 1, phase: Phase::Creating, meta: b"half" }).expect("created");
     append(&to, "a", &[(1, cage(9, 40))]);
     assert_eq!(copy(&from, &to), Ok(3));
     assert_eq!(to.records(), from.records());

@@ -8,7 +8,6 @@ mod claim;
 mod copying;
 mod damage;
 mod figures;
-mod members;
 mod opening;
 mod sharing;
 mod support;

@@ -15,7 +15,7 @@ fn a_changed_column_of_a_frame_is_found() {
     ["a", "b"].into_iter().for_each(|id| open(&catalog, id));
     append(&catalog, "b", &[(9, cage(9, 8))]);
     let stored = append(&catalog, "a", &[0, 1, 2].map(|frame| (frame, cage(frame, 8))));
-    let beside = dir.beside();
+    let mut beside = dir.beside();
     for change in [
         "frame = 77",
         "record = (SELECT number FROM records WHERE id = 'b')",
@@ -42,15 +42,13 @@ fn a_changed_column_of_a_frame_is_found() {
         "frame = -1",
         "frame = 1 << 32",
     ] {
-        beside.execute_batch("CREATE TEMP TABLE kept AS SELECT * FROM frames").expect("kept");
+        beside.run("CREATE TEMP TABLE kept AS SELECT * FROM frames");
         let sql = format!("UPDATE frames SET {change} WHERE frame = 1");
-        assert_eq!(beside.execute(&sql, []).expect(change), 1);
+        assert_eq!(beside.run(&sql), 1);
         let read = [catalog.frames("a"), catalog.frames("b")];
         assert!(read.iter().any(is_damaged), "{change}: {read:?}");
         assert!(!is_damaged(&catalog.record(crate::conformance::session("a"))));
-        beside
-            .execute_batch("DELETE FROM frames; INSERT INTO frames SELECT * FROM kept; DROP TABLE kept")
-            .expect(change);
+        beside.run("DELETE FROM frames; INSERT INTO frames SELECT * FROM kept; DROP TABLE kept");
         assert_eq!(catalog.frames("a"), Ok(stored.clone()), "restored");
     }
 }
@@ -61,8 +59,8 @@ fn a_flipped_bit_of_a_cage_is_found_and_the_others_are_read() {
     let catalog = dir.open();
     open(&catalog, "a");
     let stored = append(&catalog, "a", &[0, 1, 2].map(|frame| (frame, cage(frame, 8))));
-    let beside = dir.beside();
-    let chunk: Vec<u8> = beside.query_row("SELECT bytes FROM chunks", [], |row| row.get(0)).expect("a chunk");
+    let mut beside = dir.beside();
+    let chunk = beside.bytes("SELECT bytes FROM chunks");
     let mut out = b"kept".to_vec();
     let cut = chunk[..200].to_vec();
     let flipped = (0..8).map(|bit| {
@@ -71,7 +69,8 @@ fn a_flipped_bit_of_a_cage_is_found_and_the_others_are_read() {
         (flipped, vec![1])
     });
     for (changed, damaged) in flipped.chain([(cut, vec![2]), (Vec::new(), vec![0, 1, 2])]) {
-        beside.execute("UPDATE chunks SET bytes = ?1", [&changed]).expect("changed");
+        let hex: String = changed.iter().map(|byte| format!("{byte:02x}")).collect();
+        beside.run(&format!("UPDATE chunks SET bytes = x'{hex}'"));
         for entry in &stored {
             let read = catalog.cages("a", std::slice::from_ref(entry), &mut out);
             assert_eq!(is_damaged(&read), damaged.contains(&entry.frame), "{}: {read:?}", entry.frame);
@@ -83,7 +82,7 @@ fn a_flipped_bit_of_a_cage_is_found_and_the_others_are_read() {
         assert!(is_damaged(&catalog.cages("a", &stored, &mut out)));
         assert_eq!(out, b"kept");
     }
-    beside.execute("DELETE FROM chunks", []).expect("removed");
+    beside.run("DELETE FROM chunks");
     assert!(is_damaged(&catalog.cages("a", &stored, &mut out)));
     let again = append(&catalog, "a", &[(0, cage(5, 8))]);
     assert_eq!(cages(&catalog, "a", &again), bytes(&cage(5, 8)), "a frame stored again is there again");
@@ -96,11 +95,9 @@ fn a_record_with_an_unknown_number_is_left_out() {
     let catalog = dir.open();
     open(&catalog, "a");
     for change in ["kind = 9", "phase = 200", "phase = -1", "attempts = 1 << 40", "declared = -5"] {
-        dir.beside().execute(&format!("UPDATE records SET {change}"), []).expect(change);
+        dir.beside().run(&format!("UPDATE records SET {change}"));
         assert_eq!(catalog.records(), Ok(Vec::new()), "{change}");
-        dir.beside()
-            .execute("UPDATE records SET kind = 0, phase = 68, attempts = 0, declared = NULL", [])
-            .expect("restored");
+        dir.beside().run("UPDATE records SET kind = 0, phase = 68, attempts = 0, declared = NULL");
         assert_eq!(catalog.records().map(|records| records.len()), Ok(1));
     }
 }

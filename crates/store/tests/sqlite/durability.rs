@@ -70,12 +70,11 @@ fn a_killed_process_loses_nothing_acknowledged() {
         assert!(acknowledged.len() > before, "the child said nothing");
         check(dir.path(), &acknowledged);
     }
-    let file = dir.beside();
-    let one = |sql: &str| file.query_row(sql, [], |row| row.get::<_, rusqlite::types::Value>(0)).expect(sql);
-    assert_eq!(one("PRAGMA integrity_check"), "ok".to_owned().into());
+    let mut file = dir.beside();
+    assert_eq!(file.text("PRAGMA integrity_check"), "ok");
     for table in ["chunks", "frames"] {
-        let orphans = one(&format!("SELECT count(*) FROM {table} WHERE record NOT IN (SELECT number FROM records)"));
-        assert_eq!(orphans, 0.into(), "{table} of records that are not there");
+        let sql = format!("SELECT count(*) FROM {table} WHERE record NOT IN (SELECT number FROM records)");
+        assert_eq!(file.number(&sql), 0, "{table} of records that are not there");
     }
 }
 

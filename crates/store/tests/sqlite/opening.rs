@@ -22,11 +22,11 @@ fn a_file_that_is_no_database_is_damaged_and_left_as_it_is() {
 fn a_newer_version_is_left_as_it_is() {
     let dir = Dir::new();
     open(&dir.open(), "a");
-    dir.beside().execute_batch("PRAGMA user_version = 2").expect("written");
+    dir.beside().run("PRAGMA user_version = 2");
     let error = refused(&dir.file());
     assert_eq!(error, CatalogError::Newer { found: 2, known: 1 });
     assert!(error.to_string().contains("has version 2, and this program knows versions up to 1"), "{error}");
-    dir.beside().execute_batch("PRAGMA user_version = 1").expect("written");
+    dir.beside().run("PRAGMA user_version = 1");
     assert_eq!(dir.open().records().expect("records").len(), 1);
 }
 
@@ -36,9 +36,8 @@ fn an_empty_file_becomes_a_catalogue() {
     std::fs::write(dir.file(), b"").expect("written");
     let catalog = dir.open();
     open(&catalog, "a");
-    let one = |pragma| dir.beside().query_row(pragma, [], |row| row.get::<_, i64>(0)).expect(pragma);
-    assert_eq!(one("PRAGMA auto_vacuum"), 2, "it gives room back in steps");
-    assert_eq!(one("PRAGMA user_version"), 1);
+    assert_eq!(dir.beside().number("PRAGMA auto_vacuum"), 2, "it gives room back in steps");
+    assert_eq!(dir.beside().number("PRAGMA user_version"), 1);
 }
 
 #[test]

@@ -9,8 +9,8 @@ type Call<'a, T> = Box<dyn FnOnce() -> T + Send + 'a>;
 
 /// Has `calls` wait together, the first of them alone, until their changes can be made. Gives their answers.
 fn together<T: Send>(dir: &Dir, calls: Vec<Call<'_, T>>) -> Vec<T> {
-    let lock = dir.beside();
-    lock.execute_batch("BEGIN IMMEDIATE").expect("a lock");
+    let mut lock = dir.beside();
+    lock.run("BEGIN IMMEDIATE");
     std::thread::scope(|scope| {
         let calls = calls.into_iter().map(|call| {
             let called = scope.spawn(call);
@@ -20,7 +20,7 @@ fn together<T: Send>(dir: &Dir, calls: Vec<Call<'_, T>>) -> Vec<T> {
         let calls: Vec<_> = calls.collect();
         // Until the last of them waits too.
         std::thread::sleep(Duration::from_millis(300));
-        lock.execute_batch("COMMIT").expect("unlocked");
+        lock.run("COMMIT");
         calls.into_iter().map(|call| call.join().expect("an answer")).collect()
     })
 }
@@ -80,8 +80,7 @@ fn a_failing_call_does_not_undo_its_neighbours() {
     assert_eq!(frames.iter().map(|entry| entry.frame).collect::<Vec<_>>(), [0, 1, 3, 4]);
     assert_eq!(cages(&catalog, "a", &frames), bytes(&cage).repeat(4));
     assert_eq!(catalog.record(session("a")).expect("read").map(|record| record.meta), Some(b"{}".to_vec()));
-    let chunks: i64 = dir.beside().query_row("SELECT count(*) FROM chunks", [], |row| row.get(0)).expect("a count");
-    assert_eq!(chunks, 4, "nothing of what failed is left");
+    assert_eq!(dir.beside().number("SELECT count(*) FROM chunks"), 4, "nothing of what failed is left");
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! Folders, second connections and child processes.
 
 use cager_store::SqliteCatalog;
-use rusqlite::Connection;
+use futures_executor::block_on;
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{AssertSqlSafe, ConnectOptions as _, SqliteConnection};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -28,13 +30,37 @@ impl Dir {
     }
 
     /// A connection beside the catalogue's.
-    pub(crate) fn beside(&self) -> Connection {
-        Connection::open(self.file()).expect("a connection")
+    pub(crate) fn beside(&self) -> Beside {
+        let options = SqliteConnectOptions::new().filename(self.file());
+        Beside(block_on(options.connect()).expect("a connection"))
     }
 
     /// Bytes of the log.
     pub(crate) fn log(&self) -> Vec<u8> {
         std::fs::read(self.path().join("catalogue-wal")).unwrap_or_default()
+    }
+}
+
+/// A connection by which a test changes what is stored, and looks at it.
+pub(crate) struct Beside(SqliteConnection);
+
+impl Beside {
+    /// How many rows were changed.
+    pub(crate) fn run(&mut self, sql: &str) -> u64 {
+        let run = sqlx::raw_sql(AssertSqlSafe(sql.to_owned())).execute(&mut self.0);
+        block_on(run).expect(sql).rows_affected()
+    }
+
+    pub(crate) fn number(&mut self, sql: &str) -> i64 {
+        block_on(sqlx::query_scalar(AssertSqlSafe(sql.to_owned())).fetch_one(&mut self.0)).expect(sql)
+    }
+
+    pub(crate) fn text(&mut self, sql: &str) -> String {
+        block_on(sqlx::query_scalar(AssertSqlSafe(sql.to_owned())).fetch_one(&mut self.0)).expect(sql)
+    }
+
+    pub(crate) fn bytes(&mut self, sql: &str) -> Vec<u8> {
+        block_on(sqlx::query_scalar(AssertSqlSafe(sql.to_owned())).fetch_one(&mut self.0)).expect(sql)
     }
 }
 

@@ -15,7 +15,6 @@ use tempfile::TempDir;
 
 mod cage_jobs;
 mod faults;
-mod import;
 mod prepared;
 mod recoveries;
 mod sessions;

@@ -1,13 +1,24 @@
 //! What goes wrong with a database, whether it is worth a second try, and what is said of it.
 
 use crate::CatalogError;
+use sqlx::Error;
+use sqlx::sqlite::SqliteError;
+use std::borrow::Cow;
 use std::error::Error as _;
-use tokio_postgres::Error;
-use tokio_postgres::error::SqlState;
+
+/// SQLite's `SQLITE_FULL`, and `SQLITE_IOERR_SHMSIZE`: a full disk has no room for the index of the log.
+const FULL: [i32; 2] = [13, 10 | 19 << 8];
+/// SQLite's `SQLITE_CORRUPT` and `SQLITE_NOTADB`, of which there are kinds.
+const CORRUPT: [i32; 2] = [11, 26];
+/// Codes of PostgreSQL by which the server ends this connection, or takes no writes, which another one may do
+/// meanwhile.
+const OF_CONNECTION: [&str; 4] = ["57P01", "57P02", "57P03", "25006"];
+/// Those after which the same may succeed: transactions that met, and one number given twice.
+const MET: [&str; 3] = ["40001", "40P01", "23505"];
 
 /// Why a call was not done.
 #[derive(Debug)]
-pub(super) enum Trouble {
+pub(crate) enum Trouble {
     /// The catalogue says so; the database is well.
     Own(CatalogError),
     /// The database, or the way to it.
@@ -31,51 +42,41 @@ impl From<CatalogError> for Trouble {
 }
 
 impl Trouble {
-    fn code(&self) -> Option<&SqlState> {
-        if let Self::Database(error) = self { error.code() } else { None }
+    fn code(&self) -> Option<Cow<'_, str>> {
+        if let Self::Database(error) = self { error.as_database_error()?.code() } else { None }
     }
 
-    /// The server ends this connection, or it is one to a server that takes no writes, which another one may do meanwhile.
-    fn is_of_connection(&self) -> bool {
-        let ends = [
-            SqlState::ADMIN_SHUTDOWN,
-            SqlState::CRASH_SHUTDOWN,
-            SqlState::CANNOT_CONNECT_NOW,
-            SqlState::READ_ONLY_SQL_TRANSACTION,
-        ];
-        self.code().is_some_and(|code| ends.contains(code))
+    fn has_code(&self, codes: &[&str]) -> bool {
+        self.code().is_some_and(|code| codes.contains(&&*code))
     }
 
     /// The connection cannot be used again, and others that wait for their use may be no better.
-    pub(super) fn is_broken(&self) -> bool {
+    pub(crate) fn is_broken(&self) -> bool {
         match self {
             Self::Own(_) => false,
-            Self::Database(error) => error.as_db_error().is_none() && !is_unreadable(error) || self.is_of_connection(),
+            Self::Database(Error::Database(_)) => self.has_code(&OF_CONNECTION),
+            Self::Database(error) => !is_unreadable(error),
             Self::TimedOut | Self::Unknown(_) => true,
         }
     }
 
     /// The server gives this user no more connections.
-    pub(super) fn is_full(&self) -> bool {
-        self.code() == Some(&SqlState::TOO_MANY_CONNECTIONS)
+    pub(crate) fn is_full(&self) -> bool {
+        self.has_code(&["53300"])
     }
 
     /// It took too long.
-    pub(super) fn is_slow(&self) -> bool {
-        matches!(self, Self::TimedOut) || self.code() == Some(&SqlState::QUERY_CANCELED)
+    pub(crate) fn is_slow(&self) -> bool {
+        matches!(self, Self::TimedOut) || self.has_code(&["57014"])
     }
 
     /// Nothing was changed, and the same may succeed at once by another connection.
-    pub(super) fn is_passing(&self) -> bool {
-        let met = [SqlState::T_R_SERIALIZATION_FAILURE, SqlState::T_R_DEADLOCK_DETECTED, SqlState::UNIQUE_VIOLATION];
-        match self {
-            Self::Database(_) => self.is_broken() || self.code().is_some_and(|code| met.contains(code)),
-            _ => false,
-        }
+    pub(crate) fn is_passing(&self) -> bool {
+        matches!(self, Self::Database(_)) && (self.is_broken() || self.has_code(&MET))
     }
 
     /// What is said of it, by the database's name.
-    pub(super) fn explain(self, name: &str) -> CatalogError {
+    pub(crate) fn explain(self, name: &str) -> CatalogError {
         match self {
             Self::Own(error) => error,
             Self::TimedOut => {
@@ -85,6 +86,8 @@ impl Trouble {
                 "the answer of the database was lost, and what was to be stored may be there or not ({})",
                 cause.explain(name)
             )),
+            // No value that was written is one that cannot be read.
+            Self::Database(error) if is_unreadable(&error) => CatalogError::Damaged(error.to_string()),
             Self::Database(error) => explain(&error, name),
         }
     }
@@ -92,20 +95,27 @@ impl Trouble {
 
 /// Whether a column holds a value that its type does not allow, which this program never writes.
 fn is_unreadable(error: &Error) -> bool {
-    error.to_string().starts_with("error deserializing")
+    matches!(error, Error::ColumnDecode { .. } | Error::Decode(_))
 }
 
 fn explain(error: &Error, name: &str) -> CatalogError {
-    let said = chain(error);
-    let Some(code) = error.code() else {
-        return match is_unreadable(error) {
-            true => CatalogError::Damaged(said),
-            false => CatalogError::Failed(format!(
-                "{name} cannot be reached ({said}): see that it runs, that the address is right and that nothing lies between"
-            )),
-        };
+    let Some(of_database) = error.as_database_error() else {
+        return CatalogError::Failed(format!(
+            "{name} cannot be reached ({}): see that it runs, that the address is right and that nothing lies between",
+            chain(error)
+        ));
     };
-    let advice = match code.code() {
+    let code = of_database.code().unwrap_or_default();
+    if of_database.try_downcast_ref::<SqliteError>().is_some() {
+        let (code, said) = (code.parse().unwrap_or(0), of_database.message().to_owned());
+        return match code {
+            code if FULL.contains(&code) => CatalogError::Full,
+            code if CORRUPT.contains(&(code & 0xff)) => CatalogError::Corrupt(said),
+            _ => CatalogError::Failed(said),
+        };
+    }
+    let said = format!("{}, SQLSTATE {code}", of_database.message());
+    let advice = match &*code {
         "53100" => return CatalogError::Full,
         "XX001" | "XX002" => return CatalogError::Corrupt(format!("{name} is damaged ({said})")),
         "25006" => {
@@ -128,14 +138,15 @@ fn explain(error: &Error, name: &str) -> CatalogError {
 }
 
 /// An error and what caused it, without passwords: what was parsed is not among it.
-pub(super) fn chain(error: &Error) -> String {
-    let Some(of_database) = error.as_db_error() else {
-        let (mut said, mut next) = (error.to_string(), error.source());
-        while let Some(cause) = next {
-            said = format!("{said}: {cause}");
-            next = cause.source();
+fn chain(error: &Error) -> String {
+    let (mut said, mut next) = (error.to_string(), error.source());
+    while let Some(cause) = next {
+        let cause_said = cause.to_string();
+        // Some say their cause themselves.
+        if !said.contains(&cause_said) {
+            said = format!("{said}: {cause_said}");
         }
-        return said;
-    };
-    format!("{}, SQLSTATE {}", of_database.message(), of_database.code().code())
+        next = cause.source();
+    }
+    said
 }
