@@ -260,7 +260,7 @@ openapi: ## write docs/openapi.json anew from the routes
 	CAGER_UPDATE_OPENAPI=1 $(CARGO) test --workspace --locked --quiet --test http openapi
 
 schemathesis: $(SCHEMATHESIS) ## hold a running service against its OpenAPI document; SCHEMATHESIS_ARGS for more
-	$(CARGO) build --locked --bin cager
+	$(CARGO) build --workspace --locked --bin cager
 	$(SCHEMATHESIS) tests/schemathesis/run.py target/debug/cager $(SCHEMATHESIS_ARGS)
 
 $(SCHEMATHESIS): tests/schemathesis/requirements.txt

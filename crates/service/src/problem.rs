@@ -11,6 +11,8 @@ pub struct ApiError {
     pub problem: Box<Problem>,
     /// Value of `Retry-After`, in seconds.
     pub retry_after: Option<u32>,
+    /// The database or the bucket does not answer, or the disk is full: work that met it waits, and is not over.
+    pub(crate) passes: bool,
 }
 
 /// A kind of error. Its word is part of the API.
@@ -97,7 +99,7 @@ impl ApiError {
             detail: detail.into(),
             ..Problem::default()
         };
-        Self { problem: Box::new(problem), retry_after: None }
+        Self { problem: Box::new(problem), retry_after: None, passes: false }
     }
 
     /// An internal error: the cause is logged, not returned.
@@ -139,12 +141,23 @@ impl ApiError {
 /// The response for a storage error.
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
-        match error {
+        Self::from(&error)
+    }
+}
+
+impl From<&StoreError> for ApiError {
+    fn from(error: &StoreError) -> Self {
+        let answer = match error {
             StoreError::Full { .. } => Self::new(
                 STORAGE_FULL,
                 "the service's disk is full; no acknowledged frame is lost, so try again when the operator has freed space",
             )
             .retry_after(60),
+            StoreError::Away { .. } => {
+                tracing::warn!(%error, "the database or the bucket does not answer");
+                let detail = "the service's database or bucket does not answer; no acknowledged frame is lost, so try again in a moment";
+                Self::new(STORAGE_FAILED, detail).retry_after(2)
+            }
             StoreError::Io { .. } | StoreError::Catalog { .. } => {
                 tracing::error!(%error, "a file of the store or its catalogue cannot be read or written");
                 let detail = "the service's disk or database failed to read or write; no acknowledged frame is lost, so try again when the operator has checked it";
@@ -155,13 +168,14 @@ impl From<StoreError> for ApiError {
                 let detail = "stored data of this session is damaged; upload the capture to a new session, or ask the operator to restore it from a backup";
                 Self::new(SESSION_FAILED, detail)
             }
-            other => Self::internal(&other),
-        }
+            other => Self::internal(other),
+        };
+        Self { passes: error.is_passing(), ..answer }
     }
 }
 
 impl From<Problem> for ApiError {
     fn from(problem: Problem) -> Self {
-        Self { problem: Box::new(problem), retry_after: None }
+        Self { problem: Box::new(problem), retry_after: None, passes: false }
     }
 }

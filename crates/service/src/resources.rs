@@ -17,8 +17,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Threads that store frames; they mostly wait for the disk.
-const COMMIT_THREADS: usize = 4;
 /// Recoveries that keep what they know while they wait, beside one for each that may work.
 const RECOVERIES_KEPT: u64 = 4;
 /// New sessions and cage jobs whose files are parsed at a time.
@@ -149,7 +147,7 @@ impl Resources {
             access,
             audit,
             engine: Engine::new(config.workers).map_err(StartError::Threads)?,
-            committer: Committer::start(COMMIT_THREADS).map_err(StartError::Threads)?,
+            committer: Committer::default(),
             designs: DesignPool::new(config, designer).map_err(StartError::Threads)?,
             recovering: config.budget(config.max_recoveries as u64),
             recoveries_kept: config.budget(config.max_recoveries as u64 + RECOVERIES_KEPT),

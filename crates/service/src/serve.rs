@@ -118,7 +118,7 @@ async fn start(config: ServeConfig, stop: &CancellationToken) -> Result<Option<A
         let what = match tokio::task::spawn_blocking(opening).await? {
             Err(StartError::Store(StoreError::InUse { what })) => what,
             // Who waits does so through restarts of the database too.
-            Err(StartError::Store(StoreError::Catalog { what, action: "reach", .. })) if is_told => what,
+            Err(StartError::Store(StoreError::Away { what, .. })) if is_told => what,
             started => return Ok(Some(started?)),
         };
         if !std::mem::replace(&mut is_told, true) {

@@ -13,6 +13,8 @@ const CORRUPT: [i32; 2] = [11, 26];
 /// Codes of PostgreSQL by which the server ends this connection, or takes no writes, which another one may do
 /// meanwhile.
 const OF_CONNECTION: [&str; 4] = ["57P01", "57P02", "57P03", "25006"];
+/// Those that pass without anybody changing the program or its settings, with those before.
+const PASSING: [&str; 3] = ["53200", "53300", "57014"];
 /// Those after which the same may succeed: transactions that met, and one number given twice.
 const MET: [&str; 3] = ["40001", "40P01", "23505"];
 
@@ -80,9 +82,9 @@ impl Trouble {
         match self {
             Self::Own(error) => error,
             Self::TimedOut => {
-                CatalogError::Failed(format!("{name} does not answer: see whether it hangs or is overloaded"))
+                CatalogError::Away(format!("{name} does not answer: see whether it hangs or is overloaded"))
             }
-            Self::Unknown(cause) => CatalogError::Failed(format!(
+            Self::Unknown(cause) => CatalogError::Away(format!(
                 "the answer of the database was lost, and what was to be stored may be there or not ({})",
                 cause.explain(name)
             )),
@@ -100,7 +102,7 @@ fn is_unreadable(error: &Error) -> bool {
 
 fn explain(error: &Error, name: &str) -> CatalogError {
     let Some(of_database) = error.as_database_error() else {
-        return CatalogError::Failed(format!(
+        return CatalogError::Away(format!(
             "{name} cannot be reached ({}): see that it runs, that the address is right and that nothing lies between",
             chain(error)
         ));
@@ -134,7 +136,9 @@ fn explain(error: &Error, name: &str) -> CatalogError {
         "42P01" | "42703" => "lacks a table or column of the catalogue: was the schema dropped? Restart the program",
         _ => "failed",
     };
-    CatalogError::Failed(format!("{name} {advice} ({said})"))
+    let said = format!("{name} {advice} ({said})");
+    let passes = OF_CONNECTION.iter().chain(&PASSING).any(|known| *known == code);
+    if passes { CatalogError::Away(said) } else { CatalogError::Failed(said) }
 }
 
 /// An error and what caused it, without passwords: what was parsed is not among it.

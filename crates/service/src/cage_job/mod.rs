@@ -126,11 +126,6 @@ pub(crate) enum Cage {
 }
 
 impl CageJob {
-    /// State of the job.
-    pub(crate) fn state(&self) -> CageState {
-        state_of(&self.status().phase)
-    }
-
     fn set_timed_out(&self) {
         self.status().progress.timed_out = true;
     }

@@ -89,14 +89,12 @@ impl Run for CageDesign {
         service.create_finished(meta).await
     }
 
-    fn begin(service: Arc<Service>, job: Arc<CageJob>) {
-        tokio::spawn(async move {
-            while !job.state().is_final() && !service.is_stopped(&job) {
-                if let Some(place) = service.wait_for_turn(&job).await {
-                    return service.run_job(job, place, Service::design).await;
-                }
-            }
-        });
+    fn turn(service: &Service, job: &Arc<CageJob>) -> impl Future<Output = Option<Permit>> + Send {
+        service.wait_for_turn(job)
+    }
+
+    fn work(service: &Arc<Service>, job: &Arc<CageJob>, _place: Permit) -> Ended<Finished> {
+        service.design(job)
     }
 }
 
@@ -124,7 +122,7 @@ impl Service {
                 }
             }
         }
-        let place = self.turn(job, &self.designs.places).await?;
+        let place = self.place(job, &self.designs.places).await?;
         // A job of the same input may have been completed meanwhile; one that could not be read is not tried again.
         let completed = |duplicate: &Arc<CageJob>| matches!(duplicate.phase(), Phase::Completed(_));
         if !unreadable && duplicate().as_ref().is_some_and(completed) { None } else { Some(place) }

@@ -63,6 +63,7 @@ pub(super) async fn read(service: &Arc<Service>, tenant: &Tenant, request: Reque
 #[into_params(parameter_in = Query)]
 pub(crate) struct PageQuery {
     /// The `next` of the page before.
+    #[param(pattern = "^[0-9a-f]{32}$")]
     after: Option<String>,
 }
 
@@ -72,7 +73,7 @@ impl PageQuery {
     /// # Errors
     /// What was given is not an id.
     pub(super) fn after(&self) -> Result<Option<&str>, ApiError> {
-        let is_id = |id: &&str| uuid::Uuid::try_parse(id).is_ok();
+        let is_id = |id: &&str| id.len() == 32 && id.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
         match self.after.as_deref() {
             Some(other) if !is_id(&other) => {
                 let detail = "query: after: give the `next` of the page before; the first page has no `after`";

@@ -95,7 +95,7 @@ impl Service {
         let bytes = meta.sent_bytes();
         let job = Arc::new(Job::<W>::new(meta, Phase::Waiting, bytes));
         W::jobs(self).insert_at(place, Arc::clone(&job));
-        W::begin(Arc::clone(self), Arc::clone(&job));
+        Arc::clone(self).begin_job(Arc::clone(&job));
         Ok(job)
     }
 

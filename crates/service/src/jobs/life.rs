@@ -4,7 +4,7 @@ use super::{Job, Outcome, Phase, Run, Work, kind_of};
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{JobMeta as _, RecordMeta as _, StoreError, Workshop};
-use crate::tasks::{blocking, to_the_end};
+use crate::tasks::{Pauses, blocking, to_the_end};
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
@@ -17,6 +17,13 @@ pub(crate) enum Ended<F> {
     GivenUp(ApiError),
     /// There is nothing to do for a while, the job was deleted, or the service is stopping.
     Paused,
+}
+
+impl<F> Ended<F> {
+    /// Whether the store did not answer, or had no room, so that the same may succeed later.
+    pub(super) fn is_held_up(&self) -> bool {
+        matches!(self, Self::Failed(error) if error.passes)
+    }
 }
 
 impl Service {
@@ -60,7 +67,7 @@ impl Service {
         }
         W::jobs(self).insert(Arc::clone(&job));
         if !job.status().phase.is_final() {
-            W::begin(Arc::clone(self), job);
+            Arc::clone(self).begin_job(job);
         }
         Ok(())
     }
@@ -69,6 +76,11 @@ impl Service {
     pub(crate) async fn end_job<W: Work>(&self, job: &Arc<Job<W>>, ended: Ended<W::Finished>) -> bool {
         let (outcome, workshop) = match ended {
             Ended::Paused => return false,
+            Ended::Failed(error) if error.passes => {
+                tracing::warn!(job = job.id(), detail = %error.problem.detail, "a job waits");
+                job.set_phase(Phase::Waiting);
+                return false;
+            }
             Ended::Completed(finished, workshop) => (Outcome::Completed(finished), Some(workshop)),
             Ended::Failed(error) if error.status().is_client_error() => {
                 tracing::info!(job = job.id(), detail = %error.problem.detail, "a job cannot be done");
@@ -86,18 +98,27 @@ impl Service {
 
     /// Stores the outcome of a job with the results in a workshop, then notifies its followers.
     async fn finish_job<W: Work>(&self, job: &Arc<Job<W>>, outcome: Outcome<W::Finished>, workshop: Option<Workshop>) {
-        let (store, id, kept) = (self.store.clone(), job.id().to_owned(), outcome.clone());
-        let stored = blocking(move || {
-            let files = match &kept {
-                Outcome::Completed(finished) => W::files(finished),
-                Outcome::Failed(_) => Cow::default(),
-            };
-            let results = workshop.as_ref().map(|workshop| (workshop, &files[..]));
-            store.finish_job(kind_of::<W>(), &id, &kept, results)?;
-            W::forget_input(&store, &id);
-            Ok::<_, StoreError>(store.bytes(kind_of::<W>(), &id).ok())
-        });
-        let stored = stored.await;
+        let (workshop, mut pauses) = (workshop.map(Arc::new), Pauses::new());
+        let stored = loop {
+            let (store, id, kept, made) = (self.store.clone(), job.id().to_owned(), outcome.clone(), workshop.clone());
+            let stored = blocking(move || {
+                let files = match &kept {
+                    Outcome::Completed(finished) => W::files(finished),
+                    Outcome::Failed(_) => Cow::default(),
+                };
+                let results = made.as_deref().map(|workshop| (workshop, &files[..]));
+                store.finish_job(kind_of::<W>(), &id, &kept, results)?;
+                W::forget_input(&store, &id);
+                Ok::<_, StoreError>(store.bytes(kind_of::<W>(), &id).ok())
+            });
+            match stored.await {
+                Ok(Err(error)) if error.is_passing() && !job.is_going() && !self.is_stopped(job) => {
+                    tracing::warn!(job = job.id(), %error, "the outcome of a job cannot be kept yet");
+                    self.pause(job, &mut pauses).await;
+                }
+                stored => break stored,
+            }
+        };
         let mut changes = job.changes();
         // One that cannot be deleted is over all the same.
         loop {

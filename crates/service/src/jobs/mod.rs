@@ -109,6 +109,8 @@ pub(crate) struct Job<W: Work> {
     deleted: CancellationToken,
     /// Whether it is being deleted, or is.
     deleting: AtomicBool,
+    /// Whether this process has noted that it works on it, which counts as an attempt if the process ends.
+    is_counted: AtomicBool,
 }
 
 /// State and progress of a job.
@@ -126,6 +128,7 @@ impl<W: Work> Job<W> {
             version: watch::Sender::new(0),
             deleted: CancellationToken::new(),
             deleting: AtomicBool::new(false),
+            is_counted: AtomicBool::new(false),
         }
     }
 

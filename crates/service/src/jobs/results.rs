@@ -29,6 +29,7 @@ impl From<&ResultsError> for ApiError {
             ResultsError::Encode(EncodeError::Prepare(error)) => {
                 Self::new(problem::INVALID_GEOMETRY, error.to_string())
             }
+            ResultsError::Store(error) if error.is_passing() => Self::from(error),
             other => Self::internal(other),
         }
     }

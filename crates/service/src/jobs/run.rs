@@ -1,12 +1,14 @@
-//! Work on a job: when its turn comes, unless it has ended the process again and again, to its end or to the service's.
+//! Work on a job: when its turn comes, unless it has ended the process again and again, to its end or to the service's. A store that is away holds it up,
+//! and does not end it.
 
 use super::{Ended, Job, Jobs, Phase, Work, kind_of};
 use crate::admission::{Budget, Permit};
 use crate::problem::ApiError;
 use crate::service::Service;
-use crate::store::{JobMeta as _, Workshop};
-use crate::tasks::blocking;
+use crate::store::{JobMeta as _, StoreError, Workshop};
+use crate::tasks::{Pauses, blocking};
 use std::sync::Arc;
+use std::sync::atomic::Ordering::SeqCst;
 
 /// Number of attempts after which a job is given up, since it may be what crashes the process.
 pub(crate) const MAX_ATTEMPTS: u32 = 5;
@@ -21,8 +23,11 @@ pub(crate) trait Run: Work {
         std::future::ready(None)
     }
 
-    /// Works on a job to its end, in the background.
-    fn begin(service: Arc<Service>, job: Arc<Job<Self>>);
+    /// A place to work on a job when it is its turn; none where it has ended meanwhile, or has to be looked at again.
+    fn turn(service: &Service, job: &Arc<Job<Self>>) -> impl Future<Output = Option<Permit>> + Send;
+
+    /// Works on a job in its place until it ends or has to wait. Blocks.
+    fn work(service: &Arc<Service>, job: &Arc<Job<Self>>, place: Permit) -> Ended<Self::Finished>;
 }
 
 impl Service {
@@ -31,8 +36,8 @@ impl Service {
         job.deleted().is_cancelled() || self.stopping().is_cancelled()
     }
 
-    /// Waits until it is the turn of a job; nothing where it is deleted before, or the service stops.
-    pub(crate) async fn turn<W: Work>(&self, job: &Job<W>, places: &Arc<Budget>) -> Option<Permit> {
+    /// Waits for a place to work on a job; nothing where it is deleted before, or the service stops.
+    pub(crate) async fn place<W: Work>(&self, job: &Job<W>, places: &Arc<Budget>) -> Option<Permit> {
         tokio::select! {
             place = places.take(job.meta.tenant(), 1) => Some(place),
             () = job.deleted().cancelled() => None,
@@ -40,20 +45,34 @@ impl Service {
         }
     }
 
-    /// Works on a job in its place, by `work`, which blocks, and keeps how that ended.
-    pub(crate) async fn run_job<W: Run>(
-        self: Arc<Self>,
-        job: Arc<Job<W>>,
-        place: Permit,
-        work: impl FnOnce(&Self, &Job<W>) -> Ended<W::Finished> + Send + 'static,
-    ) {
-        job.set_phase(Phase::Running);
-        let (service, running) = (Arc::clone(&self), Arc::clone(&job));
-        let ended = blocking(move || {
-            let _place = place;
-            work(&service, &running)
+    /// Works on a job to its end, in the background. While the store is away it waits.
+    pub(crate) fn begin_job<W: Run>(self: Arc<Self>, job: Arc<Job<W>>) {
+        tokio::spawn(async move {
+            let mut pauses = Pauses::new();
+            while !job.phase().is_final() && !self.is_stopped(&job) {
+                let Some(place) = W::turn(&self, &job).await else { continue };
+                let (service, working) = (Arc::clone(&self), Arc::clone(&job));
+                let ended = blocking(move || W::work(&service, &working, place)).await.unwrap_or_else(Ended::Failed);
+                let is_held_up = ended.is_held_up();
+                if self.end_job(&job, ended).await {
+                    return;
+                }
+                if is_held_up {
+                    self.pause(&job, &mut pauses).await;
+                } else {
+                    pauses = Pauses::new();
+                }
+            }
         });
-        self.end_job(&job, ended.await.unwrap_or_else(Ended::Failed)).await;
+    }
+
+    /// A pause before what the store held up is tried again, unless the job is deleted or the service stops.
+    pub(super) async fn pause<W: Work>(&self, job: &Job<W>, pauses: &mut Pauses) {
+        tokio::select! {
+            () = pauses.next() => {}
+            () = job.deleted().cancelled() => {}
+            () = self.stopping().cancelled() => {}
+        }
     }
 
     /// Makes the results of a job by `work`, or ends it as `given_up` says where that has ended the process too often. Blocks.
@@ -63,21 +82,50 @@ impl Service {
         given_up: impl FnOnce() -> Ended<W::Finished>,
         work: impl FnOnce() -> Result<(W::Finished, Workshop), ApiError>,
     ) -> Ended<W::Finished> {
-        let (kind, id) = (kind_of::<W>(), job.id());
-        match self.store.count_attempt(kind, id) {
-            Ok(attempts) if attempts > MAX_ATTEMPTS => return given_up(),
-            Ok(_) => {}
+        match self.begin_attempt(job) {
+            Ok(true) => {}
+            Ok(false) => return given_up(),
             Err(_) if self.is_stopped(job) => return Ended::Paused,
             Err(error) => return Ended::Failed(job.fail_if_damaged(&self.store, error)),
         }
-        let ended = work();
-        if !self.is_stopped(job) {
-            return ended.map_or_else(Ended::Failed, |(found, workshop)| Ended::Completed(Box::new(found), workshop));
+        job.set_phase(Phase::Running);
+        let ended = work().map_or_else(Ended::Failed, |(found, workshop)| Ended::Completed(Box::new(found), workshop));
+        let is_stopped = self.is_stopped(job);
+        if is_stopped || ended.is_held_up() {
+            self.end_attempt(job, |before| before.saturating_sub(1));
         }
-        // An orderly stop does not count as an attempt.
-        if let Err(error) = self.store.uncount_attempt(kind, id) {
-            tracing::debug!(job = id, %error, "the count of its beginnings stays");
+        if is_stopped { Ended::Paused } else { ended }
+    }
+
+    /// Notes durably that work on a job begins, unless that is noted. Whether it may: not where it has ended the process too often. Blocks.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub(crate) fn begin_attempt<W: Work>(&self, job: &Job<W>) -> Result<bool, StoreError> {
+        if job.is_counted.load(SeqCst) {
+            return Ok(true);
         }
-        Ended::Paused
+        let attempts = self.store.count_attempt(kind_of::<W>(), job.id())?;
+        job.is_counted.store(true, SeqCst);
+        Ok(attempts <= MAX_ATTEMPTS)
+    }
+
+    /// Notes that work on a job is not what would end the process now: its attempts are as many as `count` makes of them. Blocks.
+    pub(crate) fn end_attempt<W: Work>(&self, job: &Job<W>, count: impl FnOnce(u32) -> u32) {
+        if !job.is_counted.load(SeqCst) {
+            return;
+        }
+        match self.store.set_attempts(kind_of::<W>(), job.id(), count) {
+            Ok(_) => job.is_counted.store(false, SeqCst),
+            // It stays noted, and is not noted again.
+            Err(error) => tracing::debug!(job = job.id(), %error, "the count of its beginnings stays"),
+        }
+    }
+}
+
+impl<W: Work> Job<W> {
+    /// Work on it got further than ever before, and attempts count from 0 by what the store was told.
+    pub(crate) fn forget_attempts(&self) {
+        self.is_counted.store(false, SeqCst);
     }
 }

@@ -11,7 +11,6 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{RecoveryParts, StoreError, Workshop};
 use crate::sync::lock;
-use crate::tasks::blocking;
 use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
 use cager_core::coordinates::MeanValue;
@@ -27,36 +26,28 @@ impl Run for Recovery {
         &service.recoveries
     }
 
-    fn begin(service: Arc<Service>, job: Arc<RecoveryJob>) {
-        tokio::spawn(service.run_recovery(job));
+    async fn turn(service: &Service, job: &Arc<RecoveryJob>) -> Option<Permit> {
+        let mut changes = job.changes();
+        changes.mark_unchanged();
+        // Where it could not be deleted it goes on.
+        let has_work = job.status().progress.has_work() && !job.is_going();
+        if has_work {
+            return service.place(job, &service.recovering).await;
+        }
+        tokio::select! {
+            _ = changes.changed() => {}
+            () = job.deleted().cancelled() => {}
+            () = service.stopping().cancelled() => {}
+        }
+        None
+    }
+
+    fn work(service: &Arc<Service>, job: &Arc<RecoveryJob>, place: Permit) -> Ended<Finished> {
+        Arc::clone(service).recover(job, place)
     }
 }
 
 impl Service {
-    /// Follows frames whenever there are any, to the end.
-    async fn run_recovery(self: Arc<Self>, job: Arc<RecoveryJob>) {
-        let mut changes = job.changes();
-        loop {
-            changes.mark_unchanged();
-            if self.is_stopped(&job) || job.status().phase.is_final() {
-                return;
-            }
-            // Where it could not be deleted it goes on.
-            let has_work = job.status().progress.has_work() && !job.is_going();
-            let place = tokio::select! {
-                place = self.recovering.take(&job.meta.tenant, 1), if has_work => place,
-                _ = changes.changed(), if !has_work => continue,
-                () = job.deleted().cancelled() => return,
-                () = self.stopping().cancelled() => return,
-            };
-            let (service, running) = (Arc::clone(&self), Arc::clone(&job));
-            let ended = blocking(move || service.recover(&running, place)).await.unwrap_or_else(Ended::Failed);
-            if self.end_job(&job, ended).await {
-                return;
-            }
-        }
-    }
-
     /// Follows frames until there are none for a while, or to the end. Blocks.
     fn recover(self: Arc<Self>, job: &Arc<RecoveryJob>, place: Permit) -> Ended<Finished> {
         let source = StoredSurfaces::new(Arc::clone(&self), Arc::clone(job), place);

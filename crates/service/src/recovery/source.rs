@@ -2,16 +2,15 @@
 
 use super::RecoveryJob;
 use crate::admission::Permit;
-use crate::jobs::MAX_ATTEMPTS;
 use crate::problem::ApiError;
 use crate::service::Service;
-use crate::store::{Kind, StoreError, StoredPart};
+use crate::store::{StoreError, StoredPart};
 use crate::sync::lock;
 use cager_formats::{MeshFormat, frame_numbers, read_model_bytes};
 use cager_geometry::mesh::Model;
 use cager_motion::recover::{Arrival, RecoverError, SurfaceSource};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::SeqCst};
+use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use tokio::runtime::Handle;
@@ -29,8 +28,6 @@ pub(super) struct StoredSurfaces {
     runtime: Handle,
     /// The place among those that work, and since when; given back while there is nothing to do.
     place: Mutex<Option<(Permit, Instant)>>,
-    /// Whether this is noted as an attempt, which may end the process.
-    is_counted: AtomicBool,
     /// How many frames were ever followed, over restarts.
     reached: AtomicU32,
     /// Why a stored frame could not be read.
@@ -41,8 +38,7 @@ impl StoredSurfaces {
     /// With a place for the work. Call within a tokio runtime.
     pub(super) fn new(service: Arc<Service>, job: Arc<RecoveryJob>, place: Permit) -> Self {
         let (place, failure) = (Mutex::new(Some((place, Instant::now()))), Mutex::default());
-        let (is_counted, reached) = (AtomicBool::new(false), AtomicU32::new(0));
-        Self { service, job, runtime: Handle::current(), place, is_counted, reached, failure }
+        Self { service, job, runtime: Handle::current(), place, reached: AtomicU32::new(0), failure }
     }
 
     /// Notes that work begins, durably. Whether it may: not where it ended the process several times without getting any further. Blocks.
@@ -50,19 +46,17 @@ impl StoredSurfaces {
     /// # Errors
     /// Storage errors.
     pub(super) fn begin(&self) -> Result<bool, StoreError> {
-        let (store, id) = (&self.service.store, self.job.id());
-        self.reached.store(store.reached_recovery(id)?, SeqCst);
-        let attempts = store.count_attempt(Kind::Recovery, id)?;
-        self.is_counted.store(true, SeqCst);
-        Ok(attempts <= MAX_ATTEMPTS)
+        self.reached.store(self.service.store.reached_recovery(self.job.id())?, SeqCst);
+        self.service.begin_attempt(&self.job)
     }
 
     /// Notes how many frames are followed: more than ever before are progress, after which attempts count from 0. Blocks.
     pub(super) fn followed(&self, frames: u32) {
         if self.reached.fetch_max(frames, SeqCst) < frames {
-            let noted = self.service.store.note_reached_recovery(self.job.id(), frames);
-            self.is_counted.store(false, SeqCst);
-            self.told(noted);
+            match self.service.store.note_reached_recovery(self.job.id(), frames) {
+                Ok(()) => self.job.forget_attempts(),
+                Err(error) => tracing::debug!(job = self.job.id(), %error, "the count of its beginnings stays"),
+            }
         }
     }
 
@@ -75,21 +69,8 @@ impl StoredSurfaces {
 
     /// Notes that the work is not what would end the process now. Blocks.
     pub(super) fn pause(&self) {
-        if self.is_counted.swap(false, SeqCst) {
-            let (store, id) = (&self.service.store, self.job.id());
-            let noted = if self.is_idle() {
-                store.set_attempts(Kind::Recovery, id, |_| 0).map(|_| ())
-            } else {
-                store.uncount_attempt(Kind::Recovery, id)
-            };
-            self.told(noted);
-        }
-    }
-
-    fn told(&self, noted: Result<(), StoreError>) {
-        if let Err(error) = noted {
-            tracing::debug!(job = self.job.id(), %error, "the count of its beginnings stays");
-        }
+        let is_idle = self.is_idle();
+        self.service.end_attempt(&self.job, |before| if is_idle { 0 } else { before.saturating_sub(1) });
     }
 
     /// Whether the work is to stop.

@@ -5,11 +5,13 @@ use super::{Phase, Session};
 use crate::problem::{self, ApiError};
 use crate::store::{FrameEntry, NewFrame, StoreError};
 use crate::sync::lock;
+use std::collections::{HashMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 
+/// Threads that store the frames of one tenant; they mostly wait for the disk.
+const THREADS: usize = 2;
 /// Approximate size of a stored frame without its cage, in bytes.
 const RECORD_BYTES: usize = 96;
 
@@ -36,45 +38,82 @@ pub(crate) struct CommitQueue {
     pub(super) busy: bool,
 }
 
-/// Handle to the threads that store frames.
-#[derive(Clone)]
+/// Sessions whose frames are to be stored, by tenant: each tenant has threads of its own, which are there while it has frames, so that the slow bucket
+/// or the large frames of one never delay the answer to another.
+#[derive(Clone, Default)]
 pub(crate) struct Committer {
-    sessions: Sender<Arc<Session>>,
+    tenants: Arc<Mutex<HashMap<String, Waiting>>>,
+}
+
+/// What a tenant has waiting.
+#[derive(Default)]
+struct Waiting {
+    sessions: VecDeque<Arc<Session>>,
+    threads: usize,
 }
 
 impl Committer {
-    /// Starts `threads` threads. They end when the last clone is dropped.
-    pub(crate) fn start(threads: usize) -> std::io::Result<Self> {
-        let (sessions, queue) = channel();
-        let queue = Arc::new(Mutex::new(queue));
-        for k in 0..threads {
-            let queue = Arc::clone(&queue);
-            std::thread::Builder::new().name(format!("commit-{k}")).spawn(move || run(&queue))?;
+    /// Stores the frames of a session when it is its turn.
+    fn enqueue(&self, session: Arc<Session>) {
+        let mut tenants = lock(&self.tenants);
+        let tenant = session.meta.tenant.clone();
+        let waiting = tenants.entry(tenant.clone()).or_default();
+        waiting.sessions.push_back(session);
+        if waiting.threads >= THREADS {
+            return;
         }
-        Ok(Self { sessions })
+        let committer = self.clone();
+        let thread = std::thread::Builder::new().name("commit".to_owned()).spawn(move || committer.run(&tenant));
+        match thread {
+            Ok(_) => waiting.threads += 1,
+            Err(error) if waiting.threads > 0 => {
+                tracing::warn!(%error, "frames of a tenant are stored by fewer threads")
+            }
+            Err(error) => {
+                let waiting: Vec<_> = waiting.sessions.drain(..).collect();
+                drop(tenants);
+                let error = ApiError::internal(&error);
+                waiting.iter().for_each(|session| session.give_up_waiting(&error));
+            }
+        }
+    }
+
+    /// Stores what a tenant has waiting.
+    fn run(&self, tenant: &str) {
+        loop {
+            let next = {
+                let mut tenants = lock(&self.tenants);
+                let Some(waiting) = tenants.get_mut(tenant) else { return };
+                let next = waiting.sessions.pop_front();
+                if next.is_none() {
+                    waiting.threads -= 1;
+                    if waiting.threads == 0 {
+                        tenants.remove(tenant);
+                    }
+                }
+                next
+            };
+            let Some(session) = next else { return };
+            let solved = std::mem::take(&mut lock(&session.waiting).solved);
+            if catch_unwind(AssertUnwindSafe(|| session.write(&solved))).is_err() {
+                session.give_up(&solved, &ApiError::internal(&"writing frames panicked"));
+            }
+            let is_busy = {
+                let mut waiting = lock(&session.waiting);
+                waiting.busy = !waiting.solved.is_empty();
+                waiting.busy
+            };
+            if is_busy {
+                // Behind the tenant's others; this thread takes it then, or another one.
+                lock(&self.tenants).entry(tenant.to_owned()).or_default().sessions.push_back(session);
+            }
+        }
     }
 }
 
 /// Approximate size of stored frames, in bytes.
 fn stored_bytes(solved: &[SolvedFrame]) -> u64 {
     solved.iter().map(|s| frame_bytes(s.cage.len() / 3, s.posted.as_ref().map_or(0, Vec::len))).sum()
-}
-
-fn run(queue: &Mutex<Receiver<Arc<Session>>>) {
-    loop {
-        let next = lock(queue).recv();
-        let Ok(session) = next else { return };
-        let solved = std::mem::take(&mut lock(&session.waiting).solved);
-        if catch_unwind(AssertUnwindSafe(|| session.write(&solved))).is_err() {
-            session.give_up(&solved, &ApiError::internal(&"writing frames panicked"));
-        }
-        let mut waiting = lock(&session.waiting);
-        waiting.busy = !waiting.solved.is_empty();
-        if waiting.busy {
-            drop(waiting);
-            session.enqueue();
-        }
-    }
 }
 
 impl Session {
@@ -90,13 +129,19 @@ impl Session {
         if !waiting.busy {
             waiting.busy = true;
             drop(waiting);
-            self.enqueue();
+            self.committer.enqueue(Arc::clone(self));
         }
     }
 
-    fn enqueue(self: &Arc<Self>) {
-        // The threads run as long as any session exists.
-        let _ = self.committer.sessions.send(Arc::clone(self));
+    /// Fails what waits to be stored.
+    fn give_up_waiting(&self, error: &ApiError) {
+        let solved = {
+            let mut waiting = lock(&self.waiting);
+            waiting.busy = false;
+            std::mem::take(&mut waiting.solved)
+        };
+        self.bytes.fetch_sub(stored_bytes(&solved), Relaxed);
+        self.give_up(&solved, error);
     }
 
     /// Stores frames and notifies their uploads.

@@ -13,7 +13,7 @@ use crate::preparation::{self, Geometry, Prepared, SolverRequest, SolverResponse
 use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{Content, ContentKey, Idempotency, Kind, NamedFile, SessionMeta, StoredPart};
-use crate::tasks::{blocking, to_the_end};
+use crate::tasks::{Pauses, blocking, to_the_end};
 use crate::webhooks::Event;
 use cager_proto::messages::{CacheUse, PreparationSeconds, SessionOptions};
 use http::StatusCode;
@@ -197,8 +197,7 @@ impl Service {
         mut geometry: Option<Arc<Geometry>>,
         mark: CompletionState,
     ) {
-        let clock = Instant::now();
-        let mut again = true;
+        let (clock, mut again, mut pauses) = (Instant::now(), true, Pauses::new());
         let got = loop {
             let got = tokio::select! {
                 got = self.solvers.get(wanted(&session, valid, geometry.take())) => got,
@@ -207,6 +206,14 @@ impl Service {
             // This request may have joined the preparation of a session that was deleted meanwhile together with its content.
             match got {
                 Err(error) if again && error.problem.word() == problem::SESSION_DELETED.word => again = false,
+                Err(error) if error.passes => {
+                    tracing::warn!(session = %session.meta.id, detail = %error.problem.detail, "the preparation waits");
+                    tokio::select! {
+                        () = pauses.next() => {}
+                        () = session.deleted().cancelled() => return,
+                        () = self.stopping().cancelled() => return,
+                    }
+                }
                 got => break got,
             }
         };

@@ -19,7 +19,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
 /// Pause before a group is tried again that could not be stored.
-const RETRY: Duration = Duration::from_secs(30);
+const RETRY: Duration = Duration::from_secs(5);
 
 impl Service {
     /// Codes the frames of a session, where they are to be, as groups become whole.

@@ -57,6 +57,16 @@ pub enum StoreError {
         /// What went wrong, and what to do.
         what: String,
     },
+    /// The database or the bucket does not answer for now. What was to be written may be there or not; the call can succeed later.
+    #[error("could not {action} {}: {what}", path.display())]
+    Away {
+        /// The file, or what the database is called.
+        path: PathBuf,
+        /// What was attempted, as a verb.
+        action: &'static str,
+        /// What went wrong, and what to do.
+        what: String,
+    },
     /// Not a valid id; nothing was looked up.
     #[error("{id:?} is not the id of a session: ids are 1 to 64 of the characters 0-9, a-z and -")]
     BadId {
@@ -86,15 +96,27 @@ impl StoreError {
         };
         match cause.kind() {
             StorageFull | QuotaExceeded | FileTooLarge => Self::Full { path: path.to_owned() },
-            _ => match cause.get_ref().filter(|inner| inner.is::<BlobsError>() || inner.is::<CatalogError>()) {
-                Some(inner) => Self::Catalog { path: path.to_owned(), action, what: inner.to_string() },
-                None => Self::Io { path: path.to_owned(), action, cause },
-            },
+            _ => {
+                let path = path.to_owned();
+                match cause.get_ref().map(|inner| (inner, inner.downcast_ref::<CatalogError>())) {
+                    Some((inner, Some(CatalogError::Away(_)))) => Self::Away { path, action, what: inner.to_string() },
+                    Some((inner, Some(_))) => Self::Catalog { path, action, what: inner.to_string() },
+                    Some((inner, None)) if inner.is::<BlobsError>() => {
+                        Self::Away { path, action, what: inner.to_string() }
+                    }
+                    _ => Self::Io { path, action, cause },
+                }
+            }
         }
     }
 
     pub(crate) fn damaged(path: &Path, what: impl Into<String>) -> Self {
         Self::Damaged { path: path.to_owned(), what: what.into() }
+    }
+
+    /// Whether the same may succeed later, without a change of what is asked for.
+    pub fn is_passing(&self) -> bool {
+        matches!(self, Self::Full { .. } | Self::Away { .. })
     }
 
     /// Whether the file or folder was not there.

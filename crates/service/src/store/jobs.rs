@@ -104,14 +104,6 @@ impl Store {
         self.set_attempts(kind, id, |before| before + 1)
     }
 
-    /// Decrements the number of attempts after an orderly stop.
-    ///
-    /// # Errors
-    /// Not found where the job was deleted.
-    pub fn uncount_attempt(&self, kind: Kind, id: &str) -> Result<(), StoreError> {
-        self.set_attempts(kind, id, |before| before.saturating_sub(1)).map(|_| ())
-    }
-
     /// Changes the number of attempts, durably; gives the new one.
     ///
     /// # Errors

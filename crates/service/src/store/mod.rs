@@ -345,7 +345,8 @@ fn open_folder(root: &Path, disk: Arc<dyn Disk>, shared: Shared<'_>) -> Result<(
     let bucket = shared.blobs.map(|url| bucket::open(&files, url, database.taken, shared.kept_bytes)).transpose()?;
     let (catalog, name) = database.of_folder(bucket.as_ref().map_or(&files, |bucket| &bucket.files))?;
     let files = bucket.map_or(Ok(files), Bucket::completed)?;
-    let disk = Arc::new(FencedDisk { disk: files.disk, catalog: Arc::clone(&catalog) });
+    let disk =
+        Arc::new(FencedDisk { disk: files.disk, catalog: Arc::clone(&catalog), temporary: files.tmp.clone().into() });
     Ok((Files::new(root, disk), Some((catalog, name))))
 }
 
@@ -378,7 +379,11 @@ fn of_catalog(path: &Path, action: &'static str, error: CatalogError) -> StoreEr
             // A database names itself.
             let (what, name) = (other.to_string(), path.display().to_string());
             let what = what.strip_prefix(&name).map_or(&what[..], str::trim_start).to_owned();
-            return StoreError::Catalog { path: path.to_owned(), action, what };
+            let path = path.to_owned();
+            return match other {
+                CatalogError::Away(_) => StoreError::Away { path, action, what },
+                _ => StoreError::Catalog { path, action, what },
+            };
         }
     };
     StoreError::of(path, action, cause)

@@ -51,7 +51,7 @@ impl Store {
         Ok(Workshop { store: self.clone(), path })
     }
 
-    /// Takes results out of a workshop and stores the outcome; durable on `Ok`.
+    /// Takes results out of a workshop and stores the outcome; durable on `Ok`. After an error it can be tried again.
     ///
     /// # Errors
     /// Not found where the job was deleted.
@@ -65,8 +65,12 @@ impl Store {
         let (files, folder) = (self.files(), self.folder(kind, id)?);
         if let Some((workshop, parts)) = results {
             for part in parts {
-                let place = folder.join(&part.name);
-                let moved = files.disk.rename(&workshop.path.join(&part.name), &place);
+                let (made, place) = (workshop.path.join(&part.name), folder.join(&part.name));
+                if !files.exists(&made)? && files.exists(&place)? {
+                    // By an earlier try.
+                    continue;
+                }
+                let moved = files.disk.rename(&made, &place);
                 moved.map_err(|e| StoreError::of(&place, "put in place", e))?;
             }
         }

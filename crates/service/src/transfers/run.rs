@@ -2,6 +2,7 @@
 
 use super::valid_options::{ValidOptions, design_of};
 use super::{Finished, Transfer, TransferJob, pairs_of};
+use crate::admission::Permit;
 use crate::cage_job::samples;
 use crate::jobs::{Ended, Jobs, MAX_ATTEMPTS, ResultsError, Run, Stoppable};
 use crate::preparation::{cage_of, read_part, read_part_with_units};
@@ -33,12 +34,12 @@ impl Run for Transfer {
         &service.transfers
     }
 
-    fn begin(service: Arc<Service>, job: Arc<TransferJob>) {
-        tokio::spawn(async move {
-            if let Some(place) = service.turn(&job, &service.transferring).await {
-                service.run_job(job, place, Service::transfer).await;
-            }
-        });
+    fn turn(service: &Service, job: &Arc<TransferJob>) -> impl Future<Output = Option<Permit>> + Send {
+        service.place(job, &service.transferring)
+    }
+
+    fn work(service: &Arc<Service>, job: &Arc<TransferJob>, _place: Permit) -> Ended<Finished> {
+        service.transfer(job)
     }
 }
 

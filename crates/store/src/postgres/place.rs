@@ -129,7 +129,7 @@ impl Place {
             link.limit(self.connect);
             let is_wrong = self.writes && link.only("SELECT current_setting('transaction_read_only') = 'on'", &[])?;
             match is_wrong {
-                true => Err(CatalogError::Failed(format!("{} takes no writes", self.name)).into()),
+                true => Err(CatalogError::Away(format!("{} takes no writes", self.name)).into()),
                 false => Ok(link),
             }
         };

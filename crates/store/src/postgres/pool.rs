@@ -119,7 +119,7 @@ impl Pool {
         let (mut links, waited) = waited.unwrap_or_else(PoisonError::into_inner);
         if waited.timed_out() {
             let said = format!("{} is too slow: {} connections are busy, and others wait", self.name(), CONNECTIONS);
-            return Err(CatalogError::Failed(said));
+            return Err(CatalogError::Away(said));
         }
         links.taken += 1;
         Ok(Taken(self))

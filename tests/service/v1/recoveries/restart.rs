@@ -1,9 +1,10 @@
 //! Recoveries and restarts.
 
 use super::{FRAMES, complete, completed, container, create, created, failed, post, recovery, scans, until};
-use crate::support::TestApp;
+use crate::support::{Database, TestApp};
 use cager_proto::recovery_messages::Recovery;
 use serde_json::json;
+use std::time::Duration;
 
 #[tokio::test]
 async fn a_killed_service_keeps_every_frame_it_acknowledged_and_makes_the_same_file() {
@@ -96,4 +97,24 @@ async fn a_damaged_frame_fails_the_recovery() {
     let failed = failed(&app, &job.id).await;
     assert!(failed.problem.is_some_and(|problem| problem.detail.contains("damaged")));
     post(&app, &job.id, 1, scans().parts(1..2)).await.problem(409, "recovery-failed");
+}
+
+#[tokio::test]
+async fn an_outage_of_the_database_holds_a_recovery_up_and_does_not_end_it() {
+    let Some(database) = Database::start() else { return };
+    let (app, scans) = (TestApp::on(&database, &[]), scans());
+    let job = created(&app, &json!({"points": 800})).await;
+    let waiting = created(&app, &json!({"points": 800})).await;
+    for id in [&job.id, &waiting.id] {
+        post(&app, id, 0, scans.parts(0..FRAMES)).await.expect(200);
+        complete(&app, id, FRAMES).await.expect(202);
+    }
+    until(&app, &job.id, |recovery| recovery.frames.followed >= 1).await;
+    database.kill();
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    database.run();
+    for id in [&job.id, &waiting.id] {
+        completed(&app, id).await;
+        assert!(container(&app, id).await == scans.recovered("--points 800"), "another file than the command line's");
+    }
 }

@@ -1,9 +1,10 @@
 //! Transfers and restarts.
 
 use super::{completed, created, ended, motion, running, transfer};
-use crate::support::TestApp;
+use crate::support::{Database, TestApp};
 use cager_proto::messages::JobState;
 use serde_json::json;
+use std::time::Duration;
 
 #[tokio::test]
 async fn a_killed_service_goes_on_with_those_that_ran_and_waited() {
@@ -40,4 +41,27 @@ async fn one_that_ends_the_service_again_and_again_is_given_up() {
     assert!(folder.join("target").exists());
     app.delete(&format!("/v1/transfers/{}", waiting.id)).await.expect(204);
     assert!(!folder.exists());
+}
+
+#[tokio::test]
+async fn an_outage_of_the_database_holds_those_that_run_and_wait_up_and_ends_none() {
+    let Some(database) = Database::start() else { return };
+    let app = TestApp::on(&database, &[]);
+    let mut jobs = Vec::new();
+    for _ in 0..3 {
+        jobs.push(created(&app, &json!({"align": "none"})).await);
+    }
+    running(&app, &jobs[0].id).await;
+    database.kill();
+    // The first one comes to its end meanwhile, the others to their beginning.
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    for job in &jobs {
+        let found = transfer(&app, &job.id).await;
+        assert!(!found.state.is_final(), "{found:?}");
+    }
+    database.run();
+    let expected = motion().moved("--align none");
+    for job in &jobs {
+        assert!(completed(&app, &job.id).await == expected, "another file than that of the command line");
+    }
 }
