@@ -6,6 +6,7 @@
 
 pub mod cage_messages;
 pub mod container;
+pub mod job_messages;
 pub mod le;
 pub mod messages;
 pub mod object;

@@ -59,7 +59,7 @@ pub(super) fn run(
     commit_together(report.into_iter().chain(joints.map(|(_, file)| file)).chain([container]).collect())?;
     warn(&done.warnings);
     tell(&format!(
-        "{}: {} of {} as cages of {} vertices\n  frames  {} lost\n  size    {}\n  service {}\n",
+        "{}: {} of {} as cages of {} vertices\n  frames  {} lost\n  size    {}\n  service {}/v1/recoveries/{}\n",
         output.path().display(),
         counted(done.frames.received as usize, "frame"),
         counted(done.points as usize, "point"),
@@ -67,6 +67,7 @@ pub(super) fn run(
         grouped(done.frames.lost as usize),
         human_bytes(bytes),
         plain(address),
+        done.id,
     ))
 }
 

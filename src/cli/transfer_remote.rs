@@ -69,13 +69,14 @@ pub(super) fn run(
     commit_together(report.into_iter().chain([container]).collect())?;
     warn(&done.warnings);
     tell(&format!(
-        "{}: {} of {} as cages of {} vertices\n  size    {}\n  service {}\n",
+        "{}: {} of {} as cages of {} vertices\n  size    {}\n  service {}/v1/transfers/{}\n",
         output.path().display(),
         counted(done.frames as usize, "frame"),
         counted(done.points as usize, "point"),
         grouped(done.cage_vertices.unwrap_or(0) as usize),
         human_bytes(bytes),
         plain(address),
+        done.id,
     ))
 }
 

@@ -32,7 +32,7 @@ pub enum RemoteRecoveryProgress<'a> {
     Told(&'a RecoveryProgress),
 }
 
-/// Recovers an animation on a service, where nothing stays of it when it has ended.
+/// Recovers an animation on a service, where it stays with its results when it is completed.
 ///
 /// # Errors
 /// See [`RemoteError`]. Where the connection broke, the service keeps what it has, and the same call goes on.
@@ -61,16 +61,14 @@ async fn recover(
         clean_up(&client, async |client| client.delete_recovery(&id).await).await;
     }
     let ended = followed?;
-    if ended.state == RecoveryState::Completed {
-        for (name, out) in job.outputs {
-            client.download_recovered(&id, name, out).await?;
-        }
+    if let Some(problem) = ended.problem {
+        clean_up(&client, async |client| client.delete_recovery(&id).await).await;
+        return Err(RemoteError::Failed(problem.detail));
     }
-    clean_up(&client, async |client| client.delete_recovery(&id).await).await;
-    match ended.problem {
-        Some(problem) => Err(RemoteError::Failed(problem.detail)),
-        None => Ok(ended),
+    for (name, out) in job.outputs {
+        client.download_recovered(&id, name, out).await?;
     }
+    Ok(ended)
 }
 
 /// Whether the service refuses what was sent, so that what it has is of no use. A proxy's limit can

@@ -19,7 +19,7 @@ pub struct RemoteTransfer<'a> {
     pub outputs: Vec<(&'static str, &'a mut AtomicFile)>,
 }
 
-/// Moves a motion on a service, where nothing stays of it when it has ended.
+/// Moves a motion on a service, where it stays with its results when it is completed.
 ///
 /// # Errors
 /// See [`RemoteError`]. Where the connection broke, the service goes on, and the same call finds what it did.
@@ -53,7 +53,6 @@ async fn transfer(
     for (name, out) in job.outputs {
         client.download_transferred(&id, name, out).await?;
     }
-    clean_up(&client, async |client| client.delete_transfer(&id).await).await;
     Ok(ended)
 }
 

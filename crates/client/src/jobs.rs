@@ -4,6 +4,7 @@ use crate::body::json;
 use crate::client::Client;
 use crate::create::{MeshFile, part, random_key};
 use crate::error::{ClientError, Failure};
+use cager_proto::job_messages::{Job, JobList};
 use reqwest::Method;
 use reqwest::multipart::{Form, Part};
 use serde::Serialize;
@@ -50,6 +51,14 @@ impl Client {
             Ok::<_, Failure>(made)
         })
         .await
+    }
+
+    /// Designs, recoveries and transfers, newest first, page after page.
+    ///
+    /// # Errors
+    /// Those of the connection.
+    pub async fn jobs(&self) -> Result<Vec<Job>, ClientError> {
+        self.pages("jobs", |JobList { jobs, next }| (jobs, next)).await
     }
 
     /// Deletes a job, once, over as many connections as it takes.

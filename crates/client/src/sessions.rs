@@ -5,6 +5,7 @@ use crate::client::Client;
 use crate::error::{ClientError, Failure};
 use cager_proto::messages::{Complete, Problem, Rename, Session, SessionList, SessionState};
 use reqwest::Method;
+use serde::de::DeserializeOwned;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -26,16 +27,24 @@ impl Client {
     /// # Errors
     /// Those of the connection.
     pub async fn sessions(&self) -> Result<Vec<Session>, ClientError> {
-        let mut all = Vec::new();
-        let mut query = Vec::new();
+        self.pages("sessions", |SessionList { sessions, next }| (sessions, next)).await
+    }
+
+    /// What all pages of a list have.
+    pub(crate) async fn pages<L: DeserializeOwned, T>(
+        &self,
+        list: &str,
+        read: impl Fn(L) -> (Vec<T>, Option<String>),
+    ) -> Result<Vec<T>, ClientError> {
+        let (mut all, mut query) = (Vec::new(), Vec::new());
         loop {
-            let page: SessionList = self.fetch(Method::GET, &["v1", "sessions"], &query).await?;
-            let grew = !page.sessions.is_empty();
-            all.extend(page.sessions);
-            match page.next {
+            let (page, next) = read(self.fetch(Method::GET, &["v1", list], &query).await?);
+            let grew = !page.is_empty();
+            all.extend(page);
+            match next {
                 None => return Ok(all),
                 // An empty page with a `next` would loop for ever.
-                Some(_) if !grew => return Err(ClientError::Protocol("its list of sessions has no end".to_owned())),
+                Some(_) if !grew => return Err(ClientError::Protocol(format!("its list of {list} has no end"))),
                 Some(next) => query = vec![("after", next)],
             }
         }

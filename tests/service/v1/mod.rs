@@ -1,4 +1,5 @@
 mod cages;
+mod jobs;
 mod recoveries;
 mod sessions;
 mod shapespaces;

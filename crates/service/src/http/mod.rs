@@ -23,6 +23,7 @@ pub mod fuzzing;
 mod guarded;
 mod health;
 mod job_frames;
+mod job_list;
 mod jobs;
 pub mod listen;
 mod metered;

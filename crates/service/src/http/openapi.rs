@@ -7,6 +7,7 @@ use crate::problem;
 use axum::response::IntoResponse;
 use bytes::Bytes;
 use cager_proto::cage_messages::{CageJob, CageJobList, CageOptions, CageProgress};
+use cager_proto::job_messages::{Job, JobList};
 use cager_proto::messages::{
     CageSource, FrameErrors, FrameResult, Problem, RestCage, Session, SessionList, SessionOptions,
 };
@@ -176,12 +177,13 @@ pub(crate) struct NewSessionForm {
         description = "Turns animated mesh captures into cages: make a session from a rest pose and its cage, post frames, follow or download the cages.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
     ),
-    components(schemas(CageJob, CageJobList, CageOptions, CageProgress, CageSource, Event, FrameErrors, FrameResult, Problem, Recovery, RecoveryList, RecoveryOptions, RecoveryProgress, RestCage, RowsQuery, Session, SessionList, SessionOptions, ShapeSpace, ShapeSpaceList, ShapeSpaceOptions, Transfer, TransferList, TransferOptions, TransferProgress)),
+    components(schemas(CageJob, CageJobList, CageOptions, CageProgress, CageSource, Event, FrameErrors, FrameResult, Job, JobList, Problem, Recovery, RecoveryList, RecoveryOptions, RecoveryProgress, RestCage, RowsQuery, Session, SessionList, SessionOptions, ShapeSpace, ShapeSpaceList, ShapeSpaceOptions, Transfer, TransferList, TransferOptions, TransferProgress)),
     security(("token" = [])),
     tags(
         (name = "sessions", description = "Sessions and their progress"),
         (name = "frames", description = "Frames of a capture"),
         (name = "results", description = "What comes out"),
+        (name = "jobs", description = "Designs, recoveries and transfers together"),
         (name = "cages", description = "Cages designed from a motion"),
         (name = "recoveries", description = "Animations recovered from surfaces without correspondence"),
         (name = "transfers", description = "Motions moved onto other models"),

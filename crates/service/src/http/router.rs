@@ -7,7 +7,7 @@ use super::guarded::with_permit;
 use super::respond::PROBLEM_JSON;
 use super::{
     cage, cage_jobs, cages, capture_files, container, coordinates, decode, errors, events, exported, extract, frames,
-    health, methods, openapi, origin, page, recoveries, sent, sessions, shape_spaces, transfers,
+    health, job_list, methods, openapi, origin, page, recoveries, sent, sessions, shape_spaces, transfers,
 };
 use crate::problem::{self, ApiError, ProblemKind};
 use crate::service::Service;
@@ -43,6 +43,7 @@ fn quick() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(events::get))
         .routes(routes!(cages::get))
         .routes(routes!(container::get))
+        .routes(routes!(job_list::list))
         .routes(routes!(cage_jobs::jobs::list))
         .routes(routes!(cage_jobs::jobs::get, cage_jobs::jobs::delete))
         .routes(routes!(cage_jobs::events::get))

@@ -57,6 +57,11 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
         matches!(status.phase, Phase::Waiting)
     }
 
+    /// Whether one that runs has nothing to do, since it waits for its client.
+    fn is_idle(_status: &Status<Self>) -> bool {
+        false
+    }
+
     /// Files of the results.
     fn files(finished: &Self::Finished) -> Cow<'_, [StoredPart]>;
 

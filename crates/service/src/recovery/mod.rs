@@ -50,6 +50,10 @@ impl Work for Recovery {
         !status.phase.is_final() && status.progress.has_work()
     }
 
+    fn is_idle(status: &Status<Self>) -> bool {
+        !status.progress.has_work()
+    }
+
     fn files(finished: &Finished) -> Cow<'_, [StoredPart]> {
         (&finished.files).into()
     }

@@ -11,11 +11,13 @@ pub(crate) trait JobMeta: RecordMeta + Clone + Send + Sync + 'static {
     fn tenant(&self) -> &str;
     /// Idempotency key and fingerprint of the request that created it.
     fn idempotency(&self) -> Option<&Idempotency>;
+    /// What it is called.
+    fn name(&self) -> Option<&str>;
     /// Bytes that were sent with it.
     fn sent_bytes(&self) -> u64;
 }
 
-/// Implements [`JobMeta`] for metadata with `id`, `tenant`, `created_ms` and `idempotency`: its kind, and the bytes that were sent.
+/// Implements [`JobMeta`] for metadata with `id`, `tenant`, `created_ms`, `options` and `idempotency`: its kind, and the bytes that were sent.
 macro_rules! job_meta {
     ($meta:ident, $kind:expr, |$of:ident| $sent:expr) => {
         impl $crate::store::RecordMeta for $meta {
@@ -37,6 +39,10 @@ macro_rules! job_meta {
 
             fn idempotency(&self) -> Option<&Idempotency> {
                 self.idempotency.as_ref()
+            }
+
+            fn name(&self) -> Option<&str> {
+                self.options.name.as_deref()
             }
 
             fn sent_bytes(&self) -> u64 {

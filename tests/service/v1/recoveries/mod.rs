@@ -113,7 +113,7 @@ async fn create(api: &Api, form: Form, key: Option<&str>) -> Reply {
     .await
 }
 
-async fn created(api: &Api, options: &Value) -> Recovery {
+pub(super) async fn created(api: &Api, options: &Value) -> Recovery {
     create(api, scans().form(options), None).await.is(202)
 }
 

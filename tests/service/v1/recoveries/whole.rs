@@ -123,10 +123,13 @@ async fn a_template_keeps_its_unit_and_the_axis_that_points_up() {
 }
 
 #[tokio::test]
-async fn the_command_line_has_a_service_recover_the_same_file_and_leaves_nothing_there() {
+async fn the_command_line_has_a_service_recover_the_same_file_and_leaves_it_there() {
     let app = TestApp::start();
     let made = scans().recovered(&format!("--points 800 --fps 25 --server http://{}", app.address));
     assert!(made == scans().recovered("--points 800 --fps 25"), "another file than without a service");
     let list: RecoveryList = app.get("/v1/recoveries").await.is(200);
-    assert!(list.recoveries.is_empty(), "{list:?}");
+    assert_eq!(list.recoveries.len(), 1, "{list:?}");
+    let kept = &list.recoveries[0];
+    assert_eq!((kept.state, kept.name.as_deref()), (RecoveryState::Completed, Some("out")));
+    assert!(container(&app, &kept.id).await == made);
 }

@@ -27,7 +27,7 @@ async fn pages_hold_every_session_once_the_newest_first() {
 async fn what_the_query_does_not_know_is_refused() {
     let app = TestApp::start();
     app.get("/v1/sessions?befor=1").await.problem(400, "bad-request");
-    for list in ["sessions", "cages", "recoveries", "transfers"] {
+    for list in ["sessions", "jobs", "cages", "recoveries", "transfers"] {
         for after in ["", "0", "zzz"] {
             let problem = app.get(&format!("/v1/{list}?after={after}")).await.problem(400, "bad-request");
             assert!(problem.detail.contains("the `next` of the page before"), "{}", problem.detail);

@@ -109,7 +109,7 @@ async fn create(api: &Api, form: Form, key: Option<&str>) -> Reply {
     .await
 }
 
-async fn created(api: &Api, options: &Value) -> Transfer {
+pub(super) async fn created(api: &Api, options: &Value) -> Transfer {
     create(api, motion().form(options), None).await.is(202)
 }
 

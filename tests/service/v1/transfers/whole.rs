@@ -124,7 +124,7 @@ async fn pairs_pull_as_those_of_the_command_line_do() {
 }
 
 #[tokio::test]
-async fn the_command_line_has_a_service_move_the_same_and_leaves_nothing_there() {
+async fn the_command_line_has_a_service_move_the_same_and_leaves_it_there() {
     let app = TestApp::start();
     let session = app.completed(&motion().capture, FRAMES).await;
     let container = app.get(&format!("/v1/sessions/{}/capture.cager", session.id)).await.expect(200).body;
@@ -139,7 +139,8 @@ async fn the_command_line_has_a_service_move_the_same_and_leaves_nothing_there()
         assert!(there == moved(""), "{source} {more}: another file than without a service");
     }
     let list: TransferList = app.get("/v1/transfers").await.is(200);
-    assert!(list.transfers.is_empty(), "{list:?}");
+    assert_eq!(list.transfers.len(), 3, "{list:?}");
+    assert!(list.transfers.iter().all(|transfer| transfer.state == JobState::Completed), "{list:?}");
 }
 
 #[tokio::test]
