@@ -1,5 +1,5 @@
-//! One process has the database for itself: a lock that ends with its connection, and a number that the next process raises, so that the one before
-//! changes nothing any more even where it does not know of it.
+//! One process has the database for itself: a lock that ends with its connection, or is taken from it after some seconds of silence, and a number that the next
+//! process raises, so that the one before changes nothing any more even where it does not know of it.
 
 use super::place::Place;
 use super::schema::{hash, schema};
@@ -17,8 +17,12 @@ use std::time::Duration;
 /// Distinguishes the lock of the process that has the database, and that of changes, from those that others take.
 const OWNER: i32 = 0x6361_6766;
 const CHANGES: i32 = 0x6361_6767;
-/// How often the connection with the lock is looked at.
+/// How often the process that has the database says that it is well, and looks at the connection with the lock.
 const PAUSE: Duration = Duration::from_secs(1);
+/// After how much silence another one may take it.
+const SILENCE: Duration = Duration::from_secs(8);
+/// How long connections that are ended take for it.
+const ENDING: Duration = Duration::from_millis(200);
 /// How long such a call may take. Taking waits for the changes that are under way.
 const LIMIT: Duration = Duration::from_secs(5);
 const TAKING: Duration = Duration::from_secs(60);
@@ -37,13 +41,14 @@ impl Claim {
         let explain = |trouble: Trouble| trouble.explain(&name);
         let mut link = place.of_owner().connect().map_err(explain)?;
         let hash = hash(&read(&mut link, LIMIT, schema).map_err(explain)?);
-        if !try_lock(&mut link, hash).map_err(explain)? {
+        let is_free = |link: &mut Link| Ok(try_lock(link, hash)? || (end_silent(link, hash)? && try_lock(link, hash)?));
+        if !is_free(&mut link).map_err(explain)? {
             return Err(in_use(&mut link, hash, &name));
         }
         let taken: Result<i64, Trouble> = write(&mut link, TAKING, None, |link| {
             // Until the changes that earlier owners have begun are made or given up.
             link.batch(AssertSqlSafe(format!("SELECT pg_advisory_xact_lock({CHANGES}, {hash})")))?;
-            link.only("UPDATE catalogue SET taken = taken + 1 RETURNING taken", &[])
+            link.only("UPDATE catalogue SET taken = taken + 1, seen = clock_timestamp() RETURNING taken", &[])
         });
         let taken = taken.map_err(|trouble| match trouble.is_slow() {
             true => CatalogError::InUse(format!("{name} is still being changed by its last owner")),
@@ -86,10 +91,10 @@ impl Drop for Claim {
     }
 }
 
-/// Sees that the lock is held, by another connection where the one before has ended. Whether nobody else has had it.
+/// Says that this process is well, and sees that the lock is held, by another connection where the one before has ended. Whether nobody else has had it.
 fn keep(kept: &mut Option<Link>, place: &Place, hash: i32, taken: i64) -> Result<bool, CatalogError> {
-    let is_own =
-        |link: &mut Link| read(link, LIMIT, |link| Ok(link.only::<i64>("SELECT taken FROM catalogue", &[])? == taken));
+    let sql = "UPDATE catalogue SET seen = clock_timestamp() WHERE taken = $1";
+    let is_own = |link: &mut Link| read(link, LIMIT, |link| Ok(link.execute(sql, &[Value::Integer(taken)])? == 1));
     if let Some(link) = kept {
         match is_own(link) {
             Ok(is_own) => return Ok(is_own),
@@ -108,6 +113,20 @@ fn keep(kept: &mut Option<Link>, place: &Place, hash: i32, taken: i64) -> Result
 
 fn try_lock(link: &mut Link, hash: i32) -> Result<bool, Trouble> {
     read(link, LIMIT, |link| link.only(AssertSqlSafe(format!("SELECT pg_try_advisory_lock({OWNER}, {hash})")), &[]))
+}
+
+/// Ends the connections by which another process has the database, or changes it, where that has been silent for long: it stands still, or nothing of it comes
+/// through. Whether there may have been any. What it does later is refused, as its number is not the last one.
+fn end_silent(link: &mut Link, hash: i32) -> Result<bool, Trouble> {
+    let sql = "SELECT count(pg_terminate_backend(pid)) FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint IN ($1, $2) AND objid::bigint = $3 AND granted AND pid <> pg_backend_pid() AND database = (SELECT oid FROM pg_database WHERE datname = current_database()) AND (SELECT clock_timestamp() - seen > make_interval(secs => $4) FROM catalogue)";
+    let [owner, changes, hash] = [OWNER, CHANGES, hash].map(|number| Value::Integer((number as u32).into()));
+    let ended: i64 =
+        read(link, LIMIT, |link| link.only(sql, &[owner, changes, hash, Value::Real(SILENCE.as_secs_f64())]))?;
+    if ended > 0 {
+        // They take a moment to end.
+        std::thread::sleep(ENDING);
+    }
+    Ok(ended > 0)
 }
 
 fn in_use(link: &mut Link, hash: i32, name: &str) -> CatalogError {
