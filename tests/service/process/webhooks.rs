@@ -156,3 +156,30 @@ fn a_file_that_is_wrong_stops_the_start_and_shows_no_secret() {
     assert!(!output.status.success() && said.contains("webhooks.toml: line 2") && said.contains("https"), "{said}");
     assert!(!said.contains("c2Vj"), "{said}");
 }
+
+#[tokio::test]
+async fn a_job_that_ends_is_told_of_also_after_a_restart() {
+    let receiver = Elsewhere::with(&[500, 500]).await;
+    let (_place, mut app) = telling(&receiver, "events = [\"job.completed\", \"job.failed\"]");
+    let capture = Capture::tiny();
+    let job = app.design(capture, &json!({"vertices": 32, "time_limit_s": 10.0, "name": "a cage"})).await;
+    let first = checked(&receiver.next().await);
+    assert_eq!((&first["type"], &first["data"]["tenant"]), (&json!("job.completed"), &json!("local")));
+    let told = &first["data"]["job"];
+    let expected = (json!("cage"), json!(job.id), json!("a cage"), json!("completed"));
+    assert_eq!(
+        (&told["kind"], &told["id"], &told["name"], &told["state"]),
+        (&expected.0, &expected.1, &expected.2, &expected.3)
+    );
+    assert_eq!(told["url"], json!(format!("/v1/cages/{}", job.id)));
+    // It was not taken, and the service ends before it is sent again.
+    app.kill();
+    let app = app.again();
+    assert_eq!(checked(&receiver.next().await), first, "the same again");
+    assert_eq!(checked(&receiver.next().await), first, "until it is taken");
+    // A session is not what was asked for.
+    app.completed(capture, 2).await;
+    let delivered = async || app.metric("cager_webhooks_total{result=\"delivered\"}").await;
+    eventually("that it is counted", async || (delivered().await == 1.0).then_some(())).await;
+    assert_eq!(receiver.left(), 0);
+}

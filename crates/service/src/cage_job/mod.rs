@@ -18,6 +18,7 @@ use bytes::Bytes;
 use cager_cages::Progress as DesignProgress;
 use cager_geometry::mesh::TriMesh;
 use cager_proto::cage_messages::{CageError, CageJob as View, CageProgress, CageStage, CageState};
+use cager_proto::job_messages::JobKind;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Instant;
@@ -33,6 +34,7 @@ impl Work for CageDesign {
     type Finished = Finished;
     type Progress = Progress;
 
+    const KIND: JobKind = JobKind::Cage;
     const NAME: &'static str = "cage design";
     const LIST: &'static str = "/v1/cages";
     const ENDED: &'static str = "cager_designs_total";

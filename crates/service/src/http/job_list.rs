@@ -4,15 +4,13 @@ use super::extract::{Caller, Query};
 use super::respond::JsonResult;
 use super::sessions::{PAGE, PageQuery, page_of};
 use crate::cage_job::CageDesign;
-use crate::jobs::{Job as Known, Phase, Run};
+use crate::jobs::Run;
 use crate::recovery::Recovery;
 use crate::service::Service;
-use crate::store::{JobMeta as _, RecordMeta as _};
 use crate::transfers::Transfer;
 use axum::Json;
 use axum::extract::State;
-use cager_proto::job_messages::{Job, JobKind, JobList};
-use cager_proto::messages::JobState;
+use cager_proto::job_messages::{Job, JobList};
 use std::sync::Arc;
 
 /// Lists the tenant's designs, recoveries and transfers, newest first, a hundred at a time.
@@ -23,9 +21,9 @@ pub(crate) async fn list(
     Query(query): Query<PageQuery>,
 ) -> JsonResult<JobList> {
     let after = query.after()?;
-    let mut jobs = of::<CageDesign>(&service, &tenant.name, after, JobKind::Cage);
-    jobs.extend(of::<Recovery>(&service, &tenant.name, after, JobKind::Recovery));
-    jobs.extend(of::<Transfer>(&service, &tenant.name, after, JobKind::Transfer));
+    let mut jobs = of::<CageDesign>(&service, &tenant.name, after);
+    jobs.extend(of::<Recovery>(&service, &tenant.name, after));
+    jobs.extend(of::<Transfer>(&service, &tenant.name, after));
     // Ids are in order of creation.
     jobs.sort_unstable_by(|a, b| b.id.cmp(&a.id));
     let (jobs, next) = page_of(jobs, |job| job.id.clone());
@@ -33,24 +31,6 @@ pub(crate) async fn list(
 }
 
 /// The first jobs of a kind after this id, one more than a page has.
-fn of<W: Run>(service: &Service, tenant: &str, after: Option<&str>, kind: JobKind) -> Vec<Job> {
-    W::jobs(service).page(tenant, after, PAGE + 1).iter().map(|job| told(&**job, kind)).collect()
-}
-
-fn told<W: Run>(job: &Known<W>, kind: JobKind) -> Job {
-    let (state, detail) = match job.phase() {
-        Phase::Running if !W::is_idle(&job.status()) => (JobState::Running, None),
-        Phase::Waiting | Phase::Running => (JobState::Queued, None),
-        Phase::Completed(_) => (JobState::Completed, None),
-        Phase::Failed(problem) => (JobState::Failed, Some(problem.detail)),
-    };
-    Job {
-        kind,
-        id: job.id().to_owned(),
-        name: job.meta.name().map(str::to_owned),
-        state,
-        created: job.meta.created_ms() as f64 / 1e3,
-        url: format!("{}/{}", W::LIST, job.id()),
-        detail,
-    }
+fn of<W: Run>(service: &Service, tenant: &str, after: Option<&str>) -> Vec<Job> {
+    W::jobs(service).page(tenant, after, PAGE + 1).iter().map(|job| job.summary()).collect()
 }

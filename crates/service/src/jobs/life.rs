@@ -5,6 +5,7 @@ use crate::problem::{self, ApiError};
 use crate::service::Service;
 use crate::store::{JobMeta as _, RecordMeta as _, StoreError, Workshop};
 use crate::tasks::{Pauses, blocking, to_the_end};
+use crate::webhooks::Event;
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
@@ -66,8 +67,9 @@ impl Service {
             }
         }
         W::jobs(self).insert(Arc::clone(&job));
-        if !job.status().phase.is_final() {
-            Arc::clone(self).begin_job(job);
+        match job.phase().is_final() {
+            true => self.resend_undelivered(&job),
+            false => Arc::clone(self).begin_job(job),
         }
         Ok(())
     }
@@ -89,6 +91,7 @@ impl Service {
             // Errors that may be temporary are retried after a restart.
             Ended::Failed(error) | Ended::GivenUp(error) => {
                 job.set_phase(Phase::Failed(error.problem));
+                self.announce_unrecorded_failure(job);
                 return true;
             }
         };
@@ -99,17 +102,23 @@ impl Service {
     /// Stores the outcome of a job with the results in a workshop, then notifies its followers.
     async fn finish_job<W: Work>(&self, job: &Arc<Job<W>>, outcome: Outcome<W::Finished>, workshop: Option<Workshop>) {
         let (workshop, mut pauses) = (workshop.map(Arc::new), Pauses::new());
+        let event = match outcome {
+            Outcome::Completed(_) => Event::JobCompleted,
+            Outcome::Failed(_) => Event::JobFailed,
+        };
         let stored = loop {
             let (store, id, kept, made) = (self.store.clone(), job.id().to_owned(), outcome.clone(), workshop.clone());
+            let (webhooks, about) = (Arc::clone(&self.webhooks), job.about());
             let stored = blocking(move || {
                 let files = match &kept {
                     Outcome::Completed(finished) => W::files(finished),
                     Outcome::Failed(_) => Cow::default(),
                 };
                 let results = made.as_deref().map(|workshop| (workshop, &files[..]));
+                let due = webhooks.store_pending(&about, event)?;
                 store.finish_job(kind_of::<W>(), &id, &kept, results)?;
                 W::forget_input(&store, &id);
-                Ok::<_, StoreError>(store.bytes(kind_of::<W>(), &id).ok())
+                Ok::<_, StoreError>((store.bytes(kind_of::<W>(), &id).ok(), due))
             });
             match stored.await {
                 Ok(Err(error)) if error.is_passing() && !job.is_going() && !self.is_stopped(job) => {
@@ -131,9 +140,14 @@ impl Service {
                 _ = changes.changed() => {}
             }
         }
+        let mut due = None;
         match stored {
-            Ok(Ok(Some(bytes))) => job.bytes.store(bytes, Relaxed),
-            Ok(Ok(None)) => {}
+            Ok(Ok((bytes, message))) => {
+                due = message;
+                if let Some(bytes) = bytes {
+                    job.bytes.store(bytes, Relaxed);
+                }
+            }
             Ok(Err(error)) => {
                 tracing::warn!(job = job.id(), %error, "the outcome of a job could not be kept; a restart begins it again");
                 if matches!(outcome, Outcome::Completed(_)) {
@@ -148,6 +162,9 @@ impl Service {
         };
         metrics::counter!(W::ENDED, "result" => result).increment(1);
         job.set_phase(phase);
+        if let Some(due) = due {
+            self.announce(job, due);
+        }
     }
 
     /// Deletes a job and stops its work. Runs to the end even if the client disconnects.

@@ -6,6 +6,7 @@ mod life;
 mod registry;
 mod results;
 mod run;
+mod summary;
 
 pub(crate) use create::{Checked, new_job};
 pub(crate) use life::Ended;
@@ -17,6 +18,7 @@ use crate::config::ServeConfig;
 use crate::problem::{self, ApiError};
 use crate::store::{JobMeta, Kind, RecordMeta as _, Store, StoreError, StoredPart};
 use crate::sync::lock;
+use cager_proto::job_messages::JobKind;
 use cager_proto::messages::Problem;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -34,6 +36,8 @@ pub(crate) trait Work: Send + Sync + Sized + 'static {
     /// What is known of one that is not over, in memory.
     type Progress: Default + Send;
 
+    /// What it is in lists of all kinds.
+    const KIND: JobKind;
     /// What one is called, in messages.
     const NAME: &'static str;
     /// Where they are listed.

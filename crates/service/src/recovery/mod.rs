@@ -16,6 +16,7 @@ use crate::config::ServeConfig;
 use crate::jobs::{Job, Phase, Status, Work};
 use crate::problem::{self, ApiError};
 use crate::store::{RecoveryMeta, Store, StoreError, StoredPart};
+use cager_proto::job_messages::JobKind;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -33,6 +34,7 @@ impl Work for Recovery {
     type Finished = Finished;
     type Progress = Progress;
 
+    const KIND: JobKind = JobKind::Recovery;
     const NAME: &'static str = "recovery";
     const LIST: &'static str = "/v1/recoveries";
     const ENDED: &'static str = "cager_recoveries_total";

@@ -306,7 +306,7 @@ fn write(session: &Session, prepared: &Prepared, frames: u32) -> Result<Written,
         return Err(cannot_be_coded(Goal::Size(asked), &CodingError::TooSmall { asked, least: written.bytes }));
     }
     let completion = Completion { frames, container_bytes: written.bytes, container_digest: written.digest };
-    let due = session.webhooks.store_pending(&session.meta, Event::Completed).map_err(stored)?;
+    let due = session.webhooks.store_pending(&session.about(), Event::Completed).map_err(stored)?;
     session.mark(&completion).map_err(stored)?;
     Ok(Written { completion, due })
 }

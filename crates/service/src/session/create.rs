@@ -240,7 +240,7 @@ impl Service {
                     self.keep_outcome(&session, Outcome::Failed(error.problem.clone())).await;
                 }
                 let ended = Arc::clone(&session);
-                let due = blocking(move || ended.webhooks.store_pending(&ended.meta, Event::Failed)).await;
+                let due = blocking(move || ended.webhooks.store_pending(&ended.about(), Event::Failed)).await;
                 session.set_phase(Phase::Failed(error.problem));
                 match due {
                     Ok(Ok(None)) => {}

@@ -11,6 +11,9 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
 
+/// What a message that is due is called where it is stored.
+const ANNOUNCEMENT: &str = "announce";
+
 /// What a session or job is; fixed at its creation.
 pub(crate) trait RecordMeta: Serialize + DeserializeOwned {
     const KIND: Kind;
@@ -167,6 +170,20 @@ impl Store {
     pub fn outcome<T: DeserializeOwned>(&self, kind: Kind, id: &str) -> Result<Option<T>, StoreError> {
         let outcome = self.record(kind, id)?.and_then(|record| record.outcome);
         outcome.map(|bytes| self.unsealed((kind, id), outcome_of(kind), &bytes)).transpose()
+    }
+
+    /// Stores what has to be announced about an object, in place of what had to be before; durable on `Ok`.
+    pub fn set_announcement<T: Serialize>(&self, kind: Kind, id: &str, message: &T) -> Result<(), StoreError> {
+        self.change(Key { kind, id }, &[Change::Announcement(self.sealed(ANNOUNCEMENT, message)?)])
+    }
+
+    /// What has to be announced about an object.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`].
+    pub fn announcement<T: DeserializeOwned>(&self, kind: Kind, id: &str) -> Result<Option<T>, StoreError> {
+        let message = self.record(kind, id)?.and_then(|record| record.announcement);
+        message.map(|bytes| self.unsealed((kind, id), ANNOUNCEMENT, &bytes)).transpose()
     }
 
     /// Deletes an object, if it exists. On `Ok` the deletion is durable; after an error it is either gone or still there as a whole.

@@ -1,10 +1,9 @@
-//! Sessions: metadata, container, completion mark and announcement.
+//! Sessions: metadata, container and completion mark.
 
 use super::records::{RecordMeta, outcome_of};
 use super::{ContentKey, Kind, Store, StoreError, StoredFile};
 use cager_proto::messages::SessionOptions;
 use cager_store::{Change, Key};
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -105,9 +104,8 @@ impl RecordMeta for SessionMeta {
 const CONTAINER: &str = "capture.cager";
 /// Bytes of a container gathered before a write.
 const BUFFER_BYTES: usize = 1 << 18;
-/// What they are called where they are stored.
+/// What it is called where it is stored.
 const COMPLETION: &str = "completion";
-const ANNOUNCEMENT: &str = "announce";
 
 fn key(id: &str) -> Key<'_> {
     Key { kind: Kind::Session, id }
@@ -216,20 +214,6 @@ impl Store {
         digest.update_reader(file).map_err(failed)?;
         let digest = digest.finalize().to_hex();
         Ok(bytes == completion.container_bytes && digest.as_str() == completion.container_digest)
-    }
-
-    /// Stores what has to be announced about the session, in place of what had to be before; durable on `Ok`.
-    pub fn set_announcement<T: Serialize>(&self, id: &str, message: &T) -> Result<(), StoreError> {
-        self.change(key(id), &[Change::Announcement(self.sealed(ANNOUNCEMENT, message)?)])
-    }
-
-    /// What has to be announced about the session.
-    ///
-    /// # Errors
-    /// [`StoreError::Damaged`].
-    pub fn announcement<T: DeserializeOwned>(&self, id: &str) -> Result<Option<T>, StoreError> {
-        let message = self.record(Kind::Session, id)?.and_then(|record| record.announcement);
-        message.map(|bytes| self.unsealed((Kind::Session, id), ANNOUNCEMENT, &bytes)).transpose()
     }
 
     /// Path of the session's container, whether or not it exists. For an invalid id it is a path where nothing exists.

@@ -15,6 +15,7 @@ use crate::config::ServeConfig;
 use crate::jobs::{Job, Phase, Work};
 use crate::problem;
 use crate::store::{Store, StoredPart, TransferMeta};
+use cager_proto::job_messages::JobKind;
 use cager_proto::transfer_messages::TransferStage;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -32,6 +33,7 @@ impl Work for Transfer {
     type Finished = Finished;
     type Progress = Progress;
 
+    const KIND: JobKind = JobKind::Transfer;
     const NAME: &'static str = "transfer";
     const LIST: &'static str = "/v1/transfers";
     const ENDED: &'static str = "cager_transfers_total";

@@ -1,7 +1,7 @@
 //! Delivering a message, with retries.
 
 use super::file::Hook;
-use super::{Event, PendingMessage};
+use super::{About, Event, PendingMessage};
 use crate::http_client::Client;
 use crate::store::Store;
 use crate::sync::lock;
@@ -22,11 +22,10 @@ const PAUSES: [u64; 10] = [2, 15, MINUTE, 5 * MINUTE, 30 * MINUTE, 2 * HOUR, 6 *
 
 /// A message to one receiver.
 pub(super) struct Message {
-    /// The session that it reports.
-    pub(super) session: String,
+    pub(super) about: About,
     pub(super) body: Bytes,
     pub(super) store: Store,
-    /// The receivers that have not acknowledged it, shared by all messages about the session.
+    /// The receivers that have not acknowledged it, shared by all messages about the same.
     pub(super) left: Arc<Mutex<PendingMessage>>,
 }
 
@@ -61,9 +60,9 @@ impl Message {
         let noted = tokio::task::spawn_blocking(move || {
             let mut due = self.due();
             due.left.retain(|hook| *hook != told);
-            self.store.set_announcement(&self.session, &*due)
+            self.store.set_announcement(self.about.kind, &self.about.id, &*due)
         });
-        // If this is not stored, the message is sent again after a restart with the same id. Notes of a deleted session are gone.
+        // If this is not stored, the message is sent again after a restart with the same id. What is noted of something deleted is gone.
         if let Ok(Err(error)) = noted.await {
             tracing::debug!(%error, "the delivery of a webhook message could not be stored");
         }
@@ -77,10 +76,10 @@ impl Message {
     /// The same for every attempt.
     fn id(&self) -> String {
         let what = match self.due().event {
-            Event::Completed => "completed",
-            Event::Failed => "failed",
+            Event::Completed | Event::JobCompleted => "completed",
+            Event::Failed | Event::JobFailed => "failed",
         };
-        format!("{}.{what}", self.session)
+        format!("{}.{what}", self.about.id)
     }
 
     async fn send(&self, id: &str, hook: &Hook, client: &Client) -> Result<StatusCode, String> {

@@ -5,7 +5,7 @@
 //! url = "https://pipeline.example/hooks/cager"
 //! secret = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"   # of 24 to 64 bytes, base64; the receiver has the same
 //! # tenant = "studio-a"              # only sessions of this tenant; default: all
-//! # events = ["session.completed"]   # default: session.failed as well
+//! # events = ["session.completed"]   # default: session.failed, job.completed and job.failed as well
 //! ```
 
 use super::Event;
