@@ -4,7 +4,7 @@ use crate::cli::{print, tell};
 use anyhow::{Context as _, Result, bail};
 use cager_formats::{AtomicFile, Target};
 use cager_service::config::{ServeConfig, ServeFlags};
-use cager_service::store::{Completion, Kind, LocalDisk, Opened, Shared, Store, Verified};
+use cager_service::store::{CAGE, Completion, Kind, LocalDisk, Opened, Shared, Store, StoredPart, Verified};
 use clap::{Args, Subcommand};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -38,6 +38,9 @@ pub(crate) struct StoreArgs {
     config: Option<PathBuf>,
 }
 
+/// The file of a capture.
+const CONTAINER: &str = "capture.cager";
+
 /// What to do with what is stored.
 #[derive(Subcommand)]
 pub(crate) enum StoreCommand {
@@ -45,13 +48,14 @@ pub(crate) enum StoreCommand {
     Usage,
     /// Read everything, and name what is damaged; exit status 1 if something is.
     Verify,
-    /// Copy the containers of completed sessions to a folder, as TENANT/SESSION.cager; those that
-    /// are there are passed over, damaged ones are named and left out, with exit status 1.
+    /// Copy the containers of completed sessions, recoveries and transfers to a folder, as
+    /// TENANT/ID.cager, and designed cages, as TENANT/ID.obj; those that are there are passed over,
+    /// damaged ones are named and left out, with exit status 1.
     Export {
         /// Where to; it may be there.
         #[arg(value_name = "DIR")]
         output: PathBuf,
-        /// Only this session; may be repeated.
+        /// Only this session or job; may be repeated.
         #[arg(long = "session", value_name = "ID")]
         sessions: Vec<String>,
     },
@@ -178,55 +182,76 @@ fn verify(opened: &Opened) -> Result<()> {
     print("nothing is damaged\n")
 }
 
-fn export(Opened { store, sessions, .. }: &Opened, output: &Path, wanted: &[String]) -> Result<()> {
-    if let Some(unknown) = wanted.iter().find(|id| sessions.iter().all(|session| session.id != **id)) {
-        bail!("there is no session {unknown}");
+/// The file that is wanted of a session or job; `None` where it has none yet.
+fn wanted_file(store: &Store, kind: Kind, id: &str) -> Result<Option<StoredPart>> {
+    if kind == Kind::Session {
+        let mark = store.completion(id)?;
+        return Ok(mark.map(|Completion { container_bytes: bytes, container_digest: blake3, .. }| StoredPart {
+            name: CONTAINER.to_owned(),
+            bytes,
+            blake3,
+        }));
+    }
+    Ok(store.results(kind, id)?.into_iter().find(|part| [CONTAINER, CAGE].contains(&&*part.name)))
+}
+
+fn export(opened: &Opened, output: &Path, wanted: &[String]) -> Result<()> {
+    let (store, all) = (&opened.store, objects(opened));
+    if let Some(unknown) = wanted.iter().find(|id| all.iter().all(|(_, known, _)| known != id)) {
+        bail!("there is no session or job {unknown}");
     }
     fs::create_dir_all(output).with_context(|| format!("{}: cannot be made", output.display()))?;
     let (mut written, mut there, mut running, mut left) = (0, 0, 0, 0);
-    for session in sessions.iter().filter(|session| wanted.is_empty() || wanted.contains(&session.id)) {
-        let mark = match store.completion(&session.id) {
+    for (kind, id, tenant) in all.into_iter().filter(|(_, id, _)| wanted.is_empty() || wanted.iter().any(|w| w == id)) {
+        let copied = match wanted_file(store, kind, id) {
             Ok(None) => {
                 running += 1;
                 continue;
             }
-            Ok(Some(mark)) => store.container_damage(&session.id, &mark).map_or(Ok(mark), Err),
-            Err(error) => Err(error.to_string()),
+            Ok(Some(part)) => copy(store, (kind, id), &part, &output.join(tenant)),
+            Err(error) => Err(error),
         };
-        let folder = output.join(&session.tenant);
-        match mark.and_then(|mark| copy(store, &session.id, &mark, &folder).map_err(|error| format!("{error:#}"))) {
+        match copied {
             Ok(true) => written += 1,
             Ok(false) => there += 1,
             Err(why) => {
                 left += 1;
-                print(&format!("session {} of {}: {why}\n", session.id, session.tenant))?;
+                print(&format!("{} {id} of {tenant}: {why:#}\n", kind.name()))?;
             }
         }
     }
     tell(&format!(
-        "wrote {written} containers, and {there} were there already; {running} sessions are not completed and have \
+        "wrote {written} files, and {there} were there already; {running} sessions and jobs are not completed and have \
          none\n"
     ))?;
     if left > 0 {
-        bail!("containers left out, for the reasons above: {left}");
+        bail!("files left out, for the reasons above: {left}");
     }
     Ok(())
 }
 
-/// Copies a container, unless the same is there: so that what was stopped goes on. Whether it was copied.
-fn copy(store: &Store, id: &str, mark: &Completion, folder: &Path) -> Result<bool> {
-    let path = folder.join(format!("{id}.cager"));
-    let failed = || format!("{}: the container cannot be written", path.display());
+/// Copies a file that is whole, unless the same is there: so that what was stopped goes on. Whether it was copied.
+fn copy(store: &Store, (kind, id): (Kind, &str), part: &StoredPart, folder: &Path) -> Result<bool> {
+    let damage = match kind {
+        Kind::Session => store.completion(id)?.and_then(|mark| store.container_damage(id, &mark)),
+        _ => store.result_damage(kind, id, part),
+    };
+    if let Some(why) = damage {
+        bail!(why);
+    }
+    let ending = Path::new(&part.name).extension().unwrap_or_default().display();
+    let path = folder.join(format!("{id}.{ending}"));
+    let failed = || format!("{}: the file cannot be written", path.display());
     if path.try_exists().with_context(failed)? {
-        if mark.is_of(&path).with_context(failed)? {
+        if part.is_of(&path).with_context(failed)? {
             return Ok(false);
         }
         bail!("{} has another content; move it away, or name another folder", path.display());
     }
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-    let mut container = store.open_file(&store.container_path(id))?;
+    let mut stored = store.open_file(&store.job_file(kind, id, &part.name)?)?;
     let mut file = AtomicFile::create(Target::New(path.clone())).with_context(failed)?;
-    io::copy(&mut container, &mut file).with_context(failed)?;
+    io::copy(&mut stored, &mut file).with_context(failed)?;
     file.commit().with_context(failed)?;
     Ok(true)
 }

@@ -1,6 +1,8 @@
 //! `cager store`: what a service has stored, while it does not run.
 
 use crate::support::{Capture, TestApp, folder};
+use crate::v1::recoveries;
+use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -39,7 +41,7 @@ async fn what_is_stored_is_counted_checked_and_copied() {
     let copied = store(&data, &["export", &copies.path().display().to_string()]);
     assert!(copied.status.success(), "{}", said(&copied));
     assert!(
-        said(&copied).contains("wrote 2 containers, and 0 were there already; 1 sessions are"),
+        said(&copied).contains("wrote 2 files, and 0 were there already; 1 sessions and jobs are"),
         "{}",
         said(&copied)
     );
@@ -53,7 +55,7 @@ async fn what_is_stored_is_counted_checked_and_copied() {
     assert!(!again.status.success() && said(&again).contains(&whole), "{}", said(&again));
     assert_eq!(std::fs::read(&path).expect("a file"), b"mine");
     let unknown = store(&data, &["export", "--session", "x", &copies.path().display().to_string()]);
-    assert!(said(&unknown).contains("there is no session x"), "{}", said(&unknown));
+    assert!(said(&unknown).contains("there is no session or job x"), "{}", said(&unknown));
 
     let path = app.session_file(&other, "capture.cager");
     let mut bytes = std::fs::read(&path).expect("a container");
@@ -81,5 +83,37 @@ async fn what_is_stored_is_counted_checked_and_copied() {
         assert_eq!(elsewhere.status.code(), Some(1), "{}", said(&elsewhere));
         assert!(said(&elsewhere).contains("no service's data is here"), "{}", said(&elsewhere));
         assert_eq!(std::fs::read_dir(empty.path()).expect("a folder").count(), 0, "nothing is made there");
+    }
+}
+
+#[tokio::test]
+async fn results_and_input_of_jobs_are_checked_and_results_copied() {
+    let mut app = TestApp::in_folder();
+    let capture = Capture::tiny();
+    let done = app.design(capture, &json!({"vertices": 32, "time_limit_s": 10.0})).await;
+    app.designed(&done.id).await;
+    let cage = app.get(&format!("/v1/cages/{}/cage.obj", done.id)).await.expect(200).body;
+    let recovery = recoveries::created(&app, &json!({"points": 800})).await;
+    recoveries::post_first(&app, &recovery.id).await.expect(200);
+    let data = app.data();
+    app.terminate();
+    assert!(app.ended().await.0.success());
+    let whole = store(&data, &["verify"]);
+    assert!(whole.status.success(), "{}", said(&whole));
+    let copies = folder();
+    let copied = store(&data, &["export", &copies.path().display().to_string()]);
+    assert!(said(&copied).contains("wrote 1 files") && copied.status.success(), "{}", said(&copied));
+    assert!(std::fs::read(copies.path().join(format!("local/{}.obj", done.id))).expect("a copy") == cage);
+    for (path, of) in [
+        (data.join("cages").join(&done.id).join("cage.obj"), format!("cage job {} of local: ", done.id)),
+        (data.join("recoveries").join(&recovery.id).join("frame-0"), format!("recovery {} of local: ", recovery.id)),
+    ] {
+        let kept = std::fs::read(&path).expect("a file");
+        let mut bytes = kept.clone();
+        *bytes.last_mut().expect("bytes") ^= 1;
+        std::fs::write(&path, bytes).expect("written");
+        let damaged = store(&data, &["verify"]);
+        assert!(damaged.status.code() == Some(1) && said(&damaged).contains(&of), "{}", said(&damaged));
+        std::fs::write(&path, kept).expect("written");
     }
 }

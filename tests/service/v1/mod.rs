@@ -1,6 +1,6 @@
 mod cages;
 mod jobs;
-mod recoveries;
+pub(crate) mod recoveries;
 mod sessions;
 mod shapespaces;
 mod transfers;

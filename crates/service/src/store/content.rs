@@ -2,6 +2,7 @@
 
 use super::{ContentKey, Store, StoreError, meta};
 use serde::{Deserialize, Serialize};
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
@@ -64,6 +65,20 @@ impl StoredPart {
     /// Describes a file of this name and content.
     pub fn of(name: &str, content: &[u8]) -> Self {
         Self { name: name.into(), bytes: content.len() as u64, blake3: blake3::hash(content).to_hex().to_string() }
+    }
+
+    /// Whether a file is a copy of it; reads all of that.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn is_of(&self, path: &Path) -> io::Result<bool> {
+        let file = File::open(path)?;
+        if file.metadata()?.len() != self.bytes {
+            return Ok(false);
+        }
+        let mut digest = blake3::Hasher::new();
+        digest.update_reader(file)?;
+        Ok(digest.finalize().to_hex().as_str() == self.blake3)
     }
 }
 

@@ -5,9 +5,8 @@ use super::{ContentKey, Kind, Store, StoreError, StoredFile};
 use cager_proto::messages::SessionOptions;
 use cager_store::{Change, Key};
 use serde::{Deserialize, Serialize};
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Metadata of a session, fixed at its creation but for its name.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -53,22 +52,6 @@ pub struct Completion {
     pub container_bytes: u64,
     /// Digest of the container, BLAKE3, hexadecimal.
     pub container_digest: String,
-}
-
-impl Completion {
-    /// Whether a file is a copy of the container; reads all of it.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub fn is_of(&self, path: &Path) -> io::Result<bool> {
-        let file = File::open(path)?;
-        if file.metadata()?.len() != self.container_bytes {
-            return Ok(false);
-        }
-        let mut digest = blake3::Hasher::new();
-        digest.update_reader(file)?;
-        Ok(digest.finalize().to_hex().as_str() == self.container_digest)
-    }
 }
 
 /// A written container.

@@ -1,7 +1,8 @@
 //! Reading all that is stored, to find what is damaged.
 
+use super::cage_jobs::CAGE;
 use super::files::Files;
-use super::records::{all, outcome_of};
+use super::records::outcome_of;
 use super::sessions::Completion;
 use super::{Content, ContentKey, Kind, Store, StoreError, StoredPart};
 use cager_store::Key;
@@ -52,15 +53,37 @@ impl Store {
             return Ok(found);
         }
         // Until it is over its input is there; afterwards its results are.
-        let said = match &record.outcome {
-            Some(outcome) => self.unsealed::<Value>((kind, id), outcome_of(kind), outcome),
-            None => self.unsealed((kind, id), kind.name(), &record.meta),
+        let files = match &record.outcome {
+            Some(outcome) => self.unsealed((kind, id), outcome_of(kind), outcome).map(|said| results_of(kind, &said)),
+            None => self.unsealed((kind, id), kind.name(), &record.meta).map(|said: Value| parts(&said)),
         };
-        for (name, part) in found.note(said).map(|said| parts(&said)).unwrap_or_default() {
-            let path = all(kind, self.files()).join(id).join(name);
-            found.note(self.files().check_digest(&path, part.bytes, &part.blake3));
+        for (name, part) in found.note(files).unwrap_or_default() {
+            found.note(self.files().check_digest(&folder.join(name), part.bytes, &part.blake3));
+        }
+        if kind == Kind::Recovery && record.outcome.is_none() {
+            for (frame, part) in found.note(self.recovery_frames(id)).unwrap_or_default() {
+                found.note(self.recovery_frame(id, frame, &part));
+            }
         }
         Ok(found)
+    }
+
+    /// The results of a job, as they are named in its folder; none where it is not completed.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`].
+    pub fn results(&self, kind: Kind, id: &str) -> Result<Vec<StoredPart>, StoreError> {
+        let said: Option<Value> = self.outcome(kind, id)?;
+        let results = said.map(|said| results_of(kind, &said)).unwrap_or_default();
+        Ok(results.into_iter().map(|(name, part)| StoredPart { name, ..part }).collect())
+    }
+
+    /// What is wrong with a file of a job; reads all of it.
+    pub fn result_damage(&self, kind: Kind, id: &str, part: &StoredPart) -> Option<String> {
+        let checked = self
+            .job_file(kind, id, &part.name)
+            .and_then(|path| self.files().check_digest(&path, part.bytes, &part.blake3));
+        checked.err().map(|error| error.to_string())
     }
 
     /// What is wrong with the container of a completed session, and what to do; reads all of it.
@@ -88,6 +111,19 @@ impl Store {
             None => {}
         }
         found
+    }
+}
+
+/// The files that the outcome of a job describes, with the names that they have there.
+fn results_of(kind: Kind, outcome: &Value) -> Vec<(String, StoredPart)> {
+    let found = outcome.get("completed").filter(|_| kind == Kind::CageJob);
+    let cage = found.and_then(|found| Some((found.get("cage_bytes")?.as_u64()?, found.get("cage_digest")?.as_str()?)));
+    match cage {
+        Some((bytes, digest)) => {
+            let name = CAGE.to_owned();
+            vec![(name.clone(), StoredPart { name, bytes, blake3: digest.to_owned() })]
+        }
+        None => parts(outcome),
     }
 }
 

@@ -113,13 +113,18 @@ async fn create(api: &Api, form: Form, key: Option<&str>) -> Reply {
     .await
 }
 
-pub(super) async fn created(api: &Api, options: &Value) -> Recovery {
+pub(crate) async fn created(api: &Api, options: &Value) -> Recovery {
     create(api, scans().form(options), None).await.is(202)
 }
 
 async fn post(api: &Api, id: &str, first: u32, form: Form) -> Reply {
     let path = format!("/v1/recoveries/{id}/frames?first={first}");
     api.send(api.request(http::Method::POST, &path).multipart(form)).await
+}
+
+/// Posts the first frame.
+pub(crate) async fn post_first(api: &Api, id: &str) -> Reply {
+    post(api, id, 0, scans().parts(0..1)).await
 }
 
 async fn complete(api: &Api, id: &str, frames: u32) -> Reply {
