@@ -12,21 +12,20 @@ use crate::meaning;
 use crate::own_file::{OwnFile, WorkFolder, temporary};
 use crate::watch::Watch;
 use cager_cages::DesignOptions;
-use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, Goal, InversionChoices};
-use cager_capture::design::{default_vertices, most_vertices, usual_options};
+use cager_capture::coding::{Goal, suited_cage_size};
+use cager_capture::design::{FRAMES, default_vertices, most_vertices, usual_options};
 use cager_capture::encode::{Encode, EncodeError, EncodeProgress, Encoded, sample_frames};
-use cager_capture::memory::Memory;
 use cager_capture::mismatch::cage_mismatch;
 use cager_capture::origin::move_to;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
-use cager_core::inversion::{PrepareContext, PrepareError, Solver};
+use cager_core::inversion::PrepareError;
 use cager_formats::{Action, Error, Target, Units};
 use cager_geometry::mesh::{Model, Point, TriMesh};
 use pyo3::prelude::*;
 
 /// What is told before a cage is designed.
-const TRYING: &str = "trying cages of several sizes";
+const ESTIMATING: &str = "estimating sizes of cages";
 
 /// What is asked of an encoding.
 #[derive(Clone, Copy)]
@@ -192,19 +191,10 @@ pub(crate) fn design_options(
     }
     let mut vertices = asked.vertices;
     if let (Some(goal), None) = (goal, vertices) {
-        let samples = sample_frames(&mut frames.open(), CAGE_SIZE_FRAMES, true).map_err(named)?;
+        let samples = sample_frames(&mut frames.open(), FRAMES, false).map_err(named)?;
         let (system, total, rest) = (asked.system, frames.views.len(), rest.clone());
-        let work = move |caller: Caller<()>| {
-            let before_step = |_| caller.tell(TRYING, 0.0);
-            let context = PrepareContext { before_step: &before_step, ..PrepareContext::default() };
-            let (components, memory) = (None, Memory::half_of_free());
-            let sizes = CageSizes { goal, rest: &rest, components, system, frames: &samples, total, memory };
-            sizes.best(|cage: &Cage, rest| {
-                let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
-                Solver::prepare_with(system, cage, &rest.points, options, &context)
-            })
-        };
-        vertices = apart(watch, TRYING, work, |()| ())?;
+        let work = move |_: Caller<()>| suited_cage_size(goal, system, &rest, None, &samples, total);
+        vertices = apart(watch, ESTIMATING, work, |()| ())?.map(|suited| suited.vertices);
     }
     let vertices = vertices.or_else(|| {
         let usual = default_vertices(most_vertices(asked.system, rest.points.len()));

@@ -51,7 +51,7 @@ except KeyboardInterrupt:
             "cager.encode(points, None, [bend(points, 0.1)], cage, coordinates='harmonic', progress=begin)",
         ),
         (
-            "trying cages of several sizes",
+            "estimating sizes of cages",
             "points, _ = grid(200, 0.5, 1.0);"
             "cager.encode(points, None, [bend(points, 0.1 * t) for t in range(12)], max_error=1e-3, progress=begin)",
         ),

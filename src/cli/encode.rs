@@ -136,7 +136,7 @@ fn designed(args: &EncodeArgs, files: &CaptureFiles, rest: &Model) -> Result<(Ca
     let vertices = args.design.cage_vertices.map(|vertices| vertices as usize);
     let components = components(args.design.per_part, args.solver.coordinates, rest, &frames, vertices);
     let components = components.as_ref();
-    let options = sized_design(args, files, rest, components)?;
+    let options = sized_design(args, files, rest, components, &frames)?;
     let design = design::design((&args.rest, rest), (&args.frames, &frames), None, components, &options)?;
     warn(&design.warnings);
     if design.missed {

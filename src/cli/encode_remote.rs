@@ -2,14 +2,14 @@
 
 use super::args::{EncodeArgs, SolverArgs, SpectrumArg};
 use super::coding_args::goal;
-use super::encode_shared::{Targets, checked_options, design_options, finish, sized_design};
+use super::encode_shared::{Targets, checked_options, design_options, finish, name_files, sized_design};
 use super::solver_options::{check_inversion, designed_spectrum, matrix, spectrum_bound};
 use super::{interrupt, is_container, is_scene, plain, progress, tell, warn};
 use crate::remote::{EncodedRemotely, FileFrames, RemoteCage, RemoteJob, RemoteProgress, encode_remotely, mesh_file};
 use anyhow::{Context, Result, anyhow, bail};
 use cager_cages::DesignOptions;
 use cager_capture::coding::Goal;
-use cager_capture::design::PerPart;
+use cager_capture::design::{PerPart, read_frames};
 use cager_capture::encode::Encoded;
 use cager_capture::frames::CaptureFiles;
 use cager_client::messages::SessionOptions;
@@ -104,7 +104,10 @@ pub(super) fn run(
         Some(_) => DesignOptions::default(),
         // A session has its cage.
         None if args.session.is_some() => DesignOptions::default(),
-        None => sized_design(args, files, rest, None)?,
+        None => {
+            let frames = read_frames(files).map_err(|error| name_files(error, args))?;
+            sized_design(args, files, rest, None, &frames)?
+        }
     };
     let size_seconds = clock_size.elapsed().as_secs_f64();
     let bar = progress::frames("encoding", frames.frames().unwrap_or(0) as usize);

@@ -6,14 +6,14 @@ use super::coding_args::goal;
 use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
 use super::solver_options::{check_inversion, inversion_choices, with_input_name};
-use super::{design, progress, tell, warn};
+use super::{design, human_bytes, progress, tell, warn};
 use anyhow::{Result, bail};
-use cager_cages::{Components, DesignOptions};
-use cager_capture::coding::{CAGE_SIZE_FRAMES, CageSizes, InversionChoices};
+use cager_cages::{Components, DesignOptions, SuitedSize};
+use cager_capture::coding::suited_cage_size;
 use cager_capture::design::{PerPart, most_vertices, usual_options};
-use cager_capture::encode::{self, Encoded, sample_frames};
+use cager_capture::encode::{self, Encoded};
 use cager_capture::frames::CaptureFiles;
-use cager_capture::memory::{Memory, free_bytes};
+use cager_capture::memory::free_bytes;
 use cager_core::cage::Cage;
 use cager_core::coordinates::{CoordinateSystem, MeanValue};
 use cager_core::inversion::{PrepareError, Solver, SolverOptions};
@@ -85,48 +85,34 @@ pub(super) fn design_options(args: &EncodeArgs, points: usize) -> Result<DesignO
     })
 }
 
-/// How a cage is designed, of as many vertices as suit what the file is to meet.
+/// How a cage is designed from these frames, of as many vertices as suit what the file is to meet.
 pub(super) fn sized_design(
     args: &EncodeArgs,
     files: &CaptureFiles,
     rest: &Model,
     components: Option<&Components>,
+    frames: &[Vec<f64>],
 ) -> Result<DesignOptions> {
     let mut options = design_options(args, rest.points.len())?;
-    if let Some(vertices) = best_cage_size(args, files, rest, components)? {
+    let total = files.open()?.frames();
+    let goal = goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, total)?;
+    let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.coding.mean_error) else {
+        return Ok(options);
+    };
+    check_inversion(&args.solver)?;
+    let bar = progress::steps();
+    bar.set_message("estimating sizes of cages");
+    let suited = suited_cage_size(goal, args.solver.coordinates, rest, components, frames, total);
+    bar.finish_and_clear();
+    if let Some(SuitedSize { vertices, cages, residual }) = suited {
+        let [cages, residual] = [cages, residual].map(|bytes| human_bytes(bytes as u64));
         tell(&format!(
-            "cages of several sizes were tried on the first frames: {vertices} vertices suit what is asked for\n"
+            "{vertices} vertices suit what is asked for: a small cage around the rest pose would take about {cages} \
+             and leave {residual} to code\n"
         ))?;
         options.goal = design::goal(Some(vertices as u32), None, rest.points.len())?;
     }
     Ok(options)
-}
-
-/// How many vertices a designed cage should have for a bound or a size, where neither they nor an
-/// error of the cage are given.
-fn best_cage_size(
-    args: &EncodeArgs,
-    files: &CaptureFiles,
-    rest: &Model,
-    components: Option<&Components>,
-) -> Result<Option<usize>> {
-    let mut reader = files.open()?;
-    let total = reader.frames();
-    let goal = goal(&args.coding, args.coding.units(), args.cage.is_some(), rest, total)?;
-    let (Some(goal), None, None) = (goal, args.design.cage_vertices, args.coding.mean_error) else { return Ok(None) };
-    let frames = sample_frames(reader.as_mut(), CAGE_SIZE_FRAMES, true).map_err(|error| name_files(error, args))?;
-    let memory = args.memory.unwrap_or_else(Memory::half_of_free);
-    let system = args.solver.coordinates;
-    check_inversion(&args.solver)?;
-    let sizes = CageSizes { goal, rest, components, system, frames: &frames, total, memory };
-    let bar = progress::steps();
-    bar.set_message("trying cages of several sizes");
-    let best = sizes.best(|cage, rest| {
-        let options = InversionChoices::coded(system).options(system.values(cage).unknowns());
-        Solver::prepare(system, cage, &rest.points, options)
-    });
-    bar.finish_and_clear();
-    Ok(best)
 }
 
 /// What the arguments say of the inversion, and what is usual for this rest pose and cage, which a

@@ -11,7 +11,8 @@ mod thinned;
 pub use bounding_shape::{BoundingShape, bounding_shape};
 pub use components::Components;
 pub use design::{
-    Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Parts, Progress, Stage, Style, Unseen, design,
+    Design, DesignError, DesignOptions, Goal, MAX_VERTICES, Parts, Progress, Rates, Stage, Style, SuitedSize, Unseen,
+    design,
 };
 pub use enclose::{EncloseError, EncloseOptions, enclose, enclose_watched};
 pub use enclose_apart::enclose_apart;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use cager_cages::{Components, Design, DesignError, DesignOptions, Goal, Parts, Style, design, enclose};
+use cager_cages::{Components, Design, DesignError, DesignOptions, Goal, Parts, Rates, Style, design, enclose};
 use cager_core::cage::Cage;
 use cager_core::inversion::{BATCH, Handles, Rows, Solver, SolverOptions};
 use cager_geometry::mesh::{Model, TriMesh};
@@ -374,7 +374,34 @@ fn parts_that_move_together_share_one_cage_unless_each_is_to_have_its_own() {
     let (Capture { rest, frames }, parts) = two_arms();
     let each = Components::of_each(&rest, &frames, &parts);
     assert_eq!((each.len(), each.least_vertices()), (2, 16));
-    let error = each.enclose(15).expect_err("too few").to_string();
+    let go_on = &mut |_: cager_cages::Progress<'_>| ControlFlow::Continue(());
+    let error = each.design(&rest, &frames, &with_vertices(15, Style::Free), go_on).expect_err("too few").to_string();
     assert!(error.contains("ask for at least 16"), "{error}");
-    assert_eq!(each.enclose(16).unwrap().carriers().len(), 2);
+}
+
+#[test]
+fn smaller_errors_and_larger_files_suit_cages_of_more_vertices_whatever_the_threads() {
+    let Capture { rest, frames } = capture_of(40, 30, 0.0);
+    let total = 10 * frames.len();
+    let rates = || Rates::new(&rest, &frames, total).unwrap();
+    let vertices = |error: f64| rates().suited(error).vertices;
+    let [coarse, fine] = [0.05, 1e-4].map(vertices);
+    assert!((80..500).contains(&coarse) && coarse < fine && fine <= 500, "{coarse} {fine}");
+    let [small, large] = [1e2, 1e6].map(|bytes| rates().suited_to_bytes(bytes).vertices);
+    assert!(small <= large, "{small} {large}");
+    let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(single.install(|| rates().suited(1e-3)), rates().suited(1e-3));
+    // What does not move needs no more than the fewest.
+    let still = vec![rest.points.as_flattened().to_vec(); 8];
+    assert_eq!(Rates::new(&rest, &still, 8).unwrap().suited(1e-4).vertices, 80);
+}
+
+#[test]
+fn cages_with_components_suit_what_all_their_parts_take() {
+    let (Capture { rest, frames }, parts) = two_arms();
+    let each = Components::of_each(&rest, &frames, &parts);
+    let of_both = each.rates(&frames, frames.len()).unwrap().suited(1e-3);
+    let one = Rates::new(&rest, &frames, frames.len()).unwrap().suited(1e-3);
+    // One cage for both leaves more, since one moves away from the other.
+    assert!(0.0 < of_both.residual && of_both.residual < one.residual, "{of_both:?} {one:?}");
 }

@@ -2,9 +2,9 @@
 
 mod motion;
 
-use crate::design::{check, design};
+use crate::design::{MEASURED, check, design};
 use crate::enclose::{EncloseError, EncloseOptions, enclose};
-use crate::{Design, DesignError, DesignOptions, Goal, Progress, Stage, Unseen};
+use crate::{Design, DesignError, DesignOptions, Goal, Progress, Rates, Stage, Unseen};
 use cager_core::cage::{Cage, CageError, Carrier};
 use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
 use std::ops::{ControlFlow, Range};
@@ -90,16 +90,21 @@ impl Components {
         self.groups.iter().map(|group| (group.rest.points.len() / 2).clamp(4, LEAST)).sum()
     }
 
-    /// A cage of so many vertices at the most around the model at rest.
+    /// [`Rates`] of cages with these components.
     ///
     /// # Errors
-    /// See [`EncloseError`].
-    pub fn enclose(&self, vertices: usize) -> Result<Cage, EncloseError> {
-        let too_few = |_| EncloseError::TooFewVertices { vertices, least: self.least_vertices() };
-        self.joined(self.around_each(vertices)?).map_err(too_few)
+    /// Parts that no small cages enclose.
+    pub fn rates(&self, frames: &[Vec<f64>], total: usize) -> Result<Rates, EncloseError> {
+        let shares = self.shares(MEASURED.max(self.least_vertices()))?;
+        let frames: Vec<&[f64]> = frames.iter().map(Vec::as_slice).collect();
+        let part = |(group, vertices): (&Group, usize)| {
+            let size = diagonal(&group.rest.points) / self.diagonal;
+            (group.rest.clone(), subframes(&frames, &group.points), (vertices, size))
+        };
+        Rates::of_parts(self.groups.iter().zip(shares).map(part), total)
     }
 
-    /// The components of such a cage.
+    /// Cages of so many vertices at the most around each group at rest.
     fn around_each(&self, vertices: usize) -> Result<Vec<TriMesh>, EncloseError> {
         let around = |(group, vertices): (&Group, usize)| {
             enclose(&group.rest, &EncloseOptions { vertices, ..EncloseOptions::default() })

@@ -19,7 +19,7 @@ const LEFT_OUT: f64 = 1e-5;
 const JUDGED_POINTS: usize = 8_000;
 const JUDGED_FRAMES: usize = 40;
 /// Ridge of the fits that judge a cage, as a fraction of the mean diagonal entry of `ΦᵀΦ`.
-const RIDGE: f64 = 1e-6;
+pub(super) const RIDGE: f64 = 1e-6;
 /// Number of vertices above which the condition number is not computed.
 const LARGE: usize = 1_000;
 
@@ -33,10 +33,10 @@ pub(crate) struct Samples {
     training: Mat<f32>,
     /// Points that cages are judged at, the principal components of their motion, in training
     /// frames and, from column `chosen_from` on, in the choosing ones; and the numbers of both.
-    judged_points: Vec<Point>,
-    judged_motion: Mat<f32>,
-    chosen_from: usize,
-    judged_frames: [usize; 2],
+    pub(super) judged_points: Vec<Point>,
+    pub(super) judged_motion: Mat<f32>,
+    pub(super) chosen_from: usize,
+    pub(super) judged_frames: [usize; 2],
     /// Their motion in frames that neither sees, and how many these are.
     unseen: Option<(Mat<f32>, usize)>,
     /// Diagonal of the rest pose.
@@ -166,7 +166,7 @@ pub(super) fn evenly<'a>(frames: &[&'a [f64]], count: usize) -> Vec<&'a [f64]> {
 }
 
 /// A motion in the fewest principal directions that leave out no more than [`LEFT_OUT`].
-fn principal(motion: &Mat<f64>, most: usize) -> Mat<f64> {
+pub(super) fn principal(motion: &Mat<f64>, most: usize) -> Mat<f64> {
     let columns = motion.ncols();
     let Ok(eigen) = gram(motion.as_ref(), BLOCK_ROWS).self_adjoint_eigen(faer::Side::Lower) else {
         return motion.clone();

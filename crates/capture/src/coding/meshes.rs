@@ -32,6 +32,12 @@ impl RestMeshes {
     }
 }
 
+/// About what rest pose and cage take, before there is one.
+pub(super) fn meshes_bytes(goal: Goal, rest: &Model) -> Option<u64> {
+    let (_, coded) = coded_rest(goal, rest, diagonal(&rest.points))?;
+    Some((coded.bytes() + coded.bytes() / 5 + colors_bytes(&rest.colors)) as u64)
+}
+
 /// The step, over the diagonal, and the rest pose in it.
 fn coded_rest(goal: Goal, rest: &Model, diagonal: f64) -> Option<(f64, CodedMesh)> {
     let coded = |step: f64| Some((step, CodedMesh::new(rest, step * diagonal).ok()?));

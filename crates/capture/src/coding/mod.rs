@@ -14,7 +14,7 @@ mod meshes;
 mod model;
 mod steps;
 
-pub use cage_size::{CageSizes, FRAMES as CAGE_SIZE_FRAMES};
+pub use cage_size::suited_cage_size;
 pub use error::{CodingError, Farthest};
 pub(crate) use goal::BYTES_PER_POSITION;
 pub use goal::{Carried, Goal, Room, group_frames, slack};

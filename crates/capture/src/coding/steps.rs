@@ -107,13 +107,6 @@ impl GroupCoder {
         (self.model.points() as f64 / self.model.basis.rows() as f64).sqrt()
     }
 
-    /// About the bytes of the waiting frames in the steps where [`Self::choose`] begins.
-    pub(super) fn usual_bytes(&self) -> Result<f64, CodingError> {
-        let Goal::MaxError(error) = self.goal else { return Ok(0.0) };
-        let estimated = self.estimate(self.frames.len(), USUAL_STEP * error * self.diagonal, USUAL_RATIO, 1.0);
-        estimated.map(|(bytes, _)| bytes)
-    }
-
     /// What `tried` gives in the step where its figure, over what is allowed, is nearly 1 and not
     /// above; the figure is about the power `usual` of the step. Begins at the step of the group
     /// before. `None` where no step does it.
