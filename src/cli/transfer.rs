@@ -26,6 +26,7 @@ use cager_motion::transfer::{
 use cager_shape::TransferError;
 use cager_shape::transfer::alignment::AlignBy;
 use std::path::Path;
+use std::time::Instant;
 
 pub(super) fn run(args: &TransferMotionArgs) -> Result<()> {
     let inputs = args.source_rest.iter().chain(&args.source_frames).chain(&args.source).chain(&args.cage);
@@ -162,7 +163,9 @@ fn write(
     let Transferred { mut frames, report, warnings } = moved;
     let samples = sample_frames(&mut frames, FRAMES, false)?;
     frames.rewind()?;
+    let clock = Instant::now();
     let design = design((&args.target, target), (&args.target, &samples), None, None, options)?;
+    let designed = clock.elapsed().as_secs_f64();
     warn(&design.warnings);
     let cage = Cage::new(design.cage).with_context(|| args.target.display().to_string())?;
     let encoding = Encoding {
@@ -186,10 +189,18 @@ fn write(
     commit_together(report_file.into_iter().chain([container]).collect())?;
     warn(&warnings);
     warn(&encoded.warnings);
-    tell(&summary(&report, &encoded, cage.vertices().len(), output.path()))
+    let encoding = clock.elapsed().as_secs_f64() - designed;
+    tell(&summary(&report, &encoded, cage.vertices().len(), [designed, encoding], output.path()))
 }
 
-fn summary(report: &TransferReport, encoded: &cager_proto::report::Report, cage: usize, output: &Path) -> String {
+/// With the seconds that the design of the cage and the encoding took.
+fn summary(
+    report: &TransferReport,
+    encoded: &cager_proto::report::Report,
+    cage: usize,
+    [designed, encoding]: [f64; 2],
+    output: &Path,
+) -> String {
     let laid = report.score.map_or_else(String::new, |score| {
         let pose = report.pose.unwrap_or("relative");
         format!("  laid    the source lies {:.2} % of the diagonal from the target; {pose} pose\n", 100.0 * score)
@@ -201,7 +212,8 @@ fn summary(report: &TransferReport, encoded: &cager_proto::report::Report, cage:
         "{}: {} of {} as cages of {} vertices\n\
          \x20 aligned turned by {:.1} degrees, scaled by {:.4}{runner_up}\n\
          {laid}{}\x20 size    {}; errors of encoding: L2 {:.3} % on average, L∞ {:.3} % at most\n\
-         \x20 time    {:.3} s to prepare, {:.3} s to move, {:.3} s to measure\n",
+         \x20 time    {:.3} s to prepare, {:.3} s to move, {:.3} s to measure, {designed:.3} s to design the \
+         cage, {encoding:.3} s to encode\n",
         output.display(),
         counted(report.frames, "frame"),
         counted(report.points, "point"),
