@@ -79,6 +79,16 @@ fn parts_that_move_apart_get_components_and_every_command_takes_the_file() {
     // Computed in parts, to the same result.
     dir.cager("decode out.cager --memory 100MB -o parts.npy").succeeds();
     assert!(dir.read("parts.npy") == dir.read("back.npy"));
+    // One of them alone, whose points the other component carries none of.
+    for (part, first) in [("rock", 0), ("bird", POINTS)] {
+        dir.cager(&format!("decode out.cager --part {part} -o {part}.npy")).succeeds();
+        let alone = read_frames(&dir.path(&format!("{part}.npy")), POINTS);
+        let off = |(alone, frame): (&Vec<f64>, &Vec<f64>)| {
+            let own = &frame[3 * first..3 * (first + POINTS)];
+            alone.iter().zip(own).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        assert!(alone.len() == 12 && alone.iter().zip(&frames).map(off).fold(0.0, f64::max) < 0.01, "{part}");
+    }
 
     let said = dir.cager("inspect out.cager").succeeds().stdout;
     assert!(said.contains(" carry /rock\n") && said.contains(" carry /bird\n") && said.contains("COMP"), "{said}");

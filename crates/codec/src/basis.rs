@@ -191,6 +191,8 @@ fn spread(k: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cager_core::cage::Carrier;
+    use cager_geometry::mesh::TriMesh;
 
     fn cage_of(m: usize) -> (Vec<Point>, Vec<f32>) {
         let mut random = fastrand::Rng::with_seed(3);
@@ -212,6 +214,24 @@ mod tests {
         assert!((y.norm_l2() - length).abs() < 0.05 * length, "{} {length}", y.norm_l2());
         let back = basis.inverse(y.as_ref());
         assert!(back[0].iter().zip(&cage).all(|(a, b)| (a - b).abs() < 1e-5));
+    }
+
+    #[test]
+    fn a_component_that_the_sample_misses_has_a_basis() {
+        const FACES: [[u32; 3]; 8] =
+            [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let corner = |k: usize| [0, 1, 2].map(|c| if k / 2 == c { 1.0 - 2.0 * (k % 2) as f64 } else { 0.0 });
+        let vertices = (0..12).map(|k| [corner(k % 6)[0] + 5.0 * (k / 6) as f64, corner(k % 6)[1], corner(k % 6)[2]]);
+        let triangles = [0, 6].into_iter().flat_map(|first| FACES.map(|face| face.map(|k| first + k)));
+        let mesh = TriMesh { vertices: vertices.collect(), triangles: triangles.collect() };
+        // Every third point is read, and the second component has the second one.
+        let count = 2 * CageBasis::SAMPLE as u32 + 3;
+        let carriers = [(0..1, 0..6), (1..2, 6..12), (2..count, 0..6)];
+        let carriers = carriers.map(|(points, vertices)| Carrier { points, vertices }).to_vec();
+        let cage = Cage::new(mesh).unwrap().with_carriers(carriers).unwrap();
+        let points: Vec<Point> = (0..count).map(|k| [1e-5 * f64::from(k), 0.1, 0.01 * f64::from(k % 7)]).collect();
+        let (basis, found) = CageBasis::of(&MeanValue, &cage, &points, None, None).unwrap().unwrap();
+        assert_eq!((basis.rows(), found.unwrap().phi.nrows()), (12, count.div_ceil(3) as usize));
     }
 
     /// Coordinates with the symmetries of a regular polygon, whose eigenvalues come in equal pairs.

@@ -227,6 +227,39 @@ fn points_have_the_coordinates_of_the_component_that_carries_them_alone() {
 }
 
 #[test]
+fn points_that_a_component_has_none_of_have_their_coordinates() {
+    let (mesh, mut carriers) = two_components(0.3);
+    // In one chunk all points of one component, and in another all of the other.
+    let half = octahedron().vertices.len() as u32;
+    let count = (96 << 20) / (12 * 2 * half) + 1_000;
+    for (first_vertices, second_vertices) in [(0..half, half..2 * half), (half..2 * half, 0..half)] {
+        carriers.clear();
+        carriers.push(Carrier { points: 0..count, vertices: first_vertices });
+        carriers.push(Carrier { points: count..count + 3, vertices: second_vertices });
+        let cage = Cage::new(mesh.clone()).unwrap().with_carriers(carriers.clone()).unwrap();
+        let points: Vec<Point> = (0..count + 3).map(|k| [0.1 + 1e-7 * f64::from(k), 0.02, 0.1]).collect();
+        let phi = MeanValue.coordinates(&cage, &points, None).unwrap().phi;
+        for sample in [vec![0, 1], vec![count, count + 2], Vec::new()] {
+            let some: Vec<Point> = sample.iter().map(|&i| points[i as usize]).collect();
+            let found = MeanValue.coordinates(&cage.of_points(sample.iter().copied()), &some, None).unwrap().phi;
+            for (row, &i) in sample.iter().enumerate() {
+                assert_eq!(found.row(row), phi.row(i as usize));
+            }
+        }
+        let columns = 2 * half as usize;
+        let decoder = Decoder::with_recomputed_coordinates(MeanValue.pointwise().unwrap(), &cage, &points, columns);
+        let frame: Vec<f32> = cage.vertices().as_flattened().iter().map(|&x| x as f32).collect();
+        let mut out = vec![Vec::new()];
+        decoder.decode(&[&frame], &mut out);
+        assert!(out[0].iter().zip(points.as_flattened()).all(|(&a, b)| (f64::from(a) - b).abs() < 1e-6));
+        decoder.of_points(&[count, count + 2]).decode(&[&frame], &mut out);
+        assert!(
+            (0..6).all(|k| (f64::from(out[0][k]) - points[(count + 2 * (k as u32 / 3)) as usize][k % 3]).abs() < 1e-6)
+        );
+    }
+}
+
+#[test]
 fn components_that_do_not_fit_cage_model_or_coordinates_are_refused() {
     let (mesh, carriers) = two_components(5.0);
     let refused = |change: &dyn Fn(&mut Vec<Carrier>)| {

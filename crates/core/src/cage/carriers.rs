@@ -22,9 +22,7 @@ impl Cage {
     /// # Errors
     /// [`CageError::Carriers`]: carriers that leave out a point or a vertex, overlap, or cut a face.
     pub fn with_carriers(mut self, carriers: Vec<Carrier>) -> Result<Self, CageError> {
-        if let Err(what) = check(&carriers, self.mesh()) {
-            return Err(CageError::Carriers { what });
-        }
+        self.components = components(&carriers, self.mesh()).map_err(|what| CageError::Carriers { what })?;
         self.carriers = carriers;
         Ok(self)
     }
@@ -40,9 +38,10 @@ impl Cage {
         self.carriers.last().is_none_or(|last| last.points.end as usize == points)
     }
 
-    /// The cage for some of the points, whose coordinates are asked for in this order.
+    /// The cage for some of the points, whose coordinates are asked for in this order; its components
+    /// stay, also those that carry none of them.
     pub fn of_points(&self, points: impl IntoIterator<Item = u32>) -> Cow<'_, Self> {
-        if self.carriers.is_empty() {
+        if self.components.is_empty() {
             return Cow::Borrowed(self);
         }
         let mut carriers: Vec<Carrier> = Vec::new();
@@ -57,24 +56,24 @@ impl Cage {
         Cow::Owned(Self { carriers, ..self.clone() })
     }
 
-    /// Each component as a cage of its own, with its vertices among those of this one and the points
-    /// that it carries; none where the whole cage carries every point.
-    pub(crate) fn components(&self) -> Vec<Component> {
-        if self.carriers.is_empty() {
-            return Vec::new();
+    /// Each component that carries points as a cage of its own, with its vertices among those of this
+    /// one and these points; none where the whole cage carries every point.
+    pub(crate) fn components(&self) -> Option<Vec<Component>> {
+        if self.components.is_empty() {
+            return None;
         }
-        let vertices = component_vertices(&self.carriers);
-        let mut points = vec![Vec::new(); vertices.len()];
+        let mut points = vec![Vec::new(); self.components.len()];
         for carrier in &self.carriers {
-            points[place(&vertices, carrier.vertices.start)].push(carrier.points.clone());
+            points[place(&self.components, carrier.vertices.start)].push(carrier.points.clone());
         }
-        let meshes = component_meshes(self.mesh(), &vertices);
-        let component = |((mesh, vertices), points)| Component {
+        let meshes = component_meshes(self.mesh(), &self.components);
+        let all = meshes.into_iter().zip(&self.components).zip(points);
+        let component = |((mesh, vertices), points): ((TriMesh, &Range<u32>), _)| Component {
             cage: Self::new(mesh).expect("a component of a cage"),
-            vertices,
+            vertices: vertices.clone(),
             points,
         };
-        meshes.into_iter().zip(vertices).zip(points).map(component).collect()
+        Some(all.filter(|(_, points)| !points.is_empty()).map(component).collect())
     }
 }
 
@@ -83,14 +82,6 @@ pub(crate) struct Component {
     pub(crate) cage: Cage,
     pub(crate) vertices: Range<u32>,
     pub(crate) points: Vec<Range<u32>>,
-}
-
-/// The vertices of each component, ascending.
-fn component_vertices(carriers: &[Carrier]) -> Vec<Range<u32>> {
-    let mut vertices: Vec<Range<u32>> = carriers.iter().map(|carrier| carrier.vertices.clone()).collect();
-    vertices.sort_unstable_by_key(|vertices| (vertices.start, vertices.end));
-    vertices.dedup();
-    vertices
 }
 
 /// Which of the components has a vertex.
@@ -110,9 +101,10 @@ fn component_meshes(mesh: &TriMesh, components: &[Range<u32>]) -> Vec<TriMesh> {
     meshes
 }
 
-fn check(carriers: &[Carrier], mesh: &TriMesh) -> Result<(), String> {
+/// The vertices of each component, ascending, where these can carry the points of a model.
+fn components(carriers: &[Carrier], mesh: &TriMesh) -> Result<Vec<Range<u32>>, String> {
     if carriers.is_empty() {
-        return Ok(());
+        return Ok(Vec::new());
     }
     let mut next = 0;
     for Carrier { points, .. } in carriers {
@@ -121,7 +113,9 @@ fn check(carriers: &[Carrier], mesh: &TriMesh) -> Result<(), String> {
         }
         next = points.end;
     }
-    let components = component_vertices(carriers);
+    let mut components: Vec<Range<u32>> = carriers.iter().map(|carrier| carrier.vertices.clone()).collect();
+    components.sort_unstable_by_key(|vertices| (vertices.start, vertices.end));
+    components.dedup();
     let mut next = 0;
     for vertices in &components {
         if vertices.start != next || vertices.end <= next || vertices.end as usize > mesh.vertices.len() {
@@ -142,5 +136,5 @@ fn check(carriers: &[Carrier], mesh: &TriMesh) -> Result<(), String> {
     for (mesh, vertices) in component_meshes(mesh, &components).into_iter().zip(&components) {
         Cage::new(mesh).map_err(|error| format!("the component of vertices {vertices:?}: {error}"))?;
     }
-    Ok(())
+    Ok(components)
 }

@@ -11,6 +11,7 @@ pub use error::CageError;
 
 use cager_geometry::mesh::{Point, TriMesh, diagonal};
 use defects::Examination;
+use std::ops::Range;
 
 /// A closed, outward-oriented triangle mesh around a model.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub struct Cage {
     edges: Vec<Edge>,
     faces: Vec<Face>,
     diagonal: f64,
+    /// Vertices of each component, ascending; none where the whole cage carries every point.
+    components: Vec<Range<u32>>,
     carriers: Vec<Carrier>,
 }
 
@@ -31,7 +34,14 @@ impl Cage {
         let Examination { defects, edges, faces } = Examination::of(&mesh);
         match defects.first(&mesh) {
             Some(error) => Err(error),
-            None => Ok(Self { diagonal: diagonal(&mesh.vertices), mesh, edges, faces, carriers: Vec::new() }),
+            None => Ok(Self {
+                diagonal: diagonal(&mesh.vertices),
+                mesh,
+                edges,
+                faces,
+                components: Vec::new(),
+                carriers: Vec::new(),
+            }),
         }
     }
 

@@ -50,10 +50,7 @@ impl CoordinateSystem for MeanValue {
 
 /// In each component of the cage those of the points that it carries.
 fn coordinates(cage: &Cage, points: &[Point]) -> Coordinates {
-    let components = cage.components();
-    if components.is_empty() {
-        return component_coordinates(cage, points);
-    }
+    let Some(components) = cage.components() else { return component_coordinates(cage, points) };
     assert!(cage.carries(points.len()), "the points that the components of the cage carry");
     let (mut phi, mut outside) = (zeros(points.len(), cage.vertices().len()), Vec::new());
     for Component { cage, vertices, points: carried } in components {
