@@ -3,6 +3,7 @@
 use cager_capture::encode::Encode;
 use cager_capture::memory::Memory;
 use cager_capture::{Animation, Cage, EncodeError, Goal, InvertError, Inverter};
+use cager_core::cage::Carrier;
 use cager_demo::{Capture, Options};
 use cager_formats::{ScratchDir, Target};
 
@@ -119,4 +120,21 @@ fn an_encoder_that_lost_frames_refuses_to_go_on_and_leaves_no_file() {
     let refused = encoder.finish();
     assert!(matches!(refused, Err(EncodeError::Stopped { frame: 3 })), "{refused:?}");
     assert!(!output.exists());
+}
+
+#[test]
+fn a_cage_whose_components_carry_other_points_is_refused_whatever_is_asked_for() {
+    let (rest, cage, _) = demo();
+    let folder = ScratchDir::create(std::env::temp_dir()).expect("a folder");
+    let output = folder.path().join("out.cager");
+    let (points, vertices) = (rest.points.len() as u32, cage.vertices().len() as u32);
+    for carried in [points - 1, points + 1] {
+        let carriers = vec![Carrier { points: 0..carried, vertices: 0..vertices }];
+        let cage = cage.clone().with_carriers(carriers).expect("components");
+        for goal in [None, Some(Goal::MaxError(1e-3)), Some(Goal::Preview)] {
+            let refused = Encode::new(&rest, &cage).goal(goal).start(&output).err().map(|error| error.to_string());
+            let told = format!("carry {carried} points, the model has {points}");
+            assert!(refused.as_ref().is_some_and(|refused| refused.contains(&told)), "{goal:?}: {refused:?}");
+        }
+    }
 }

@@ -14,7 +14,7 @@ use crate::positions::not_single;
 use crate::preparation_warnings::held_frames;
 use crate::speed::StepClock;
 use cager_core::cage::Cage;
-use cager_core::inversion::{BATCH, PrepareContext, PrepareError, Solver, SolverOptions, Step};
+use cager_core::inversion::{BATCH, PrepareContext, PrepareError, Solver, SolverOptions, Step, reject_carriers};
 use cager_core::spectral::Analysis;
 use cager_formats::{AtomicFile, FrameReader, Target};
 use cager_geometry::mesh::{Model, Point, diagonal};
@@ -97,6 +97,8 @@ impl Encoder {
         // First, so that an unwritable output fails before the work.
         let file = AtomicFile::create(output)?;
         let (system, goal) = (job.system, job.goal);
+        // Before all that takes the coordinates of points.
+        reject_carriers(system, job.cage, job.rest.points.len()).map_err(PrepareError::from)?;
         let clock_code = Instant::now();
         let meshes =
             goal.filter(|_| !job.exact_rest).and_then(|goal| RestMeshes::new(goal, job.rest, job.cage, system));

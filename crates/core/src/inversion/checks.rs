@@ -34,11 +34,10 @@ pub fn reject_far_points(cage: &Cage, points: &[Point]) -> Result<(), PrepareErr
 }
 
 /// Rejects a cage whose components are for another model or not for this system.
-pub(super) fn reject_carriers(
-    system: &dyn CoordinateSystem,
-    cage: &Cage,
-    points: usize,
-) -> Result<(), CoordinatesError> {
+///
+/// # Errors
+/// Such a cage.
+pub fn reject_carriers(system: &dyn CoordinateSystem, cage: &Cage, points: usize) -> Result<(), CoordinatesError> {
     match cage.carriers().last() {
         None => Ok(()),
         Some(_) if system.name() != MeanValue.name() => Err(CoordinatesError::ByComponent { system: system.name() }),

@@ -15,7 +15,7 @@ mod solve;
 mod target;
 
 pub use crate::batch::BATCH;
-pub use checks::{check_options, coordinates_bytes, reject_far_points};
+pub use checks::{check_options, coordinates_bytes, reject_carriers, reject_far_points};
 pub use consistent::{Convergence, Outcome};
 pub use context::{PreparationReport, PrepareContext, Step};
 pub use error::PrepareError;
