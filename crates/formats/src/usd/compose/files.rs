@@ -65,13 +65,16 @@ impl<'a> Loaded<'a> {
     }
 }
 
+/// A layer, and the stack that it is the strongest of, where there is one.
+type Known = (usize, Option<usize>);
+
 /// Layers, each with those below it, the strongest first.
 pub(super) struct Files<'a> {
     pub(super) layers: Vec<Loaded<'a>>,
     pub(super) stacks: Vec<Vec<(usize, Times)>>,
     /// The folder of the first, where it is known.
     folder: Option<PathBuf>,
-    known: HashMap<PathBuf, Option<usize>>,
+    known: HashMap<PathBuf, Known>,
     /// How many layers are clips.
     clips: usize,
     /// Bytes of all files.
@@ -103,13 +106,14 @@ impl<'a> Files<'a> {
     pub(super) fn open_clip(&mut self, layer: usize, asset: &str) -> Result<Option<usize>, Fault> {
         match self.load(layer, asset, true)? {
             None => Ok(None),
-            Some(Ok(known)) => Ok(known.map(|stack| self.stacks[stack][0].0)),
+            Some(Ok((known, _))) => Ok(Some(known)),
             Some(Err((path, loaded))) => {
-                self.known.insert(path, Some(self.stacks.len()));
-                self.stacks.push(vec![(self.layers.len(), Times::default())]);
+                let layer = self.layers.len();
+                self.known.insert(path, (layer, Some(self.stacks.len())));
+                self.stacks.push(vec![(layer, Times::default())]);
                 self.layers.push(loaded);
                 self.clips += 1;
-                Ok(Some(self.layers.len() - 1))
+                Ok(Some(layer))
             }
         }
     }
@@ -119,10 +123,11 @@ impl<'a> Files<'a> {
     pub(super) fn open(&mut self, layer: usize, asset: &str) -> Result<Option<(usize, f64)>, Fault> {
         let Some(loaded) = self.load(layer, asset, false)? else { return Ok(None) };
         let stack = match loaded {
-            Ok(stack) => stack,
+            Ok((_, stack)) => stack,
             Err((path, loaded)) => {
+                let top = self.layers.len();
                 let stack = self.stack(loaded)?;
-                self.known.insert(path, stack);
+                self.known.insert(path, (top, stack));
                 stack
             }
         };
@@ -130,14 +135,14 @@ impl<'a> Files<'a> {
         Ok(stack.map(|stack| (stack, rates(stack))))
     }
 
-    /// A file that is not known yet, or the stack of one that is.
+    /// A file that is not known yet, or one that is.
     #[allow(clippy::type_complexity)]
     fn load(
         &mut self,
         from: usize,
         asset: &str,
         is_clip: bool,
-    ) -> Result<Option<Result<Option<usize>, (PathBuf, Loaded<'a>)>>, Fault> {
+    ) -> Result<Option<Result<Known, (PathBuf, Loaded<'a>)>>, Fault> {
         let Loaded { folder: base, depth, .. } = &self.layers[from];
         let (Some(folder), Some(path)) = (&self.folder, resolved(base, asset)) else { return Ok(None) };
         if let Some(known) = self.known.get(&path) {
@@ -183,7 +188,7 @@ impl<'a> Files<'a> {
                 Some(Err((path, loaded))) => {
                     let below = self.layers.len();
                     self.layers.push(loaded);
-                    self.known.insert(path, None);
+                    self.known.insert(path, (below, None));
                     below
                 }
                 // One that is below two, or a reference too, is read twice by no program.
