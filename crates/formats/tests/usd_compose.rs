@@ -315,7 +315,7 @@ fn clips_of_a_template_are_those_that_are_there() {
     for (from, to, what) in [
         ("in/clip.08.usda", "in/gone.usda", "in/gone.usda: is a value clip that is not there"),
         ("in/clip.08.usda", "../clip.08.usda", "../clip.08.usda: is a value clip that is not there"),
-        ("in/clip.08.usda", "base.usda", "base.usda: is a value clip"),
+        ("in/clip.08.usda", "base.usda", "has value clips of which base.usda has no samples of points"),
         ("(5, 1)", "(5, 2)", "/model has value clips, which are not read"),
         ("\"/model\"", "\"model\"", "/model has value clips, which are not read"),
         ("double2[] times", "double2[] stage", "/model has value clips, which are not read"),
@@ -324,11 +324,48 @@ fn clips_of_a_template_are_those_that_are_there() {
         let error = message(open_frames(&path, 3));
         assert!(error.contains(what), "{error}\nnot: {what}");
     }
-    // A clip that lacks what the first one has.
-    fs::write(folder.path().join("in/clip.08.usda"), "#usda 1.0\nover \"model\" { }\n").unwrap();
-    fs::write(&path, clipped(listed)).unwrap();
-    let error = message(open_frames(&path, 3));
-    assert!(error.contains("has value clips of which in/clip.08.usda has no samples of points"), "{error}");
+    // A clip that lacks what the other one has.
+    for lacking in ["in/clip.08.usda", "in/clip.07.usda"] {
+        fs::write(folder.path().join("in/clip.07.usda"), &a).unwrap();
+        fs::write(folder.path().join(lacking), "#usda 1.0\nover \"model\" { }\n").unwrap();
+        fs::write(&path, clipped(listed)).unwrap();
+        let error = message(open_frames(&path, 3));
+        assert!(error.contains(&format!("has value clips of which {lacking} has no samples of points")), "{error}");
+        fs::write(folder.path().join("in/clip.08.usda"), &b).unwrap();
+    }
+    // One that is a sublayer too.
+    fs::write(folder.path().join("in/clip.07.usda"), &a).unwrap();
+    fs::write(&path, clipped(listed).replace("[@base.usda@]", "[@in/clip.08.usda@, @base.usda@]")).unwrap();
+    let heights: Vec<f64> = all(&mut *open_frames(&path, 3).unwrap()).iter().map(|frame| frame[2]).collect();
+    assert_eq!(heights, [7.0, 7.0, 7.0, 7.0, 7.0, 8.0, 8.0]);
+}
+
+/// As usd-core has it.
+#[test]
+fn a_part_is_hidden_by_a_clip_behind_one_that_says_nothing() {
+    let clip = |first: u32, own: &str| {
+        let at = |z: u32| format!("{z}: [(0, 0, {z}), (1, 0, 0), (0, 1, 0)]");
+        let samples = format!("point3f[] points.timeSamples = {{ {}, {} }}", at(first), at(first + 1));
+        format!("#usda 1.0\nover \"model\" {{\nover \"m\" {{\n{samples}\n{own}\n}}\n}}\n")
+    };
+    let base = |own: &str| format!("#usda 1.0\ndef Xform \"model\" {{\ndef Mesh \"m\" {{\n{TRIANGLE}{own}\n}}\n}}\n");
+    let hidden = "token visibility.timeSamples = { 3: \"invisible\" }";
+    let listed = "double2[] active = [(1, 0), (3, 1), (5, 2)]\nasset[] assetPaths = [@a.usda@, @b.usda@, @c.usda@]\n\
+                  string primPath = \"/model\"";
+    let folder = folder(&[
+        ("shot.usda", &clipped(listed)),
+        ("base.usda", &base("")),
+        ("a.usda", &clip(1, "")),
+        ("b.usda", &clip(3, hidden)),
+        ("c.usda", &clip(5, "")),
+    ]);
+    let shown = || open_frames(folder.path().join("shot.usda"), 3).unwrap().shown();
+    assert_eq!(shown(), [Some(vec![0..2, 4..6])]);
+    // What is weaker than the clips is as if it were not there.
+    fs::write(folder.path().join("base.usda"), base("token visibility = \"invisible\"")).unwrap();
+    assert_eq!(shown(), [Some(vec![0..2, 4..6])]);
+    fs::write(folder.path().join("b.usda"), clip(3, "")).unwrap();
+    assert_eq!(shown(), [Some(vec![])]);
 }
 
 #[test]

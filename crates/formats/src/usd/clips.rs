@@ -1,9 +1,15 @@
 //! Value clips, as metadata describe them: files that have the values of a prim and of all below it,
 //! one after another.
 
+use crate::error::Fault;
+use crate::scene::Allowance;
+
 /// Files of one sequence, and pairs of time codes that map it.
 pub(super) const MOST_CLIPS: usize = 1 << 12;
-const MOST_PAIRS: usize = 1 << 14;
+pub(super) const MOST_PAIRS: usize = 1 << 14;
+/// Letters of a template, and digits of its numbers.
+const LONGEST: usize = 1 << 12;
+const MOST_DIGITS: usize = 19;
 /// Time codes by which a mapping changes before it jumps.
 const JUMP: f64 = 4e-9;
 
@@ -46,7 +52,7 @@ impl Clips {
             ("templateActiveOffset", Entry::Number(offset)) => self.offset = offset,
             ("active", Entry::Pairs(pairs)) => self.active = pairs,
             ("times", Entry::Pairs(pairs)) => self.times = pairs,
-            // Which attributes they have is seen in the first of them.
+            // Which attributes they have is seen in them.
             ("manifestAssetPath" | "interpolateMissingClipValues", _) => {}
             _ => return false,
         }
@@ -80,7 +86,10 @@ impl Clips {
         let digits = 1 + rest.len() - after.len();
         let [start, end] = self.range;
         let count = ((end - start) / self.stride).floor();
-        if after.contains('#') || !(0.0..MOST_CLIPS as f64).contains(&count) || self.stride <= 0.0 {
+        if after.contains('#') || digits > MOST_DIGITS || self.template.len() > LONGEST {
+            return None;
+        }
+        if !(0.0..MOST_CLIPS as f64).contains(&count) || self.stride <= 0.0 {
             return None;
         }
         let (mut files, mut active) = (Vec::new(), Vec::new());
@@ -98,31 +107,44 @@ impl Clips {
 
     /// The samples at these times of a file, while the mapping from `start` to before `end` holds: time
     /// codes, and the times in the file that are then; beside samples, those at which the mapping changes.
-    pub(super) fn mapped(&self, samples: &[f64], [start, end]: [f64; 2]) -> Vec<(f64, f64)> {
+    /// A mapping may have the same samples many times: the allowance is for all that it gives.
+    pub(super) fn mapped(
+        &self,
+        samples: &[f64],
+        [start, end]: [f64; 2],
+        allowance: &mut Allowance,
+    ) -> Result<Vec<(f64, f64)>, Fault> {
+        let mut take = |count: usize| allowance.take(count as u64, 16).map(drop);
         let is_active = |time: f64| start <= time && time < end;
         if self.times.len() < 2 {
             let shift = self.times.first().map_or(0.0, |[time, inside]| time - inside);
-            return samples
-                .iter()
-                .map(|&inside| (inside + shift, inside))
-                .filter(|&(time, _)| is_active(time))
-                .collect();
+            let before = |bound: f64| samples.partition_point(|&inside| inside + shift < bound);
+            let within = &samples[before(start)..before(end)];
+            take(within.len())?;
+            return Ok(within.iter().map(|&inside| (inside + shift, inside)).collect());
         }
         let mut found = Vec::new();
-        for (k, pair) in self.times.windows(2).enumerate() {
+        let first = self.times.partition_point(|pair| pair[0] < start).saturating_sub(1);
+        for (k, pair) in self.times.windows(2).enumerate().skip(first) {
+            if pair[0][0] >= end {
+                break;
+            }
             let [[begin, from], [stop, to]] = [pair[0], pair[1]];
             let is_over = stop < start || stop == start && k + 2 < self.times.len();
-            if stop <= begin || is_over || begin >= end {
+            if stop <= begin || is_over {
                 continue;
             }
+            take(2)?;
             let speed = (to - from) / (stop - begin);
             let inside = |time: f64| from + (time - begin) * speed;
             let first = begin.max(start);
             found.push((first, inside(first)));
             if speed != 0.0 {
-                let (low, high) = (from.min(to), from.max(to));
+                let last = if end < stop { inside(end) } else { to };
+                let (low, high) = (inside(first).min(last), inside(first).max(last));
                 let within =
                     samples.partition_point(|&sample| sample <= low)..samples.partition_point(|&sample| sample < high);
+                take(within.len())?;
                 let at = samples[within].iter().map(|&sample| (begin + (sample - from) / speed, sample));
                 found.extend(at.filter(|&(time, _)| time > first && is_active(time)));
             }
@@ -136,7 +158,7 @@ impl Clips {
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found.dedup_by(|later, earlier| later.0 == earlier.0);
-        found
+        Ok(found)
     }
 }
 
@@ -158,7 +180,16 @@ mod tests {
         assert_eq!(clips.files, ["./a.008.usd", "./a.010.usd", "./a.011.usd"]);
         assert_eq!(clips.active, [[8.0, 0.0], [10.0, 1.0], [11.0, 2.0]]);
         assert_eq!(template("a.#.usd", 2.0).unwrap().files, ["a.8.usd", "a.10.usd"]);
-        for (path, stride) in [("a.usd", 1.0), ("a.##.##.usd", 1.0), ("a.#.usd", 0.0), ("a.#.usd", 1e-9)] {
+        let (wide, long) = (format!("a.{}.usd", "#".repeat(70_000)), format!("{}a.#.usd", "./".repeat(3_000)));
+        for (path, stride) in [
+            ("a.usd", 1.0),
+            ("a.##.##.usd", 1.0),
+            ("a.#.usd", 0.0),
+            ("a.#.usd", 1e-9),
+            ("a.####################.usd", 1.0),
+            (&wide, 1.0),
+            (&long, 1.0),
+        ] {
             assert_eq!(template(path, stride), None, "{path}");
         }
         assert!(!Clips::default().take("stage", Entry::Number(1.0)));
@@ -167,7 +198,7 @@ mod tests {
     /// As usd-core has them.
     #[test]
     fn samples_are_where_the_mapping_has_them() {
-        let clips = |times: &[[f64; 2]]| Clips { times: times.to_vec(), ..Clips::default() };
+        let clips = |times: &[[f64; 2]]| Mapping(Clips { times: times.to_vec(), ..Clips::default() });
         let all = [f64::NEG_INFINITY, f64::INFINITY];
         let samples = [0.0, 4.0, 8.0];
         let same = [(0.0, 0.0), (4.0, 4.0), (8.0, 8.0)];
@@ -183,5 +214,30 @@ mod tests {
         let [(0.0, 1.0), (before, 1.0)] = held.mapped(&[1.0], [0.0, 2.0])[..] else { panic!() };
         assert!(before < 2.0 && before > 1.999_999);
         assert_eq!(held.mapped(&[2.0], [2.0, f64::INFINITY]), [(2.0, 2.0), (4.0, 2.0)]);
+    }
+
+    #[test]
+    fn a_mapping_gives_no_more_than_it_may() {
+        // A thousand times from the first sample to the last.
+        let loops = |k: u32| [[f64::from(k), 0.0], [f64::from(k + 1), 1_000.0]];
+        let clips = Clips { times: (0..1_000).flat_map(loops).collect(), ..Clips::default() };
+        let samples: Vec<f64> = (0..=1_000).map(f64::from).collect();
+        let count = |bytes: u64, range| clips.mapped(&samples, range, &mut Allowance(bytes)).map(|found| found.len());
+        assert!(count(1 << 20, [f64::NEG_INFINITY, f64::INFINITY]).is_err());
+        assert_eq!(count(1 << 25, [f64::NEG_INFINITY, f64::INFINITY]).ok(), Some(1_001_000));
+        // What is not active counts for nothing.
+        assert_eq!(count(1 << 10, [7.25, 7.28125]).ok(), Some(32));
+        let plain = Clips::default();
+        assert_eq!(plain.mapped(&samples, [3.5, 6.0], &mut Allowance(32)).ok(), Some(vec![(4.0, 4.0), (5.0, 5.0)]));
+        assert!(plain.mapped(&samples, [3.5, 6.5], &mut Allowance(32)).is_err());
+    }
+
+    /// Without bound.
+    struct Mapping(Clips);
+
+    impl Mapping {
+        fn mapped(&self, samples: &[f64], range: [f64; 2]) -> Vec<(f64, f64)> {
+            self.0.mapped(samples, range, &mut Allowance(u64::MAX)).unwrap()
+        }
     }
 }

@@ -5,12 +5,10 @@ use super::kind;
 use super::sections::Sections;
 use crate::error::Fault;
 use crate::scene::damaged;
-use crate::usd::clips::{Clips, Entry, MOST_CLIPS};
+use crate::usd::clips::{Clips, Entry, MOST_CLIPS, MOST_PAIRS};
 
 /// Entries of a dictionary; programs write ten.
 const MOST: u64 = 64;
-/// Pairs of time codes.
-const MOST_PAIRS: u64 = 1 << 14;
 
 /// The only sequence of clips; none where there are several, or where one has what is not read.
 pub(super) fn read(file: &mut File<'_>, sections: &Sections, rep: Rep) -> Result<Option<Clips>, Fault> {
@@ -55,7 +53,7 @@ fn entry(file: &mut File<'_>, sections: &Sections, rep: Rep) -> Result<Option<En
         (kind::TOKEN | kind::ASSET, false) if rep.is_inlined() => Entry::Text(text(small)),
         (kind::BOOL, false) => Entry::Number(small.into()),
         (kind::DOUBLE | kind::FLOAT | kind::INT, false) => Entry::Number(file.numbers(rep)?[0]),
-        (kind::VEC2D, true) => Entry::Pairs(file.vectors(rep, 2, MOST_PAIRS)?.as_chunks().0.to_vec()),
+        (kind::VEC2D, true) => Entry::Pairs(file.vectors(rep, 2, MOST_PAIRS as u64)?.as_chunks().0.to_vec()),
         (kind::ASSET, true) => {
             let (start, count) = file.elements(rep)?;
             if count > MOST_CLIPS as u64 {

@@ -1,7 +1,9 @@
 //! Values that a composed scene has in clips: they count as those of the layer that names the files,
 //! before what lies below it.
 
-use super::source::Composite;
+use std::collections::HashMap;
+
+use super::source::{Composite, NOTHING};
 use super::{Builder, Name, Site};
 use crate::error::Fault;
 use crate::scene::{Track, Value};
@@ -69,7 +71,7 @@ impl Composite<'_> {
         own.iter().any(|other| (other.layer, other.mapping) == (site.layer, site.mapping))
     }
 
-    /// The values of an attribute in clips; none where the first of these has none.
+    /// The values of an attribute in clips; none where none of these has any.
     pub(super) fn in_clips(&mut self, clipped: &Clipped, attribute: &str) -> Result<Track, Fault> {
         let set = &self.sets[clipped.set];
         let mut names = vec![clipped];
@@ -82,26 +84,43 @@ impl Composite<'_> {
         let prim = set.clips.prim.trim_start_matches('/').split('/').map(|name| Name::from(name.as_bytes()));
         let path: Vec<Name> = prim.chain(names.iter().rev().map(|place| Name::clone(&place.name))).collect();
         let (active, layers) = (set.clips.active.clone(), set.layers.clone());
-        let mut track = Track::default();
-        for (k, &[start, file]) in active.iter().enumerate() {
-            let start = if k == 0 { f64::NEG_INFINITY } else { start };
-            let end = active.get(k + 1).map_or(f64::INFINITY, |next| next[0]);
-            let layer = layers[file as usize];
+        self.reserve(active.len() as u64, 1)?;
+        let mut tracks = HashMap::new();
+        for layer in active.iter().map(|&[_, file]| layers[file as usize]) {
+            if tracks.contains_key(&layer) {
+                continue;
+            }
             let loaded = &mut self.layers[layer];
             let own = match loaded.find(&path) {
                 Some(prim) => loaded.layer.source.attribute(prim, attribute)?,
                 None => Track::default(),
             };
-            let file = &self.sets[clipped.set].clips.files[file as usize];
+            self.reserve(own.times.len() as u64, 16)?;
+            tracks.insert(layer, own);
+        }
+        let mut track = Track::default();
+        if tracks.values().all(|own| own.times.is_empty()) {
+            return Ok(track);
+        }
+        for (k, &[start, file]) in active.iter().enumerate() {
+            let begin = if k == 0 { f64::NEG_INFINITY } else { start };
+            let end = active.get(k + 1).map_or(f64::INFINITY, |next| next[0]);
+            let layer = layers[file as usize];
+            let own = &tracks[&layer];
+            let clips = &self.sets[clipped.set].clips;
+            let file = &clips.files[file as usize];
             if own.times.is_empty() {
-                if k == 0 {
-                    return Ok(track);
+                // As after a value that is blocked: what is above it says whether it is shown.
+                if attribute == "visibility" {
+                    track.times.push(start);
+                    track.values.push(NOTHING);
+                    continue;
                 }
                 let what =
                     format!("has value clips of which {file} has no samples of {attribute}; write all into one file");
                 return Err(Fault::unsupported(what));
             }
-            let mapped = self.sets[clipped.set].clips.mapped(&own.times, [start, end]);
+            let mapped = clips.mapped(&own.times, [begin, end], &mut self.allowance)?;
             let between = || {
                 let what = format!("has value clips of which {file} begins or ends between two of its samples");
                 Fault::unsupported(format!("{what}, which is not read; write all into one file"))
@@ -111,7 +130,6 @@ impl Composite<'_> {
                 let (value, _, share) = own.at(inside).ok_or_else(between)?;
                 values.push((time, if share == 0.0 { value } else { return Err(between()) }));
             }
-            self.reserve(values.len() as u64, 16)?;
             for (time, value) in values {
                 track.times.push(time);
                 let value = self.held(layer, value);

@@ -16,6 +16,8 @@ const ELEMENT: u32 = 48;
 const LAYER: u32 = 48;
 /// Of values that are elements of lists.
 const IS_ELEMENT: u64 = 1 << 63;
+/// The value where clips have none.
+pub(super) const NOTHING: Value = Value(IS_ELEMENT - 1);
 
 /// Prims by the prim above them and their names.
 type Places = HashMap<(Option<usize>, Name), usize>;
@@ -40,7 +42,7 @@ pub(super) struct Composite<'a> {
     integers: HashMap<u64, Vec<i32>>,
     vectors: HashMap<(u64, usize), Vec<f64>>,
     /// Bytes that may still be given of it.
-    allowance: Allowance,
+    pub(super) allowance: Allowance,
 }
 
 /// A list that was read once, where it is not longer than it may be.
@@ -274,6 +276,9 @@ impl Attributes for Composite<'_> {
     }
 
     fn tokens(&mut self, value: Value, most: usize) -> Result<Vec<String>, Fault> {
+        if value.0 == NOTHING.0 {
+            return Ok(Vec::new());
+        }
         if !self.tokens.contains_key(&value.0) {
             let (source, inner, _) = self.of(value)?;
             let names = source.tokens(inner, most)?;
