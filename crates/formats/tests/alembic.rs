@@ -548,6 +548,16 @@ fn instances_of_nothing_or_of_themselves_and_too_many_are_told() {
     let first = transform("l0", &[0x10], 0, &[vec![0.0; 3]], vec![triangle(1)]);
     let levels: Vec<Node> = std::iter::once(first).chain((1..7).map(twice)).collect();
     assert!(message(open(&levels)).contains("shows its meshes so many times"));
+    // The same without anything that is there: of those in copies there is one message.
+    let missing = |levels: usize| {
+        let first = transform("l0", &[0x10], 0, &[vec![0.0; 3]], vec![instance("gone", "/nothing")]);
+        let levels = std::iter::once(first).chain((1..levels).map(twice));
+        open(&levels.chain([triangle(1)]).collect::<Vec<_>>())
+    };
+    let (points, notes) = missing(3).unwrap();
+    assert_eq!((points, notes.matches("which is not there").count()), (3, 1));
+    assert!(notes.contains("/l0/gone is an instance of /nothing") && notes.contains("110 more times"), "{notes}");
+    assert!(message(missing(7)).contains("shows its meshes so many times"));
 }
 
 #[test]

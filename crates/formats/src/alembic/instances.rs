@@ -1,6 +1,6 @@
 //! Instances: objects that say which other one they are, taken for that one and all below it.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use cager_geometry::surface::Part;
@@ -32,7 +32,9 @@ impl Archive<'_> {
         let sources = self.sources()?;
         let (nodes, objects) = (std::mem::take(&mut self.nodes), std::mem::take(&mut self.objects));
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
-        let (mut waiting, mut missing, mut copies) = (Vec::new(), Vec::new(), 0);
+        let (mut waiting, mut copies) = (Vec::new(), 0);
+        // Of each instance how often it is there, and the first place.
+        let mut missing: BTreeMap<usize, (usize, String)> = BTreeMap::new();
         for (k, node) in nodes.iter().enumerate() {
             match node.parent {
                 Some(parent) => children[parent].push(k),
@@ -43,27 +45,37 @@ impl Archive<'_> {
         while let Some((original, parent, is_within)) = waiting.pop() {
             let chain = std::iter::successors(Some(original), |k| sources.get(k)?.as_ref().ok().copied());
             let of = chain.take(MOST_IN_A_ROW).last().unwrap_or(original);
-            if objects[of].kind == Kind::Instance {
+            let is_missing = objects[of].kind == Kind::Instance;
+            let is_copy = is_within || of != original;
+            copies += usize::from(is_copy || is_missing);
+            if copies > MOST_COPIES {
+                return Err(too_many());
+            }
+            if is_missing {
+                if let Some((count, _)) = missing.get_mut(&original) {
+                    *count += 1;
+                    continue;
+                }
                 let told = sources.get(&of).and_then(|told| told.as_ref().err());
                 let source = told.map_or("itself", String::as_str);
                 let path = shown_path(&nodes, original);
-                missing.push(format!("{path} is an instance of {source}, which is not there, and is left out"));
+                let said = format!("{path} is an instance of {source}, which is not there, and is left out");
+                missing.insert(original, (0, said));
                 continue;
             }
-            let is_copy = is_within || of != original;
-            copies += usize::from(is_copy);
             let depth = parent.map_or(1, |parent: usize| self.nodes[parent].depth + 1);
             if depth > super::objects::DEEPEST {
                 return Err(too_deep());
-            }
-            if copies > MOST_COPIES {
-                return Err(too_many());
             }
             waiting.extend(children[of].iter().rev().map(|&child| (child, Some(self.nodes.len()), is_copy)));
             self.nodes.push(Node { name: Arc::clone(&nodes[original].name), parent, depth });
             self.objects.push(Object { is_copy, ..objects[of] });
         }
-        Ok(missing)
+        let said = |(more, said)| match more {
+            0 => said,
+            _ => format!("{said}, {more} more times in copies of what it lies below"),
+        };
+        Ok(missing.into_values().map(said).collect())
     }
 
     /// Which object each instance is, or the path of what is not there.
