@@ -61,10 +61,10 @@ impl SequenceWriter {
         let moving =
             (mesh.library.is_some() && options.surface.has_sequences()).then(|| options.surface.materials.clone());
         let one = mesh.library.take_if(|_| moving.is_none());
+        // Files of materials of an earlier output too, which had one of all frames, or one of each.
         let is_frame = |name: &str| {
-            names.number(name).is_some()
-                || one.is_some() && name == library
-                || moving.is_some() && names.is_own_library(name)
+            let is_library = || name == library || names.is_own_library(name);
+            names.number(name).is_some() || format == MeshFormat::Obj && is_library()
         };
         let path = &announced.path;
         let mut place = if shares_folder(target.path()) {
