@@ -405,3 +405,24 @@ fn cages_with_components_suit_what_all_their_parts_take() {
     // One cage for both leaves more, since one moves away from the other.
     assert!(0.0 < of_both.residual && of_both.residual < one.residual, "{of_both:?} {one:?}");
 }
+
+#[test]
+fn parts_in_one_place_share_the_component_of_the_nearest_part() {
+    let (Capture { mut rest, mut frames }, [first, second]) = two_arms();
+    let (count, place) = (rest.points.len(), rest.points[second.start]);
+    rest.points.extend([place; 3]);
+    for frame in &mut frames {
+        let at: Vec<f64> = frame[3 * second.start..3 * second.start + 3].to_vec();
+        frame.extend(at.repeat(3));
+    }
+    let parts = [first, second, count..count + 3];
+    let each = Components::of_each(&rest, &frames, &parts);
+    assert_eq!((each.len(), each.least_vertices()), (2, 16));
+    let cage = each.enclose(40).unwrap();
+    let [arm, other, locator] = cage.carriers() else { panic!("{:?}", cage.carriers()) };
+    assert!(cage.carries(count + 3) && arm.vertices != other.vertices && locator.vertices == other.vertices);
+    assert_eq!(Components::by_motion(&rest, &frames, &parts, 60).expect("components").len(), 2);
+    // Nothing is left to join.
+    let flat = Components::of_each(&rest, &frames, &[count..count + 3]);
+    assert_eq!(flat.enclose(16).unwrap_err(), cager_cages::EncloseError::NoExtent);
+}

@@ -3,10 +3,11 @@
 mod motion;
 
 use crate::design::{MEASURED, check, design};
-use crate::enclose::{EncloseError, EncloseOptions, enclose};
+use crate::enclose::{EncloseError, EncloseOptions, enclose, extent};
 use crate::{Design, DesignError, DesignOptions, Goal, Progress, Rates, Stage, Unseen};
 use cager_core::cage::{Cage, CageError, Carrier};
-use cager_geometry::mesh::{Model, Polygons, TriMesh, diagonal};
+use cager_geometry::mesh::{Model, Point, Polygons, TriMesh, bounds, diagonal};
+use cager_geometry::vector::norm;
 use std::ops::{ControlFlow, Range};
 
 /// Vertices of a component at least, where its points determine so many: a box.
@@ -39,7 +40,7 @@ impl Components {
     }
 
     fn of_groups(rest: &Model, frames: &[Vec<f64>], groups: Vec<Vec<Range<usize>>>) -> Self {
-        let frames = motion::some(frames);
+        let (frames, groups) = (motion::some(frames), with_extent(&rest.points, groups));
         let group = |points: Vec<Range<usize>>| {
             let rest = submodel(rest, &points);
             let motion = motion::beyond_affine(&rest, &subframes(&frames, &points));
@@ -197,6 +198,30 @@ impl Components {
         carriers.sort_unstable_by_key(|carrier| carrier.points.start);
         Cage::new(mesh)?.with_carriers(carriers)
     }
+}
+
+/// Groups of points, of which those whose points are all in one place join the nearest other one.
+fn with_extent(points: &[Point], groups: Vec<Vec<Range<usize>>>) -> Vec<Vec<Range<usize>>> {
+    let all = |group: &Vec<Range<usize>>| -> Vec<Point> {
+        group.iter().flat_map(|range| &points[range.clone()]).copied().collect()
+    };
+    let is_wide = |group: &Vec<Range<usize>>| extent(&all(group)).is_ok();
+    let (mut wide, flat): (Vec<_>, Vec<_>) = groups.into_iter().partition(is_wide);
+    if wide.is_empty() {
+        return flat;
+    }
+    let boxes: Vec<(Point, Point)> = wide.iter().map(|group| bounds(&all(group))).collect();
+    for group in flat {
+        let place = points[group[0].start];
+        let distance = |(low, high): &(Point, Point)| {
+            norm([0, 1, 2].map(|k| (low[k] - place[k]).max(place[k] - high[k]).max(0.0)))
+        };
+        let nearest = (0..wide.len()).min_by(|&a, &b| distance(&boxes[a]).total_cmp(&distance(&boxes[b])));
+        let joined = &mut wide[nearest.unwrap_or_default()];
+        joined.extend(group);
+        joined.sort_unstable_by_key(|range| range.start);
+    }
+    wide
 }
 
 /// Some points of a model with the faces between them.
