@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use cager_geometry::surface::{Channel, Component, Material, Texture};
+use cager_geometry::surface::{Channel, Component, Material, TILES, Texture};
 use percent_encoding::utf8_percent_encode;
 use serde_json::{Value, json};
 
@@ -83,11 +83,14 @@ impl Looks {
     }
 }
 
-/// Pictures that are left out: the format has roughness and metalness in one, and opacity in that
-/// of the colour.
+/// Pictures that are left out: the format has roughness and metalness in one, opacity in that of
+/// the colour, and no tiles.
 pub(crate) fn lost_pictures(materials: &[Material]) -> Vec<&'static str> {
     let any = |is_lost: &dyn Fn(&Material) -> bool| materials.iter().any(is_lost);
     let mut lost = Vec::new();
+    if any(&|material| material.textures.iter().any(is_tiled)) {
+        lost.push("textures in tiles (UDIM)");
+    }
     let has = |material: &Material, channel| picture(material, channel).is_some();
     if any(&|material| {
         let is_there = has(material, Channel::Roughness) || has(material, Channel::Metalness);
@@ -109,7 +112,12 @@ pub(crate) fn lost_pictures(materials: &[Material]) -> Vec<&'static str> {
 }
 
 fn picture(material: &Material, channel: Channel) -> Option<&Texture> {
-    material.textures.iter().find(|texture| texture.channel == channel)
+    material.textures.iter().find(|texture| texture.channel == channel && !is_tiled(texture))
+}
+
+/// Whether it has a picture for each square of texture coordinates.
+fn is_tiled(texture: &Texture) -> bool {
+    texture.path.contains(TILES)
 }
 
 /// The picture whose green is roughness and whose blue is metalness, or whose roughness is all the same
@@ -125,4 +133,21 @@ fn shared_picture(material: &Material) -> Option<&Texture> {
         }
     };
     is_fit.then_some(rough)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_are_left_out_and_told() {
+        let textures =
+            vec![Texture::new(Channel::BaseColor, "skin.<UDIM>.png"), Texture::new(Channel::Normal, "n.png")];
+        let material = Material { base_color: [0.5; 3], textures, ..Material::default() };
+        let looks = Looks::of(std::slice::from_ref(&material), |_, _| 0);
+        assert_eq!(looks.pictures, ["n.png"]);
+        let pbr = &looks.materials[0]["pbrMetallicRoughness"];
+        assert_eq!((pbr.get("baseColorTexture"), &pbr["baseColorFactor"][0]), (None, &json!(0.5)));
+        assert_eq!(lost_pictures(&[material]), ["textures in tiles (UDIM)"]);
+    }
 }
