@@ -167,6 +167,18 @@ fn points_faces_and_corners_have_values_as_programs_write_them() {
     let names: Vec<_> = surface.materials.iter().map(|material| material.name.as_str()).collect();
     assert_eq!((names, &part.materials), (vec!["linen", "silk"], &vec![0, 1]));
     assert_eq!(part.groups, [FaceGroup { name: "patch".to_owned(), faces: vec![0, 1] }]);
+    // Creases that lead further than there are points are no reason to leave out the others.
+    let mut damaged = archive::with_surface();
+    let find = |numbers: &[i32], from: usize| {
+        let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+        (from..damaged.len()).find(|&at| damaged[at..].starts_with(&bytes)).unwrap()
+    };
+    let lengths = find(&[3, 2], find(&[2, 1, 0, 1, 9], 0));
+    damaged[lengths] = 30;
+    let read = read_mesh_bytes(MeshFormat::Abc, Path::new("a.abc"), &damaged).unwrap();
+    let whole = Part { creases: Vec::new(), ..part.clone() };
+    assert_eq!((&read.model.surface.parts[..], &read.model.surface.materials), (&[whole][..], &surface.materials));
+    assert!(read.dropped.sentence(Path::new("a.abc"), false).unwrap().contains("damaged creases"));
 }
 
 #[test]

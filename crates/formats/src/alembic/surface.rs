@@ -61,7 +61,10 @@ pub(super) fn read(
     }
     if archive.objects[mesh].kind == ObjectKind::Subdivision {
         part.subdivision = scheme(archive, &properties)?;
-        part.creases = read_creases(archive, &properties, topology.points)?;
+        match read_creases(archive, &properties, topology.points) {
+            Ok(creases) => part.creases = creases,
+            Err(_) => dropped.add("damaged creases"),
+        }
     }
     if let Some(normals) = own("N") {
         match archive.parameter::<3>(normals, &topology)? {
