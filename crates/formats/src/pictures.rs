@@ -60,10 +60,13 @@ fn read(file: &Path, most: u64) -> Result<Vec<u8>, String> {
     }
     let mut bytes = Vec::new();
     fs::File::open(file).map_err(plain)?.take(most).read_to_end(&mut bytes).map_err(plain)?;
-    let has_signature =
-        SIGNATURES.iter().any(|(at, signature)| bytes.get(*at..).is_some_and(|b| b.starts_with(signature)));
-    let is_targa = file.extension().is_some_and(|found| found.eq_ignore_ascii_case("tga")) && bytes.len() > 18;
-    if has_signature || is_targa { Ok(bytes) } else { Err("it is no picture that is known".to_owned()) }
+    if is_picture(file, &bytes) { Ok(bytes) } else { Err("it is no picture that is known".to_owned()) }
+}
+
+/// Whether a file of this name has the bytes of a picture.
+pub(crate) fn is_picture(file: &Path, bytes: &[u8]) -> bool {
+    let is_targa = || file.extension().is_some_and(|found| found.eq_ignore_ascii_case("tga")) && bytes.len() > 18;
+    SIGNATURES.iter().any(|(at, signature)| bytes.get(*at..).is_some_and(|b| b.starts_with(signature))) || is_targa()
 }
 
 /// What pictures begin with, and where: PNG, JPEG, WebP, KTX2, KTX, OpenEXR, TIFF, Radiance, BMP,

@@ -1,10 +1,13 @@
 //! The materials of faces.
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::Arc;
 
-use cager_geometry::surface::{Channel, Material, NO_MATERIAL, Picture, Texture};
+use cager_geometry::surface::{Channel, MOST_PICTURES, Material, NO_MATERIAL, Picture, Texture};
 use ufbx::{MaterialMap, Mesh, Node};
+
+use crate::pictures::is_picture;
 
 /// Those of all meshes that are read.
 #[derive(Default)]
@@ -67,9 +70,9 @@ fn read(stored: &ufbx::Material, first: &str, pictures: &mut Vec<Picture>) -> Ma
         textures: textures
             .into_iter()
             .filter_map(|(channel, map)| {
-                let (path, found) = picture(map)?;
-                if !found.content.is_empty() && pictures.iter().all(|picture| picture.path != path) {
-                    pictures.push(Picture { path: path.clone(), bytes: Arc::from(&found.content[..]) });
+                let (mut path, found) = picture(map)?;
+                if is_picture(Path::new(&path), &found.content) {
+                    path = embed(pictures, &path, &found.content);
                 }
                 let uv_set = if &*found.uv_set == first { String::new() } else { found.uv_set.to_string() };
                 Some(Texture { uv_set, ..Texture::new(channel, path) })
@@ -85,4 +88,46 @@ fn picture(map: &MaterialMap) -> Option<(String, &ufbx::Texture)> {
     let names = [&texture.relative_filename, &texture.filename, &texture.absolute_filename];
     let path = names.into_iter().find(|name| !name.is_empty())?;
     Some((path.replace('\\', "/"), texture))
+}
+
+/// Adds a picture that lies in the file, once, as far as there is room; gives its path, with a number where another
+/// one has the same.
+fn embed(pictures: &mut Vec<Picture>, path: &str, bytes: &[u8]) -> String {
+    let end = path.rfind('.').filter(|&dot| !path[dot..].contains('/')).unwrap_or(path.len());
+    let (stem, extension) = path.split_at(end);
+    for k in 1.. {
+        let name = if k == 1 { path.to_owned() } else { format!("{stem}_{k}{extension}") };
+        match pictures.iter().find(|known| known.path == name) {
+            Some(known) if known.bytes[..] != *bytes => continue,
+            None if pictures.len() < MOST_PICTURES => {
+                pictures.push(Picture { path: name.clone(), bytes: Arc::from(bytes) });
+            }
+            _ => {}
+        }
+        return name;
+    }
+    unreachable!("numbers do not end")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_pictures_of_one_path_are_numbered_and_too_many_are_not_kept() {
+        let mut pictures = Vec::new();
+        let mut embed = |path: &str, bytes: &[u8]| embed(&mut pictures, path, bytes);
+        for (path, bytes, known) in [
+            ("maps/skin.png", b"1", "maps/skin.png"),
+            ("maps/skin.png", b"2", "maps/skin_2.png"),
+            ("maps/skin.png", b"1", "maps/skin.png"),
+            ("maps/skin.png", b"2", "maps/skin_2.png"),
+            ("a.b/skin", b"3", "a.b/skin"),
+            ("a.b/skin", b"4", "a.b/skin_2"),
+        ] {
+            assert_eq!(embed(path, bytes), known);
+        }
+        (0..2 * MOST_PICTURES).for_each(|k| drop(embed(&format!("{k}.png"), b"5")));
+        assert_eq!(pictures.len(), MOST_PICTURES);
+    }
 }
