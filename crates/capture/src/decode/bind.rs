@@ -3,7 +3,6 @@
 use super::opened::{Container, DecodeError};
 use crate::memory::free_bytes;
 use crate::origin::move_to;
-use cager_core::cage::Cage;
 use cager_core::coordinates;
 use cager_core::coordinates::{CoordinateSystem as _, Coordinates, DEFINITION, ElementPlan, MeanValue};
 use cager_core::decode::{Bound, Decoder, Survey};
@@ -53,13 +52,10 @@ pub(super) fn bind(
             what: format!("face {face} of the model has fewer than three vertices"),
         }));
     }
-    let mesh = container.cage().map_err(fail)?;
-    let carriers = container.carriers().map_err(fail)?;
-    if let (Some((model, _)), false) = (other, carriers.is_empty()) {
+    let cage = container.checked_cage().map_err(fail)?;
+    if let (Some((model, _)), false) = (other, cage.carriers().is_empty()) {
         return Err(DecodeError::ByComponent { path: path.to_owned(), model: model.to_owned() });
     }
-    let cage = Cage::new(mesh).and_then(|cage| cage.with_carriers(carriers));
-    let cage = cage.map_err(|cause| DecodeError::Cage { path: path.to_owned(), cause })?;
     let values = system.values(&cage);
     if values.unknowns() != header.rows_per_frame as usize {
         return Err(unsupported(format!("it stores {} rows per frame", header.rows_per_frame)));

@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 
 use cager_geometry::mesh::Polygons;
-use cager_geometry::surface::{Part, Subdivision, Surface};
+use cager_geometry::surface::{Subdivision, Surface};
 
 use super::super::CacheFormat;
 use super::collected::{Collected, Collection, MOST_BYTES, check_room};
@@ -56,9 +56,8 @@ impl MorphWriter {
             floats,
         };
         let mut lost = lost(surface, faces);
-        let is_hidden =
-            |part: &&Part| part.shown.as_ref().is_some_and(|shown| shown.first().is_none_or(|first| first.start > 0));
-        let hidden = surface.parts.iter().filter(is_hidden).map(|part| part.path.as_bytes());
+        let hidden = surface.parts.iter().zip(&scene.pieces).filter(|(_, piece)| piece.is_hidden());
+        let hidden = hidden.map(|(part, _)| part.path.as_bytes());
         if announced.frames < 2 && hidden.clone().next().is_some() {
             lost.push(format!("what is hidden ({})", listed(hidden)));
         }

@@ -69,7 +69,7 @@ impl Piece {
     }
 
     /// Whether it is hidden in the first frame.
-    pub(super) fn is_hidden(&self) -> bool {
+    pub(crate) fn is_hidden(&self) -> bool {
         self.shown.as_ref().is_some_and(|shown| shown.first().is_none_or(|range| range.start > 0))
     }
 
