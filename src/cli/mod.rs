@@ -161,6 +161,7 @@ fn read_whole(path: &Path, prims: &[String]) -> Result<ReadModel, cager_formats:
 /// As [`read_whole`], of a model whose pictures no option of the command asks for.
 fn read_without_pictures(path: &Path) -> Result<ReadModel, cager_formats::Error> {
     let mut read = read_whole(path, &[])?;
+    read.model.surface.keep_named_pictures();
     if !std::mem::take(&mut read.model.surface.pictures).is_empty() {
         warn(&[format!(
             "{}: the pictures in it are left out; cager encode --textures embed takes pictures in",

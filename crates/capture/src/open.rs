@@ -118,22 +118,41 @@ fn as_in_frames(rest: ReadModel, path: &Path, files: &CaptureFiles) -> Result<Re
 }
 
 /// Gives the materials of a rest pose the pictures of frames, named from the folder of its file: by the names of
-/// materials, or where there is one alone.
-fn take_sequences(surface: &mut Surface, found: &[PictureSequence], path: &Path) {
+/// materials, of equal ones by their places, or where there is one alone; says which pictures are left out.
+fn take_sequences(surface: &mut Surface, found: &[PictureSequence], path: &Path) -> Option<String> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let here = |path: &str| {
         let [path, folder] = [Path::new(path), folder].map(|path| absolute(path).unwrap_or_else(|_| path.to_owned()));
         path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/")
     };
-    let of_one = found.first().filter(|first| found.iter().all(|other| other.material == first.material));
-    let of_one = of_one.map(|first| first.material.as_str()).filter(|_| surface.materials.len() == 1);
-    for material in &mut surface.materials {
-        let name = of_one.unwrap_or(&material.name);
+    let is_one = |a: &PictureSequence, b: &PictureSequence| (&a.material, a.place) == (&b.material, b.place);
+    let is_alone = surface.materials.len() == 1 && found.windows(2).all(|pair| is_one(&pair[0], &pair[1]));
+    let names: Vec<String> = surface.materials.iter().map(|material| material.name.clone()).collect();
+    let is_only = |sequence: &PictureSequence| {
+        names.iter().filter(|name| **name == sequence.material).count() == 1
+            && found.iter().all(|other| other.material != sequence.material || is_one(sequence, other))
+    };
+    let is_of = |sequence: &PictureSequence, place: usize| {
+        is_alone || sequence.material == names[place] && (sequence.place == Some(place) || is_only(sequence))
+    };
+    let mut left: Vec<&PictureSequence> = found.iter().collect();
+    for (place, material) in surface.materials.iter_mut().enumerate() {
         for texture in &mut material.textures {
-            let sequence = found.iter().find(|found| found.material == name && found.channel == texture.channel);
+            let is_it = |found: &PictureSequence| found.channel == texture.channel && is_of(found, place);
+            let sequence = found.iter().find(|found| is_it(found));
+            left.retain(|found| !is_it(found));
             texture.set_frames(sequence.map_or_else(Vec::new, |found| found.paths.iter().map(|p| here(p)).collect()));
         }
     }
+    let first = left.first()?;
+    let more = if left.len() > 1 { format!(" and {} more", left.len() - 1) } else { String::new() };
+    Some(format!(
+        "{}: the {} pictures by frame of the material {:?}{more} are left out, as the rest pose has no such picture, \
+         or several materials of this name",
+        path.display(),
+        first.channel.name(),
+        first.material,
+    ))
 }
 
 impl OpenOptions {
@@ -229,7 +248,8 @@ impl OpenOptions {
         for (part, shown) in rest.surface.parts.iter_mut().zip(std::mem::take(&mut files.shown)) {
             part.shown = shown;
         }
-        take_sequences(&mut rest.surface, &std::mem::take(&mut files.pictures), path);
+        warnings.extend(take_sequences(&mut rest.surface, &std::mem::take(&mut files.pictures), path));
+        rest.surface.keep_named_pictures();
         if pictures {
             warnings.extend(take_pictures(&mut rest.surface, path));
         } else if !std::mem::take(&mut rest.surface.pictures).is_empty() {

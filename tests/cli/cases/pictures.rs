@@ -79,6 +79,9 @@ fn pictures_of_scans_come_in_and_out_frame_by_frame() {
     let packed = open_frames(dir.path("walk.usdz"), 8).expect("a package").pictures();
     assert_eq!(packed[0].paths.len(), FRAMES);
     assert_eq!(packed[0].paths[1], packed[0].paths[2]);
+    dir.cager(&format!("{ENCODE} --rest walk.usdz --frames walk.usdz -o packed.cager --textures embed")).succeeds();
+    dir.cager("decode packed.cager -o unpacked.usdc").succeeds();
+    assert_eq!(named_by(&dir, "unpacked.usdc"), all());
 
     // Folders of .obj have a file of materials for each frame.
     dir.cager("decode again.cager -o take/").succeeds();
@@ -87,6 +90,12 @@ fn pictures_of_scans_come_in_and_out_frame_by_frame() {
         let path = &read.surface.materials[0].textures[0].path;
         assert_eq!(fs::read(dir.path("take").join(path)).expect(path), picture(frame));
     }
+    dir.cager("decode again.cager -o take/ --overwrite").succeeds();
+    // An output of one file of materials takes their place, and the other way round.
+    dir.cager("decode again.cager -o plain.npy").succeeds();
+    dir.cager(&format!("{ENCODE} --rest walk.usdc --frames plain.npy -o still.cager")).succeeds();
+    dir.cager("decode again.cager -o take/ --overwrite").succeeds();
+    dir.cager("decode still.cager -o take/ --overwrite").succeeds();
     dir.cager("decode again.cager -o take/ --overwrite").succeeds();
 
     // Others have the first one, and say so.
@@ -113,4 +122,72 @@ fn one_frame_has_its_own_picture_and_one_file_of_materials_has_one() {
         dir.write(&name, text.replace(&format!("scan.{frame}.mtl"), "scan.0.mtl"));
     }
     assert!(open_frames(dir.path("scans"), 8).expect("frames").pictures().is_empty());
+}
+
+/// Two boxes, each with a material `skin` of its own, of which one has another picture in each frame.
+fn two_skins(moving_first: bool) -> String {
+    let mut text = "#usda 1.0\n(\nstartTimeCode = 0\nendTimeCode = 3\n)\n".to_owned();
+    for (place, name) in ["one", "two"].into_iter().enumerate() {
+        let file = match (place == 0) == moving_first {
+            true => "asset inputs:file.timeSamples = { 0: @0.png@, 1: @1.png@, 2: @2.png@, 3: @3.png@ }",
+            false => "asset inputs:file = @still.png@",
+        };
+        let frame = |frame: usize| {
+            let points: Vec<String> = (0..8)
+                .map(|corner| {
+                    let at = |axis: usize| f64::from(corner >> axis & 1);
+                    format!("({}, {}, {})", at(0) + 3.0 * place as f64 + 0.1 * frame as f64, at(1), at(2))
+                })
+                .collect();
+            format!("{frame}: [{}]", points.join(", "))
+        };
+        let frames: Vec<String> = (0..FRAMES).map(frame).collect();
+        write!(
+            text,
+            "def Xform \"{name}\"\n{{\n\
+             def Mesh \"m\" (\nprepend apiSchemas = [\"MaterialBindingAPI\"]\n)\n{{\n\
+             int[] faceVertexCounts = [4, 4, 4, 4, 4, 4]\n\
+             int[] faceVertexIndices = [0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5]\n\
+             rel material:binding = </{name}/skin>\npoint3f[] points.timeSamples = {{ {} }}\n}}\n\
+             def Material \"skin\"\n{{\ntoken outputs:surface.connect = </{name}/skin/surface.outputs:surface>\n\
+             def Shader \"surface\"\n{{\nuniform token info:id = \"UsdPreviewSurface\"\n\
+             color3f inputs:diffuseColor.connect = </{name}/skin/map.outputs:rgb>\ntoken outputs:surface\n}}\n\
+             def Shader \"map\"\n{{\nuniform token info:id = \"UsdUVTexture\"\n{file}\nfloat3 outputs:rgb\n}}\n}}\n}}\n",
+            frames.join(", "),
+        )
+        .expect("memory");
+    }
+    text
+}
+
+#[test]
+fn of_materials_of_one_name_each_has_its_own_pictures() {
+    let dir = Dir::new();
+    for (moving_first, moving) in [(true, "/one/m"), (false, "/two/m")] {
+        dir.write("shot.usda", two_skins(moving_first));
+        let encode = format!("{ENCODE} --rest shot.usda --frames shot.usda -o shot.cager");
+        let said = dir.cager(&encode).succeeds().stderr;
+        assert!(!said.contains("left out"), "{said}");
+        dir.cager("decode shot.cager -o out.usdc --overwrite").succeeds();
+        let found = open_frames(dir.path("out.usdc"), 16).expect("frames").pictures();
+        assert_eq!((found.len(), found[0].paths.len()), (1, FRAMES));
+        let surface = read_mesh(&dir.path("out.usdc"), &[]).expect("a model").model.surface;
+        for part in &surface.parts {
+            let [texture] = &surface.materials[part.materials[0] as usize].textures[..] else { panic!("{surface:?}") };
+            let moves = part.path.ends_with(moving);
+            let name = if moves { "0.png" } else { "still.png" };
+            assert!(texture.path.ends_with(name), "{}: {}", part.path, texture.path);
+            assert_eq!(moves, found[0].place == Some(part.materials[0] as usize), "{}", part.path);
+        }
+    }
+}
+
+#[test]
+fn pictures_by_frame_that_the_rest_pose_has_no_place_for_are_told() {
+    let dir = scans();
+    dir.write("rest.obj", dir.read("scans/scan.0.obj"));
+    dir.write("scan.0.mtl", "newmtl skin\nmap_Pr scans/rough.png\n");
+    let said = dir.cager(&format!("{ENCODE} --rest rest.obj --frames scans -o scans.cager")).succeeds().stderr;
+    let told = "the base_color pictures by frame of the material \"skin\" are left out";
+    assert!(said.contains(told), "{said}");
 }

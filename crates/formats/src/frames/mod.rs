@@ -63,6 +63,9 @@ pub const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 pub struct PictureSequence {
     /// The name of the material.
     pub material: String,
+    /// Its place among the materials of a model that is read from the same file, where names of
+    /// several can be equal.
+    pub place: Option<usize>,
     /// What the pictures are for.
     pub channel: Channel,
     /// One for each frame.

@@ -42,7 +42,7 @@ pub(super) fn of_files(files: &[PathBuf]) -> Vec<PictureSequence> {
     }
     let differs = |paths: &Vec<String>| paths.windows(2).any(|pair| pair[0] != pair[1]);
     let sequences = found.into_iter().filter(|(_, paths)| differs(paths));
-    sequences.map(|((material, channel), paths)| PictureSequence { material, channel, paths }).collect()
+    sequences.map(|((material, channel), paths)| PictureSequence { material, place: None, channel, paths }).collect()
 }
 
 /// A name of a file in a folder as seen from where the folder is named.

@@ -45,8 +45,13 @@ pub(super) struct Materials {
 }
 
 impl Materials {
-    /// The pictures of frames at these times, where a material has other ones in some of them.
-    pub(super) fn sequences(layer: &mut Layer<'_>, times: &[f64]) -> Result<Vec<PictureSequence>, Fault> {
+    /// The pictures of frames at these times, where a material has other ones in some of them; the
+    /// materials of these meshes have the places that they have in a model of these.
+    pub(super) fn sequences(
+        layer: &mut Layer<'_>,
+        meshes: &[usize],
+        times: &[f64],
+    ) -> Result<Vec<PictureSequence>, Fault> {
         let kinds = layer.prims.iter().enumerate().filter(|(_, prim)| prim.kind == Kind::Shading && prim.is_there);
         let shading: Vec<usize> = kinds.map(|(k, _)| k).collect();
         let mut is_moving = false;
@@ -55,15 +60,24 @@ impl Materials {
         }
         let mut sequences = Vec::new();
         let mut materials = Self { times: times.to_vec(), ..Self::new(layer) };
-        for &prim in shading.iter().filter(|_| is_moving) {
+        for &mesh in meshes.iter().filter(|_| is_moving) {
+            materials.whole(layer, mesh, "")?;
+            for (subset, _) in materials.face_subsets(layer, mesh)? {
+                materials.bound(layer, subset, "")?;
+            }
+        }
+        // By their names, where frames are in a file without what is bound to what.
+        let is_bound = !materials.list.is_empty();
+        for &prim in shading.iter().filter(|_| is_moving && !is_bound) {
             if layer.source.target(prim, "outputs:surface")?.is_some() {
                 materials.number(layer, prim, "");
             }
         }
-        for Material { name, textures, .. } in materials.list {
+        for (place, Material { name, textures, .. }) in materials.list.into_iter().enumerate() {
             let moving = textures.into_iter().filter(|texture| !texture.frames.is_empty());
             sequences.extend(moving.map(|Texture { channel, frames, .. }| PictureSequence {
                 material: name.clone(),
+                place: Some(place),
                 channel,
                 paths: frames,
             }));
@@ -90,23 +104,13 @@ impl Materials {
         part: &mut Part,
     ) -> Result<(), Fault> {
         let count = faces.arities.len();
-        let (mut whole, first) = (NO_MATERIAL, part.uv_sets.first().map_or("", |set| &set.name).to_owned());
-        for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
-            if let Some(material) = self.bound(layer, prim, &first)? {
-                whole = material;
-                break;
-            }
-        }
+        let first = part.uv_sets.first().map_or("", |set| &set.name).to_owned();
+        let whole = self.whole(layer, mesh, &first)?;
         layer.source.reserve(count as u64, 4)?;
         let mut materials = vec![whole; count];
-        for subset in self.subsets.remove(&mesh).unwrap_or_default() {
-            let Some(indices) = layer.first(subset, "indices")? else { continue };
+        for (subset, indices) in self.face_subsets(layer, mesh)? {
             let indices = layer.source.integers(indices, faces.most())?;
             let inside = |&face: &i32| usize::try_from(face).ok().filter(|&face| face < count);
-            let elements = layer.tokens(subset, "elementType", 1)?.unwrap_or_default().concat();
-            if !matches!(elements.as_str(), "" | "face") {
-                continue;
-            }
             match self.bound(layer, subset, &first)? {
                 Some(material) => indices.iter().filter_map(inside).for_each(|face| materials[face] = material),
                 None => part.groups.push(FaceGroup {
@@ -121,14 +125,27 @@ impl Materials {
         Ok(())
     }
 
-    /// Whether one of them names a picture.
-    pub(super) fn names(&self, path: &str) -> bool {
-        let tiles = |named: &str| {
-            let (before, after) = named.split_once("<UDIM>")?;
-            Some(path.starts_with(before) && path.ends_with(after))
-        };
-        let mut textures = self.list.iter().flat_map(|material| &material.textures);
-        textures.any(|texture| tiles(&texture.path).unwrap_or(texture.path == path))
+    /// The material of faces of a mesh that are in no subset.
+    fn whole(&mut self, layer: &mut Layer<'_>, mesh: usize, first: &str) -> Result<u32, Fault> {
+        for prim in ancestry(&layer.nodes, mesh).collect::<Vec<_>>() {
+            if let Some(material) = self.bound(layer, prim, first)? {
+                return Ok(material);
+            }
+        }
+        Ok(NO_MATERIAL)
+    }
+
+    /// The subsets of the faces of a mesh, and which faces are in each.
+    fn face_subsets(&mut self, layer: &mut Layer<'_>, mesh: usize) -> Result<Vec<(usize, Value)>, Fault> {
+        let mut found = Vec::new();
+        for subset in self.subsets.remove(&mesh).unwrap_or_default() {
+            let Some(indices) = layer.first(subset, "indices")? else { continue };
+            let elements = layer.tokens(subset, "elementType", 1)?.unwrap_or_default().concat();
+            if matches!(elements.as_str(), "" | "face") {
+                found.push((subset, indices));
+            }
+        }
+        Ok(found)
     }
 
     /// The material that a prim itself is bound to, on a mesh whose first texture coordinates have a name.

@@ -41,7 +41,7 @@ pub(super) fn open<'a>(
         mesh.positions.times.iter().chain(moved).copied().chain(deformed).collect::<Vec<f64>>()
     };
     tracks.timeline = timeline(&layer.stage, tracks.meshes.iter().flat_map(of_mesh).collect())?;
-    if let Some((dropped, mut pictures)) = model {
+    if let Some((dropped, pictures)) = model {
         tracks.timeline.at.truncate(1);
         let (mut materials, mut unread) = (Materials::new(&layer), Unread::default());
         for (&prim, mesh) in prims.iter().zip(&mut tracks.meshes) {
@@ -50,11 +50,10 @@ pub(super) fn open<'a>(
             unread.take(&mut layer, prim, mesh, &read);
         }
         unread.tell(materials.names_alone, dropped);
-        pictures.retain(|picture| materials.names(&picture.path));
         (tracks.materials, tracks.pictures) = (materials.list, pictures);
     } else {
         // What cannot be read is no reason to refuse a capture.
-        tracks.sequences = Materials::sequences(&mut layer, &tracks.timeline.at).unwrap_or_default();
+        tracks.sequences = Materials::sequences(&mut layer, &prims, &tracks.timeline.at).unwrap_or_default();
     }
     MovingScene::new(layer.source, tracks)
 }

@@ -122,7 +122,8 @@ pub(crate) fn read_part_with_units(part: &str, name: &str, bytes: &[u8]) -> Resu
     }
     let format = MeshFormat::from_path(path).map_err(|error| geometry(format!("{part}: {error}")))?;
     // Frames come without a file that would say which points are one.
-    let read = read_split_mesh_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))?;
+    let mut read = read_split_mesh_bytes(format, path, bytes).map_err(|error| geometry(format!("{part}: {error}")))?;
+    read.model.surface.keep_named_pictures();
     Ok((read.model, read.units))
 }
 
