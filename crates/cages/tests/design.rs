@@ -418,11 +418,13 @@ fn parts_in_one_place_share_the_component_of_the_nearest_part() {
     let parts = [first, second, count..count + 3];
     let each = Components::of_each(&rest, &frames, &parts);
     assert_eq!((each.len(), each.least_vertices()), (2, 16));
-    let cage = each.enclose(40).unwrap();
+    let go_on = &mut |_: cager_cages::Progress<'_>| ControlFlow::Continue(());
+    let options = with_vertices(40, Style::Free);
+    let cage = each.design(&rest, &frames, &options, go_on).unwrap().into_cage().unwrap();
     let [arm, other, locator] = cage.carriers() else { panic!("{:?}", cage.carriers()) };
     assert!(cage.carries(count + 3) && arm.vertices != other.vertices && locator.vertices == other.vertices);
     assert_eq!(Components::by_motion(&rest, &frames, &parts, 60).expect("components").len(), 2);
     // Nothing is left to join.
-    let flat = Components::of_each(&rest, &frames, &[count..count + 3]);
-    assert_eq!(flat.enclose(16).unwrap_err(), cager_cages::EncloseError::NoExtent);
+    let flat = Components::of_each(&rest, &frames, &parts[2..]);
+    assert!(flat.rates(&frames, frames.len()).is_err_and(|error| error == cager_cages::EncloseError::NoExtent));
 }

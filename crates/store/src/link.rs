@@ -237,7 +237,7 @@ fn of_postgres(values: &[Value<'_>]) -> Result<PgArguments, BoxDynError> {
     Ok(arguments)
 }
 
-fn unusable(error: BoxDynError) -> Trouble {
+fn unusable(error: impl std::fmt::Display) -> Trouble {
     CatalogError::Failed(error.to_string()).into()
 }
 

@@ -67,7 +67,7 @@ impl Committer {
         match thread {
             Ok(_) => waiting.threads += 1,
             Err(error) if waiting.threads > 0 => {
-                tracing::warn!(%error, "frames of a tenant are stored by fewer threads")
+                tracing::warn!(%error, "frames of a tenant are stored by fewer threads");
             }
             Err(error) => {
                 let waiting: Vec<_> = waiting.sessions.drain(..).collect();
