@@ -7,9 +7,8 @@ pub(crate) type Step = (i64, &'static str);
 
 pub(crate) const SQLITE: [Step; 1] = [(1, include_str!("../migrations/sqlite/1_catalogue.sql"))];
 
-pub(crate) const POSTGRES: [Step; 3] = [
+pub(crate) const POSTGRES: [Step; 2] = [
     (1, include_str!("../migrations/postgres/1_catalogue.sql")),
-    (3, include_str!("../migrations/postgres/3_without_shards.sql")),
     (4, include_str!("../migrations/postgres/4_seen.sql")),
 ];
 

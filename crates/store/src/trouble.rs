@@ -2,6 +2,8 @@
 
 use crate::CatalogError;
 use sqlx::Error;
+use sqlx::error::DatabaseError;
+use sqlx::postgres::{PgDatabaseError, PgSeverity};
 use sqlx::sqlite::SqliteError;
 use std::borrow::Cow;
 use std::error::Error as _;
@@ -56,7 +58,7 @@ impl Trouble {
     pub(crate) fn is_broken(&self) -> bool {
         match self {
             Self::Own(_) => false,
-            Self::Database(Error::Database(_)) => self.has_code(&OF_CONNECTION),
+            Self::Database(Error::Database(error)) => ends_connection(&**error) || self.has_code(&OF_CONNECTION),
             Self::Database(error) => !is_unreadable(error),
             Self::TimedOut | Self::Unknown(_) => true,
         }
@@ -137,8 +139,18 @@ fn explain(error: &Error, name: &str) -> CatalogError {
         _ => "failed",
     };
     let said = format!("{name} {advice} ({said})");
-    let passes = OF_CONNECTION.iter().chain(&PASSING).any(|known| *known == code);
+    // Neither user nor database are others the next time.
+    let is_lasting = code.starts_with("28") || code == "3D000";
+    let passes = OF_CONNECTION.iter().chain(&PASSING).any(|known| *known == code) || ends_connection(of_database);
+    let passes = passes && !is_lasting;
     if passes { CatalogError::Away(said) } else { CatalogError::Failed(said) }
+}
+
+/// Whether PostgreSQL, or what lies between, ends the connection with this error.
+fn ends_connection(error: &dyn DatabaseError) -> bool {
+    let severity = error.try_downcast_ref::<PgDatabaseError>().map(PgDatabaseError::severity);
+    matches!(severity, Some(PgSeverity::Fatal | PgSeverity::Panic))
+        || error.code().is_some_and(|code| code.starts_with("08"))
 }
 
 /// An error and what caused it, without passwords: what was parsed is not among it.

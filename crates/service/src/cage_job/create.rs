@@ -12,6 +12,7 @@ use crate::service::Service;
 use crate::session::registry::Reserved;
 use crate::store::{CAGE, CageJobMeta, ContentKey, Idempotency, Spool, Store, StoreError, StoredPart, Workshop};
 use crate::tasks::blocking;
+use crate::webhooks::Event;
 use cager_geometry::mesh::diagonal;
 use cager_proto::cage_messages::CageOptions;
 use std::sync::Arc;
@@ -69,6 +70,7 @@ impl Service {
         let job = Arc::new(CageJob::new(meta.clone(), Phase::Completed(found.clone()), found.cage_bytes));
         self.cage_jobs.insert(Arc::clone(&job));
         metrics::counter!("cager_designs_total", "result" => "known").increment(1);
+        self.announce_unrecorded(&job, Event::JobCompleted);
         Some(job)
     }
 

@@ -78,6 +78,11 @@ impl Service {
     pub(crate) async fn end_job<W: Work>(&self, job: &Arc<Job<W>>, ended: Ended<W::Finished>) -> bool {
         let (outcome, workshop) = match ended {
             Ended::Paused => return false,
+            // Its files may be gone, which says nothing of it, unless it cannot be deleted.
+            Ended::Failed(_) if job.is_going() => {
+                job.set_phase(Phase::Waiting);
+                return false;
+            }
             Ended::Failed(error) if error.passes => {
                 tracing::warn!(job = job.id(), detail = %error.problem.detail, "a job waits");
                 job.set_phase(Phase::Waiting);
@@ -90,13 +95,20 @@ impl Service {
             }
             // Errors that may be temporary are retried after a restart.
             Ended::Failed(error) | Ended::GivenUp(error) => {
-                job.set_phase(Phase::Failed(error.problem));
-                self.announce_unrecorded_failure(job);
+                self.fail_job(job, error);
                 return true;
             }
         };
         self.finish_job(job, outcome, workshop).await;
         true
+    }
+
+    /// Ends a job for this process: a restart begins it again.
+    fn fail_job<W: Work>(&self, job: &Job<W>, error: ApiError) {
+        job.set_phase(Phase::Failed(error.problem));
+        if !self.is_stopped(job) {
+            self.announce_unrecorded(job, Event::JobFailed);
+        }
     }
 
     /// Stores the outcome of a job with the results in a workshop, then notifies its followers.
@@ -121,24 +133,19 @@ impl Service {
                 Ok::<_, StoreError>((store.bytes(kind_of::<W>(), &id).ok(), due))
             });
             match stored.await {
-                Ok(Err(error)) if error.is_passing() && !job.is_going() && !self.is_stopped(job) => {
+                Ok(Err(error)) if error.is_passing() && !self.is_stopped(job) => {
                     tracing::warn!(job = job.id(), %error, "the outcome of a job cannot be kept yet");
                     self.pause(job, &mut pauses).await;
+                    if !job.settled().await {
+                        return;
+                    }
                 }
                 stored => break stored,
             }
         };
-        let mut changes = job.changes();
         // One that cannot be deleted is over all the same.
-        loop {
-            changes.mark_unchanged();
-            if !job.is_going() {
-                break;
-            }
-            tokio::select! {
-                () = job.deleted().cancelled() => return,
-                _ = changes.changed() => {}
-            }
+        if !job.settled().await {
+            return;
         }
         let mut due = None;
         match stored {
@@ -151,10 +158,10 @@ impl Service {
             Ok(Err(error)) => {
                 tracing::warn!(job = job.id(), %error, "the outcome of a job could not be kept; a restart begins it again");
                 if matches!(outcome, Outcome::Completed(_)) {
-                    return job.set_phase(Phase::Failed(ApiError::from(error).problem));
+                    return self.fail_job(job, ApiError::from(error));
                 }
             }
-            Err(error) => return job.set_phase(Phase::Failed(error.problem)),
+            Err(error) => return self.fail_job(job, error),
         }
         let (phase, result) = match outcome {
             Outcome::Completed(found) => (Phase::Completed(found), "completed"),

@@ -50,6 +50,10 @@ impl Service {
         tokio::spawn(async move {
             let mut pauses = Pauses::new();
             while !job.phase().is_final() && !self.is_stopped(&job) {
+                // Where it cannot be deleted it goes on.
+                if !job.settled().await {
+                    return;
+                }
                 let Some(place) = W::turn(&self, &job).await else { continue };
                 let (service, working) = (Arc::clone(&self), Arc::clone(&job));
                 let ended = blocking(move || W::work(&service, &working, place)).await.unwrap_or_else(Ended::Failed);
@@ -85,7 +89,7 @@ impl Service {
         match self.begin_attempt(job) {
             Ok(true) => {}
             Ok(false) => return given_up(),
-            Err(_) if self.is_stopped(job) => return Ended::Paused,
+            Err(_) if self.is_stopped(job) || job.is_going() => return Ended::Paused,
             Err(error) => return Ended::Failed(job.fail_if_damaged(&self.store, error)),
         }
         job.set_phase(Phase::Running);
@@ -124,6 +128,21 @@ impl Service {
 }
 
 impl<W: Work> Job<W> {
+    /// Waits while it is being deleted. Whether it is still there.
+    pub(super) async fn settled(&self) -> bool {
+        let mut changes = self.changes();
+        loop {
+            changes.mark_unchanged();
+            if !self.is_going() {
+                return true;
+            }
+            tokio::select! {
+                () = self.deleted().cancelled() => return false,
+                _ = changes.changed() => {}
+            }
+        }
+    }
+
     /// Work on it got further than ever before, and attempts count from 0 by what the store was told.
     pub(crate) fn forget_attempts(&self) {
         self.is_counted.store(false, SeqCst);

@@ -41,14 +41,19 @@ impl Service {
 
     /// Sends the stored message about a job that is over, if some receiver has not acknowledged it. Blocks.
     pub(super) fn resend_undelivered<W: Run>(&self, job: &Job<W>) {
-        if let Some(due) = self.webhooks.pending(&job.about()).filter(|_| job.phase().is_final()) {
+        let ended = |due: &PendingMessage| match job.phase() {
+            Phase::Completed(_) => due.event == Event::JobCompleted,
+            Phase::Failed(_) => due.event == Event::JobFailed,
+            Phase::Waiting | Phase::Running => false,
+        };
+        if let Some(due) = self.webhooks.pending(&job.about()).filter(ended) {
             self.announce(job, due);
         }
     }
 
-    /// Reports a failure that is not stored: a restart begins the job again.
-    pub(super) fn announce_unrecorded_failure<W: Work>(&self, job: &Job<W>) {
-        if let Some(due) = self.webhooks.message_for(job.meta.tenant(), Event::JobFailed) {
+    /// Sends a message that is not stored: of a job that was completed when it was made, or that a restart begins again.
+    pub(crate) fn announce_unrecorded<W: Work>(&self, job: &Job<W>, event: Event) {
+        if let Some(due) = self.webhooks.message_for(job.meta.tenant(), event) {
             self.announce(job, due);
         }
     }

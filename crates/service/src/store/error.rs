@@ -101,10 +101,12 @@ impl StoreError {
                 match cause.get_ref().map(|inner| (inner, inner.downcast_ref::<CatalogError>())) {
                     Some((inner, Some(CatalogError::Away(_)))) => Self::Away { path, action, what: inner.to_string() },
                     Some((inner, Some(_))) => Self::Catalog { path, action, what: inner.to_string() },
-                    Some((inner, None)) if inner.is::<BlobsError>() => {
-                        Self::Away { path, action, what: inner.to_string() }
-                    }
-                    _ => Self::Io { path, action, cause },
+                    Some((inner, None)) => match inner.downcast_ref::<BlobsError>() {
+                        Some(error) if error.is_away() => Self::Away { path, action, what: error.to_string() },
+                        Some(error) => Self::Catalog { path, action, what: error.to_string() },
+                        None => Self::Io { path, action, cause },
+                    },
+                    None => Self::Io { path, action, cause },
                 }
             }
         }

@@ -66,8 +66,8 @@ impl Bucket {
     /// As [`Self::connect`], where silence is taken for absence after so long.
     fn connect_within(url: &str, environment: &[(String, String)], silence: Duration) -> Result<Self, BlobsError> {
         let runtime = Builder::new_multi_thread().worker_threads(1).thread_name("blobs").enable_all().build();
-        let runtime =
-            runtime.map_err(|error| BlobsError(format!("no thread can be started for the bucket: {error}")))?;
+        let runtime = runtime
+            .map_err(|error| BlobsError::lasting(format!("no thread can be started for the bucket: {error}")))?;
         let (store, prefix) = place(url, environment, silence)?;
         Ok(Self {
             store,
@@ -151,7 +151,7 @@ impl Bucket {
             let mut parts = futures_util::stream::iter(ranges).map(fetch).buffered(PARTS);
             while let Some((range, part)) = parts.try_next().await? {
                 if part.len() as u64 != range.end - range.start {
-                    return Ok(Err(io::Error::other(BlobsError(format!(
+                    return Ok(Err(io::Error::other(BlobsError::lasting(format!(
                         "{}: {key} is shorter than it was",
                         self.name
                     )))));
@@ -222,7 +222,10 @@ impl Bucket {
             Ok(RuntimeFlavor::MultiThread) => block_in_place(|| runtime.block_on(work)),
             _ => runtime.block_on(work),
         };
-        let told = |error: &object_store::Error| BlobsError(format!("{}: {}", self.name, innermost(error)));
+        let told = |error: &object_store::Error| BlobsError {
+            what: format!("{}: {}", self.name, innermost(error)),
+            is_away: matches!(error, object_store::Error::Generic { .. }),
+        };
         *lock(&self.away) = match &done {
             Err(error @ object_store::Error::Generic { .. }) => Some(told(error)),
             _ => None,
@@ -263,7 +266,7 @@ fn place(
     let refused = |what: &dyn std::fmt::Display| {
         // Keys may have been written into it.
         let url = url.rsplit_once('@').map_or(url, |(_, rest)| rest);
-        BlobsError(format!("{url:?} is no place for files: {what}; give s3://bucket/path, or file:///folder"))
+        BlobsError::lasting(format!("{url:?} is no place for files: {what}; give s3://bucket/path, or file:///folder"))
     };
     if let Some(folder) = url.strip_prefix("file://").filter(|folder| folder.starts_with('/')) {
         std::fs::create_dir_all(folder).map_err(|error| refused(&error))?;

@@ -22,8 +22,23 @@ const OWNER: &str = "owner";
 
 /// Why the bucket cannot be used; inside an [`io::Error`] where that is what a call gives.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct BlobsError(pub(crate) String);
+#[error("{what}")]
+pub struct BlobsError {
+    what: String,
+    is_away: bool,
+}
+
+impl BlobsError {
+    /// What waiting does not cure.
+    pub(crate) fn lasting(what: impl Into<String>) -> Self {
+        Self { what: what.into(), is_away: false }
+    }
+
+    /// Whether it does not answer for now, so that the same may succeed later.
+    pub fn is_away(&self) -> bool {
+        self.is_away
+    }
+}
 
 /// A file or folder in a folder of the bucket.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,7 +73,7 @@ impl Blobs {
     ) -> Result<Self, BlobsError> {
         let environment: Vec<_> = environment.into_iter().collect();
         let bucket = Bucket::connect(url, &environment)?;
-        let failed = |error: io::Error| BlobsError(error.to_string());
+        let failed = |error: io::Error| BlobsError::lasting(error.to_string());
         let (mut index, last) = Index::of(&bucket.list("").map_err(failed)?);
         // A database that was restored counts fewer takeovers than the bucket has seen.
         let taken = taken.max(last + 1);
@@ -172,7 +187,8 @@ impl Blobs {
                 return fetched.map(|()| names::length(&objects));
             }
         }
-        Err(io::Error::other(BlobsError(format!("{}: {path} changes faster than it can be fetched", self.bucket.name))))
+        let what = format!("{}: {path} changes faster than it can be fetched", self.bucket.name);
+        Err(io::Error::other(BlobsError::lasting(what)))
     }
 
     /// Gives a file, or all in a folder, another name.

@@ -45,6 +45,9 @@ impl Claim {
         if !is_free(&mut link).map_err(explain)? {
             return Err(in_use(&mut link, hash, &name));
         }
+        // Before it waits for changes: what the last owner said is old.
+        let began = read(&mut link, LIMIT, |link| link.execute("UPDATE catalogue SET seen = clock_timestamp()", &[]));
+        began.map_err(explain)?;
         let taken: Result<i64, Trouble> = write(&mut link, TAKING, None, |link| {
             // Until the changes that earlier owners have begun are made or given up.
             link.batch(AssertSqlSafe(format!("SELECT pg_advisory_xact_lock({CHANGES}, {hash})")))?;
@@ -116,9 +119,9 @@ fn try_lock(link: &mut Link, hash: i32) -> Result<bool, Trouble> {
 }
 
 /// Ends the connections by which another process has the database, or changes it, where that has been silent for long: it stands still, or nothing of it comes
-/// through. Whether there may have been any. What it does later is refused, as its number is not the last one.
+/// through. Those that have just begun are left. Whether any was ended. What it does later is refused, as its number is not the last one.
 fn end_silent(link: &mut Link, hash: i32) -> Result<bool, Trouble> {
-    let sql = "SELECT count(pg_terminate_backend(pid)) FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint IN ($1, $2) AND objid::bigint = $3 AND granted AND pid <> pg_backend_pid() AND database = (SELECT oid FROM pg_database WHERE datname = current_database()) AND (SELECT clock_timestamp() - seen > make_interval(secs => $4) FROM catalogue)";
+    let sql = "SELECT count(pg_terminate_backend(pid)) FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint IN ($1, $2) AND objid::bigint = $3 AND granted AND pid <> pg_backend_pid() AND pid IN (SELECT pid FROM pg_stat_activity WHERE clock_timestamp() - backend_start > make_interval(secs => $4)) AND database = (SELECT oid FROM pg_database WHERE datname = current_database()) AND (SELECT clock_timestamp() - seen > make_interval(secs => $4) FROM catalogue)";
     let [owner, changes, hash] = [OWNER, CHANGES, hash].map(|number| Value::Integer((number as u32).into()));
     let ended: i64 =
         read(link, LIMIT, |link| link.only(sql, &[owner, changes, hash, Value::Real(SILENCE.as_secs_f64())]))?;

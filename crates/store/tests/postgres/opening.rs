@@ -79,3 +79,12 @@ fn a_wrong_password_is_told() {
     says(&server.url_of("guarded:right"), &["right to do so"]);
     says(&server.url_of("guarded"), &["password"]);
 }
+
+#[test]
+fn tables_of_others_in_the_same_schema_are_left_alone() {
+    let Some(server) = Server::start() else { return };
+    server
+        .sql("CREATE SCHEMA cager; CREATE TABLE cager.tenants (name text); INSERT INTO cager.tenants VALUES ('mine')");
+    open(&server.open(), "a");
+    assert_eq!(server.sql("SELECT name FROM cager.tenants"), "mine");
+}
