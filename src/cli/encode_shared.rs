@@ -6,7 +6,7 @@ use super::coding_args::goal;
 use super::encode_summary::{summary, write_report};
 use super::outputs::Outputs;
 use super::solver_options::{check_inversion, inversion_choices, with_input_name};
-use super::{design, human_bytes, progress, tell, warn};
+use super::{design, progress, tell, warn};
 use anyhow::{Result, bail};
 use cager_cages::{Components, DesignOptions, SuitedSize};
 use cager_capture::coding::suited_cage_size;
@@ -104,11 +104,10 @@ pub(super) fn sized_design(
     bar.set_message("estimating sizes of cages");
     let suited = suited_cage_size(goal, args.solver.coordinates, rest, components, frames, total);
     bar.finish_and_clear();
-    if let Some(SuitedSize { vertices, cages, residual }) = suited {
-        let [cages, residual] = [cages, residual].map(|bytes| human_bytes(bytes as u64));
+    if let Some(SuitedSize { vertices, .. }) = suited {
         tell(&format!(
-            "{vertices} vertices suit what is asked for: a small cage around the rest pose would take about {cages} \
-             and leave {residual} to code\n"
+            "the cage gets {vertices} vertices, estimated from what a small cage leaves of the motion; --cage-vertices \
+             gives another number\n"
         ))?;
         options.goal = design::goal(Some(vertices as u32), None, rest.points.len())?;
     }

@@ -113,7 +113,7 @@ fn without_a_cage_its_size_is_chosen_for_the_bound() {
         let encode = encode.replace("out.cager", output);
         let args = format!("{encode} --max-error {bound} --time-limit 1 --report {output}.json");
         let said = dir.cager(&args).succeeds().stdout;
-        assert!(said.contains("vertices suit what is asked for"), "{said}");
+        assert!(said.contains("vertices, estimated from what a small cage leaves"), "{said}");
         dir.json(&format!("{output}.json"))["cage_vertices"].as_u64().expect("a number")
     };
     let (coarse, fine) = (chosen("5e-2", "coarse.cager"), chosen("1e-4", "fine.cager"));

@@ -51,7 +51,8 @@ pub(crate) trait Engine: Debug + Send + Sync {
     }
 }
 
-/// Number of the row of a record; `None` if the record does not exist. `lock` keeps it until the transaction ends, where
+/// Number of the row of a record; `None` if the record does not exist. `lock` keeps it until the transaction ends,
+/// where
 /// others may change it meanwhile.
 fn number(link: &mut Link, kind: Kind, id: &str, lock: &str) -> Result<Option<i64>, Trouble> {
     let lock = if link.is_postgres() { lock } else { "" };

@@ -34,7 +34,8 @@ pub enum CatalogError {
     /// Another process has taken the database for itself since.
     #[error("another process has taken over the database, and this one changes nothing any more")]
     TakenOver,
-    /// The database does not answer, or takes nothing for now: the same call can succeed later. What was to be stored may be there or not.
+    /// The database does not answer, or takes nothing for now: the same call can succeed later. What was to be stored
+    /// may be there or not.
     #[error("{0}")]
     Away(String),
     /// Anything else.

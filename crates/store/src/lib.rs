@@ -204,7 +204,8 @@ pub trait Catalog: Debug + Send + Sync {
     /// Changes a record in several ways at once. Whether there is one.
     fn change(&self, key: Key<'_>, changes: &[Change]) -> Result<bool, CatalogError>;
 
-    /// Removes a record with its frames, unless there is none. May be stopped in between, so its phase is [`Phase::Deleted`] or [`Phase::Creating`] before.
+    /// Removes a record with its frames, unless there is none. May be stopped in between, so its phase is
+    /// [`Phase::Deleted`] or [`Phase::Creating`] before.
     fn remove(&self, key: Key<'_>) -> Result<(), CatalogError>;
 
     /// Stores frames of a session, replacing those that are there. Gives their entries, in the same order.

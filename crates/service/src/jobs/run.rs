@@ -1,4 +1,5 @@
-//! Work on a job: when its turn comes, unless it has ended the process again and again, to its end or to the service's. A store that is away holds it up,
+//! Work on a job: when its turn comes, unless it has ended the process again and again, to its end or to the
+//! service's. A store that is away holds it up,
 //! and does not end it.
 
 use super::{Ended, Job, Jobs, Phase, Work, kind_of};
@@ -101,7 +102,8 @@ impl Service {
         if is_stopped { Ended::Paused } else { ended }
     }
 
-    /// Notes durably that work on a job begins, unless that is noted. Whether it may: not where it has ended the process too often. Blocks.
+    /// Notes durably that work on a job begins, unless that is noted. Whether it may: not where it has ended the
+    /// process too often. Blocks.
     ///
     /// # Errors
     /// Those of the store.
@@ -114,7 +116,8 @@ impl Service {
         Ok(attempts <= MAX_ATTEMPTS)
     }
 
-    /// Notes that work on a job is not what would end the process now: its attempts are as many as `count` makes of them. Blocks.
+    /// Notes that work on a job is not what would end the process now: its attempts are as many as `count` makes of
+    /// them. Blocks.
     pub(crate) fn end_attempt<W: Work>(&self, job: &Job<W>, count: impl FnOnce(u32) -> u32) {
         if !job.is_counted.load(SeqCst) {
             return;

@@ -51,7 +51,8 @@ impl Service {
         }
     }
 
-    /// Sends a message that is not stored: of a job that was completed when it was made, or that a restart begins again.
+    /// Sends a message that is not stored: of a job that was completed when it was made, or that a restart begins
+    /// again.
     pub(crate) fn announce_unrecorded<W: Work>(&self, job: &Job<W>, event: Event) {
         if let Some(due) = self.webhooks.message_for(job.meta.tenant(), event) {
             self.announce(job, due);

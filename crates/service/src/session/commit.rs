@@ -38,7 +38,8 @@ pub(crate) struct CommitQueue {
     pub(super) busy: bool,
 }
 
-/// Sessions whose frames are to be stored, by tenant: each tenant has threads of its own, which are there while it has frames, so that the slow bucket
+/// Sessions whose frames are to be stored, by tenant: each tenant has threads of its own, which are there while it has
+/// frames, so that the slow bucket
 /// or the large frames of one never delay the answer to another.
 #[derive(Clone, Default)]
 pub(crate) struct Committer {

@@ -57,7 +57,8 @@ pub enum StoreError {
         /// What went wrong, and what to do.
         what: String,
     },
-    /// The database or the bucket does not answer for now. What was to be written may be there or not; the call can succeed later.
+    /// The database or the bucket does not answer for now. What was to be written may be there or not; the call can
+    /// succeed later.
     #[error("could not {action} {}: {what}", path.display())]
     Away {
         /// The file, or what the database is called.

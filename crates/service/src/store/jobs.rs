@@ -17,7 +17,8 @@ pub(crate) trait JobMeta: RecordMeta + Clone + Send + Sync + 'static {
     fn sent_bytes(&self) -> u64;
 }
 
-/// Implements [`JobMeta`] for metadata with `id`, `tenant`, `created_ms`, `options` and `idempotency`: its kind, and the bytes that were sent.
+/// Implements [`JobMeta`] for metadata with `id`, `tenant`, `created_ms`, `options` and `idempotency`: its kind, and
+/// the bytes that were sent.
 macro_rules! job_meta {
     ($meta:ident, $kind:expr, |$of:ident| $sent:expr) => {
         impl $crate::store::RecordMeta for $meta {

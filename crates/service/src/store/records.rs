@@ -243,7 +243,8 @@ impl Store {
         read.collect()
     }
 
-    /// Compares the folders with the records at the start. Those without a record are moved to quarantine, or removed where they
+    /// Compares the folders with the records at the start. Those without a record are moved to quarantine, or removed
+    /// where they
     /// are empty; those that a backup has left out because they were empty are made.
     pub(super) fn match_folders(
         &self,

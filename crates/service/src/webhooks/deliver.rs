@@ -62,7 +62,8 @@ impl Message {
             due.left.retain(|hook| *hook != told);
             self.store.set_announcement(self.about.kind, &self.about.id, &*due)
         });
-        // If this is not stored, the message is sent again after a restart with the same id. What is noted of something deleted is gone.
+        // If this is not stored, the message is sent again after a restart with the same id. What is noted of
+        // something deleted is gone.
         if let Ok(Err(error)) = noted.await {
             tracing::debug!(%error, "the delivery of a webhook message could not be stored");
         }

@@ -1,4 +1,5 @@
-//! Webhooks that report completed and failed sessions and jobs, in the form of Standard Webhooks (standardwebhooks.com).
+//! Webhooks that report completed and failed sessions and jobs, in the form of Standard Webhooks
+//! (standardwebhooks.com).
 //!
 //! A message is a POST with the headers `webhook-id` (the same for every attempt), `webhook-timestamp` and `webhook-signature`, and a JSON
 //! body. A response 2xx acknowledges it; otherwise it is sent again after increasing pauses, for about three days. Pending messages are

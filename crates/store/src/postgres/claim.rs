@@ -1,4 +1,5 @@
-//! One process has the database for itself: a lock that ends with its connection, or is taken from it after some seconds of silence, and a number that the next
+//! One process has the database for itself: a lock that ends with its connection, or is taken from it after some
+//! seconds of silence, and a number that the next
 //! process raises, so that the one before changes nothing any more even where it does not know of it.
 
 use super::place::Place;
@@ -94,7 +95,8 @@ impl Drop for Claim {
     }
 }
 
-/// Says that this process is well, and sees that the lock is held, by another connection where the one before has ended. Whether nobody else has had it.
+/// Says that this process is well, and sees that the lock is held, by another connection where the one before has
+/// ended. Whether nobody else has had it.
 fn keep(kept: &mut Option<Link>, place: &Place, hash: i32, taken: i64) -> Result<bool, CatalogError> {
     let sql = "UPDATE catalogue SET seen = clock_timestamp() WHERE taken = $1";
     let is_own = |link: &mut Link| read(link, LIMIT, |link| Ok(link.execute(sql, &[Value::Integer(taken)])? == 1));
@@ -118,10 +120,17 @@ fn try_lock(link: &mut Link, hash: i32) -> Result<bool, Trouble> {
     read(link, LIMIT, |link| link.only(AssertSqlSafe(format!("SELECT pg_try_advisory_lock({OWNER}, {hash})")), &[]))
 }
 
-/// Ends the connections by which another process has the database, or changes it, where that has been silent for long: it stands still, or nothing of it comes
-/// through. Those that have just begun are left. Whether any was ended. What it does later is refused, as its number is not the last one.
+/// Ends the connections by which another process has the database, or changes it, where that has been silent for long:
+/// it stands still, or nothing of it comes
+/// through. Those that have just begun are left. Whether any was ended. What it does later is refused, as its number
+/// is not the last one.
 fn end_silent(link: &mut Link, hash: i32) -> Result<bool, Trouble> {
-    let sql = "SELECT count(pg_terminate_backend(pid)) FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint IN ($1, $2) AND objid::bigint = $3 AND granted AND pid <> pg_backend_pid() AND pid IN (SELECT pid FROM pg_stat_activity WHERE clock_timestamp() - backend_start > make_interval(secs => $4)) AND database = (SELECT oid FROM pg_database WHERE datname = current_database()) AND (SELECT clock_timestamp() - seen > make_interval(secs => $4) FROM catalogue)";
+    let sql = "SELECT count(pg_terminate_backend(pid)) FROM pg_locks WHERE locktype = 'advisory' AND granted \
+        AND classid::bigint IN ($1, $2) AND objid::bigint = $3 AND pid <> pg_backend_pid() \
+        AND database = (SELECT oid FROM pg_database WHERE datname = current_database()) \
+        AND pid IN (SELECT pid FROM pg_stat_activity \
+            WHERE clock_timestamp() - backend_start > make_interval(secs => $4)) \
+        AND (SELECT clock_timestamp() - seen > make_interval(secs => $4) FROM catalogue)";
     let [owner, changes, hash] = [OWNER, CHANGES, hash].map(|number| Value::Integer((number as u32).into()));
     let ended: i64 =
         read(link, LIMIT, |link| link.only(sql, &[owner, changes, hash, Value::Real(SILENCE.as_secs_f64())]))?;

@@ -70,7 +70,8 @@ impl SqliteCatalog {
             .auto_vacuum(SqliteAutoVacuum::Incremental)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full)
-            // Another thread does it before, unless much is written: what the log alone holds must fit the reserve, or a full disk stays full.
+            // Another thread does it before, unless much is written: what the log alone holds must fit the reserve, or
+            // a full disk stays full.
             .pragma("wal_autocheckpoint", LOG_PAGES.to_string());
         let mut link = connect(&writing)?;
         let version = link.only("PRAGMA user_version", &[]).map_err(explain)?;
